@@ -1,0 +1,102 @@
+//! Files that appear whole or not at all.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicU64, Ordering},
+};
+
+use crate::{Error, Result};
+
+/// A file being written under a temporary name beside its final one.
+///
+/// [`commit`](Self::commit) renames it; dropped without, it is removed. Whatever was there before stays until then.
+#[derive(Debug)]
+pub struct PendingFile {
+    temporary: PathBuf,
+    destination: PathBuf,
+    committed: bool,
+}
+
+impl PendingFile {
+    /// Reserves a temporary name beside `destination`, creating its folder.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or `destination` is a folder.
+    pub fn new(destination: impl Into<PathBuf>) -> Result<Self> {
+        static SERIAL: AtomicU64 = AtomicU64::new(0);
+        let destination = destination.into();
+        let shown = destination.display().to_string();
+        if destination.is_dir() {
+            return Err(Error::new("write", shown, "there is a folder of that name").help("name a file"));
+        }
+        let name = destination
+            .file_name()
+            .ok_or_else(|| Error::new("write", &shown, "the path ends in no file name"))?
+            .to_string_lossy()
+            .into_owned();
+        let folder = match destination.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        fs::create_dir_all(folder)
+            .map_err(|error| Error::new("create the folder", folder.display().to_string(), error))?;
+        let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
+        let temporary = folder.join(format!(".{name}.{}-{serial}.partial", std::process::id()));
+        Ok(Self { temporary, destination, committed: false })
+    }
+
+    /// Where to write now.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Where the file will appear.
+    #[must_use]
+    pub fn destination(&self) -> &Path {
+        &self.destination
+    }
+
+    /// Creates the temporary file for writing.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn create(&self) -> Result<fs::File> {
+        fs::File::create(&self.temporary).map_err(|error| self.failure(error))
+    }
+
+    /// An error about this file, named by its final name.
+    pub fn failure(&self, problem: impl ToString) -> Error {
+        Error::new("write", self.destination.display().to_string(), problem)
+    }
+
+    /// Gives the file its final name, replacing what was there.
+    ///
+    /// # Errors
+    /// When the file system refuses the rename.
+    pub fn commit(mut self) -> Result<PathBuf> {
+        fs::rename(&self.temporary, &self.destination).map_err(|error| self.failure(error))?;
+        self.committed = true;
+        Ok(self.destination.clone())
+    }
+}
+
+impl Drop for PendingFile {
+    fn drop(&mut self) {
+        if !self.committed {
+            // Nothing more can be done about a temporary file that will not go.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// Writes `contents` whole or not at all.
+///
+/// # Errors
+/// When the folder or the file cannot be written.
+pub fn write(destination: impl Into<PathBuf>, contents: &[u8]) -> Result<PathBuf> {
+    let pending = PendingFile::new(destination)?;
+    fs::write(pending.path(), contents).map_err(|error| pending.failure(error))?;
+    pending.commit()
+}

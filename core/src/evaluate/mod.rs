@@ -1,0 +1,28 @@
+//! The standards' values of a separated form.
+
+pub mod roundness;
+pub mod texture;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One value of one section.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Value {
+    /// The standard's symbol.
+    pub symbol: String,
+    /// Its unit.
+    pub unit: String,
+    /// The number.
+    pub value: f64,
+    /// Standard and clause, or paper and equation.
+    pub source: String,
+    /// Undulations per revolution over which it was computed, both ends included.
+    pub band_upr: [usize; 2],
+    /// Orders of that band that the layout cannot tell: they are not in the value.
+    pub lost_orders: Vec<usize>,
+    /// The filter applied.
+    pub filter: String,
+    /// What the profile was referred to.
+    pub reference: String,
+}

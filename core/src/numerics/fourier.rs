@@ -1,0 +1,116 @@
+//! Harmonics of periodic signals on equally spaced angles.
+
+use std::sync::Arc;
+
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+use crate::Complex64;
+
+/// Transforms between one turn of equally spaced samples and its harmonics cₙ, signal = Re Σ cₙ e^{+inα}.
+///
+/// For a coefficient of e^{−inΦ} take the complex conjugate. The Nyquist order of an even length is left out: its
+/// phase cannot be known.
+pub struct Fourier {
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+    signal: Vec<f64>,
+    spectrum: Vec<Complex64>,
+    scratch: Vec<Complex64>,
+}
+
+impl Fourier {
+    /// Plans transforms of `length` samples, at least 2.
+    #[must_use]
+    pub fn new(length: usize) -> Self {
+        let mut planner = RealFftPlanner::new();
+        let forward = planner.plan_fft_forward(length);
+        let inverse = planner.plan_fft_inverse(length);
+        let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
+        Self {
+            signal: forward.make_input_vec(),
+            spectrum: forward.make_output_vec(),
+            scratch: vec![Complex64::ZERO; scratch],
+            forward,
+            inverse,
+        }
+    }
+
+    /// Samples a turn.
+    #[must_use]
+    pub fn length(&self) -> usize {
+        self.signal.len()
+    }
+
+    /// Highest order below Nyquist.
+    #[must_use]
+    pub fn max_order(&self) -> usize {
+        max_order(self.length())
+    }
+
+    /// Harmonics of a turn from order 0 to as many as `harmonics` holds, at most [`max_order`](Self::max_order)+1.
+    ///
+    /// `signal` yields [`length`](Self::length) samples; missing ones count as 0.
+    pub fn analyse(&mut self, signal: impl IntoIterator<Item = f64>, harmonics: &mut [Complex64]) {
+        let length = self.signal.len();
+        let mut samples = signal.into_iter();
+        self.signal.fill_with(|| samples.next().unwrap_or(0.0));
+        let scratch = &mut self.scratch[..self.forward.get_scratch_len()];
+        // The buffers were made by the plan itself, so their lengths fit.
+        let _ = self.forward.process_with_scratch(&mut self.signal, &mut self.spectrum, scratch);
+        let scale = 2.0 / length as f64;
+        let kept = harmonics.len().min(max_order(length) + 1);
+        for (harmonic, bin) in harmonics.iter_mut().zip(&self.spectrum[..kept]) {
+            *harmonic = bin * scale;
+        }
+        harmonics[kept..].fill(Complex64::ZERO);
+        if let Some(level) = harmonics.first_mut() {
+            *level *= 0.5;
+        }
+    }
+
+    /// One turn of the signal that has these harmonics from order 0; orders above Nyquist must not occur.
+    pub fn synthesise(&mut self, harmonics: impl IntoIterator<Item = Complex64>) -> &[f64] {
+        self.spectrum.fill(Complex64::ZERO);
+        let kept = max_order(self.signal.len()) + 1;
+        for (bin, harmonic) in self.spectrum[..kept].iter_mut().zip(harmonics) {
+            *bin = 0.5 * harmonic;
+        }
+        self.spectrum[0] = Complex64::new(2.0 * self.spectrum[0].re, 0.0);
+        let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
+        let _ = self.inverse.process_with_scratch(&mut self.spectrum, &mut self.signal, scratch);
+        &self.signal
+    }
+}
+
+/// Highest order below Nyquist on `length` samples a turn.
+#[must_use]
+pub fn max_order(length: usize) -> usize {
+    length.saturating_sub(1) / 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn harmonics_of_a_known_sum_and_back() {
+        for length in [31, 32, 2560] {
+            let mut fourier = Fourier::new(length);
+            let signal: Vec<f64> = (0..length)
+                .map(|index| {
+                    let angle = std::f64::consts::TAU * index as f64 / length as f64;
+                    0.5 + 2.0 * (3.0 * angle + 0.7).cos() - 0.25 * (15.0 * angle).sin()
+                })
+                .collect();
+            let mut harmonics = vec![Complex64::ZERO; fourier.max_order() + 1];
+            fourier.analyse(signal.iter().copied(), &mut harmonics);
+            // 1e-14: rounding of a transform of values near 1.
+            assert!((harmonics[0] - 0.5).norm() < 1e-14);
+            assert!((harmonics[3] - Complex64::from_polar(2.0, 0.7)).norm() < 1e-14);
+            assert!((harmonics[15] - Complex64::new(0.0, 0.25)).norm() < 1e-14);
+            let back = fourier.synthesise(harmonics.iter().copied());
+            let worst = back.iter().zip(&signal).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-14, "length {length}: {worst:e}");
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! Numerical tools that know nothing of rigs.
+
+pub mod fourier;

@@ -1,0 +1,315 @@
+//! A pipeline, from TOML to stages that can only be valid.
+
+use schemars::{JsonSchema, Schema};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use toml::{Spanned, de::DeValue};
+
+use super::{
+    document::{self, ConfigError, Document, Sources, Table},
+    error::{Fault, known_names},
+    registry::{Catalogue, Context, Plugin, Registry},
+};
+use crate::{
+    rig::{Rig, RigConfig},
+    separation::Assessment,
+    stage::{
+        Averager, Conditioner, Exporter, Loader, PointSeparator, Preprocessor, Separator, SourceKind, StationSeparator,
+    },
+    surface::SurfaceConfig,
+};
+
+/// The key whose string value names a file of its own.
+pub const INCLUDE_KEY: &str = "rig";
+
+/// A checked pipeline.
+pub struct Pipeline {
+    /// For results and meshes.
+    pub title: String,
+    /// Sensors and setups; always there on the [`Route::Turns`].
+    pub rig: Option<Rig>,
+    /// Opens the measurement.
+    pub loader: Box<dyn Loader>,
+    /// From there to form and motion.
+    pub route: Route,
+    /// How sections become a surface.
+    pub surface: SurfaceConfig,
+    /// In the order configured.
+    pub exporters: Vec<Box<dyn Exporter>>,
+    /// What the separator can tell with the rig.
+    pub assessment: Option<Assessment>,
+    /// The configuration's texts, for provenance.
+    pub configuration: String,
+}
+
+/// The two ways from a measurement to form.
+pub enum Route {
+    /// Recorded turns, station by station.
+    Turns {
+        /// Samples to samples.
+        conditioners: Vec<Box<dyn Conditioner>>,
+        /// Samples to a profile.
+        averager: Box<dyn Averager>,
+        /// Profiles to form and motion.
+        separator: Box<dyn StationSeparator>,
+    },
+    /// Measured points, all at once.
+    Points {
+        /// Points to form.
+        separator: Box<dyn PointSeparator>,
+    },
+}
+
+/// `[diagnose]`: which effects the closed loop may consider. `run` leaves it alone.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DiagnoseConfig {
+    /// "all", or a list of effect ids.
+    #[serde(default)]
+    pub effects: Effects,
+}
+
+/// A choice of effects.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Effects {
+    /// "all".
+    Word(AllEffects),
+    /// Ids.
+    Some(Vec<String>),
+}
+
+/// The word "all".
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AllEffects {
+    /// Every effect that the toolkit knows.
+    All,
+}
+
+impl Default for Effects {
+    fn default() -> Self {
+        Self::Word(AllEffects::All)
+    }
+}
+
+const KEYS: [&str; 8] = ["title", "rig", "load", "preprocess", "separate", "surface", "diagnose", "export"];
+
+impl Pipeline {
+    /// Checks a configuration against the registry and builds every stage.
+    ///
+    /// # Errors
+    /// The first mistake, with its place.
+    pub fn from_sources(sources: &Sources, registry: &Registry) -> Result<Self, ConfigError> {
+        let document = Document::parse(sources)?;
+        Self::build(document.root(), sources, registry).map_err(|fault| document.diagnose(fault).into())
+    }
+
+    fn build(root: &Table, sources: &Sources, registry: &Registry) -> Result<Self, Fault> {
+        for key in root.get_ref().keys() {
+            if !KEYS.contains(&key.get_ref().as_ref()) {
+                let fault = Fault::span(key.span(), format!("unknown key `{}`", key.get_ref()));
+                return Err(fault.help(known_names(key.get_ref(), KEYS)));
+            }
+        }
+        let title = match root.get_ref().get("title") {
+            None => "Untitled".to_owned(),
+            Some(value) => value
+                .get_ref()
+                .as_str()
+                .ok_or_else(|| Fault::span(value.span(), "expected the title in quotes"))?
+                .to_owned(),
+        };
+        let rig = table(root, "rig")?.map(|table| checked::<RigConfig, _>(&table, RigConfig::check)).transpose()?;
+        let context = Context { folder: sources.folder(), rig: rig.as_ref() };
+        if let Some(table) = table(root, "diagnose")? {
+            document::read::<DiagnoseConfig>(&table)?;
+        }
+        let surface = table(root, "surface")?
+            .map(|table| checked::<SurfaceConfig, _>(&table, SurfaceConfig::check))
+            .transpose()?
+            .unwrap_or_default();
+
+        let load_table = required(root, "load")?;
+        let loader = registry.loaders.build(&load_table, &context)?;
+        let separate_table = required(root, "separate")?;
+        let mut preprocessors = Vec::new();
+        for table in tables(root, "preprocess")? {
+            preprocessors.push((registry.preprocessors.build(&table, &context)?, table));
+        }
+        let (route, assessment) = match loader.kind() {
+            SourceKind::Turns => {
+                if rig.is_none() {
+                    return Err(Fault::here("missing key `rig`").help("describe sensors and setups in [rig]"));
+                }
+                let separator = registry.separators.build(&separate_table, &context)?;
+                turns(preprocessors, separator, &separate_table, root)?
+            }
+            SourceKind::Points => {
+                if let Some((_, table)) = preprocessors.first() {
+                    let fault = Fault::here("measured points take no preprocessor").help("leave [[preprocess]] out");
+                    return Err(document::resolve(fault, table));
+                }
+                match registry.separators.build(&separate_table, &context)? {
+                    Separator::Points(separator) => (Route::Points { separator }, None),
+                    Separator::Stations(_) => {
+                        let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
+                        return Err(document::resolve(fault, &separate_table));
+                    }
+                }
+            }
+        };
+        let mut exporters = Vec::new();
+        let mut outputs = Vec::new();
+        for table in tables(root, "export")? {
+            let exporter = registry.exporters.build(&table, &context)?;
+            for output in exporter.outputs() {
+                if outputs.contains(&output) {
+                    let message = format!("{} is already written by an exporter above", output.display());
+                    return Err(document::resolve(Fault::at("path", message), &table));
+                }
+                outputs.push(output);
+            }
+            exporters.push(exporter);
+        }
+        Ok(Self { title, rig, loader, route, surface, exporters, assessment, configuration: sources.texts() })
+    }
+}
+
+fn turns(
+    preprocessors: Vec<(Preprocessor, Table)>,
+    separator: Separator,
+    separate_table: &Table,
+    root: &Table,
+) -> Result<(Route, Option<Assessment>), Fault> {
+    let mut conditioners = Vec::new();
+    let mut averager = None;
+    for (preprocessor, table) in preprocessors {
+        if averager.is_some() {
+            let fault = Fault::at("plugin", "no preprocessor can follow the one that averages the turns");
+            return Err(document::resolve(fault.help("move it above"), &table));
+        }
+        match preprocessor {
+            Preprocessor::Conditioner(conditioner) => conditioners.push(conditioner),
+            Preprocessor::Averager(found) => averager = Some(found),
+        }
+    }
+    let averager = averager.ok_or_else(|| {
+        let fault = Fault::at("preprocess", "the turns are never averaged");
+        document::resolve(fault.help("end [[preprocess]] with plugin = \"synchronous-average\""), root)
+    })?;
+    match separator {
+        Separator::Stations(separator) => {
+            let assessment =
+                separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
+            Ok((Route::Turns { conditioners, averager, separator }, Some(assessment)))
+        }
+        Separator::Points(_) => {
+            let fault = Fault::at("plugin", "this separator takes measured points; [load] gives recorded turns");
+            Err(document::resolve(fault, separate_table))
+        }
+    }
+}
+
+/// Reads a table and checks it, with the places of the check's faults resolved.
+///
+/// # Errors
+/// The first mistake.
+pub fn checked<C: serde::de::DeserializeOwned, T>(
+    table: &Table,
+    check: impl FnOnce(C) -> Result<T, Fault>,
+) -> Result<T, Fault> {
+    check(document::read(table)?).map_err(|fault| document::resolve(fault, table))
+}
+
+/// A top-level table, where there is one.
+///
+/// # Errors
+/// When the key holds something else.
+pub fn table<'a>(root: &Table<'a>, key: &str) -> Result<Option<Table<'a>>, Fault> {
+    match root.get_ref().get_key_value(key) {
+        None => Ok(None),
+        Some((name, value)) => match value.get_ref() {
+            // The key is the better place to point at: the table's own span may be all its lines.
+            DeValue::Table(table) => Ok(Some(Spanned::new(name.span(), table.clone()))),
+            other => Err(Fault::span(value.span(), format!("expected a table `{key}`, found {}", other.type_str()))),
+        },
+    }
+}
+
+fn required<'a>(root: &Table<'a>, key: &str) -> Result<Table<'a>, Fault> {
+    table(root, key)?.ok_or_else(|| {
+        document::resolve(Fault::here(format!("missing key `{key}`")).help(format!("add a table [{key}]")), root)
+    })
+}
+
+fn tables<'a>(root: &Table<'a>, key: &str) -> Result<Vec<Table<'a>>, Fault> {
+    let Some(value) = root.get_ref().get(key) else { return Ok(Vec::new()) };
+    let expected = |span, found: &str| Fault::span(span, format!("expected tables [[{key}]], found {found}"));
+    match value.get_ref() {
+        DeValue::Array(items) => items
+            .iter()
+            .map(|item| match item.get_ref() {
+                DeValue::Table(table) => Ok(Spanned::new(item.span(), table.clone())),
+                other => Err(expected(item.span(), other.type_str())),
+            })
+            .collect(),
+        other => Err(expected(value.span(), other.type_str())),
+    }
+}
+
+/// JSON Schema of a pipeline file with these plugins.
+#[must_use]
+pub fn pipeline_schema(registry: &Registry) -> Value {
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "runout pipeline",
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["load", "separate"],
+        "properties": {
+            "title": { "type": "string", "description": "For results and meshes." },
+            "rig": {
+                "description": "Sensors and setups, or the path of a file that holds them.",
+                "anyOf": [{ "type": "string" }, inline::<RigConfig>()],
+            },
+            "load": choice(&registry.loaders),
+            "preprocess": { "type": "array", "items": choice(&registry.preprocessors) },
+            "separate": choice(&registry.separators),
+            "surface": inline::<SurfaceConfig>(),
+            "diagnose": inline::<DiagnoseConfig>(),
+            "export": { "type": "array", "items": choice(&registry.exporters) },
+        },
+    })
+}
+
+/// Schema of a stage's table: one of the plugins, told apart by `plugin`.
+#[must_use]
+pub fn choice<S>(catalogue: &Catalogue<S>) -> Value {
+    let one = |plugin: &Plugin<S>| {
+        let mut schema = plugin.schema().to_value();
+        if let Some(object) = schema.as_object_mut() {
+            object.remove("$schema");
+            object.insert("title".into(), plugin.name.into());
+            object.insert("description".into(), plugin.about.into());
+            let properties = object.entry("properties").or_insert_with(|| json!({}));
+            if let Some(properties) = properties.as_object_mut() {
+                properties.insert("plugin".into(), json!({ "const": plugin.name }));
+            }
+            let required = object.entry("required").or_insert_with(|| json!([]));
+            if let Some(required) = required.as_array_mut() {
+                required.insert(0, "plugin".into());
+            }
+        }
+        schema
+    };
+    json!({ "oneOf": catalogue.iter().map(one).collect::<Vec<_>>() })
+}
+
+pub(super) fn inline<T: JsonSchema>() -> Schema {
+    let settings = schemars::generate::SchemaSettings::default().with(|settings| {
+        settings.inline_subschemas = true;
+        settings.meta_schema = None;
+    });
+    settings.into_generator().into_root_schema_for::<T>()
+}

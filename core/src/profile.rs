@@ -1,0 +1,119 @@
+//! The synchronous average of one capture, one harmonic at a time, with its covariance over the turns.
+
+use crate::{
+    Complex64,
+    measurement::{DefectKind, Response, Trim},
+};
+
+/// What the turns of one capture say together: Re Σ cₙ e^{−inΦ} for each channel, Φ the spindle angle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Where it came from, for messages.
+    pub object: String,
+    /// Index into the rig's setups.
+    pub setup: usize,
+    /// The rig's sensor behind each channel.
+    pub sensors: Vec<usize>,
+    /// Equal angles per turn on which the turns were averaged.
+    pub samples_per_rev: usize,
+    /// Mean over the turns, µm, `[order][channel]`, orders 0..=`max_order`.
+    pub mean: Vec<Complex64>,
+    /// Covariance of that mean across channels, µm², `[order][channel][channel]`, E[δ δᴴ]; `None` below two turns.
+    pub covariance: Option<Vec<Complex64>>,
+    /// How many turns there were, and what became of them.
+    pub turns: TurnCount,
+    /// Mean speed over the turns used, where the sampling rate is known.
+    pub speed_rpm: Option<f64>,
+    /// Filters that the signal went through.
+    pub responses: Vec<Response>,
+    /// What the user should know of this capture.
+    pub warnings: Vec<String>,
+}
+
+impl Profile {
+    /// Number of channels.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.sensors.len()
+    }
+
+    /// Highest order that the average holds.
+    #[must_use]
+    pub fn max_order(&self) -> usize {
+        (self.mean.len() / self.channels().max(1)).saturating_sub(1)
+    }
+
+    /// The mean of one order, one coefficient a channel.
+    #[must_use]
+    pub fn order(&self, order: usize) -> &[Complex64] {
+        let channels = self.channels();
+        &self.mean[order * channels..(order + 1) * channels]
+    }
+
+    /// The covariance of one order's mean, `[channel][channel]`.
+    #[must_use]
+    pub fn order_covariance(&self, order: usize) -> Option<&[Complex64]> {
+        let size = self.channels() * self.channels();
+        self.covariance.as_ref().map(|covariance| &covariance[order * size..(order + 1) * size])
+    }
+}
+
+/// Every turn of a capture is either used or listed here.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TurnCount {
+    /// Whole turns between the first and the last mark.
+    pub recorded: usize,
+    /// Turns in the average.
+    pub used: usize,
+    /// Turns set aside at the ends.
+    pub trimmed: Vec<Trim>,
+    /// Turns left out of the average.
+    pub rejected: Vec<RejectedTurn>,
+}
+
+/// A turn that was left out, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RejectedTurn {
+    /// Counted from 0 at the capture's first mark.
+    pub turn: usize,
+    /// Sample at which it begins.
+    pub start_sample: u64,
+    /// Why.
+    pub reason: Rejection,
+}
+
+/// Why a turn was left out.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Rejection {
+    /// About twice as long as the others: a mark is missing.
+    MissingMark(TurnLength),
+    /// Much shorter than the others: a mark was counted twice.
+    DoubledMark(TurnLength),
+    /// Its length is off by more than the tolerance.
+    Speed(TurnLength),
+    /// A channel holds samples that cannot be trusted.
+    Defect {
+        /// The rig's sensor.
+        sensor: usize,
+        /// What is wrong with them.
+        kind: DefectKind,
+    },
+    /// A channel is far from the other turns.
+    Outlier {
+        /// The rig's sensor.
+        sensor: usize,
+        /// Root mean square distance from the other turns, in µm.
+        distance_um: f64,
+    },
+    /// The turn is not wholly covered by samples.
+    Incomplete,
+}
+
+/// A turn's length beside the others'.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnLength {
+    /// Its own, in samples.
+    pub samples: f64,
+    /// The capture's median, in samples.
+    pub median_samples: f64,
+}

@@ -1,0 +1,41 @@
+//! Exporting: from results to files.
+
+use std::path::PathBuf;
+
+use crate::{
+    Result,
+    pipeline::run::{RunInfo, StationResult, Summary},
+    surface::Surface,
+};
+
+/// Writes results to files.
+pub trait Exporter: Send + Sync {
+    /// The files that it will write, so that two exporters do not write the same one.
+    fn outputs(&self) -> Vec<PathBuf>;
+
+    /// Whether it needs the surface at the end.
+    fn needs_surface(&self) -> bool {
+        false
+    }
+
+    /// Begins an export. Files appear under their names only when it is finished.
+    ///
+    /// # Errors
+    /// When the place cannot be written to.
+    fn begin(&self, run: &RunInfo) -> Result<Box<dyn Export>>;
+}
+
+/// An export under way: stations come in order, one at a time.
+pub trait Export: Send {
+    /// Takes one station's result.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    fn station(&mut self, result: &StationResult) -> Result<()>;
+
+    /// Completes the files and gives them their names.
+    ///
+    /// # Errors
+    /// When they cannot be completed.
+    fn finish(self: Box<Self>, summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PathBuf>>;
+}

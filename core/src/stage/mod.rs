@@ -1,0 +1,13 @@
+//! The stages of a pipeline: one trait a file. A plugin implements one of them.
+
+pub mod exporter;
+pub mod loader;
+pub mod preprocessor;
+pub mod separator;
+pub mod simulator;
+
+pub use exporter::{Export, Exporter};
+pub use loader::{Loader, Source, SourceKind};
+pub use preprocessor::{Averager, Conditioner, Preprocessor};
+pub use separator::{PointSeparator, Separator, Station, StationSeparator};
+pub use simulator::Simulator;

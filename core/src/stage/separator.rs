@@ -1,0 +1,70 @@
+//! Separation: from profiles or points to form and motion.
+
+use crate::{
+    Result,
+    pipeline::error::Fault,
+    points::Points,
+    profile::Profile,
+    rig::Rig,
+    separation::{Assessment, Separation},
+};
+
+/// A separator, by what it takes.
+pub enum Separator {
+    /// Profiles of all setups, one station at a time.
+    Stations(Box<dyn StationSeparator>),
+    /// All points at once.
+    Points(Box<dyn PointSeparator>),
+}
+
+/// Separates the profiles of one station. Built for one rig, which it has checked.
+pub trait StationSeparator: Send + Sync {
+    /// What it can tell with its rig, for orders 1 to `max_order`.
+    ///
+    /// # Errors
+    /// When the rig does not fit the method.
+    fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault>;
+
+    /// Form and motion of one station.
+    ///
+    /// # Errors
+    /// When the profiles do not fit the rig.
+    fn separate(&self, station: &Station) -> Result<Separation>;
+}
+
+/// One axial station, measured in every setup of the rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Station {
+    /// Its name.
+    pub name: String,
+    /// Carriage position, in mm.
+    pub z_mm: f64,
+    /// One profile a setup, in the rig's order.
+    pub profiles: Vec<Profile>,
+}
+
+/// Separates measured points as a whole, for example circles from the cylinder that they lie on.
+pub trait PointSeparator: Send + Sync {
+    /// One separation a section, in the order of z, named by the section's id.
+    ///
+    /// # Errors
+    /// When the points do not hold what the method needs.
+    fn separate(&self, points: &Points) -> Result<Vec<Separation>>;
+
+    /// Nominal radius that the deviations are measured from, in mm.
+    fn nominal_radius_mm(&self) -> f64;
+}
+
+/// What a separator is built with besides its own configuration.
+#[must_use]
+pub fn rig_needed() -> Fault {
+    Fault::at("plugin", "this separator needs a [rig]").help("describe sensors and setups in [rig]")
+}
+
+/// The rig of a pipeline, or the fault that says it is missing.
+///
+/// # Errors
+/// When there is none.
+pub fn require_rig(rig: Option<&Rig>) -> std::result::Result<&Rig, Fault> {
+    rig.ok_or_else(rig_needed)
+}

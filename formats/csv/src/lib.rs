@@ -1,0 +1,1 @@
+//! CSV measurements: one file a setup and station.

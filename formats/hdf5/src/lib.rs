@@ -1,0 +1,1 @@
+//! HDF5: measurement files and results.

@@ -1,0 +1,1 @@
+//! Measured circles and generatrices of a cylinder.

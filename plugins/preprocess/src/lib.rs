@@ -1,0 +1,1 @@
+//! From raw samples to one profile a capture: trims, filters, synchronous average.

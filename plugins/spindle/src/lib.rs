@@ -1,0 +1,1 @@
+//! Separators and a simulator for spindles: form of the part, error motion of the axis.
