@@ -1,1 +1,3 @@
-//! Separators and a simulator for spindles: form of the part, error motion of the axis.
+//! Spindles: separators of the part's form from the axis's error motion, and a simulator of both.
+
+pub mod simulate;

@@ -1,0 +1,1 @@
+//! Campaigns in the time domain with a declared truth.
