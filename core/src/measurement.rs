@@ -60,6 +60,8 @@ pub struct Capture {
     pub samples: u64,
     /// The rig's sensor behind each channel.
     pub sensors: Vec<usize>,
+    /// Id of the sensor behind each channel, for messages.
+    pub sensor_ids: Vec<String>,
     /// Lowest and highest reading that the converter can give, in µm per channel, where the samples are integers.
     pub converter_limits_um: Option<Vec<[f64; 2]>>,
     /// Sample positions (fractional, ascending) at which a turn begins: the once-per-turn mark, or the encoder's zero.
