@@ -1,3 +1,4 @@
 //! Numerical tools that know nothing of rigs.
 
 pub mod fourier;
+pub mod least_squares;
