@@ -91,11 +91,21 @@ impl Capture {
         let middle = lengths.len() / 2;
         Some(*lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
+
+    /// Number of the turn that begins at the first mark still there, counted from 0 before anything was trimmed.
+    #[must_use]
+    pub fn first_turn(&self) -> usize {
+        let mut leading: Vec<&Trim> = self.trimmed.iter().collect();
+        leading.sort_by_key(|trim| trim.first_turn);
+        leading.iter().fold(0, |next, trim| if trim.first_turn == next { next + trim.turns } else { next })
+    }
 }
 
 /// Turns set aside at one end of a capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trim {
+    /// Number of the first of them, counted from 0 at the capture's first mark.
+    pub first_turn: usize,
     /// Number of whole turns.
     pub turns: usize,
     /// "start-up", "run-down" or what the user asked for.

@@ -107,6 +107,8 @@ pub enum Rejection {
     },
     /// The turn is not wholly covered by samples.
     Incomplete,
+    /// The encoder's angle does not grow steadily by one turn.
+    Angle,
 }
 
 /// A turn's length beside the others'.

@@ -513,6 +513,7 @@ fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
             format!("{}: {distance_um:.3} µm rms from the other turns", sensor(*index))
         }
         Rejection::Incomplete => "not wholly covered by samples".into(),
+        Rejection::Angle => "the encoder's angle does not grow steadily by one turn".into(),
     };
     CaptureSummary {
         setup,
