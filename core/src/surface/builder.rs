@@ -1,0 +1,204 @@
+//! From sections to a surface.
+
+use super::{
+    Meeting, Surface, SurfaceConfig,
+    monotone::{STENCIL, Stencil},
+};
+use crate::{
+    Complex64, Error, Result,
+    numerics::fourier::{Fourier, max_order},
+    pipeline::run::StationResult,
+    separation::{Quantity, Separation},
+};
+
+/// Sections nearer to each other than this lie at one z, in mm: a carriage's repeatability.
+const SAME_Z_MM: f64 = 1e-3;
+
+/// Points that a surface may have: 0.8 GB here, and still an index of 32 bits in a mesh.
+const MOST_POINTS: f64 = 1e8;
+
+/// Collects sections as stations come in.
+#[derive(Debug, Default)]
+pub struct SurfaceBuilder {
+    config: SurfaceConfig,
+    sections: Vec<Section>,
+    /// Whether a section had orders that do not fit on the grid.
+    band_limited: bool,
+}
+
+/// One section's form, order by order from 0; `None` where it is not known.
+#[derive(Debug)]
+struct Section {
+    id: String,
+    station: String,
+    z_mm: f64,
+    orders: Vec<Option<Order>>,
+}
+
+/// One order of a form.
+#[derive(Debug, Clone, Copy)]
+struct Order {
+    value: Complex64,
+    /// E|δ|², µm²; NaN where not known.
+    variance: f64,
+}
+
+impl Section {
+    fn label(&self) -> String {
+        format!("{}@{}", self.id, self.station)
+    }
+}
+
+impl SurfaceBuilder {
+    /// For one configuration.
+    #[must_use]
+    pub fn new(config: &SurfaceConfig) -> Self {
+        Self { config: config.clone(), ..Self::default() }
+    }
+
+    /// Adds a station's sections.
+    pub fn add(&mut self, result: &StationResult) {
+        let separation = &result.separation;
+        for (index, at) in separation.sections.iter().enumerate() {
+            let Some(unknown) = separation.position(Quantity::Form(index)) else { continue };
+            let mut orders = orders(separation, unknown);
+            let fitting = max_order(self.config.angles) + 1;
+            self.band_limited |= orders.iter().skip(fitting).flatten().any(|order| order.value != Complex64::ZERO);
+            orders.truncate(fitting);
+            self.sections.push(Section { id: at.id.clone(), station: result.station.clone(), z_mm: at.z_mm, orders });
+        }
+    }
+
+    /// The surface.
+    ///
+    /// Sections at one z become one ring, each order their mean, weighted by the inverse variance where all of them
+    /// know it.
+    ///
+    /// # Errors
+    /// With fewer than two sections along z, or more points than can be held.
+    pub fn build(mut self, radius_mm: f64) -> Result<Surface> {
+        let failure = |problem: String| Error::new("build", "the surface", problem);
+        if let Some(section) = self.sections.iter().find(|section| !section.z_mm.is_finite()) {
+            return Err(failure(format!("section {} has no place along z", section.label())));
+        }
+        self.sections.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm));
+        let angles = self.config.angles;
+        let mut fourier = Fourier::new(angles);
+        let mut rings = Rings { angles, z_mm: Vec::new(), deviation_um: Vec::new() };
+        let mut meetings = Vec::new();
+        let mut rest = self.sections.as_slice();
+        while let Some(first) = rest.first() {
+            let (group, later) = rest.split_at(rest.partition_point(|other| other.z_mm - first.z_mm <= SAME_Z_MM));
+            for (index, section) in group.iter().enumerate() {
+                let others = group[index + 1..].iter().filter(|other| other.id != section.id);
+                meetings.extend(others.map(|other| meeting(section, other, &mut fourier)));
+            }
+            rings.z_mm.push(group.iter().map(|section| section.z_mm).sum::<f64>() / group.len() as f64);
+            rings.deviation_um.extend_from_slice(fourier.synthesise(mean(group)));
+            rest = later;
+        }
+        let (start, end) = match rings.z_mm.as_slice() {
+            [] => return Err(failure("no section was measured".into())),
+            [only] => {
+                let problem = format!("all sections lie at one z ({only} mm); a surface needs two or more");
+                return Err(failure(problem).help("measure at another station, or export no mesh"));
+            }
+            [start, .., end] => (*start, *end),
+        };
+        let interpolation = describe(rings.z_mm.len(), self.band_limited);
+        let rings = match self.config.step_mm {
+            None => rings,
+            Some(step) => {
+                let points = ((end - start) / step + 2.0) * angles as f64;
+                if points > MOST_POINTS {
+                    let problem = format!("rings every {step} mm over {} mm are more than can be held", end - start);
+                    return Err(failure(problem).help("enlarge step_mm or take fewer angles"));
+                }
+                rings.every(step, start, end)
+            }
+        };
+        let Rings { z_mm, deviation_um, .. } = rings;
+        Ok(Surface { radius_mm, angles, z_mm, deviation_um, interpolation, meetings })
+    }
+}
+
+/// Form over (angle, z), as in [`Surface`].
+struct Rings {
+    angles: usize,
+    z_mm: Vec<f64>,
+    deviation_um: Vec<f64>,
+}
+
+impl Rings {
+    /// Rings at every `step` from `start`, and one at `end`.
+    fn every(&self, step: f64, start: f64, end: f64) -> Self {
+        // A last gap below a thousandth of the step is rounding, not a ring.
+        let full = ((end - start) / step - 1e-3).ceil().max(1.0) as usize;
+        let z_mm: Vec<f64> = (0..full).map(|ring| start + step * ring as f64).chain([end]).collect();
+        let mut deviation_um = Vec::with_capacity(z_mm.len() * self.angles);
+        let ring = |index: usize| &self.deviation_um[index * self.angles..(index + 1) * self.angles];
+        for stencil in z_mm.iter().filter_map(|z| Stencil::locate(&self.z_mm, *z)) {
+            let known: [&[f64]; STENCIL] = std::array::from_fn(|knot| ring(stencil.knot(knot)));
+            deviation_um.extend((0..self.angles).map(|angle| stencil.value(known.map(|ring| ring[angle]))));
+        }
+        Self { angles: self.angles, z_mm, deviation_um }
+    }
+}
+
+fn describe(sections: usize, band_limited: bool) -> &'static str {
+    match (sections, band_limited) {
+        (2, false) => "linear along z between the two sections",
+        (2, true) => "linear along z between the two sections; orders from half the angles upwards left out",
+        (_, false) => "monotone piecewise cubic along z (Fritsch, Carlson 1980; slopes of Fritsch, Butland 1984)",
+        (_, true) => {
+            "monotone piecewise cubic along z (Fritsch, Carlson 1980; slopes of Fritsch, Butland 1984); orders from \
+             half the angles upwards left out"
+        }
+    }
+}
+
+fn orders(separation: &Separation, unknown: usize) -> Vec<Option<Order>> {
+    let width = separation.unknowns.len();
+    let seen = separation.observable.iter().skip(unknown).step_by(width);
+    let variances = separation.variance.iter().skip(unknown).step_by(width).copied().chain(std::iter::repeat(f64::NAN));
+    separation
+        .coefficients(unknown)
+        .zip(seen)
+        .zip(variances)
+        .map(|((value, seen), variance)| (*seen && value.is_finite()).then_some(Order { value, variance }))
+        .collect()
+}
+
+/// Orders of two sections side by side, where both know them.
+fn common<'a>(a: &'a Section, b: &'a Section) -> impl Iterator<Item = Option<(Order, Order)>> + 'a {
+    a.orders.iter().zip(&b.orders).map(|(a, b)| a.zip(*b))
+}
+
+fn meeting(a: &Section, b: &Section, fourier: &mut Fourier) -> Meeting {
+    let difference = common(a, b).map(|pair| pair.map_or(Complex64::ZERO, |(a, b)| a.value - b.value));
+    let difference = fourier.synthesise(difference);
+    let squares: f64 = difference.iter().map(|value| value * value).sum();
+    // As Separation::angle_std: ½ Σ E|δₙ|² from order 1.
+    let variance: f64 = common(a, b).skip(1).flatten().map(|(a, b)| a.variance + b.variance).sum();
+    let expected = (0.5 * variance).sqrt();
+    Meeting {
+        z_mm: 0.5 * (a.z_mm + b.z_mm),
+        sections: [a.label(), b.label()],
+        rms_um: (squares / difference.len() as f64).sqrt(),
+        max_um: difference.iter().fold(0.0, |largest: f64, value| largest.max(value.abs())),
+        expected_rms_um: (expected.is_finite() && expected > 0.0).then_some(expected),
+    }
+}
+
+/// The mean of sections at one z, order by order over those that know it.
+fn mean(group: &[Section]) -> impl Iterator<Item = Complex64> + '_ {
+    let orders = group.iter().map(|section| section.orders.len()).max().unwrap_or(0);
+    (0..orders).map(move |order| {
+        let known = || group.iter().filter_map(move |section| *section.orders.get(order)?);
+        let weighted = known().all(|known| known.variance.is_finite() && known.variance > 0.0);
+        let weight = |order: &Order| if weighted { order.variance.recip() } else { 1.0 };
+        let weights: f64 = known().map(|order| weight(&order)).sum();
+        let sum: Complex64 = known().map(|order| order.value * weight(&order)).sum();
+        if weights > 0.0 { sum / weights } else { Complex64::ZERO }
+    })
+}
