@@ -1,2 +1,48 @@
-//! Chores.
-fn main() {}
+//! Chores of this repository: set-up, demo, tests, schemas. It needs nothing but Rust, so that it can bring the rest.
+
+mod chores;
+mod foreign;
+mod process;
+mod setup;
+
+use std::process::ExitCode;
+
+use process::{Outcome, say};
+
+const HELP: &str = "\
+cargo xtask COMMAND
+
+  setup         find or bring what a build needs besides Rust: a C compiler, make, CMake 3.26 or newer
+  demo          build runout, make the campaign of examples/01-four-sensor once, run its pipeline
+  test [--ci]   format, lints, tests; with --ci also files read by Python and Node, which it installs below target/
+  schemas       write schemas/ anew from the types
+
+Every command does the set-up it needs first.
+";
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let outcome: Outcome = match words[..] {
+        [] | ["help" | "--help" | "-h"] => {
+            say(HELP);
+            Ok(())
+        }
+        ["setup"] => setup::report(),
+        ["demo"] => chores::demo(),
+        ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1")),
+        ["test", "--ci"] => chores::test(true),
+        ["schemas"] => chores::schemas(),
+        _ => {
+            say(&format!("unknown command `{}`\n\n{HELP}", words.join(" ")));
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            say(&format!("error: {problem}"));
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! The chores themselves.
+
+use std::{fs, path::Path, process::Command, time::SystemTime};
+
+use crate::{
+    foreign,
+    process::{Outcome, answer, root, run, say, target},
+    setup::cargo,
+};
+
+/// Format, lints, tests.
+pub fn test(foreign_readers: bool) -> Outcome {
+    run(&mut cargo(&["fmt", "--all", "--check"])?)?;
+    run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;
+    let nextest = answer("cargo-nextest", &["--version"]).is_some();
+    let runner: &[&str] =
+        if nextest { &["nextest", "run", "--workspace"] } else { &["test", "--workspace", "--all-targets"] };
+    let mut tests = cargo(runner)?;
+    if foreign_readers {
+        foreign::equip(&mut tests)?;
+    }
+    run(&mut tests)?;
+    run(&mut cargo(&["test", "--workspace", "--doc", "--quiet"])?)
+}
+
+/// Writes schemas/ anew.
+pub fn schemas() -> Outcome {
+    run(&mut cargo(&["run", "--quiet", "--package", "runout", "--", "schema", "--out", "schemas"])?)
+}
+
+/// Makes the first example's campaign once, and runs its pipeline.
+pub fn demo() -> Outcome {
+    run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
+    let program = target().join("release/runout");
+    let example = Path::new("examples/01-four-sensor");
+    let scenario = example.join("scenario.toml");
+    let campaign = example.join("shaft.h5");
+    if newer(&campaign, &scenario) {
+        say(&format!("the campaign is there: {}", campaign.display()));
+    } else {
+        run(Command::new(&program).arg("simulate").arg(&scenario).arg("--out").arg(&campaign))?;
+    }
+    run(Command::new(&program).arg("run").arg(example.join("pipeline.toml")))?;
+    say(&format!(
+        "\nThe program is {}; the files above open in MeshLab, Blender, ParaView, Python.",
+        program.display()
+    ));
+    Ok(())
+}
+
+/// Whether `made` is there and not older than what it is made from.
+fn newer(made: &Path, from: &Path) -> bool {
+    let changed = |path: &Path| -> Option<SystemTime> { fs::metadata(root().join(path)).ok()?.modified().ok() };
+    matches!((changed(made), changed(from)), (Some(made), Some(from)) if made >= from)
+}

@@ -1,0 +1,39 @@
+//! Readers that others wrote, for tests of our files: h5py, pyarrow, trimesh, and the Khronos glTF validator.
+
+use std::process::Command;
+
+use crate::{
+    process::{Outcome, answer, run, tools},
+    setup,
+};
+
+const PYTHON_PACKAGES: [&str; 4] = ["numpy", "h5py", "pyarrow", "trimesh"];
+/// The Khronos validator's releases are pre-releases to npm: the version has to be named.
+const NODE_PACKAGES: [&str; 1] = ["gltf-validator@2.0.0-dev.3.10"];
+
+/// Tells a test run where the readers are, installing them below target/ where they are not yet.
+pub fn equip(tests: &mut Command) -> Outcome {
+    let python = tools().join("python-venv");
+    setup::python_environment(&python)?;
+    let interpreter = python.join("bin/python");
+    if answer(&interpreter, &["-c", &format!("import {}", PYTHON_PACKAGES.join(", "))]).is_none() {
+        run(Command::new(python.join("bin/pip")).args(["install", "--quiet"]).args(PYTHON_PACKAGES))?;
+    }
+    let node = tools().join("node");
+    if answer("node", &["--version"]).is_none() {
+        setup::install(&["nodejs"], "Node.js")?;
+    }
+    if !node.join("node_modules/gltf-validator/package.json").is_file() {
+        if answer("npm", &["--version"]).is_none() {
+            setup::install(&["npm"], "npm")?;
+        }
+        std::fs::create_dir_all(&node).map_err(|error| format!("cannot create {}: {error}", node.display()))?;
+        let quiet = ["install", "--no-audit", "--no-fund", "--no-save", "--loglevel=error", "--prefix"];
+        run(Command::new("npm").args(quiet).arg(&node).args(NODE_PACKAGES))?;
+    }
+    tests
+        .env("RUNOUT_PYTHON", interpreter)
+        .env("RUNOUT_NODE_MODULES", node.join("node_modules"))
+        .env("RUNOUT_REQUIRE_FOREIGN", "1");
+    Ok(())
+}
