@@ -155,6 +155,39 @@ impl Block {
     }
 }
 
+/// A capture that is in memory as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MemoryStream {
+    /// What is known of it.
+    pub capture: Capture,
+    /// Readings in µm, `[sample][channel]`.
+    pub samples: Vec<f64>,
+    /// Encoder angle of each sample in turns; empty without an encoder.
+    pub angle_rev: Vec<f64>,
+    /// Samples of each channel in a block, at least 1.
+    pub block_samples: usize,
+    /// The next sample to be handed on.
+    pub next: usize,
+}
+
+impl SampleStream for MemoryStream {
+    fn capture(&self) -> &Capture {
+        &self.capture
+    }
+
+    fn next_block(&mut self, block: &mut Block) -> Result<bool> {
+        block.clear();
+        let channels = self.capture.channels().max(1);
+        let end = self.next.saturating_add(self.block_samples.max(1)).min(self.samples.len() / channels);
+        let range = self.next.min(end)..end;
+        block.start = range.start as u64;
+        block.samples.extend_from_slice(&self.samples[range.start * channels..range.end * channels]);
+        block.angle_rev.extend_from_slice(self.angle_rev.get(range.clone()).unwrap_or_default());
+        self.next = end;
+        Ok(!range.is_empty())
+    }
+}
+
 /// A run of samples of one channel that cannot be trusted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Defect {

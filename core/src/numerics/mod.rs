@@ -1,4 +1,5 @@
 //! Numerical tools that know nothing of rigs.
 
 pub mod fourier;
+pub mod lanes;
 pub mod least_squares;

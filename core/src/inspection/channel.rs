@@ -1,0 +1,255 @@
+//! What is known of one channel so far, and the look at its next samples.
+
+use std::ops::Range;
+
+use super::{LIMIT_RUN, STEEP_STEPS};
+use crate::{
+    measurement::{Block, Defect, DefectKind},
+    numerics::lanes::{LaneWork, load},
+};
+
+/// How clipping shows.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Rule {
+    /// At the converter's limits, lowest and highest of each channel.
+    Limits(Vec<[f64; 2]>),
+    /// Flat at the extreme so far; lengths in samples.
+    Flat {
+        /// Of a run that began steeply.
+        shortest: u64,
+        /// Of any run.
+        pegged: u64,
+        /// Of the approach that is looked at.
+        approach: u64,
+    },
+    /// Not at all.
+    None,
+}
+
+impl Rule {
+    /// Readings between which a channel is certainly not clipped.
+    fn inside(&self, channel: usize) -> [f64; 2] {
+        match self {
+            // Readings and limits come from the same integers; the margin covers their rounding.
+            Self::Limits(limits) => {
+                let [low, high] = limits[channel];
+                let margin = 1e-9 * (high - low).abs();
+                [low.min(high) + margin, low.max(high) - margin]
+            }
+            Self::Flat { .. } | Self::None => [f64::NEG_INFINITY, f64::INFINITY],
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Channel {
+    last: Option<f64>,
+    lowest: f64,
+    highest: f64,
+    /// Smallest change between two samples so far that is not 0.
+    finest_step: f64,
+    seen: u64,
+    run: Run,
+}
+
+/// Samples in a row that may turn out to be clipped.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Run {
+    start: u64,
+    length: u64,
+    /// At the limit, or equal at the extreme.
+    suspect: bool,
+    clipped: bool,
+    steep: Option<bool>,
+}
+
+impl Default for Channel {
+    fn default() -> Self {
+        Self {
+            last: None,
+            lowest: f64::INFINITY,
+            highest: f64::NEG_INFINITY,
+            finest_step: f64::INFINITY,
+            seen: 0,
+            run: Run::default(),
+        }
+    }
+}
+
+impl Channel {
+    /// Where the run begins whose end must be awaited.
+    pub(super) fn undecided(&self, rule: &Rule) -> Option<u64> {
+        let open = match rule {
+            Rule::Limits(_) => self.run.length < LIMIT_RUN,
+            Rule::Flat { pegged, .. } => self.run.length < *pegged,
+            Rule::None => false,
+        };
+        (self.run.suspect && !self.run.clipped && open).then_some(self.run.start)
+    }
+
+    /// What shows that the channel never moved.
+    pub(super) fn dead(&self) -> Option<String> {
+        if self.seen < 2 || self.lowest < self.highest {
+            None
+        } else if self.last.is_none() {
+            Some(format!("none of its {} samples is a number", self.seen))
+        } else {
+            Some(format!("all {} samples read {} µm", self.seen, self.lowest))
+        }
+    }
+
+    /// Looks at `frames` of the block, one sample after the other; `past` are the frames before the block.
+    pub(super) fn look(
+        &mut self,
+        index: usize,
+        frames: Range<usize>,
+        channels: usize,
+        rule: &Rule,
+        block: &mut Block,
+        past: &[f64],
+    ) {
+        let [low, high] = rule.inside(index);
+        for frame in frames {
+            let place = block.start + frame as u64;
+            let at = frame * channels + index;
+            let value = block.samples[at];
+            self.seen += 1;
+            if !value.is_finite() {
+                block.samples[at] = self.last.unwrap_or(0.0);
+                mark(&mut block.defects, index, DefectKind::NotFinite, place..place + 1);
+                self.run = Run::default();
+                continue;
+            }
+            let suspect = match rule {
+                Rule::Limits(_) => value <= low || value >= high,
+                Rule::Flat { .. } => value <= self.lowest || value >= self.highest,
+                Rule::None => false,
+            };
+            let goes_on = match rule {
+                Rule::Limits(_) => self.run.suspect && suspect,
+                Rule::Flat { .. } | Rule::None => self.run.length > 0 && self.last == Some(value),
+            };
+            if goes_on {
+                self.run.length += 1;
+            } else {
+                self.run = Run { start: place, length: 1, suspect, ..Run::default() };
+            }
+            if let Some(last) = self.last {
+                let step = (value - last).abs();
+                if step > 0.0 {
+                    self.finest_step = self.finest_step.min(step);
+                }
+            }
+            self.last = Some(value);
+            self.lowest = self.lowest.min(value);
+            self.highest = self.highest.max(value);
+            if self.run.suspect {
+                self.judge(index, rule, block, past, channels, value);
+            }
+        }
+    }
+
+    /// Decides on the run so far.
+    fn judge(&mut self, index: usize, rule: &Rule, block: &mut Block, past: &[f64], channels: usize, value: f64) {
+        let end = self.run.start + self.run.length;
+        if self.run.clipped {
+            mark(&mut block.defects, index, DefectKind::Clipped, end - 1..end);
+            return;
+        }
+        self.run.clipped = match rule {
+            Rule::Limits(_) => self.run.length >= LIMIT_RUN,
+            Rule::Flat { shortest, pegged, approach } => {
+                if self.run.length >= *shortest && self.run.steep.is_none() {
+                    let before = self.run.start.checked_sub(*approach);
+                    let reading = before.and_then(|place| reading(place, index, block, past, channels));
+                    let rise = reading.map_or(0.0, |reading| (value - reading).abs());
+                    self.run.steep = Some(rise > STEEP_STEPS * self.finest_step);
+                }
+                self.run.steep == Some(true) || self.run.length >= *pegged
+            }
+            Rule::None => false,
+        };
+        if self.run.clipped {
+            // An undecided run was held back, so that it still begins in this block.
+            mark(&mut block.defects, index, DefectKind::Clipped, self.run.start..end);
+        }
+    }
+}
+
+/// One channel's reading at a place in the capture, in the block or the frames before it.
+fn reading(place: u64, channel: usize, block: &Block, past: &[f64], channels: usize) -> Option<f64> {
+    if let Some(frame) = place.checked_sub(block.start) {
+        return block.samples.get(frame as usize * channels + channel).copied();
+    }
+    let frame = (past.len() / channels).checked_sub((block.start - place) as usize)?;
+    past.get(frame * channels + channel).copied()
+}
+
+/// Adds a run of bad samples, or lengthens the channel's last one.
+fn mark(defects: &mut Vec<Defect>, channel: usize, kind: DefectKind, samples: Range<u64>) {
+    match defects.iter_mut().rev().find(|defect| defect.channel == channel) {
+        Some(last) if last.kind == kind && last.samples.end == samples.start => last.samples.end = samples.end,
+        _ => defects.push(Defect { samples, channel, kind }),
+    }
+}
+
+/// A look at frames of a block, by all channels.
+pub(super) struct Look<'a> {
+    pub(super) channels: &'a mut [Channel],
+    pub(super) rule: &'a Rule,
+    pub(super) block: &'a mut Block,
+    /// The frames before the block.
+    pub(super) past: &'a [f64],
+    pub(super) frames: Range<usize>,
+}
+
+impl LaneWork for Look<'_> {
+    /// Nearly always a glance at the extremes of all frames is enough: no value that is not finite, at a limit, or
+    /// equal to the one before. Only where it is not, each channel is looked at sample by sample.
+    fn lanes<const C: usize>(&mut self, offset: usize) {
+        let count = self.channels.len();
+        let group = &mut self.channels[offset..offset + C];
+        let frames = &self.block.samples[self.frames.start * count..self.frames.end * count];
+        let mut lowest = [f64::INFINITY; C];
+        let mut highest = [f64::NEG_INFINITY; C];
+        let mut finest = [f64::INFINITY; C];
+        // 0 · value is 0 for finite values only.
+        let mut zero = [0.0; C];
+        let mut last: [f64; C] = std::array::from_fn(|lane| group[lane].last.unwrap_or(f64::NAN));
+        for frame in frames.chunks_exact(count) {
+            let value: [f64; C] = load(frame, offset);
+            for lane in 0..C {
+                let step = (value[lane] - last[lane]).abs();
+                lowest[lane] = if value[lane] < lowest[lane] { value[lane] } else { lowest[lane] };
+                highest[lane] = if value[lane] > highest[lane] { value[lane] } else { highest[lane] };
+                finest[lane] = if step < finest[lane] { step } else { finest[lane] };
+                zero[lane] += 0.0 * value[lane];
+            }
+            last = value;
+        }
+        let flat = matches!(self.rule, Rule::Flat { .. });
+        let quiet = (0..C).all(|lane| {
+            let [low, high] = self.rule.inside(offset + lane);
+            zero[lane] == 0.0 && lowest[lane] > low && highest[lane] < high && !(flat && finest[lane] == 0.0)
+        });
+        if !quiet {
+            for (lane, channel) in group.iter_mut().enumerate() {
+                channel.look(offset + lane, self.frames.clone(), count, self.rule, self.block, self.past);
+            }
+            return;
+        }
+        for (lane, channel) in group.iter_mut().enumerate() {
+            channel.last = Some(last[lane]);
+            channel.lowest = channel.lowest.min(lowest[lane]);
+            channel.highest = channel.highest.max(highest[lane]);
+            channel.finest_step = channel.finest_step.min(finest[lane]);
+            channel.seen += self.frames.len() as u64;
+            channel.run = Run {
+                start: self.block.start + self.frames.end as u64 - 1,
+                length: 1,
+                suspect: flat && (last[lane] <= channel.lowest || last[lane] >= channel.highest),
+                ..Run::default()
+            };
+        }
+    }
+}

@@ -1,0 +1,157 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::measurement::{Defect, DefectKind, MemoryStream};
+
+const TURN: usize = 1000;
+
+fn stream(channels: &[Vec<f64>], limits: Option<[f64; 2]>, block_samples: usize) -> MemoryStream {
+    let count = channels.len();
+    let frames = channels[0].len();
+    let capture = Capture {
+        object: "test.h5:/initial/s01".into(),
+        setup: 0,
+        station: "s01".into(),
+        z_mm: 0.0,
+        stated_speed_rpm: None,
+        sample_rate_hz: None,
+        samples: frames as u64,
+        sensors: (0..count).collect(),
+        sensor_ids: (1..=count).map(|number| format!("S{number}")).collect(),
+        converter_limits_um: limits.map(|limits| vec![limits; count]),
+        marks: (0..=frames / TURN).map(|turn| (turn * TURN) as f64).collect(),
+        encoder: false,
+        trimmed: Vec::new(),
+        responses: Vec::new(),
+    };
+    let samples = (0..frames).flat_map(|frame| channels.iter().map(move |channel| channel[frame])).collect();
+    MemoryStream { capture, samples, angle_rev: Vec::new(), block_samples, next: 0 }
+}
+
+/// Everything that comes out, with the defects' pieces joined.
+fn inspect(stream: MemoryStream) -> Result<(Vec<f64>, Vec<Defect>)> {
+    let mut inspection = Inspection::new(Box::new(stream));
+    let (mut samples, mut defects, mut block) = (Vec::new(), Vec::<Defect>::new(), Block::default());
+    let count = inspection.capture().channels();
+    while inspection.next_block(&mut block)? {
+        assert_eq!(block.start as usize, samples.len() / count, "blocks follow each other");
+        for defect in &block.defects {
+            assert!(defect.samples.start >= block.start, "{defect:?} lies before the block at {}", block.start);
+            match defects.iter_mut().rev().find(|earlier| earlier.channel == defect.channel) {
+                Some(earlier) if earlier.kind == defect.kind && earlier.samples.end == defect.samples.start => {
+                    earlier.samples.end = defect.samples.end;
+                }
+                _ => defects.push(defect.clone()),
+            }
+        }
+        samples.extend_from_slice(&block.samples);
+    }
+    defects.sort_by_key(|defect| (defect.channel, defect.samples.start));
+    Ok((samples, defects))
+}
+
+fn sine(frames: usize, amplitude_um: f64, phase: f64) -> Vec<f64> {
+    (0..frames).map(|index| amplitude_um * (TAU * index as f64 / TURN as f64 + phase).sin()).collect()
+}
+
+fn defect(channel: usize, samples: std::ops::Range<u64>, kind: DefectKind) -> Defect {
+    Defect { samples, channel, kind }
+}
+
+/// Any block size must give the same samples and the same places.
+fn inspect_in_blocks(channels: &[Vec<f64>], limits: Option<[f64; 2]>) -> (Vec<f64>, Vec<Defect>) {
+    let whole = inspect(stream(channels, limits, usize::MAX)).unwrap();
+    for block_samples in [1, 7, 64, 1500] {
+        assert_eq!(inspect(stream(channels, limits, block_samples)).unwrap(), whole, "{block_samples}");
+    }
+    whole
+}
+
+#[test]
+fn good_samples_pass_untouched() {
+    for width in [1, 4, 11] {
+        let channels: Vec<Vec<f64>> = (0..width).map(|channel| sine(5 * TURN, 3.0, f64::from(channel))).collect();
+        let (samples, defects) = inspect_in_blocks(&channels, None);
+        assert_eq!(samples, stream(&channels, None, 1).samples);
+        assert_eq!(defects, []);
+    }
+}
+
+#[test]
+fn what_is_not_finite_is_bridged_by_the_last_good_value() {
+    let mut channels = vec![sine(3 * TURN, 3.0, 0.1), sine(3 * TURN, 3.0, 0.4)];
+    let good = channels[1][1499];
+    channels[1][1500..1503].fill(f64::NAN);
+    channels[0][0] = f64::INFINITY;
+    let (samples, defects) = inspect_in_blocks(&channels, None);
+    assert!(samples.iter().all(|value| value.is_finite()));
+    assert_eq!(samples[0].to_bits(), 0.0_f64.to_bits(), "nothing good before");
+    assert!((1500..1503).all(|frame| samples[2 * frame + 1].to_bits() == good.to_bits()));
+    assert_eq!(defects, [defect(0, 0..1, DefectKind::NotFinite), defect(1, 1500..1503, DefectKind::NotFinite)]);
+}
+
+#[test]
+fn integers_are_clipped_at_the_converters_limit() {
+    let step = 10.0 / 32768.0;
+    let convert = |value: f64| (value / step).round().clamp(-32768.0, 32767.0) * step;
+    let mut channels = vec![sine(2 * TURN, 8.0, 0.0).into_iter().map(convert).collect::<Vec<_>>()];
+    let limits = [-32768.0 * step, 32767.0 * step];
+    channels[0][700] = limits[0];
+    let (_, defects) = inspect_in_blocks(&channels, Some(limits));
+    assert_eq!(defects, [], "one sample may touch the limit");
+    channels[0][40..43].fill(limits[1]);
+    let (_, defects) = inspect_in_blocks(&channels, Some(limits));
+    assert_eq!(defects, [defect(0, 40..43, DefectKind::Clipped)]);
+}
+
+#[test]
+fn a_flat_top_is_clipped_and_a_quantised_crest_is_not() {
+    // The top of the sine cut at 90 %: arcsin 0.9 to π − arcsin 0.9 is 14.4 % of a turn.
+    let cut: Vec<f64> = sine(4 * TURN, 5.0, 0.0).into_iter().map(|value| value.min(4.5)).collect();
+    let whole = sine(4 * TURN, 5.0, 0.0);
+    let (_, defects) = inspect_in_blocks(&[whole, cut], None);
+    assert_eq!(defects.len(), 4, "{defects:?}");
+    for (turn, found) in defects.iter().enumerate() {
+        let rise = TURN as f64 * 0.9_f64.asin() / TAU;
+        let start = (turn * TURN) as f64 + rise;
+        assert!((found.samples.start as f64 - start).abs() <= 1.0, "{found:?}, expected from {start}");
+        assert!((found.samples.end as f64 - (start + 0.5 * TURN as f64 - 2.0 * rise)).abs() <= 1.0, "{found:?}");
+    }
+    // Crests of 1.4 to 14 % of a turn, without and with noise that dithers them.
+    for (steps, noise) in [(10.0, 0.0), (30.0, 0.0), (100.0, 0.0), (1000.0, 0.0), (30.0, 0.4), (100.0, 1.0)] {
+        for phase in [0.0, 0.25 * TAU, 2.0] {
+            let mut state = 1_u32;
+            let coarse: Vec<f64> = sine(20 * TURN, steps, phase)
+                .into_iter()
+                .map(|value| {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    0.01 * (value + noise * (f64::from(state) / f64::from(u32::MAX) - 0.5)).round()
+                })
+                .collect();
+            let (_, defects) = inspect(stream(&[coarse], None, 512)).unwrap();
+            assert_eq!(defects, [], "{steps} steps, noise {noise}, phase {phase}");
+        }
+    }
+}
+
+#[test]
+fn a_sensor_pegged_from_the_start_is_clipped() {
+    let mut channel = sine(4 * TURN, 5.0, 0.0);
+    channel[..1250].fill(9.0);
+    let (_, defects) = inspect_in_blocks(&[channel], None);
+    assert_eq!(defects, [defect(0, 0..1250, DefectKind::Clipped)]);
+}
+
+#[test]
+fn a_dead_channel_is_an_error_that_names_it() {
+    for (value, said) in [(2.5, "all 3000 samples read 2.5 µm"), (f64::NAN, "none of its 3000 samples is a number")] {
+        for limits in [None, Some([-10.0, 10.0])] {
+            let channels = vec![sine(3 * TURN, 3.0, 0.0), vec![value; 3 * TURN]];
+            let error = inspect(stream(&channels, limits, 100)).unwrap_err().to_string();
+            assert!(error.contains("sensor S2, channel 2 of test.h5:/initial/s01"), "{error}");
+            assert!(error.contains(said), "{error}");
+        }
+    }
+}
