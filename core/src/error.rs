@@ -19,6 +19,7 @@ pub struct Error {
 impl Error {
     /// `operation` is a verb ("read"), `object` names the thing ("shaft.h5:/initial/s01"), `problem` says what was
     /// found and what was expected.
+    #[allow(clippy::needless_pass_by_value, reason = "sources' errors and literals come alike")]
     pub fn new(operation: impl Into<String>, object: impl Into<String>, problem: impl ToString) -> Self {
         Self { operation: operation.into(), object: object.into(), problem: problem.to_string(), help: None }
     }

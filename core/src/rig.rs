@@ -177,8 +177,9 @@ impl RigConfig {
                 section,
                 sign: f64::from(sensor.sign),
             };
-            if let Some(first) = sensors.iter().find(|other: &&Sensor| other.section == section) {
-                if (first.z_mm - checked.z_mm).abs() > SAME_SECTION_MM {
+            if let Some(first) = sensors.iter().find(|other: &&Sensor| other.section == section)
+                && (first.z_mm - checked.z_mm).abs() > SAME_SECTION_MM
+            {
                     return Err(fault(
                         "z_mm",
                         format!(
@@ -187,7 +188,6 @@ impl RigConfig {
                         ),
                     )
                     .help("give the sensor a section of its own"));
-                }
             }
             sensors.push(checked);
         }

@@ -93,14 +93,11 @@ impl PivotedQr {
         let mut operator = vec![Complex64::ZERO; cols * rows];
         let mut column = vec![Complex64::ZERO; rows];
         for source in 0..rows {
-            match weights {
-                Some(weights) => {
-                    column.iter_mut().zip(weights.iter().skip(source).step_by(rows)).for_each(|(to, from)| *to = *from);
-                }
-                None => {
-                    column.fill(Complex64::ZERO);
-                    column[source] = Complex64::ONE;
-                }
+            if let Some(weights) = weights {
+                column.iter_mut().zip(weights.iter().skip(source).step_by(rows)).for_each(|(to, from)| *to = *from);
+            } else {
+                column.fill(Complex64::ZERO);
+                column[source] = Complex64::ONE;
             }
             self.apply_adjoint(&mut column);
             self.back_substitute(&mut column);

@@ -1,0 +1,281 @@
+//! The layout of a rig: which combination of form and motion each sensor reads in each setup, one order at a time.
+
+use std::f64::consts::FRAC_PI_2;
+
+use runout_core::{
+    Complex64,
+    numerics::least_squares::PivotedQr,
+    rig::Rig,
+    separation::{Assessment, OrderAssessment, Quantity},
+};
+
+/// A column adds to the rank when more than this of it (relative) lies outside the others' span. Rounding of
+/// e^{inθ} at order 10 000 is 1e-12; a sensor misplaced by a nanometre on 30 mm gives 3e-8.
+const RANK_TOLERANCE: f64 = 1e-9;
+/// An unknown takes part in the null space above this share.
+const NULL_TOLERANCE: f64 = 1e-7;
+/// Sines and cosines below this are those of a sensor that looks along the other axis.
+const ALONG_AXIS: f64 = 1e-9;
+/// µm of displacement per mm of lever and µrad of tilt.
+pub const UM_PER_MM_URAD: f64 = 1e-3;
+
+/// What each reading sees. Readings are ordered setup by setup, sensor by sensor.
+///
+/// Row (k, c) of Aₙ, with θ' = θ_c + σ_k: [e^{±in(θ'−β_k)} at its section, cos θ', sin θ', −z sin θ', z cos θ'] for the
+/// unknowns H (conjugated where the part turns clockwise), X, Y, E_x, E_y. Motion is taken at the sensors' mean z, so
+/// that Aₙ is well conditioned and the same at every station.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// Readings, in order.
+    pub readings: Vec<Reading>,
+    /// What is solved for at orders from 2: forms, then motions that some sensor sees.
+    pub unknowns: Vec<Quantity>,
+    /// Mean z of the sensors, before the station's position is added, in mm.
+    pub mean_z_mm: f64,
+    /// +1 where the part turns counter-clockwise.
+    pub direction: f64,
+    sections: usize,
+    setups: usize,
+    odd_motion: bool,
+}
+
+/// One sensor in one setup.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    /// Index of the setup.
+    pub setup: usize,
+    /// Index of the sensor.
+    pub sensor: usize,
+    /// Index of the section.
+    pub section: usize,
+    /// θ' = θ + σ: where the sensor stands, in rad.
+    pub angle_rad: f64,
+    /// θ' − β: where on the part it looks at spindle angle 0, in rad.
+    pub part_angle_rad: f64,
+    /// z minus the sensors' mean z, in mm.
+    pub lever_mm: f64,
+}
+
+/// The unknowns at order 1, where each clamping has an eccentricity of its own in each section.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FirstOrder {
+    /// Eccentricity of a section in a setup: Re C e^{+iα}.
+    Eccentricity {
+        /// Index of the setup.
+        setup: usize,
+        /// Index of the section.
+        section: usize,
+    },
+    /// The part of (x, y) that turns against the spindle: X, with Y = −iX.
+    CounterRotatingShift,
+    /// The part of the tilt that turns against the spindle: E_y, with E_x = iE_y.
+    CounterRotatingTilt,
+}
+
+impl Layout {
+    /// The layout of a rig. `odd_motion` assumes, as the four-sensor paper's equation (7) does, that motion has odd
+    /// orders only, so that it changes sign after half a turn: even orders then count with the opposite sign in every
+    /// setup but the first.
+    #[must_use]
+    pub fn new(rig: &Rig, odd_motion: bool) -> Self {
+        let mean_z_mm = rig.sensors.iter().map(|sensor| sensor.z_mm).sum::<f64>() / rig.sensors.len() as f64;
+        let mut readings = Vec::with_capacity(rig.setups.len() * rig.sensors.len());
+        for (setup, clamping) in rig.setups.iter().enumerate() {
+            for (index, sensor) in rig.sensors.iter().enumerate() {
+                let angle_rad = sensor.angle_rad + clamping.sensors_rad;
+                readings.push(Reading {
+                    setup,
+                    sensor: index,
+                    section: sensor.section,
+                    angle_rad,
+                    part_angle_rad: angle_rad - clamping.part_rad,
+                    lever_mm: sensor.z_mm - mean_z_mm,
+                });
+            }
+        }
+        let sees_x = readings.iter().any(|reading| reading.angle_rad.cos().abs() > ALONG_AXIS);
+        let sees_y = readings.iter().any(|reading| reading.angle_rad.sin().abs() > ALONG_AXIS);
+        let sees_tilt = readings.iter().any(|reading| reading.lever_mm != 0.0);
+        let mut unknowns: Vec<Quantity> = (0..rig.sections.len()).map(Quantity::Form).collect();
+        for (quantity, seen) in [
+            (Quantity::X, sees_x),
+            (Quantity::Y, sees_y),
+            (Quantity::TiltX, sees_tilt && sees_y),
+            (Quantity::TiltY, sees_tilt && sees_x),
+        ] {
+            if seen {
+                unknowns.push(quantity);
+            }
+        }
+        Self {
+            readings,
+            unknowns,
+            mean_z_mm,
+            direction: rig.rotation.direction(),
+            sections: rig.sections.len(),
+            setups: rig.setups.len(),
+            odd_motion,
+        }
+    }
+
+    /// +1, or −1 where motion of this order is assumed to change sign in this setup.
+    #[must_use]
+    pub fn motion_sign(&self, setup: usize, order: usize) -> f64 {
+        if self.odd_motion && setup > 0 && order.is_multiple_of(2) { -1.0 } else { 1.0 }
+    }
+
+    /// What one reading sees of a unit of an unknown, at an order.
+    #[must_use]
+    pub fn coefficient(&self, reading: &Reading, quantity: Quantity, order: usize) -> Complex64 {
+        // Both sines come from the same function, so that sensors at right angles are exactly so.
+        let (cosine, sine) = (exact_cos(reading.angle_rad), exact_cos(reading.angle_rad - FRAC_PI_2));
+        let lever = reading.lever_mm * UM_PER_MM_URAD;
+        let motion = match quantity {
+            Quantity::Form(section) if section == reading.section => {
+                return self.part_phase(reading, order);
+            }
+            Quantity::Form(_) => return Complex64::ZERO,
+            Quantity::X => cosine,
+            Quantity::Y => sine,
+            Quantity::TiltX => -lever * sine,
+            Quantity::TiltY => lever * cosine,
+        };
+        Complex64::from(self.motion_sign(reading.setup, order) * motion)
+    }
+
+    /// e^{±in(θ'−β)}, + where the part turns counter-clockwise.
+    #[must_use]
+    pub fn part_phase(&self, reading: &Reading, order: usize) -> Complex64 {
+        // The angle is reduced before it is multiplied by a large order.
+        let turns = (reading.part_angle_rad / std::f64::consts::TAU).rem_euclid(1.0);
+        let angle = (turns * order as f64).rem_euclid(1.0) * std::f64::consts::TAU;
+        Complex64::new(exact_cos(angle), self.direction * exact_cos(angle - FRAC_PI_2))
+    }
+
+    /// Aₙ, `[reading][unknown]`.
+    #[must_use]
+    pub fn matrix(&self, order: usize) -> Vec<Complex64> {
+        let row = |reading| self.unknowns.iter().map(move |unknown| self.coefficient(reading, *unknown, order));
+        self.readings.iter().flat_map(row).collect()
+    }
+
+    /// The unknowns at order 1.
+    #[must_use]
+    pub fn first_order_unknowns(&self) -> Vec<FirstOrder> {
+        let setups = 0..self.setups;
+        let each = |setup| (0..self.sections).map(move |section| FirstOrder::Eccentricity { setup, section });
+        let mut unknowns: Vec<FirstOrder> = setups.flat_map(each).collect();
+        unknowns.push(FirstOrder::CounterRotatingShift);
+        if self.unknowns.iter().any(|unknown| matches!(unknown, Quantity::TiltX | Quantity::TiltY)) {
+            unknowns.push(FirstOrder::CounterRotatingTilt);
+        }
+        unknowns
+    }
+
+    /// The matrix at order 1, `[reading][first-order unknown]`.
+    ///
+    /// cos θ' X + sin θ' Y = X e^{−iθ'} where Y = −iX, and likewise z(cos θ' E_y − sin θ' E_x) = z E_y e^{−iθ'} where
+    /// E_x = iE_y; the other half, e^{+iθ'}, turns with the part and is what ISO 230-7 removes as centring.
+    #[must_use]
+    pub fn first_order_matrix(&self) -> Vec<Complex64> {
+        let unknowns = self.first_order_unknowns();
+        let row = |reading: &Reading| {
+            let against = Complex64::from_polar(1.0, -self.direction * reading.angle_rad);
+            unknowns
+                .iter()
+                .map(|unknown| match unknown {
+                    FirstOrder::Eccentricity { setup, section } => {
+                        let seen = *setup == reading.setup && *section == reading.section;
+                        if seen { self.part_phase(reading, 1) } else { Complex64::ZERO }
+                    }
+                    FirstOrder::CounterRotatingShift => against,
+                    FirstOrder::CounterRotatingTilt => against * reading.lever_mm * UM_PER_MM_URAD,
+                })
+                .collect::<Vec<_>>()
+        };
+        self.readings.iter().flat_map(row).collect()
+    }
+
+    /// Factors one order's matrix, rows weighted where `weights` (`[reading][reading]`) is given.
+    #[must_use]
+    pub fn factor(&self, order: usize) -> PivotedQr {
+        PivotedQr::new(self.readings.len(), self.unknowns.len(), &self.matrix(order), RANK_TOLERANCE)
+    }
+
+    /// Factors any matrix with this layout's readings as rows.
+    #[must_use]
+    pub fn factor_matrix(&self, columns: usize, matrix: &[Complex64]) -> PivotedQr {
+        PivotedQr::new(self.readings.len(), columns, matrix, RANK_TOLERANCE)
+    }
+
+    /// Whether each unknown can be told at an order.
+    ///
+    /// At order 1 form is 0 by definition and motion is its counter-rotating part; both are lost where one clamping
+    /// cannot tell eccentricity from co-rotating motion even in principle (A₁ is deficient), or no sensor pair tells
+    /// the counter-rotating part.
+    #[must_use]
+    pub fn observable(&self, order: usize) -> Vec<bool> {
+        let mut observable = self.factor(order).observable(NULL_TOLERANCE);
+        if order == 1 {
+            let unknowns = self.first_order_unknowns();
+            let first = self.factor_matrix(unknowns.len(), &self.first_order_matrix()).observable(NULL_TOLERANCE);
+            let told = |wanted| unknowns.iter().zip(&first).any(|(unknown, told)| *unknown == wanted && *told);
+            for (quantity, observable) in self.unknowns.iter().zip(&mut observable) {
+                *observable &= match quantity {
+                    Quantity::Form(_) => true,
+                    // Motion is reported at the spindle's reference, where shift and tilt mix.
+                    Quantity::X | Quantity::Y => {
+                        told(FirstOrder::CounterRotatingShift)
+                            && (!unknowns.contains(&FirstOrder::CounterRotatingTilt)
+                                || told(FirstOrder::CounterRotatingTilt))
+                    }
+                    Quantity::TiltX | Quantity::TiltY => told(FirstOrder::CounterRotatingTilt),
+                };
+            }
+        }
+        observable
+    }
+
+    /// What can be told at orders 1 to `max_order`, with plain (unweighted) least squares.
+    #[must_use]
+    pub fn assess(&self, max_order: usize) -> Assessment {
+        let orders = (1..=max_order).map(|order| self.assess_order(order)).collect();
+        Assessment { unknowns: self.unknowns.clone(), orders, notes: Vec::new() }
+    }
+
+    fn assess_order(&self, order: usize) -> OrderAssessment {
+        let qr = self.factor(order);
+        let observable = self.observable(order);
+        let covariance = qr.covariance();
+        let width = self.unknowns.len();
+        let noise_gain = observable
+            .iter()
+            .enumerate()
+            .map(|(index, seen)| if *seen { covariance[index * width + index].re.sqrt() } else { f64::NAN })
+            .collect();
+        let lost_because = observable.contains(&false).then(|| {
+            let names = self.unknowns.iter().zip(&observable).filter(|(_, seen)| !**seen);
+            let names: Vec<&str> = names.map(|(quantity, _)| quantity.id()).collect();
+            if order == 1 {
+                "1/rev: eccentricity of the part and motion that turns with it are the same in every reading".to_owned()
+            } else {
+                format!("a {order}/rev change of {} leaves every reading as it is", names.join(", "))
+            }
+        });
+        OrderAssessment {
+            order,
+            rank: qr.rank(),
+            residual_dof: self.readings.len() - qr.rank(),
+            observable,
+            noise_gain,
+            lost_because,
+        }
+    }
+}
+
+/// cos, with the exact 0 where the angle is a quarter turn: cos(π/2) is 6e-17 in floating point, which would make a
+/// lost order look like a very noisy one.
+fn exact_cos(angle_rad: f64) -> f64 {
+    let cosine = angle_rad.cos();
+    if cosine.abs() < 1e-15 { 0.0 } else { cosine }
+}

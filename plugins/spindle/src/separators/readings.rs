@@ -1,0 +1,105 @@
+//! One station's averaged readings, in the layout's order.
+
+use runout_core::{Complex64, Error, Result, rig::Rig, stage::Station};
+
+use crate::layout::Layout;
+
+/// Averaged readings of one station: Re Σ uₙ e^{−inΦ}, with their covariance.
+#[derive(Debug, Clone)]
+pub struct Readings {
+    /// Number of readings: sensors times setups.
+    pub count: usize,
+    /// Highest order that all profiles hold.
+    pub max_order: usize,
+    /// Equal angles a turn on which the profiles were averaged.
+    pub samples_per_rev: usize,
+    /// Coefficients in µm, `[order][reading]`, orders from 0.
+    pub mean: Vec<Complex64>,
+    /// Covariance of `mean` in µm², one matrix `[order][channel][channel]` a setup, channels in the rig's order.
+    pub covariance: Option<Vec<Vec<Complex64>>>,
+    /// Turns averaged in each setup.
+    pub turns: Vec<usize>,
+}
+
+impl Readings {
+    /// Gathers the profiles of a station.
+    ///
+    /// # Errors
+    /// When a setup or a sensor of the rig is missing, or the profiles' angles differ.
+    pub fn gather(rig: &Rig, layout: &Layout, station: &Station) -> Result<Self> {
+        let object = || format!("station {}", station.name);
+        let sensors = rig.sensors.len();
+        let mut ordered = Vec::with_capacity(rig.setups.len());
+        for (setup, clamping) in rig.setups.iter().enumerate() {
+            let profile = station
+                .profiles
+                .iter()
+                .find(|profile| profile.setup == setup)
+                .ok_or_else(|| Error::new("separate", object(), format!("setup `{}` is missing", clamping.id)))?;
+            let mut channels = Vec::with_capacity(sensors);
+            for (index, sensor) in rig.sensors.iter().enumerate() {
+                let channel = profile.sensors.iter().position(|found| *found == index);
+                channels.push(channel.ok_or_else(|| {
+                    Error::new("separate", &profile.object, format!("sensor `{}` was not recorded", sensor.id))
+                })?);
+            }
+            ordered.push((profile, channels));
+        }
+        let max_order = ordered.iter().map(|(profile, _)| profile.max_order()).min().unwrap_or(0);
+        let samples_per_rev = ordered.first().map_or(0, |(profile, _)| profile.samples_per_rev);
+        if ordered.iter().any(|(profile, _)| profile.samples_per_rev != samples_per_rev) {
+            return Err(Error::new("separate", object(), "the setups were averaged on different numbers of angles"));
+        }
+        let mut mean = Vec::with_capacity((max_order + 1) * layout.readings.len());
+        for order in 0..=max_order {
+            for (profile, channels) in &ordered {
+                let coefficients = profile.order(order);
+                mean.extend(channels.iter().map(|channel| coefficients[*channel]));
+            }
+        }
+        let covariance = ordered
+            .iter()
+            .map(|(profile, channels)| {
+                let width = profile.channels();
+                let mut matrices = Vec::with_capacity((max_order + 1) * sensors * sensors);
+                for order in 0..=max_order {
+                    let matrix = profile.order_covariance(order)?;
+                    for row in channels {
+                        matrices.extend(channels.iter().map(|col| matrix[row * width + col]));
+                    }
+                }
+                Some(matrices)
+            })
+            .collect();
+        Ok(Self {
+            count: layout.readings.len(),
+            max_order,
+            samples_per_rev,
+            mean,
+            covariance,
+            turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
+        })
+    }
+
+    /// The readings of one order.
+    #[must_use]
+    pub fn order(&self, order: usize) -> &[Complex64] {
+        &self.mean[order * self.count..(order + 1) * self.count]
+    }
+
+    /// Covariance of one order across all readings, `[reading][reading]`: setups are independent of each other.
+    #[must_use]
+    pub fn order_covariance(&self, order: usize) -> Option<Vec<Complex64>> {
+        let setups = self.covariance.as_ref()?;
+        let sensors = self.count / setups.len();
+        let mut joined = vec![Complex64::ZERO; self.count * self.count];
+        for (setup, matrices) in setups.iter().enumerate() {
+            let matrix = &matrices[order * sensors * sensors..(order + 1) * sensors * sensors];
+            for row in 0..sensors {
+                let start = (setup * sensors + row) * self.count + setup * sensors;
+                joined[start..start + sensors].copy_from_slice(&matrix[row * sensors..(row + 1) * sensors]);
+            }
+        }
+        Some(joined)
+    }
+}

@@ -1,0 +1,163 @@
+//! Second-order geometry: a sensor's straight line meets the displaced profile.
+//!
+//! With the part's axis off by (along, t) as the sensor sees it, the line meets the profile of radius ρ = R + h at
+//! α* = α − asin(t/ρ(α*)), at u = along + √(ρ(α*)² − t²) − R (`physics.md` section 1). What exceeds the linear reading
+//! along + h(α) is h(α*) − h(α) − t²/(ρ + √(ρ² − t²)), written so that nothing cancels.
+
+use std::f64::consts::TAU;
+
+use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
+
+use super::solution::Estimate;
+use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
+
+/// Finer grid on which form is tabulated, per angle of the profile.
+const OVERSAMPLING: usize = 4;
+/// Points of the Lagrange interpolation: at fourfold oversampling, orders up to a quarter of the samples a turn are
+/// interpolated to 1e-6 of their amplitude.
+const POINTS: usize = 8;
+/// The shift asin(t/ρ) changes by less than 1e-9 of itself after two rounds: ρ varies by 1e-3 at most.
+const ROUNDS: usize = 2;
+
+/// Computes what exact geometry adds to linear readings.
+pub struct SecondOrder<'a> {
+    layout: &'a Layout,
+    radius_um: f64,
+    turn: Fourier,
+    fine: Fourier,
+    table: Vec<Vec<f64>>,
+}
+
+impl<'a> SecondOrder<'a> {
+    pub fn new(layout: &'a Layout, part_radius_mm: f64, samples_per_rev: usize) -> Self {
+        Self {
+            layout,
+            radius_um: part_radius_mm * 1e3,
+            turn: Fourier::new(samples_per_rev),
+            fine: Fourier::new(samples_per_rev * OVERSAMPLING),
+            table: Vec::new(),
+        }
+    }
+
+    /// Writes the excess over the linear readings, coefficients of e^{−inΦ}, to `excess` (`[order][reading]`).
+    pub fn excess(&mut self, estimate: &Estimate, excess: &mut [Complex64]) {
+        let layout = self.layout;
+        let count = layout.readings.len();
+        let max_order = excess.len() / count - 1;
+        let samples = self.turn.length();
+        self.tabulate(estimate, max_order);
+        let mut motions = Vec::new();
+        let mut harmonics = vec![Complex64::ZERO; max_order + 1];
+        let mut curve = vec![0.0; samples];
+        for (index, reading) in layout.readings.iter().enumerate() {
+            if motions.get(reading.setup).is_none() {
+                motions.push(self.motion(estimate, reading.setup, max_order));
+            }
+            let [x, y, tilt_x, tilt_y] = &motions[reading.setup];
+            let eccentricity = estimate.eccentricity(layout, reading.setup, reading.section);
+            let (sine, cosine) = reading.angle_rad.sin_cos();
+            let lever = reading.lever_mm * UM_PER_MM_URAD;
+            let table = &self.table[reading.section];
+            for (step, value) in curve.iter_mut().enumerate() {
+                let turned = layout.direction * TAU * step as f64 / samples as f64;
+                let part_angle = reading.part_angle_rad - turned;
+                // The eccentricity Re C e^{iα} is along the sensor's line; a quarter turn on, it is across.
+                let ahead = eccentricity * Complex64::from_polar(1.0, part_angle);
+                let across_motion = cosine * (y[step] - lever * tilt_x[step]) - sine * (x[step] + lever * tilt_y[step]);
+                let across = across_motion - ahead.im;
+                let here = interpolate(table, part_angle);
+                let mut there = here;
+                for _ in 0..ROUNDS {
+                    there = interpolate(table, part_angle - (across / (self.radius_um + there)).asin());
+                }
+                let radius = self.radius_um + there;
+                let sagitta = across * across / (radius + (radius * radius - across * across).sqrt());
+                *value = there - here - sagitta;
+            }
+            self.turn.analyse(curve.iter().copied(), &mut harmonics);
+            for (order, harmonic) in harmonics.iter().enumerate() {
+                excess[order * count + index] = harmonic.conj();
+            }
+        }
+    }
+
+    /// Form of each section on the fine grid, over the part's angle.
+    fn tabulate(&mut self, estimate: &Estimate, max_order: usize) {
+        self.table.clear();
+        let sections = self.layout.unknowns.iter().filter(|unknown| unknown.is_form()).count();
+        for section in 0..sections {
+            let forms =
+                (0..=max_order).map(|order| if order < 2 { Complex64::ZERO } else { estimate.told(order, section) });
+            // The unknown of a clockwise part is the conjugate: see `Layout`.
+            let forms = forms.map(|form| if self.layout.direction < 0.0 { form.conj() } else { form });
+            self.table.push(self.fine.synthesise(forms).to_vec());
+        }
+    }
+
+    /// x, y, tilt about x and y at the sensors' mean z over the spindle's angle, as one setup sees them.
+    fn motion(&mut self, estimate: &Estimate, setup: usize, max_order: usize) -> [Vec<f64>; 4] {
+        [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY].map(|quantity| {
+            let Some(unknown) = self.layout.unknowns.iter().position(|known| *known == quantity) else {
+                return vec![0.0; self.turn.length()];
+            };
+            let layout = self.layout;
+            let harmonics = (0..=max_order).map(|order| {
+                if order == 0 {
+                    Complex64::ZERO
+                } else {
+                    estimate.told(order, unknown).conj() * layout.motion_sign(setup, order)
+                }
+            });
+            self.turn.synthesise(harmonics).to_vec()
+        })
+    }
+}
+
+impl Estimate {
+    /// Eccentricity C of a section in a setup, reading Re C e^{+iα}, in µm.
+    fn eccentricity(&self, layout: &Layout, setup: usize, section: usize) -> Complex64 {
+        let wanted = FirstOrder::Eccentricity { setup, section };
+        let found = layout.first_order_unknowns().iter().position(|unknown| *unknown == wanted);
+        let value = found.map_or(Complex64::ZERO, |index| self.first[index]);
+        if layout.direction < 0.0 { value.conj() } else { value }
+    }
+}
+
+/// Lagrange interpolation in a periodic table.
+fn interpolate(table: &[f64], angle_rad: f64) -> f64 {
+    let position = (angle_rad / TAU).rem_euclid(1.0) * table.len() as f64;
+    let base = position.floor();
+    let offset = position - base;
+    let first = base as usize + table.len() - (POINTS / 2 - 1);
+    let mut sum = 0.0;
+    for (point, weight) in LAGRANGE_WEIGHTS.iter().enumerate() {
+        let mut product = *weight;
+        for other in 0..POINTS {
+            if other != point {
+                product *= offset + (POINTS / 2 - 1) as f64 - other as f64;
+            }
+        }
+        sum += product * table[(first + point) % table.len()];
+    }
+    sum
+}
+
+/// 1/Π(i − j) of eight equally spaced points.
+const LAGRANGE_WEIGHTS: [f64; POINTS] =
+    [-1.0 / 5040.0, 1.0 / 720.0, -1.0 / 240.0, 1.0 / 144.0, -1.0 / 144.0, 1.0 / 240.0, -1.0 / 720.0, 1.0 / 5040.0];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interpolation_of_a_harmonic() {
+        let samples = 2048;
+        let table: Vec<f64> =
+            (0..samples).map(|index| (60.0 * TAU * f64::from(index) / f64::from(samples)).cos()).collect();
+        for angle in [0.0, 0.001, 1.0, -2.5, 6.2] {
+            // (60·2π/2048)⁸ times the largest of the node polynomial over 8!: about 1e-9.
+            assert!((interpolate(&table, angle) - (60.0 * angle).cos()).abs() < 1e-8);
+        }
+    }
+}

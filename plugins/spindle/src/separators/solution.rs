@@ -1,0 +1,320 @@
+//! From operators to a separation: solve, add second-order geometry, propagate covariance, look at the residual.
+
+use runout_core::{
+    Complex64, Result,
+    rig::Rig,
+    separation::{Quantity, Residual, SectionAt, Separation},
+    stage::Station,
+};
+
+use super::{readings::Readings, second_order::SecondOrder, swapped_setups, weights};
+use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
+
+/// Three passes settle the second order; more are allowed for large eccentricities.
+const MAX_PASSES: usize = 8;
+/// Passes end when the readings move less than this, rms.
+const SETTLED_UM: f64 = 1e-9;
+
+/// The linear solution of one order: unknowns = operator · readings.
+#[derive(Debug, Clone)]
+pub struct OrderOperator {
+    /// `[unknown][reading]`.
+    pub operator: Vec<Complex64>,
+    /// Independent columns of the layout's matrix.
+    pub rank: usize,
+}
+
+/// Linear solutions of all orders; entry 0 belongs to order 1 and its own unknowns.
+#[derive(Debug, Clone)]
+pub struct Operators {
+    /// From order 1.
+    pub orders: Vec<OrderOperator>,
+    /// Whether each unknown can be told, `[order − 1][unknown]`.
+    pub observable: Vec<Vec<bool>>,
+    /// W of each order where readings were weighted.
+    pub weights: Option<Vec<Vec<Complex64>>>,
+}
+
+/// The unknowns at all orders, motion at the sensors' mean z.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    width: usize,
+    /// First-order unknowns, as [`Layout::first_order_unknowns`] lists them.
+    pub first: Vec<Complex64>,
+    /// `[order][unknown]` from order 0; order 1 holds the motion that turns against the spindle.
+    values: Vec<Complex64>,
+    told: Vec<bool>,
+}
+
+impl Estimate {
+    /// An unknown at an order, 0 where it cannot be told.
+    #[must_use]
+    pub fn told(&self, order: usize, unknown: usize) -> Complex64 {
+        let index = order * self.width + unknown;
+        if self.told[index] { self.values[index] } else { Complex64::ZERO }
+    }
+}
+
+/// Solves one station.
+pub struct Solver<'a> {
+    pub rig: &'a Rig,
+    pub layout: &'a Layout,
+    pub second_order: bool,
+}
+
+impl Solver<'_> {
+    /// Separates a station with the operators that `method` makes for its readings.
+    ///
+    /// # Errors
+    /// When the station's profiles do not fit the rig.
+    pub fn separate(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Separation> {
+        let mut readings = Readings::gather(self.rig, self.layout, station)?;
+        weights::smooth(&mut readings);
+        let operators = method(&readings);
+        let mut estimate = self.estimate(&operators, &readings.mean, readings.max_order);
+        let mut linear = readings.mean.clone();
+        if self.second_order {
+            let mut geometry = SecondOrder::new(self.layout, self.rig.part_radius_mm, readings.samples_per_rev);
+            let mut excess = vec![Complex64::ZERO; readings.mean.len()];
+            for _ in 0..MAX_PASSES {
+                geometry.excess(&estimate, &mut excess);
+                let mut moved = 0.0;
+                for ((linear, reading), excess) in linear.iter_mut().zip(&readings.mean).zip(&excess) {
+                    let corrected = reading - excess;
+                    moved += (corrected - *linear).norm_sqr();
+                    *linear = corrected;
+                }
+                estimate = self.estimate(&operators, &linear, readings.max_order);
+                if (0.5 * moved / readings.count as f64).sqrt() < SETTLED_UM {
+                    break;
+                }
+            }
+        }
+        let mut warnings = Vec::new();
+        let residual = self.residual(&operators, &readings, &linear);
+        if residual.chi2_per_dof > swapped_setups::SUSPICIOUS_CHI2 {
+            warnings.extend(swapped_setups::suspect(self.rig, self.layout, &operators, &readings));
+        }
+        Ok(self.report(station, &operators, &readings, &estimate, residual, warnings))
+    }
+
+    fn estimate(&self, operators: &Operators, readings: &[Complex64], max_order: usize) -> Estimate {
+        let (width, count) = (self.layout.unknowns.len(), self.layout.readings.len());
+        let mut values = vec![Complex64::ZERO; (max_order + 1) * width];
+        let mut told = vec![true; (max_order + 1) * width];
+        let mut first = Vec::new();
+        for order in 1..=max_order {
+            let solution = apply(&operators.orders[order - 1].operator, &readings[order * count..(order + 1) * count]);
+            told[order * width..(order + 1) * width].copy_from_slice(&operators.observable[order - 1]);
+            if order == 1 {
+                let motion = self.first_order_motion(&solution);
+                values[width..2 * width].copy_from_slice(&motion);
+                first = solution;
+            } else {
+                values[order * width..(order + 1) * width].copy_from_slice(&solution);
+            }
+        }
+        Estimate { width, first, values, told }
+    }
+
+    /// Order 1 as the other orders' unknowns: form 0, motion its counter-rotating part.
+    fn first_order_motion(&self, solution: &[Complex64]) -> Vec<Complex64> {
+        let names = self.layout.first_order_unknowns();
+        let of =
+            |wanted| names.iter().position(|name| *name == wanted).map_or(Complex64::ZERO, |index| solution[index]);
+        let shift = of(FirstOrder::CounterRotatingShift);
+        let tilt = of(FirstOrder::CounterRotatingTilt);
+        let quarter = Complex64::I * self.layout.direction;
+        let value = |quantity: &Quantity| match quantity {
+            Quantity::Form(_) => Complex64::ZERO,
+            Quantity::X => shift,
+            Quantity::Y => -quarter * shift,
+            Quantity::TiltX => quarter * tilt,
+            Quantity::TiltY => tilt,
+        };
+        self.layout.unknowns.iter().map(value).collect()
+    }
+
+    fn residual(&self, operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Residual {
+        let count = readings.count;
+        let (mut squares, mut expected, mut chi2, mut dof) = (0.0, 0.0, 0.0, 0);
+        let mut known = readings.covariance.is_some();
+        for order in 1..=readings.max_order {
+            let OrderOperator { operator, rank } = &operators.orders[order - 1];
+            if *rank == count {
+                continue;
+            }
+            dof += count - rank;
+            let matrix = if order == 1 { self.layout.first_order_matrix() } else { self.layout.matrix(order) };
+            let left = leftover(&matrix, operator, count);
+            let residual = apply(&left, &linear[order * count..(order + 1) * count]);
+            squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+            match readings.order_covariance(order) {
+                Some(covariance) => {
+                    expected += variances(&left, &covariance, count).iter().sum::<f64>();
+                    if let Some(weights) = operators.weights.as_ref().map(|weights| &weights[order - 1]) {
+                        chi2 += apply(weights, &residual).iter().map(Complex64::norm_sqr).sum::<f64>();
+                    }
+                }
+                None => known = false,
+            }
+        }
+        if dof == 0 {
+            return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0 };
+        }
+        // A coefficient of size c is a wave of mean square c²/2.
+        let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
+        let chi2_per_dof = match &operators.weights {
+            _ if !known || expected <= 0.0 => f64::NAN,
+            Some(_) => chi2 / dof as f64,
+            None => squares / expected,
+        };
+        Residual {
+            rms_um: rms(squares),
+            expected_rms_um: if known { rms(expected) } else { f64::NAN },
+            chi2_per_dof,
+            dof: 2 * dof,
+        }
+    }
+
+    fn report(
+        &self,
+        station: &Station,
+        operators: &Operators,
+        readings: &Readings,
+        estimate: &Estimate,
+        residual: Residual,
+        warnings: Vec<String>,
+    ) -> Separation {
+        let layout = self.layout;
+        let (width, count) = (layout.unknowns.len(), readings.count);
+        let to_reference = to_spindle_reference(layout, layout.mean_z_mm + station.z_mm);
+        let mut values = vec![Complex64::ZERO; (readings.max_order + 1) * width];
+        let mut variance = vec![0.0; values.len()];
+        let mut observable = vec![true; values.len()];
+        for order in 1..=readings.max_order {
+            let row = order * width..(order + 1) * width;
+            let mut solved = apply_real(&to_reference, &estimate.values[row.clone()]);
+            let told = &operators.observable[order - 1];
+            if layout.direction < 0.0 {
+                let forms = layout.unknowns.iter().zip(&mut solved).filter(|(unknown, _)| unknown.is_form());
+                forms.for_each(|(_, form)| *form = form.conj());
+            }
+            let spread = readings.order_covariance(order).map(|covariance| {
+                let operator = if order == 1 {
+                    self.first_order_operator(&operators.orders[0].operator, count)
+                } else {
+                    operators.orders[order - 1].operator.clone()
+                };
+                variances(&rows_combined(&to_reference, &operator, count), &covariance, count)
+            });
+            for unknown in 0..width {
+                let index = row.start + unknown;
+                observable[index] = told[unknown];
+                let lost = Complex64::new(f64::NAN, f64::NAN);
+                values[index] = if told[unknown] { solved[unknown] } else { lost };
+                variance[index] = match &spread {
+                    Some(spread) if told[unknown] => spread[unknown],
+                    _ => f64::NAN,
+                };
+            }
+        }
+        let sections = self
+            .rig
+            .sections
+            .iter()
+            .enumerate()
+            .map(|(index, id)| SectionAt { id: id.clone(), z_mm: self.rig.section_z_mm(index) + station.z_mm });
+        Separation {
+            sections: sections.collect(),
+            unknowns: layout.unknowns.clone(),
+            estimate: values,
+            variance,
+            observable,
+            residual,
+            warnings,
+        }
+    }
+
+    /// The operator of order 1 with the other orders' unknowns as rows.
+    fn first_order_operator(&self, operator: &[Complex64], count: usize) -> Vec<Complex64> {
+        let columns: Vec<Vec<Complex64>> = (0..count)
+            .map(|reading| {
+                let column: Vec<Complex64> = operator.iter().skip(reading).step_by(count).copied().collect();
+                self.first_order_motion(&column)
+            })
+            .collect();
+        let width = self.layout.unknowns.len();
+        (0..width).flat_map(|unknown| columns.iter().map(move |column| column[unknown])).collect()
+    }
+}
+
+/// Takes motion from the sensors' mean z to the spindle's reference: x = X − z E_y, y = Y + z E_x.
+fn to_spindle_reference(layout: &Layout, mean_z_mm: f64) -> Vec<f64> {
+    let width = layout.unknowns.len();
+    let lever = mean_z_mm * UM_PER_MM_URAD;
+    let mut matrix = vec![0.0; width * width];
+    for (row, unknown) in layout.unknowns.iter().enumerate() {
+        matrix[row * width + row] = 1.0;
+        let (tilt, sign) = match unknown {
+            Quantity::X => (Quantity::TiltY, -1.0),
+            Quantity::Y => (Quantity::TiltX, 1.0),
+            _ => continue,
+        };
+        if let Some(col) = layout.unknowns.iter().position(|other| *other == tilt) {
+            matrix[row * width + col] = sign * lever;
+        }
+    }
+    matrix
+}
+
+/// Matrix (`[row][col]`) times vector.
+pub fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
+    matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
+}
+
+fn apply_real(matrix: &[f64], vector: &[Complex64]) -> Vec<Complex64> {
+    matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| b * *a).sum()).collect()
+}
+
+fn rows_combined(matrix: &[f64], operator: &[Complex64], count: usize) -> Vec<Complex64> {
+    let width = operator.len() / count;
+    let mut combined = vec![Complex64::ZERO; operator.len()];
+    for (row, weights) in matrix.chunks_exact(width).enumerate() {
+        for (source, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+            for reading in 0..count {
+                combined[row * count + reading] += operator[source * count + reading] * *weight;
+            }
+        }
+    }
+    combined
+}
+
+/// I − A·P, `[reading][reading]`.
+pub fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usize) -> Vec<Complex64> {
+    let width = operator.len() / count;
+    let mut left = vec![Complex64::ZERO; count * count];
+    for row in 0..count {
+        left[row * count + row] = Complex64::ONE;
+        for unknown in 0..width {
+            let entry = matrix[row * width + unknown];
+            for col in 0..count {
+                left[row * count + col] -= entry * operator[unknown * count + col];
+            }
+        }
+    }
+    left
+}
+
+/// Diagonal of M·Σ·Mᴴ for M (`[row][reading]`).
+fn variances(matrix: &[Complex64], covariance: &[Complex64], count: usize) -> Vec<f64> {
+    matrix
+        .chunks_exact(count)
+        .map(|row| {
+            let spread = |col: usize| -> Complex64 {
+                (0..count).map(|inner| row[inner] * covariance[inner * count + col]).sum()
+            };
+            (0..count).map(|col| (spread(col) * row[col].conj()).re).sum::<f64>().max(0.0)
+        })
+        .collect()
+}

@@ -1,0 +1,69 @@
+//! Weights from the scatter over the turns: matrices, since asynchronous motion is common to channels.
+
+use runout_core::{
+    Complex64,
+    numerics::least_squares::{cholesky, invert_lower},
+};
+
+use super::readings::Readings;
+
+/// Orders to each side over which covariances are averaged: the scatter's spectrum is smooth, its estimate is not.
+const SMOOTHING: usize = 2;
+/// With fewer independent samples a channel than this, correlations are shrunk towards none.
+const SAMPLES_A_CHANNEL: f64 = 10.0;
+
+/// Replaces each order's covariance by the mean over its neighbours. Order 1 stays by itself: what shakes the
+/// eccentricity shakes no other order.
+pub fn smooth(readings: &mut Readings) {
+    let (max_order, sensors) = (readings.max_order, readings.count / readings.turns.len().max(1));
+    let size = sensors * sensors;
+    for matrices in readings.covariance.iter_mut().flatten() {
+        let raw = matrices.clone();
+        for order in 2..=max_order {
+            let window = order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order);
+            let share = 1.0 / (window.end() + 1 - window.start()) as f64;
+            for (entry, target) in matrices[order * size..(order + 1) * size].iter_mut().enumerate() {
+                *target = window.clone().map(|near| raw[near * size + entry]).sum::<Complex64>() * share;
+            }
+        }
+    }
+}
+
+/// W with Wᴴ·W = Σ⁻¹ for one order, `[reading][reading]`: it makes errors uncorrelated and of size 1.
+///
+/// `None` where there is no scatter to weigh by (one turn, or turns that are all alike).
+#[must_use]
+pub fn whitening(readings: &Readings, order: usize) -> Option<Vec<Complex64>> {
+    let setups = readings.covariance.as_ref()?;
+    let sensors = readings.count / setups.len();
+    let size = sensors * sensors;
+    let mut weights = vec![Complex64::ZERO; readings.count * readings.count];
+    for (setup, matrices) in setups.iter().enumerate() {
+        let mut matrix = matrices[order * size..(order + 1) * size].to_vec();
+        regularise(&mut matrix, sensors, readings.turns[setup], if order == 1 { 1 } else { 2 * SMOOTHING + 1 });
+        let inverse = invert_lower(sensors, &cholesky(sensors, &matrix)?);
+        for row in 0..sensors {
+            let start = (setup * sensors + row) * readings.count + setup * sensors;
+            weights[start..start + sensors].copy_from_slice(&inverse[row * sensors..(row + 1) * sensors]);
+        }
+    }
+    Some(weights)
+}
+
+fn regularise(matrix: &mut [Complex64], sensors: usize, turns: usize, window: usize) {
+    let samples = (turns.saturating_sub(1) * window) as f64;
+    let shrink = (1.0 - samples / (SAMPLES_A_CHANNEL * sensors as f64)).clamp(0.0, 1.0);
+    let mean_variance =
+        (0..sensors).map(|channel| matrix[channel * sensors + channel].re).sum::<f64>() / sensors as f64;
+    for row in 0..sensors {
+        for col in 0..sensors {
+            let entry = &mut matrix[row * sensors + col];
+            if row == col {
+                // 1e-6 of the variance: far below any estimate's own error, enough to keep the factor real.
+                *entry += 1e-6 * mean_variance;
+            } else {
+                *entry *= 1.0 - shrink;
+            }
+        }
+    }
+}
