@@ -1,0 +1,20 @@
+//! Measurement files.
+
+mod capture;
+mod coding;
+pub mod loader;
+pub mod samples;
+mod stream;
+mod truth;
+pub mod write;
+
+pub(crate) use capture::{CaptureSource, Phase};
+
+/// Samples of all channels; attributes `sensors`, `sample_rate_hz`, and for integers `scale`, `offset`.
+pub(crate) const SAMPLES: &str = "samples";
+/// Sample positions of the once-per-turn mark.
+pub(crate) const INDEX: &str = "index";
+/// Spindle angle of each sample.
+pub(crate) const ANGLE: &str = "angle_deg";
+/// The group of what is declared to be true.
+pub(crate) const TRUTH: &str = "truth";

@@ -1,0 +1,181 @@
+//! The samples of one capture, block after block.
+
+use hdf5_metno::{Dataset, H5Type};
+use ndarray::s;
+use runout_core::{
+    Error, Result,
+    encoder::EncoderScan,
+    measurement::{Block, Capture, SampleStream},
+    rig::Rig,
+};
+
+use super::{
+    capture::{CaptureSource, Phase},
+    samples::SampleType,
+};
+use crate::node::Place;
+
+/// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
+const BLOCK_SAMPLES: usize = 16_384;
+
+/// A block never takes more elements than this, even where the file's chunks are larger.
+const BLOCK_ELEMENTS: usize = 1 << 24;
+
+/// One sensor's column, and how its codes become µm towards the surface.
+#[derive(Debug)]
+struct Column {
+    /// Counted from the first column that is read.
+    offset: usize,
+    gain: f64,
+    zero_um: f64,
+}
+
+/// An opened capture.
+pub(super) struct Hdf5Stream {
+    capture: Capture,
+    dataset: Dataset,
+    place: Place,
+    kind: SampleType,
+    first_column: usize,
+    read_columns: usize,
+    columns: Vec<Column>,
+    encoder: Option<(Dataset, Place, EncoderScan)>,
+    block_samples: usize,
+    next: usize,
+    samples: usize,
+}
+
+impl Hdf5Stream {
+    pub(super) fn new(source: CaptureSource, rig: &Rig, setup: usize, station: &str) -> Result<Self> {
+        let stored = &source.stored;
+        let found = columns_of(&stored.sensors, rig, &source.samples_place)?;
+        let first_column = found.iter().copied().min().unwrap_or(0);
+        let last_column = found.iter().copied().max().unwrap_or(0);
+        // Both factors take the sign, so that turning a sensor round changes no rounding.
+        let columns: Vec<Column> = found
+            .iter()
+            .zip(&rig.sensors)
+            .map(|(column, sensor)| Column {
+                offset: column - first_column,
+                gain: stored.scale[*column] * sensor.sign,
+                zero_um: stored.offset[*column] * sensor.sign,
+            })
+            .collect();
+        let converter_limits_um = stored.limits.map(|limits| {
+            let limits_um = |column: &Column| {
+                let [one, other] = limits.map(|code| code * column.gain + column.zero_um);
+                [one.min(other), one.max(other)]
+            };
+            columns.iter().map(limits_um).collect()
+        });
+        let (marks, scan) = source.phase.marks(stored.samples)?;
+        let capture = Capture {
+            object: source.place.to_string(),
+            setup,
+            station: station.to_owned(),
+            z_mm: source.z_mm,
+            stated_speed_rpm: source.speed_rpm,
+            sample_rate_hz: stored.sample_rate_hz,
+            samples: stored.samples as u64,
+            sensors: (0..rig.sensors.len()).collect(),
+            sensor_ids: rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
+            converter_limits_um,
+            marks,
+            encoder: scan.is_some(),
+            trimmed: Vec::new(),
+            responses: Vec::new(),
+        };
+        let encoder = match (source.phase, scan) {
+            (Phase::Angle(dataset, place), Some(scan)) => Some((dataset, place, scan)),
+            _ => None,
+        };
+        let read_columns = last_column + 1 - first_column;
+        Ok(Self {
+            block_samples: block_samples(source.dataset.chunk().as_deref(), read_columns),
+            samples: stored.samples,
+            kind: stored.kind,
+            capture,
+            dataset: source.dataset,
+            place: source.samples_place,
+            first_column,
+            read_columns,
+            columns,
+            encoder,
+            next: 0,
+        })
+    }
+
+    fn fill<T: H5Type + Copy + Into<f64>>(&self, rows: std::ops::Range<usize>, to: &mut [f64]) -> Result<()> {
+        let columns = self.first_column..self.first_column + self.read_columns;
+        let codes = self.dataset.read_slice_2d::<T, _>(s![rows.clone(), columns]).map_err(|error| {
+            self.place.error(format!("samples {} to {}: {error}", rows.start, rows.end.saturating_sub(1)))
+        })?;
+        let flat = codes.as_slice().ok_or_else(|| self.place.error("the samples came in another order"))?;
+        for (row, to) in flat.chunks_exact(self.read_columns).zip(to.chunks_exact_mut(self.columns.len())) {
+            for (value, column) in to.iter_mut().zip(&self.columns) {
+                let code: f64 = row[column.offset].into();
+                *value = code * column.gain + column.zero_um;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl SampleStream for Hdf5Stream {
+    fn capture(&self) -> &Capture {
+        &self.capture
+    }
+
+    fn next_block(&mut self, block: &mut Block) -> Result<bool> {
+        block.clear();
+        block.start = self.next as u64;
+        let rows = self.next..self.samples.min(self.next + self.block_samples);
+        if rows.is_empty() {
+            return Ok(false);
+        }
+        block.samples.resize(rows.len() * self.columns.len(), 0.0);
+        match self.kind {
+            SampleType::F64 => self.fill::<f64>(rows.clone(), &mut block.samples)?,
+            SampleType::F32 => self.fill::<f32>(rows.clone(), &mut block.samples)?,
+            SampleType::I16 => self.fill::<i16>(rows.clone(), &mut block.samples)?,
+            SampleType::I32 => self.fill::<i32>(rows.clone(), &mut block.samples)?,
+        }
+        if let Some((dataset, place, scan)) = &self.encoder {
+            let angles = dataset.read_slice_1d::<f64, _>(s![rows.clone()]).map_err(|error| place.error(error))?;
+            block.angle_rev.extend(angles.iter().map(|angle_deg| scan.turns(*angle_deg)));
+        }
+        self.next = rows.end;
+        Ok(true)
+    }
+}
+
+/// The file's column of each of the rig's sensors.
+pub(super) fn columns_of(sensors: &[String], rig: &Rig, place: &Place) -> Result<Vec<usize>> {
+    rig.sensors
+        .iter()
+        .map(|sensor| {
+            let mut found = sensors.iter().enumerate().filter(|(_, id)| **id == sensor.id).map(|(column, _)| column);
+            match (found.next(), found.next()) {
+                (Some(column), None) => Ok(column),
+                (Some(_), Some(_)) => Err(place.error(format!("the channel `{}` is there twice", sensor.id))),
+                (None, _) => Err(missing(&sensor.id, sensors, place)),
+            }
+        })
+        .collect()
+}
+
+fn missing(id: &str, sensors: &[String], place: &Place) -> Error {
+    place
+        .error(format!("expected a channel for the sensor `{id}`, found {}", sensors.join(", ")))
+        .help("the rig's sensor ids have to be the names in the attribute `sensors`")
+}
+
+/// Whole chunks at a time, so that none is unpacked twice.
+fn block_samples(chunk: Option<&[usize]>, columns: usize) -> usize {
+    let longest = (BLOCK_ELEMENTS / columns.max(1)).max(1);
+    match chunk {
+        Some([rows, ..]) if *rows >= BLOCK_SAMPLES => (*rows).min(longest),
+        Some([rows, ..]) if *rows > 0 => (BLOCK_SAMPLES - BLOCK_SAMPLES % rows).min(longest),
+        _ => BLOCK_SAMPLES.min(longest),
+    }
+}

@@ -1,0 +1,265 @@
+//! Groups, datasets and attributes with their place in the file, so that every error can name it.
+
+use std::{fmt, path::Path};
+
+use hdf5_metno::{
+    Attribute, Dataset, File, Group, H5Type, Location,
+    dataset::Layout,
+    types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode},
+};
+use runout_core::{Error, Result};
+
+/// Where something stands: `shaft.h5:/initial/s01`.
+#[derive(Debug, Clone)]
+pub(crate) struct Place {
+    file: String,
+    path: String,
+}
+
+impl Place {
+    pub(crate) fn root(file: &Path) -> Self {
+        Self { file: file.display().to_string(), path: "/".into() }
+    }
+
+    pub(crate) fn child(&self, name: &str) -> Self {
+        let separator = if self.path == "/" { "" } else { "/" };
+        Self { file: self.file.clone(), path: format!("{}{separator}{name}", self.path) }
+    }
+
+    pub(crate) fn error(&self, problem: impl ToString) -> Error {
+        Error::new("read", self.to_string(), problem)
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}:{}", self.file, self.path)
+    }
+}
+
+/// Opens a file for reading.
+pub(crate) fn open(path: &Path) -> Result<(File, Place)> {
+    let place = Place::root(path);
+    let shown = path.display().to_string();
+    // The file system's own answer is clearer than the library's.
+    let bytes = std::fs::File::open(path)
+        .and_then(|file| file.metadata())
+        .map_err(|error| Error::new("open", &shown, error))?;
+    if bytes.is_dir() {
+        return Err(Error::new("open", &shown, "expected an HDF5 file, found a folder"));
+    }
+    let file = File::open(path).map_err(|error| {
+        Error::new("open", &shown, format!("no HDF5 file, or a damaged one: {error}"))
+            .help("a file whose writing was interrupted is often truncated")
+    })?;
+    Ok((file, place))
+}
+
+/// Names of the members of a group, sorted.
+pub(crate) fn members(group: &Group, place: &Place) -> Result<Vec<String>> {
+    let mut names = group.member_names().map_err(|error| place.error(error))?;
+    names.sort();
+    Ok(names)
+}
+
+/// A member that must be a group.
+pub(crate) fn group(parent: &Group, place: &Place, name: &str) -> Result<(Group, Place)> {
+    let place = place.child(name);
+    let group = parent.group(name).map_err(|error| place.error(format!("expected a group: {error}")))?;
+    Ok((group, place))
+}
+
+/// A member that must be a dataset.
+pub(crate) fn dataset(parent: &Group, place: &Place, name: &str) -> Result<(Dataset, Place)> {
+    let place = place.child(name);
+    if !parent.link_exists(name) {
+        return Err(place.error("expected a dataset, found nothing of that name"));
+    }
+    let dataset = parent.dataset(name).map_err(|error| place.error(format!("expected a dataset: {error}")))?;
+    Ok((dataset, place))
+}
+
+fn attribute(location: &Location, place: &Place, name: &str) -> Result<Option<Attribute>> {
+    let names = location.attr_names().map_err(|error| place.error(error))?;
+    if !names.iter().any(|known| known == name) {
+        return Ok(None);
+    }
+    let at = |problem: String| place.error(format!("attribute `{name}`: {problem}"));
+    let attribute = location.attr(name).map_err(|error| at(error.to_string()))?;
+    // No attribute of these formats has more elements than a rig has sensors.
+    match attribute.size() {
+        0 => Err(at("expected a value, found none".into())),
+        size if size > 65_536 => Err(at(format!("expected at most 65536 elements, found {size}"))),
+        _ => Ok(Some(attribute)),
+    }
+}
+
+/// The numbers of an attribute, where it is there.
+pub(crate) fn numbers(location: &Location, place: &Place, name: &str) -> Result<Option<Vec<f64>>> {
+    let Some(attribute) = attribute(location, place, name)? else { return Ok(None) };
+    let at = |problem: String| place.error(format!("attribute `{name}`: {problem}"));
+    let found = attribute.dtype().and_then(|dtype| dtype.to_descriptor()).map_err(|error| at(error.to_string()))?;
+    if !matches!(found, TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) | TypeDescriptor::Float(_)) {
+        return Err(at(format!("expected a number, found {}", type_name(&found))));
+    }
+    attribute.read_raw::<f64>().map(Some).map_err(|error| at(error.to_string()))
+}
+
+/// One finite number of an attribute, where it is there.
+pub(crate) fn number(location: &Location, place: &Place, name: &str) -> Result<Option<f64>> {
+    match numbers(location, place, name)?.as_deref() {
+        None => Ok(None),
+        Some([value]) if value.is_finite() => Ok(Some(*value)),
+        Some(other) => {
+            Err(place.error(format!("attribute `{name}`: expected one finite number, found {}", listed(other))))
+        }
+    }
+}
+
+/// One number above 0 of an attribute, where it is there.
+pub(crate) fn positive(location: &Location, place: &Place, name: &str) -> Result<Option<f64>> {
+    match number(location, place, name)? {
+        Some(value) if value <= 0.0 => {
+            Err(place.error(format!("attribute `{name}`: expected a number above 0, found {value}")))
+        }
+        other => Ok(other),
+    }
+}
+
+fn listed(values: &[f64]) -> String {
+    match values {
+        [one] => one.to_string(),
+        many => format!("{} numbers", many.len()),
+    }
+}
+
+/// The texts of an attribute, where it is there.
+pub(crate) fn texts(location: &Location, place: &Place, name: &str) -> Result<Option<Vec<String>>> {
+    let Some(attribute) = attribute(location, place, name)? else { return Ok(None) };
+    let at = |problem: String| place.error(format!("attribute `{name}`: {problem}"));
+    let found = attribute.dtype().and_then(|dtype| dtype.to_descriptor()).map_err(|error| at(error.to_string()))?;
+    let bytes: hdf5_metno::Result<Vec<Vec<u8>>> = match &found {
+        TypeDescriptor::VarLenUnicode => collect(&attribute, VarLenUnicode::as_bytes),
+        TypeDescriptor::VarLenAscii => collect(&attribute, VarLenAscii::as_bytes),
+        TypeDescriptor::FixedUnicode(size) if *size <= LONGEST_FIXED => {
+            collect(&attribute, FixedUnicode::<LONGEST_FIXED>::as_bytes)
+        }
+        TypeDescriptor::FixedAscii(size) if *size <= LONGEST_FIXED => {
+            collect(&attribute, FixedAscii::<LONGEST_FIXED>::as_bytes)
+        }
+        other => return Err(at(format!("expected text, found {}", type_name(other)))),
+    };
+    let bytes = bytes.map_err(|error| at(error.to_string()))?;
+    let text = |bytes| String::from_utf8(bytes).map_err(|_| at("expected text in UTF-8".into()));
+    bytes.into_iter().map(text).collect::<Result<_>>().map(Some)
+}
+
+/// One text of an attribute, where it is there.
+pub(crate) fn text(location: &Location, place: &Place, name: &str) -> Result<Option<String>> {
+    match texts(location, place, name)? {
+        None => Ok(None),
+        Some(mut all) if all.len() == 1 => Ok(all.pop()),
+        Some(all) => Err(place.error(format!("attribute `{name}`: expected one text, found {}", all.len()))),
+    }
+}
+
+const LONGEST_FIXED: usize = 1024;
+
+fn collect<T: H5Type>(attribute: &Attribute, bytes: impl Fn(&T) -> &[u8]) -> hdf5_metno::Result<Vec<Vec<u8>>> {
+    Ok(attribute.read_raw::<T>()?.iter().map(|text| bytes(text).to_vec()).collect())
+}
+
+/// An attribute that has to be there.
+pub(crate) fn needed<T>(value: Option<T>, place: &Place, name: &str) -> Result<T> {
+    value.ok_or_else(|| place.error(format!("expected an attribute `{name}`, found none of that name")))
+}
+
+/// A type in words.
+pub(crate) fn type_name(descriptor: &TypeDescriptor) -> String {
+    let bits = |size: usize| 8 * size;
+    match descriptor {
+        TypeDescriptor::Integer(size) => format!("i{}", bits(*size as usize)),
+        TypeDescriptor::Unsigned(size) => format!("u{}", bits(*size as usize)),
+        TypeDescriptor::Float(size) => format!("f{}", bits(*size as usize)),
+        TypeDescriptor::Boolean => "booleans".into(),
+        TypeDescriptor::Enum(_) => "an enumeration".into(),
+        TypeDescriptor::Compound(_) => "a compound type".into(),
+        TypeDescriptor::FixedAscii(_)
+        | TypeDescriptor::FixedUnicode(_)
+        | TypeDescriptor::VarLenAscii
+        | TypeDescriptor::VarLenUnicode => "text".into(),
+        _ => "another type".into(),
+    }
+}
+
+/// The type of a dataset's elements.
+pub(crate) fn element_type(dataset: &Dataset, place: &Place) -> Result<TypeDescriptor> {
+    dataset.dtype().and_then(|dtype| dtype.to_descriptor()).map_err(|error| place.error(error))
+}
+
+/// Whether numbers of this type can be read as f64.
+pub(crate) fn is_number(descriptor: &TypeDescriptor) -> bool {
+    use TypeDescriptor::{Float, Integer, Unsigned};
+    matches!(descriptor, Float(FloatSize::U4 | FloatSize::U8))
+        || matches!(descriptor, Integer(size) | Unsigned(size) if *size as usize <= IntSize::U8 as usize)
+}
+
+/// The shape of a dataset, once it is certain that as many elements were really written.
+///
+/// A recording that was cut short can declare any shape; HDF5 would fill what is missing with zeros.
+pub(crate) fn written_shape(dataset: &Dataset, place: &Place) -> Result<Vec<usize>> {
+    let shape = dataset.get_shape().map_err(|error| place.error(error))?;
+    let width = dataset.dtype().map_err(|error| place.error(error))?.size();
+    let elements = shape.iter().try_fold(1_usize, |product, extent| product.checked_mul(*extent));
+    let Some(bytes) = elements.and_then(|elements| elements.checked_mul(width)) else {
+        return Err(place.error(format!("the shape {shape:?} is beyond any memory")));
+    };
+    let incomplete = |found: String| {
+        Err(place
+            .error(format!("the shape {shape:?} was declared, but {found}"))
+            .help("the recording was probably interrupted"))
+    };
+    match dataset.layout() {
+        Layout::Chunked => {
+            let (Some(chunk), Some(found)) = (dataset.chunk(), dataset.num_chunks()) else {
+                return Err(place.error("its chunks cannot be counted"));
+            };
+            if chunk.len() != shape.len() || chunk.contains(&0) {
+                return Err(place.error(format!("the chunk shape {chunk:?} does not fit the shape {shape:?}")));
+            }
+            let counts = shape.iter().zip(&chunk).map(|(extent, side)| extent.div_ceil(*side));
+            let expected = counts.fold(1_usize, usize::saturating_mul);
+            if bytes > 0 && found < expected {
+                return incomplete(format!("only {found} of {expected} chunks were written"));
+            }
+        }
+        Layout::Contiguous | Layout::Compact => {
+            let stored = dataset.storage_size();
+            if stored < bytes as u64 && dataset.dcpl().is_ok_and(|plist| plist.external().is_empty()) {
+                return incomplete(format!("only {stored} of {bytes} bytes were written"));
+            }
+        }
+        Layout::Virtual => {}
+    }
+    Ok(shape)
+}
+
+/// Writes a text attribute.
+pub(crate) fn put_text(location: &Location, name: &str, text: &str) -> hdf5_metno::Result<()> {
+    put(location, name, &unicode(text)?)
+}
+
+/// Writes an attribute of one element.
+pub(crate) fn put<T: H5Type>(location: &Location, name: &str, value: &T) -> hdf5_metno::Result<()> {
+    location.new_attr::<T>().create(name)?.write_scalar(value)
+}
+
+/// Writes an attribute of one element, or one element a channel.
+pub(crate) fn put_list<T: H5Type>(location: &Location, name: &str, values: &[T]) -> hdf5_metno::Result<()> {
+    location.new_attr::<T>().shape(values.len()).create(name)?.write(values)
+}
+
+/// A text as HDF5 holds it, without NUL, which would end it.
+pub(crate) fn unicode(text: &str) -> hdf5_metno::Result<VarLenUnicode> {
+    text.parse().map_err(|_| format!("a text must not hold NUL: {text:?}").into())
+}

@@ -1,0 +1,170 @@
+//! The exporter: form, motion and harmonics in one file, with everything that is needed to repeat the run.
+//!
+//! ```text
+//! /            format = "runout-result", version = 1, title, program
+//! /form        section, station, z_mm, angle_deg, form_um, std_um: one dataset a column
+//! /motion      station, angle_deg, x_um, y_um, tilt_x_urad, tilt_y_urad, and std_… of each
+//! /harmonics   quantity, section, station, order, re, im, std, observable
+//! /provenance  configuration, inputs/{path, bytes, blake3}
+//! /warnings    [n] texts
+//! /summary     the run's summary as JSON
+//! ```
+//!
+//! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; texts of the tables are
+//! UTF-8 of fixed length (`.asstr()` in h5py). What was not solved for, and what the layout cannot tell, is NaN.
+
+mod table;
+
+use std::path::PathBuf;
+
+use hdf5_metno::{File, Group, types::VarLenUnicode};
+use runout_core::{
+    Error, Result,
+    atomic_file::PendingFile,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+        run::{RunInfo, StationResult, Summary},
+    },
+    provenance::Input,
+    separation::Quantity,
+    stage::{Export, Exporter},
+    surface::Surface,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::{RESULT_FORMAT, VERSION, node};
+use table::{FormTable, HarmonicsTable, MotionTable};
+
+/// `[[export]] plugin = "hdf5"`: a result file.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ResultConfig {
+    /// The file to write, relative to the TOML.
+    pub path: PathBuf,
+}
+
+impl StageConfig for ResultConfig {
+    type Stage = Box<dyn Exporter>;
+    const NAME: &'static str = "hdf5";
+    const ABOUT: &'static str = "one file with form, motion, harmonics and where they came from";
+
+    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        if self.path.file_name().is_none() {
+            return Err(Fault::at("path", format!("expected the path of a file, found `{}`", self.path.display())));
+        }
+        Ok(Box::new(ResultExporter { path: context.path(&self.path) }))
+    }
+}
+
+struct ResultExporter {
+    path: PathBuf,
+}
+
+impl Exporter for ResultExporter {
+    fn outputs(&self) -> Vec<PathBuf> {
+        vec![self.path.clone()]
+    }
+
+    fn begin(&self, run: &RunInfo) -> Result<Box<dyn Export>> {
+        let pending = PendingFile::new(&self.path)?;
+        let begin = || -> hdf5_metno::Result<ResultExport> {
+            let file = File::with_options().with_fapl(|access| access.libver_v110()).create(pending.path())?;
+            node::put_text(&file, "format", RESULT_FORMAT)?;
+            node::put(&file, "version", &VERSION)?;
+            node::put_text(&file, "title", &run.title)?;
+            Ok(ResultExport {
+                form: FormTable::create(&file)?,
+                motion: MotionTable::create(&file)?,
+                harmonics: HarmonicsTable::create(&file)?,
+                file,
+                // Taken in below: the closure only borrows it.
+                pending: None,
+            })
+        };
+        let export = begin().map_err(|error| pending.failure(error))?;
+        Ok(Box::new(ResultExport { pending: Some(pending), ..export }))
+    }
+}
+
+/// A result file being written. The datasets come first: they have to be closed before the file gets its name.
+struct ResultExport {
+    form: FormTable,
+    motion: MotionTable,
+    harmonics: HarmonicsTable,
+    file: File,
+    pending: Option<PendingFile>,
+}
+
+impl ResultExport {
+    fn failure(&self, problem: impl ToString) -> Error {
+        match &self.pending {
+            Some(pending) => pending.failure(problem),
+            None => Error::new("write", "the result", problem),
+        }
+    }
+
+    fn complete(&self, summary: &Summary) -> hdf5_metno::Result<()> {
+        let provenance = &summary.provenance;
+        node::put_text(&self.file, "program", &provenance.program)?;
+        let json = serde_json::to_string_pretty(summary)
+            .map_err(|error| hdf5_metno::Error::from(format!("the summary: {error}")))?;
+        put_dataset(&self.file, "summary", &json)?;
+        put_texts(&self.file, "warnings", summary.warnings.iter())?;
+        let group = self.file.create_group("provenance")?;
+        put_dataset(&group, "configuration", &provenance.configuration)?;
+        let inputs = group.create_group("inputs")?;
+        put_texts(&inputs, "path", provenance.inputs.iter().map(|input| &input.path))?;
+        put_texts(&inputs, "blake3", provenance.inputs.iter().map(|input| &input.blake3))?;
+        let bytes: Vec<u64> = provenance.inputs.iter().map(|Input { bytes, .. }| *bytes).collect();
+        inputs.new_dataset_builder().with_data(&bytes).create("bytes")?;
+        // What the disk refuses comes out here, and not when the file is closed.
+        self.file.flush()
+    }
+}
+
+impl Export for ResultExport {
+    fn station(&mut self, result: &StationResult) -> Result<()> {
+        let name = table::name(&result.station).map_err(|error| self.failure(error))?;
+        let separation = &result.separation;
+        let mut motions = [None; 4];
+        for (unknown, quantity) in separation.unknowns.iter().enumerate() {
+            let written = match quantity {
+                Quantity::Form(section) => match separation.sections.get(*section) {
+                    Some(section) => self.form.append(result, &name, section, unknown),
+                    None => Err(format!("the form of section {section} has no section").into()),
+                },
+                motion => {
+                    if let Some(place) = table::MOTION.iter().position(|(known, ..)| known == motion) {
+                        motions[place] = Some(unknown);
+                    }
+                    Ok(())
+                }
+            };
+            written
+                .and_then(|()| self.harmonics.append(separation, &name, unknown))
+                .map_err(|error| self.failure(error))?;
+        }
+        if motions.iter().any(Option::is_some) {
+            self.motion.append(result, &name, motions).map_err(|error| self.failure(error))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PathBuf>> {
+        self.complete(summary).map_err(|error| self.failure(error))?;
+        let Self { form, motion, harmonics, file, pending } = *self;
+        drop((form, motion, harmonics, file));
+        pending.map(PendingFile::commit).into_iter().collect()
+    }
+}
+
+fn put_dataset(group: &Group, name: &str, text: &str) -> hdf5_metno::Result<()> {
+    group.new_dataset::<VarLenUnicode>().create(name)?.write_scalar(&node::unicode(text)?)
+}
+
+fn put_texts<'a>(group: &Group, name: &str, texts: impl Iterator<Item = &'a String>) -> hdf5_metno::Result<()> {
+    let texts: hdf5_metno::Result<Vec<VarLenUnicode>> = texts.map(|text| node::unicode(text)).collect();
+    group.new_dataset_builder().with_data(&texts?).create(name).map(|_| ())
+}
