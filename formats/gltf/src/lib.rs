@@ -1,1 +1,66 @@
 //! glTF binary meshes.
+//!
+//! One file holds one mesh: metres, +Y up as glTF demands, so that the spindle's axis z points up: (x, y, z) in mm
+//! becomes (x, z, −y) / 1000. Where a magnified mesh is asked for, it is a second file (`NAME-x1000.glb`): in one scene
+//! the two would hide each other, and a reader that measures a file should find one solid in it.
+
+mod document;
+mod vertices;
+
+use std::{
+    fs::File,
+    io::{self, Write},
+};
+
+use runout_core::{
+    pipeline::{
+        error::Fault,
+        registry::{Context, Plugin, Registry, StageConfig},
+    },
+    stage::Exporter,
+};
+use runout_mesh::{Format, Mesh, MeshConfig, Notes};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// The exporter `gltf`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct GltfConfig(MeshConfig);
+
+impl StageConfig for GltfConfig {
+    type Stage = Box<dyn Exporter>;
+
+    const NAME: &'static str = "gltf";
+    const ABOUT: &'static str = "writes the surface as a glTF binary mesh, coloured by deviation";
+
+    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
+        self.0.check(context, Format { extension: "glb", unit: "m", write })
+    }
+}
+
+/// Adds the exporter `gltf`.
+pub fn register(registry: &mut Registry) {
+    registry.exporters.add(Plugin::of::<GltfConfig>());
+}
+
+/// Writes a GLB: header, JSON chunk, binary chunk (glTF 2.0 specification, 4.4).
+fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
+    let layout = vertices::Layout::of(mesh)?;
+    let (binary, bounds) = vertices::fill(mesh, &layout);
+    let mut json = document::json(&layout, &bounds, notes)?;
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let too_long = |_| io::Error::other("a GLB holds at most 4 GiB; take fewer angles or a larger step_mm");
+    let whole = u32::try_from(12 + 8 + json.len() + 8 + binary.len()).map_err(too_long)?;
+    let mut head = Vec::with_capacity(json.len() + 28);
+    head.extend_from_slice(b"glTF");
+    for number in [2, whole, json.len() as u32] {
+        head.extend_from_slice(&number.to_le_bytes());
+    }
+    head.extend_from_slice(b"JSON");
+    head.extend_from_slice(&json);
+    head.extend_from_slice(&(binary.len() as u32).to_le_bytes());
+    head.extend_from_slice(b"BIN\0");
+    file.write_all(&head)?;
+    file.write_all(&binary)
+}

@@ -1,1 +1,108 @@
 //! Wavefront OBJ meshes.
+//!
+//! Millimetres, z along the spindle as measured. Vertices carry their colour (sRGB, 0 to 1) after their position, as
+//! MeshLab reads it. Where a magnified mesh is asked for, it is a second file (`NAME-x1000.obj`).
+
+mod text;
+
+use std::{
+    fs::File,
+    io::{self, Write},
+};
+
+use runout_core::{
+    pipeline::{
+        error::Fault,
+        registry::{Context, Plugin, Registry, StageConfig},
+    },
+    stage::Exporter,
+};
+use runout_mesh::{COLOUR_STEPS, Format, Mesh, MeshConfig, Notes, UNMEASURED, palette};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use text::Text;
+
+/// The exporter `obj`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct ObjConfig(MeshConfig);
+
+impl StageConfig for ObjConfig {
+    type Stage = Box<dyn Exporter>;
+
+    const NAME: &'static str = "obj";
+    const ABOUT: &'static str = "writes the surface as a Wavefront OBJ mesh in mm, coloured by deviation";
+
+    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
+        self.0.check(context, Format { extension: "obj", unit: "mm", write })
+    }
+}
+
+/// Adds the exporter `obj`.
+pub fn register(registry: &mut Registry) {
+    registry.exporters.add(Plugin::of::<ObjConfig>());
+}
+
+/// Text that is handed to the file at a time, in bytes.
+const PORTION: usize = 1 << 18;
+
+/// Writes comments, vertices with their normals ring by ring, and triangles band by band.
+///
+/// A cap shares the rim's vertices, so that the solid is closed by its very indices, and has a normal of its own.
+fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
+    let mut text = Text::with_capacity(2 * PORTION);
+    for line in notes.lines() {
+        text.raw("# ").raw(&line).raw("\n");
+    }
+    text.raw("# axes: z along the spindle, x at the part's 0 deg\n");
+    text.raw("o ").raw(&object_name(&notes.title)).raw("\n");
+    let colours: [String; COLOUR_STEPS] = palette().map(colour_text);
+    for ring in 0..mesh.rings() {
+        mesh.ring(ring, |vertex| {
+            text.raw("v").vector(vertex.position_mm).raw(&colours[vertex.colour]);
+            text.raw("vn").vector(vertex.normal).raw("\n");
+        });
+        text.flush_above(PORTION, file)?;
+    }
+    let caps = mesh.caps();
+    for cap in &caps {
+        text.raw("v").vector([0.0, 0.0, cap.z_mm]).raw(&colour_text(UNMEASURED));
+        text.raw("vn").vector([0.0, 0.0, cap.normal_z]).raw("\n");
+    }
+    for ring in 0..mesh.rings() - 1 {
+        for pair in mesh.band(ring) {
+            for triangle in pair {
+                // OBJ counts from 1.
+                let [a, b, c] = triangle.map(|vertex| vertex + 1);
+                text.raw("f").corner(a, a).corner(b, b).corner(c, c).raw("\n");
+            }
+        }
+        text.flush_above(PORTION, file)?;
+    }
+    let angles = mesh.angles() as u32;
+    let wall = mesh.rings() as u32 * angles;
+    for (index, cap) in caps.iter().enumerate() {
+        let centre = wall + index as u32;
+        for triangle in cap.triangles(angles, centre, cap.ring as u32 * angles) {
+            let [a, b, c] = triangle.map(|vertex| vertex + 1);
+            text.raw("f").corner(a, centre + 1).corner(b, centre + 1).corner(c, centre + 1).raw("\n");
+        }
+        text.flush_above(PORTION, file)?;
+    }
+    text.flush_above(0, file)?;
+    file.flush()
+}
+
+/// Names of objects hold no blanks.
+fn object_name(title: &str) -> String {
+    let name: String =
+        title.chars().map(|letter| if letter.is_whitespace() || letter.is_control() { '_' } else { letter }).collect();
+    if name.is_empty() { "surface".into() } else { name }
+}
+
+/// " r g b" and the line's end; four digits keep every one of 256 steps apart.
+fn colour_text(srgb: [u8; 3]) -> String {
+    let [r, g, b] = srgb.map(|channel| f64::from(channel) / 255.0);
+    format!(" {r:.4} {g:.4} {b:.4}\n")
+}

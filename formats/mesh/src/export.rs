@@ -1,0 +1,99 @@
+//! The exporter around a format.
+
+use std::{fs::File, io, path::PathBuf};
+
+use runout_core::{
+    Error, Result,
+    atomic_file::PendingFile,
+    pipeline::run::{RunInfo, StationResult, Summary},
+    stage::{Export, Exporter},
+    surface::Surface,
+};
+
+use crate::{
+    config::MeshConfig,
+    mesh::Mesh,
+    notes::{Band, Notes},
+};
+
+/// How a mesh becomes a file.
+#[derive(Debug, Clone, Copy)]
+pub struct Format {
+    /// Of its files, without the dot.
+    pub extension: &'static str,
+    /// Of its positions.
+    pub unit: &'static str,
+    /// Writes one mesh into an empty file.
+    pub write: fn(&Mesh, &Notes, &mut File) -> io::Result<()>,
+}
+
+/// Writes the surface at true scale, and magnified where asked.
+pub(crate) struct MeshExporter {
+    pub(crate) format: Format,
+    pub(crate) config: MeshConfig,
+}
+
+/// Files that wait for the surface.
+struct MeshExport {
+    format: Format,
+    config: MeshConfig,
+    files: Vec<Target>,
+    band: Band,
+}
+
+struct Target {
+    place: PendingFile,
+    file: File,
+    scale: f64,
+}
+
+impl Exporter for MeshExporter {
+    fn outputs(&self) -> Vec<PathBuf> {
+        self.config.files().into_iter().map(|(path, _)| path).collect()
+    }
+
+    fn needs_surface(&self) -> bool {
+        true
+    }
+
+    fn begin(&self, _run: &RunInfo) -> Result<Box<dyn Export>> {
+        // Opened now: a folder that cannot be written to shows before the work, not after it.
+        let open = |(path, scale)| {
+            let place = PendingFile::new(path)?;
+            let file = place.create()?;
+            Ok(Target { place, file, scale })
+        };
+        let files: Result<Vec<_>> = self.config.files().into_iter().map(open).collect();
+        Ok(Box::new(MeshExport {
+            format: self.format,
+            config: self.config.clone(),
+            files: files?,
+            band: Band::default(),
+        }))
+    }
+}
+
+impl Export for MeshExport {
+    fn station(&mut self, result: &StationResult) -> Result<()> {
+        self.band.add(result);
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>, summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PathBuf>> {
+        let surface = surface.ok_or_else(|| {
+            Error::new("write", self.config.path.display().to_string(), "the run built no surface to draw")
+        })?;
+        let checksum = surface.checksum();
+        for Target { place, file, scale } in &mut self.files {
+            let mesh = Mesh::new(surface, *scale, self.config.capped, self.config.colour_range_um)?;
+            let notes = Notes::new(&self.format, &mesh, surface, &checksum, &self.band, summary);
+            (self.format.write)(&mesh, &notes, file).map_err(|error| place.failure(error))?;
+        }
+        // Named only when all of them are written. Closed first: some systems do not rename what is open.
+        let written = self.files.into_iter().map(|Target { place, file, .. }| {
+            drop(file);
+            place.commit()
+        });
+        written.collect()
+    }
+}

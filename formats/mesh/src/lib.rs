@@ -1,0 +1,17 @@
+//! What mesh formats share.
+//!
+//! A [`Surface`](runout_core::surface::Surface) becomes a [`Mesh`]: a wall of rings that closes at 0°, with caps on its
+//! ends where asked. A format is a [`Format`]: an extension, a unit and a function that writes one mesh; configuration,
+//! the second, magnified file, notes and atomic files are here.
+
+mod colour;
+mod config;
+mod export;
+mod mesh;
+mod notes;
+
+pub use colour::{ColourScale, STEPS as COLOUR_STEPS, UNMEASURED, linear, palette};
+pub use config::MeshConfig;
+pub use export::Format;
+pub use mesh::{Cap, Mesh, Vertex};
+pub use notes::{InputNote, Notes};
