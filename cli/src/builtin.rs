@@ -1,0 +1,20 @@
+//! What this program has on board: the one list.
+
+use runout_core::pipeline::Registry;
+
+/// Every plugin that is compiled in.
+#[must_use]
+pub fn registry() -> Registry {
+    let mut registry = Registry::default();
+    for register in [
+        runout_hdf5::register,
+        runout_spindle::register,
+        runout_cylinder::register,
+        runout_parquet::register,
+        runout_gltf::register,
+        runout_obj::register,
+    ] {
+        register(&mut registry);
+    }
+    registry
+}

@@ -1,0 +1,191 @@
+//! `runout check`: everything that can be said without the data.
+
+use runout_core::{
+    pipeline::{
+        Pipeline,
+        document::{Document, Sources},
+        run::LostOrders,
+    },
+    rig::{Rig, Rotation},
+    separation::{Assessment, OrderAssessment, Quantity},
+};
+use schemars::JsonSchema;
+use serde::Serialize;
+use toml::{Spanned, de::DeValue};
+
+use super::{pipeline, print};
+use crate::{args::PipelineArgs, failure::Failure, render};
+
+/// What can be said without the data.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Report {
+    /// The pipeline's title.
+    pub title: String,
+    /// The plugins in the order in which data meet them.
+    pub stages: Vec<Stage>,
+    /// The rig in numbers, where there is one.
+    pub rig: Option<RigSize>,
+    /// What the rig can and cannot separate; absent for measured points.
+    #[serde(flatten)]
+    pub separability: Option<Separability>,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// A plugin in its place.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Stage {
+    /// The table's key: "load", "preprocess", "separate", "export".
+    pub stage: &'static str,
+    /// The plugin's name.
+    pub plugin: String,
+}
+
+/// A rig in numbers.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct RigSize {
+    /// Displacement sensors.
+    pub sensors: usize,
+    /// Circles of the part that they look at.
+    pub sections: usize,
+    /// Setups.
+    pub setups: usize,
+    /// Nominal radius of the part, in mm.
+    pub part_radius_mm: f64,
+    /// "ccw" or "cw", seen against +z.
+    pub rotation: Rotation,
+}
+
+/// What a rig can and cannot separate.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Separability {
+    /// What is solved for, per order.
+    pub unknowns: Vec<Unknown>,
+    /// Orders that cannot be separated.
+    pub lost_orders: LostOrders,
+    /// One entry an order, ascending from 1.
+    pub orders: Vec<Order>,
+}
+
+/// Something that is solved for.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Unknown {
+    /// "form", "x", "y", "tilt_x", "tilt_y".
+    pub quantity: &'static str,
+    /// The section whose form it is; absent for motion.
+    pub section: Option<String>,
+    /// "um" or "urad".
+    pub unit: &'static str,
+}
+
+/// One order.
+#[derive(Debug, Serialize, JsonSchema)]
+#[allow(clippy::struct_field_names, reason = "the number of an order is what the standards call its order")]
+pub struct Order {
+    /// Undulations per revolution.
+    pub order: usize,
+    /// Rank of the layout's matrix.
+    pub rank: usize,
+    /// Readings (complex) that are left over for a residual.
+    pub residual_dof: usize,
+    /// Whether each of `unknowns` can be told.
+    pub observable: Vec<bool>,
+    /// Standard deviation of each of `unknowns`, in its unit, for 1 µm in every reading; null where it cannot be told.
+    pub noise_gain: Vec<Option<f64>>,
+    /// Why something cannot be told.
+    pub lost_because: Option<String>,
+}
+
+impl Unknown {
+    /// "form a", "tilt_x".
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.section.as_ref().map_or_else(|| self.quantity.to_owned(), |id| format!("{} {id}", self.quantity))
+    }
+}
+
+/// Checks a pipeline and says what it can do.
+///
+/// # Errors
+/// When the configuration is wrong.
+pub fn execute(args: &PipelineArgs, json: bool) -> Result<(), Failure> {
+    let (sources, pipeline) = pipeline(args)?;
+    let report = report(&sources, &pipeline)?;
+    print(&report, json, render::check::text)
+}
+
+fn report(sources: &Sources, pipeline: &Pipeline) -> Result<Report, Failure> {
+    let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
+    if let Err(error) = pipeline.loader.open(pipeline.rig.as_ref()) {
+        notes.push(format!("the data are not there yet, or cannot be used: {error}"));
+    }
+    if pipeline.exporters.is_empty() {
+        notes.push("there is no [[export]]: a run would only print its summary".into());
+    }
+    Ok(Report {
+        title: pipeline.title.clone(),
+        stages: stages(sources)?,
+        rig: pipeline.rig.as_ref().map(RigSize::from),
+        separability: pipeline.assessment.as_ref().map(|found| Separability::new(found, pipeline.rig.as_ref())),
+        notes,
+    })
+}
+
+fn stages(sources: &Sources) -> Result<Vec<Stage>, Failure> {
+    let document = Document::parse(sources)?;
+    let root = document.root().get_ref();
+    let mut stages = Vec::new();
+    for stage in ["load", "preprocess", "separate", "export"] {
+        let name = |table: &DeValue| Some(table.get("plugin")?.get_ref().as_str()?.to_owned());
+        let names: Vec<String> = match root.get(stage).map(Spanned::get_ref) {
+            Some(DeValue::Array(tables)) => tables.iter().filter_map(|table| name(table.get_ref())).collect(),
+            Some(table) => name(table).into_iter().collect(),
+            None => Vec::new(),
+        };
+        stages.extend(names.into_iter().map(|plugin| Stage { stage, plugin }));
+    }
+    Ok(stages)
+}
+
+impl From<&Rig> for RigSize {
+    fn from(rig: &Rig) -> Self {
+        Self {
+            sensors: rig.sensors.len(),
+            sections: rig.sections.len(),
+            setups: rig.setups.len(),
+            part_radius_mm: rig.part_radius_mm,
+            rotation: rig.rotation,
+        }
+    }
+}
+
+impl Separability {
+    fn new(assessment: &Assessment, rig: Option<&Rig>) -> Self {
+        let unknown = |quantity: &Quantity| Unknown {
+            quantity: quantity.id(),
+            section: match quantity {
+                Quantity::Form(section) => rig.and_then(|rig| rig.sections.get(*section)).cloned(),
+                _ => None,
+            },
+            unit: quantity.unit(),
+        };
+        Self {
+            unknowns: assessment.unknowns.iter().map(unknown).collect(),
+            lost_orders: assessment.into(),
+            orders: assessment.orders.iter().map(Order::from).collect(),
+        }
+    }
+}
+
+impl From<&OrderAssessment> for Order {
+    fn from(order: &OrderAssessment) -> Self {
+        Self {
+            order: order.order,
+            rank: order.rank,
+            residual_dof: order.residual_dof,
+            observable: order.observable.clone(),
+            noise_gain: order.noise_gain.iter().map(|gain| gain.is_finite().then_some(*gain)).collect(),
+            lost_because: order.lost_because.clone(),
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! `runout plugins`: what is on board, and the keys of each.
+
+use runout_core::pipeline::{Registry, error::known_names, registry::Catalogue};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::print;
+use crate::{
+    args::PluginsArgs,
+    builtin,
+    failure::Failure,
+    render::{keys, table::Table},
+};
+
+/// One plugin.
+#[derive(Debug, Serialize)]
+pub struct Entry {
+    /// The table's key in TOML; "simulate" for scenarios.
+    pub stage: &'static str,
+    /// Kebab-case name in TOML.
+    pub name: &'static str,
+    /// What it does.
+    pub about: &'static str,
+    /// JSON Schema of its keys.
+    pub schema: Value,
+}
+
+/// Lists the plugins, or the keys of those with one name.
+///
+/// # Errors
+/// When the name is unknown.
+pub fn execute(args: &PluginsArgs, json: bool) -> Result<(), Failure> {
+    let entries = entries(&builtin::registry());
+    match &args.name {
+        None => print(&entries.iter().collect::<Vec<_>>(), json, |entries| list(entries)),
+        Some(name) => match named(&entries, name) {
+            found if found.is_empty() => Err(unknown(&entries, name, &[])),
+            found => {
+                print(&found, json, |found| found.iter().map(|entry| describe(entry)).collect::<Vec<_>>().join("\n"))
+            }
+        },
+    }
+}
+
+/// Every plugin, by stage.
+#[must_use]
+pub fn entries(registry: &Registry) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    add(&mut entries, "load", &registry.loaders);
+    add(&mut entries, "preprocess", &registry.preprocessors);
+    add(&mut entries, "separate", &registry.separators);
+    add(&mut entries, "export", &registry.exporters);
+    add(&mut entries, "simulate", &registry.simulators);
+    entries
+}
+
+fn add<S>(entries: &mut Vec<Entry>, stage: &'static str, catalogue: &Catalogue<S>) {
+    entries.extend(catalogue.iter().map(|plugin| Entry {
+        stage,
+        name: plugin.name,
+        about: plugin.about,
+        schema: plugin.schema().to_value(),
+    }));
+}
+
+/// Those that are meant by a name alone, or by `stage/name`.
+#[must_use]
+pub fn named<'a>(entries: &'a [Entry], name: &str) -> Vec<&'a Entry> {
+    let meant = |entry: &&Entry| match name.split_once('/') {
+        Some((stage, name)) => entry.stage == stage && entry.name == name,
+        None => entry.name == name,
+    };
+    entries.iter().filter(meant).collect()
+}
+
+/// The failure that says which names there are.
+#[must_use]
+pub fn unknown(entries: &[Entry], name: &str, others: &[&str]) -> Failure {
+    let mut known: Vec<&str> = entries.iter().map(|entry| entry.name).chain(others.iter().copied()).collect();
+    known.sort_unstable();
+    known.dedup();
+    Failure::Name { message: format!("unknown name `{name}`"), help: known_names(name, known) }
+}
+
+fn list(entries: &[&Entry]) -> String {
+    let mut table = Table::new(3, ["stage", "plugin", "does"]);
+    for entry in entries {
+        table.row([entry.stage, entry.name, entry.about]);
+    }
+    format!("{}\n  The keys of one: runout plugins NAME\n", table.text())
+}
+
+fn describe(entry: &Entry) -> String {
+    let table = match entry.stage {
+        "simulate" => "a scenario".to_owned(),
+        stage @ ("preprocess" | "export") => format!("[[{stage}]]"),
+        stage => format!("[{stage}]"),
+    };
+    format!("{} ({table}): {}\n\n{}", entry.name, entry.about, keys::text(&entry.schema))
+}

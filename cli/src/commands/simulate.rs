@@ -1,0 +1,141 @@
+//! `runout simulate`: a campaign with declared truth and effects.
+
+use std::path::PathBuf;
+
+use runout_core::{
+    Error,
+    pipeline::{
+        Registry,
+        config::INCLUDE_KEY,
+        document::{Document, Sources, Table},
+        error::Fault,
+        registry::Context,
+    },
+    stage::Simulator,
+};
+use runout_hdf5::{SampleFormat, Scale, WriteOptions, write_measurement};
+use serde::Serialize;
+
+use super::print;
+use crate::{args::SimulateArgs, builtin, failure::Failure, progress::Progress, render::count};
+
+/// What was made. What is hidden in it stays hidden.
+#[derive(Debug, Serialize)]
+struct Report {
+    title: String,
+    output: PathBuf,
+    bytes: u64,
+    setups: usize,
+    stations: usize,
+    sensors: usize,
+    samples_per_capture: u64,
+    turns_per_capture: usize,
+    effects: usize,
+}
+
+/// Computes a campaign and writes it.
+///
+/// # Errors
+/// When the scenario is wrong, cannot be computed, or the file cannot be written.
+pub fn execute(args: &SimulateArgs, json: bool) -> Result<(), Failure> {
+    let sources = Sources::read(&args.scenario, &args.overrides.set, INCLUDE_KEY)?;
+    let document = Document::parse(&sources)?;
+    let scenario = Scenario::build(document.root(), &sources, args.out.clone(), &builtin::registry())
+        .map_err(|fault| document.diagnose(fault))?;
+    let report = write(&scenario)?;
+    print(&report, json, text)
+}
+
+/// A checked scenario.
+struct Scenario {
+    title: String,
+    output: PathBuf,
+    samples: SampleFormat,
+    effects: usize,
+    simulator: Box<dyn Simulator>,
+}
+
+impl Scenario {
+    fn build(root: &Table, sources: &Sources, out: Option<PathBuf>, registry: &Registry) -> Result<Self, Fault> {
+        let title = string(root, "title")?.unwrap_or_else(|| "Untitled".into());
+        let context = Context { folder: sources.folder(), rig: None };
+        let output = match (out, string(root, "output")?) {
+            (Some(out), _) => out,
+            (None, Some(output)) => context.path(output.as_ref()),
+            (None, None) => {
+                let fault = Fault::here("missing key `output`");
+                return Err(fault.help("name the measurement file to write, here or by --out"));
+            }
+        };
+        let mut own = root.clone();
+        own.get_mut().remove("title");
+        own.get_mut().remove("output");
+        let simulator = registry.simulators.build(&own, &context)?;
+        let effects =
+            root.get_ref().get("effect").and_then(|value| value.get_ref().as_array()).map_or(0, |all| all.len());
+        Ok(Self { title, output, samples: samples(root), effects, simulator })
+    }
+}
+
+fn string(root: &Table, key: &str) -> Result<Option<String>, Fault> {
+    let Some(value) = root.get_ref().get(key) else { return Ok(None) };
+    let text = value.get_ref().as_str().ok_or_else(|| Fault::at(key, format!("expected `{key}` in quotes")))?;
+    Ok(Some(text.to_owned()))
+}
+
+/// How the file is to hold the samples: the simulator has checked the word.
+fn samples(root: &Table) -> SampleFormat {
+    let recording = root.get_ref().get("recording");
+    match recording.and_then(|table| table.get_ref().get("format")).and_then(|value| value.get_ref().as_str()) {
+        Some("f32") => SampleFormat::F32,
+        Some("i16") => SampleFormat::I16(Scale::ConverterLimits),
+        Some("i32") => SampleFormat::I32(Scale::ConverterLimits),
+        _ => SampleFormat::F64,
+    }
+}
+
+fn write(scenario: &Scenario) -> Result<Report, Error> {
+    let rig = scenario.simulator.rig();
+    let recording = scenario.simulator.recording()?;
+    let stations = recording.stations().len();
+    let first = recording.open(0, 0)?.capture().clone();
+    let options = WriteOptions {
+        samples: scenario.samples,
+        title: &scenario.title,
+        scenario: Some(scenario.simulator.scenario()),
+        ..WriteOptions::default()
+    };
+    let progress = Progress::new("captures", stations * rig.setups.len());
+    let output = write_measurement(&*recording, rig, &scenario.output, &options, &mut |name| progress.advance(name))?;
+    drop(progress);
+    let bytes = std::fs::metadata(&output).map_err(|error| Error::new("read", output.display().to_string(), error))?;
+    Ok(Report {
+        title: scenario.title.clone(),
+        output,
+        bytes: bytes.len(),
+        setups: rig.setups.len(),
+        stations,
+        sensors: rig.sensors.len(),
+        samples_per_capture: first.samples,
+        turns_per_capture: first.marks.len().saturating_sub(1),
+        effects: scenario.effects,
+    })
+}
+
+fn text(report: &Report) -> String {
+    let effects = match report.effects {
+        0 => String::new(),
+        effects => format!("  {} in it, kept with the truth in the file\n", count(effects, "effect")),
+    };
+    format!(
+        "{}\n  {}, {}, {}, {} of {} samples each\n{effects}  written: {} ({:.1} MB)\n",
+        report.title,
+        count(report.setups, "setup"),
+        count(report.stations, "station"),
+        count(report.sensors, "sensor"),
+        count(report.turns_per_capture, "turn"),
+        report.samples_per_capture,
+        report.output.display(),
+        report.bytes as f64 / 1e6,
+    )
+}

@@ -1,0 +1,119 @@
+//! What can go wrong, how it is shown, and the exit status that it gives.
+
+use std::{io, process::ExitCode};
+
+use runout_core::{
+    Error,
+    pipeline::{document::ConfigError, error::Diagnostic},
+};
+use serde_json::{Value, json};
+
+use crate::render::{self, diagnostic};
+
+/// Why a command did not do its work.
+#[derive(Debug)]
+pub enum Failure {
+    /// The command line is wrong: clap's words.
+    CommandLine(Box<clap::Error>),
+    /// A name on the command line is unknown.
+    Name {
+        /// Which, and of what.
+        message: String,
+        /// The known ones.
+        help: String,
+    },
+    /// The configuration is wrong, or cannot be read.
+    Configuration(ConfigError),
+    /// The data or the work failed.
+    Work(Error),
+    /// Standard output cannot be written to.
+    Output(io::Error),
+}
+
+impl From<clap::Error> for Failure {
+    fn from(error: clap::Error) -> Self {
+        Self::CommandLine(Box::new(error))
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Self::Configuration(error)
+    }
+}
+
+impl From<Diagnostic> for Failure {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::Configuration(diagnostic.into())
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Work(error)
+    }
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+impl Failure {
+    /// Shows it on stderr, with `json` also as a document on stdout, and gives its exit status.
+    pub fn report(&self, json: bool) -> ExitCode {
+        render::to_stderr(&self.text());
+        if json {
+            // When stdout cannot be written to either, the exit status has to tell.
+            let _ = render::document(&json!({ "error": self.document() }));
+        }
+        ExitCode::from(match self {
+            Self::CommandLine(_) | Self::Name { .. } | Self::Configuration(_) => 2,
+            Self::Work(_) | Self::Output(_) => 1,
+        })
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::CommandLine(error) if render::fancy_stderr() => error.render().ansi().to_string(),
+            Self::CommandLine(error) => error.render().to_string(),
+            Self::Name { message, help } => plain(message, Some(help)),
+            Self::Configuration(ConfigError::Text(diagnostic)) => diagnostic::report(diagnostic),
+            Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
+                plain(&error.to_string(), error.advice())
+            }
+            Self::Output(error) => plain(&format!("cannot write to stdout: {error}"), None),
+        }
+    }
+
+    fn document(&self) -> Value {
+        match self {
+            Self::CommandLine(error) => {
+                let text = error.render().to_string();
+                let message = text.lines().next().unwrap_or_default();
+                json!({ "message": message.trim_start_matches("error: ") })
+            }
+            Self::Name { message, help } => json!({ "message": message, "help": help }),
+            Self::Configuration(ConfigError::Text(diagnostic)) => {
+                let (line, column) = diagnostic.line_and_column();
+                json!({
+                    "message": diagnostic.message,
+                    "help": diagnostic.help,
+                    "file": diagnostic.source_name,
+                    "line": line,
+                    "column": column,
+                })
+            }
+            Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
+                json!({ "message": error.to_string(), "help": error.advice() })
+            }
+            Self::Output(error) => json!({ "message": error.to_string() }),
+        }
+    }
+}
+
+fn plain(message: &str, help: Option<&str>) -> String {
+    let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
+    format!("error: {message}\n{help}")
+}

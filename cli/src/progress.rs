@@ -1,0 +1,49 @@
+//! Progress on a terminal's stderr; nothing in a pipe.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use runout_core::pipeline::run::Observer;
+
+/// A bar that fills as things get done.
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// A bar for so many things of this name ("stations").
+    #[must_use]
+    pub fn new(things: &'static str, count: usize) -> Self {
+        // Hidden by itself where stderr is no terminal.
+        let bar = ProgressBar::new(count as u64);
+        if let Ok(style) = ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix} {msg} ({elapsed}, {eta} to go)")
+        {
+            bar.set_style(style);
+        }
+        bar.set_prefix(things);
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self { bar }
+    }
+
+    /// One more thing is done.
+    pub fn advance(&self, done: &str) {
+        self.bar.set_message(done.to_owned());
+        self.bar.inc(1);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Observer for Progress {
+    fn begin(&self, stations: usize) {
+        self.bar.set_length(stations as u64);
+    }
+
+    fn station(&self, name: &str) {
+        self.advance(name);
+    }
+}

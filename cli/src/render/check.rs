@@ -1,0 +1,92 @@
+//! What can be said without the data, for people.
+
+use std::collections::BTreeMap;
+
+use runout_core::rig::Rotation;
+
+use super::{
+    count,
+    number::{ranges, significant, spread},
+    page::Page,
+    table::Table,
+};
+use crate::commands::check::{Order, Report, RigSize, Separability, Unknown};
+
+/// The text of a report.
+#[must_use]
+pub fn text(report: &Report) -> String {
+    let mut page = Page::default();
+    page.line(&report.title);
+    page.line("The configuration is valid.");
+    let mut stages = Table::new(2, ["stage", "plugin"]);
+    for stage in &report.stages {
+        stages.row([stage.stage, &stage.plugin]);
+    }
+    page.headed_table("Stages", &stages);
+    if let Some(size) = &report.rig {
+        rig(&mut page, size);
+    }
+    if let Some(separability) = &report.separability {
+        orders(&mut page, separability);
+        lost_orders(&mut page, separability);
+        noise_gain(&mut page, separability);
+    }
+    page.bullets("Notes", &report.notes);
+    page.into_text()
+}
+
+fn rig(page: &mut Page, rig: &RigSize) {
+    let turning = match rig.rotation {
+        Rotation::Ccw => "counter-clockwise about +z",
+        Rotation::Cw => "clockwise about +z",
+    };
+    let [sensors, sections] = [count(rig.sensors, "sensor"), count(rig.sections, "section")];
+    page.heading("Rig");
+    page.line(format_args!("  {sensors} looking at {sections}, {}", count(rig.setups, "setup")));
+    page.line(format_args!("  part radius {} mm, turning {turning}", rig.part_radius_mm));
+}
+
+fn orders(page: &mut Page, separability: &Separability) {
+    let orders = &separability.orders;
+    let names: Vec<String> = separability.unknowns.iter().map(Unknown::name).collect();
+    page.heading(format_args!("Per order, 1 to {}", orders.last().map_or(0, |order| order.order)));
+    page.line(format_args!("  {}: {}", count(names.len(), "unknown"), names.join(", ")));
+    let mut by_dof: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for order in orders {
+        by_dof.entry(order.residual_dof).or_default().push(order.order);
+    }
+    let dof: Vec<String> = by_dof.iter().map(|(dof, orders)| format!("{dof} at {}", ranges(orders))).collect();
+    page.line(format_args!("  readings left over for a residual: {}", dof.join("; ")));
+}
+
+fn lost_orders(page: &mut Page, separability: &Separability) {
+    page.heading("Lost orders");
+    page.line(format_args!("  form    {}", ranges(&separability.lost_orders.form)));
+    page.line(format_args!("  motion  {}", ranges(&separability.lost_orders.motion)));
+    let mut reasons: Vec<(&str, Vec<usize>)> = Vec::new();
+    for order in &separability.orders {
+        let Some(reason) = &order.lost_because else { continue };
+        match reasons.iter_mut().find(|(known, _)| known == reason) {
+            Some((_, at)) => at.push(order.order),
+            None => reasons.push((reason, vec![order.order])),
+        }
+    }
+    for (reason, at) in reasons {
+        page.line(format_args!("  at {}: {reason}", ranges(&at)));
+    }
+}
+
+fn noise_gain(page: &mut Page, separability: &Separability) {
+    let mut table = Table::new(1, ["unknown", "median", "worst", "at order"]);
+    for (index, unknown) in separability.unknowns.iter().enumerate() {
+        let gain = |order: &Order| order.noise_gain.get(index).copied().flatten();
+        let gains = separability.orders.iter().filter_map(|order| Some((order.order, gain(order)?)));
+        let worst = gains.clone().max_by(|a, b| a.1.total_cmp(&b.1));
+        if let (Some((at, worst)), Some([_, median, _])) = (worst, spread(gains.map(|(_, gain)| gain))) {
+            let unit = if unknown.unit == "urad" { "µrad" } else { "µm" };
+            let name = format!("{} ({unit})", unknown.name());
+            table.row([name, significant(median, 3), significant(worst, 3), at.to_string()]);
+        }
+    }
+    page.headed_table("Noise gain: standard deviation of each unknown for 1 µm in every reading", &table);
+}

@@ -1,0 +1,109 @@
+//! Numbers as a metrologist writes them.
+
+/// `value` with so many significant digits; powers of ten where a plain number would be mostly zeros.
+#[must_use]
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "-".into();
+    }
+    let magnitude = value.abs();
+    if magnitude != 0.0 && !(1e-4..1e6).contains(&magnitude) {
+        return format!("{value:.*e}", digits.saturating_sub(1));
+    }
+    let above = if magnitude == 0.0 { 0 } else { magnitude.log10().floor() as isize };
+    let decimals = digits.saturating_sub(1).saturating_add_signed(-above);
+    format!("{value:.decimals$}")
+}
+
+/// A value with as many decimals as its standard uncertainty (two significant digits) gives a meaning to.
+#[must_use]
+pub fn with_std(value: f64, std: Option<f64>) -> String {
+    match std {
+        Some(std) if std.is_finite() && std > 0.0 => {
+            let decimals = usize::try_from(1 - std.log10().floor() as i32).unwrap_or(0);
+            if decimals > MOST_DECIMALS {
+                format!("{} ± {std:.0e}", significant(value, 6))
+            } else {
+                format!("{value:.decimals$} ± {std:.decimals$}")
+            }
+        }
+        _ => significant(value, 5),
+    }
+}
+
+/// A picometre and less means nothing for form in µm: such uncertainties are rounding.
+const MOST_DECIMALS: usize = 6;
+
+/// Ascending numbers as ranges: "2-80 even", "4-80 by 4", "1, 7", "none".
+#[must_use]
+pub fn ranges(numbers: &[usize]) -> String {
+    let mut shown = Vec::new();
+    let mut rest = numbers;
+    while let Some((first, after)) = rest.split_first() {
+        let step = after.first().map_or(0, |second| second - first);
+        let run = 1 + rest.windows(2).take_while(|pair| pair[1] - pair[0] == step).count();
+        let last = first + step * (run - 1);
+        // Two numbers are no pattern yet.
+        let taken = if run < 3 { 1 } else { run };
+        shown.push(match (taken, step) {
+            (1, _) => first.to_string(),
+            (_, 1) => format!("{first}-{last}"),
+            (_, 2) => format!("{first}-{last} {}", if first % 2 == 0 { "even" } else { "odd" }),
+            _ => format!("{first}-{last} by {step}"),
+        });
+        rest = &rest[taken..];
+    }
+    if shown.is_empty() { "none".into() } else { shown.join(", ") }
+}
+
+/// Lowest, middle and highest of the finite values.
+#[must_use]
+pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<[f64; 3]> {
+    let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = (sorted.get((sorted.len().checked_sub(1)?) / 2)? + sorted.get(sorted.len() / 2)?) / 2.0;
+    Some([*sorted.first()?, middle, *sorted.last()?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ranges, significant, spread, with_std};
+
+    #[test]
+    fn orders_become_ranges() {
+        let even: Vec<usize> = (2..=80).step_by(2).collect();
+        assert_eq!(ranges(&even), "2-80 even");
+        let mut with_one = vec![1];
+        with_one.extend(&even);
+        assert_eq!(ranges(&with_one), "1, 2-80 even");
+        assert_eq!(ranges(&(4..=80).step_by(4).collect::<Vec<_>>()), "4-80 by 4");
+        assert_eq!(ranges(&[1, 2, 3, 9, 255, 257]), "1-3, 9, 255, 257");
+        assert_eq!(ranges(&[3, 5, 7, 8]), "3-7 odd, 8");
+        assert_eq!(ranges(&[]), "none");
+    }
+
+    #[test]
+    fn digits_follow_the_magnitude() {
+        assert_eq!(significant(21.6412, 4), "21.64");
+        assert_eq!(significant(0.006_512, 2), "0.0065");
+        assert_eq!(significant(0.0, 3), "0.00");
+        assert_eq!(significant(1234.56, 2), "1235");
+        assert_eq!(significant(3.21e-16, 2), "3.2e-16");
+        assert_eq!(significant(f64::NAN, 2), "-");
+    }
+
+    #[test]
+    fn digits_follow_the_uncertainty() {
+        assert_eq!(with_std(4.012_34, Some(0.0034)), "4.0123 ± 0.0034");
+        assert_eq!(with_std(412.34, Some(25.0)), "412 ± 25");
+        assert_eq!(with_std(4.012_34, Some(3e-17)), "4.01234 ± 3e-17");
+        assert_eq!(with_std(4.012_34, None), "4.0123");
+    }
+
+    #[test]
+    fn spread_ignores_what_is_not_known() {
+        assert_eq!(spread([3.0, f64::NAN, 1.0]), Some([1.0, 2.0, 3.0]));
+        assert_eq!(spread([5.0, 1.0, 2.0]), Some([1.0, 2.0, 5.0]));
+        assert_eq!(spread([f64::NAN]), None);
+    }
+}

@@ -1,0 +1,269 @@
+//! What a run found, for people: `run`'s last words.
+
+use runout_core::pipeline::run::{CaptureSummary, SectionSummary, StationSummary, Summary};
+
+use super::{
+    count,
+    number::{ranges, significant, spread, with_std},
+    page::Page,
+    table::Table,
+};
+
+/// Up to so many stations each has its own row; more are gathered into lowest, median and highest.
+const FEW_STATIONS: usize = 8;
+
+/// Rejected turns that are listed one by one.
+const FEW_TURNS: usize = 12;
+
+/// The text of a summary.
+#[must_use]
+pub fn text(summary: &Summary) -> String {
+    let stations = &summary.stations;
+    let mut page = Page::default();
+    page.line(&summary.title);
+    page.line(count(stations.len(), "station"));
+    turns(&mut page, stations);
+    let form = if stations.len() <= FEW_STATIONS { form_by_station(stations) } else { form_gathered(stations) };
+    page.headed_table(form_heading(stations), &form);
+    residual(&mut page, stations);
+    motion_truth(&mut page, stations);
+    lost_orders(&mut page, summary);
+    surface(&mut page, summary);
+    let mut warnings = summary.warnings.clone();
+    warnings.extend(stations.iter().flat_map(|station| station.warnings.iter().cloned()));
+    page.bullets("Warnings and notes", &warnings);
+    let outputs: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
+    page.bullets("Written", &outputs);
+    page.into_text()
+}
+
+fn captures(stations: &[StationSummary]) -> impl Iterator<Item = (&StationSummary, &CaptureSummary)> {
+    stations.iter().flat_map(|station| station.captures.iter().map(move |capture| (station, capture)))
+}
+
+fn turns(page: &mut Page, stations: &[StationSummary]) {
+    let mut setups: Vec<&str> = Vec::new();
+    for (_, capture) in captures(stations) {
+        if !setups.contains(&&*capture.setup) {
+            setups.push(&capture.setup);
+        }
+    }
+    let mut table = Table::new(1, ["setup", "turns", "used", "rejected", "set aside", "speed rpm"]);
+    for setup in setups {
+        let of: Vec<&CaptureSummary> =
+            captures(stations).map(|(_, capture)| capture).filter(|capture| capture.setup == setup).collect();
+        let recorded: usize = of.iter().map(|capture| capture.turns_recorded).sum();
+        let used: usize = of.iter().map(|capture| capture.turns_used).sum();
+        let rejected: usize = of.iter().map(|capture| capture.rejected.len()).sum();
+        table.row([
+            setup.to_owned(),
+            recorded.to_string(),
+            used.to_string(),
+            rejected.to_string(),
+            recorded.saturating_sub(used + rejected).to_string(),
+            speeds(&of),
+        ]);
+    }
+    if table.is_empty() {
+        return;
+    }
+    page.headed_table("Turns", &table);
+    let filters: Vec<String> = captures(stations).flat_map(|(_, capture)| capture.filters.clone()).collect();
+    page.bullets("Filters", &filters);
+    let trims = captures(stations).flat_map(|(_, capture)| {
+        capture.trimmed.iter().map(|trim| format!("{}: {trim}", capture.setup)).collect::<Vec<_>>()
+    });
+    page.bullets("Set aside", &trims.collect::<Vec<_>>());
+    rejected(page, stations);
+}
+
+fn speeds(captures: &[&CaptureSummary]) -> String {
+    match spread(captures.iter().filter_map(|capture| capture.speed_rpm)) {
+        None => String::new(),
+        Some([low, middle, high]) if high - low < 1e-3 * middle => significant(middle, 4),
+        Some([low, _, high]) => format!("{} to {}", significant(low, 4), significant(high, 4)),
+    }
+}
+
+fn rejected(page: &mut Page, stations: &[StationSummary]) {
+    let all: Vec<String> = captures(stations)
+        .flat_map(|(station, capture)| {
+            let place = format!("{}/{}", capture.setup, station.station);
+            capture.rejected.iter().map(move |turn| {
+                format!("{place} turn {} (from sample {}): {}", turn.turn, turn.start_sample, turn.reason)
+            })
+        })
+        .collect();
+    let mut shown: Vec<String> = all.iter().take(FEW_TURNS).cloned().collect();
+    if all.len() > shown.len() {
+        shown.push(format!("and {} more: every one is listed with --json", all.len() - shown.len()));
+    }
+    page.bullets("Rejected turns", &shown);
+}
+
+/// Symbols of the values that any section has, in order of first appearance.
+fn symbols(stations: &[StationSummary]) -> Vec<(String, String)> {
+    let mut found: Vec<(String, String)> = Vec::new();
+    for value in sections(stations).flat_map(|(_, section)| &section.values) {
+        if !found.iter().any(|(symbol, _)| *symbol == value.symbol) {
+            found.push((value.symbol.clone(), unit(&value.unit)));
+        }
+    }
+    found
+}
+
+fn unit(id: &str) -> String {
+    match id {
+        "um" => "µm".into(),
+        "urad" => "µrad".into(),
+        other => other.into(),
+    }
+}
+
+fn sections(stations: &[StationSummary]) -> impl Iterator<Item = (&StationSummary, &SectionSummary)> {
+    stations.iter().flat_map(|station| station.sections.iter().map(move |section| (station, section)))
+}
+
+fn value_of(section: &SectionSummary, symbol: &str) -> Option<f64> {
+    section.values.iter().find(|value| value.symbol == symbol).map(|value| value.value)
+}
+
+fn form_heading(stations: &[StationSummary]) -> String {
+    let band = sections(stations).find_map(|(_, section)| section.values.first()).map(|value| value.band_upr);
+    let band = band.map(|[low, high]| format!(", {low} to {high} undulations per revolution")).unwrap_or_default();
+    format!("Form{band} (± is the standard uncertainty at any one angle)")
+}
+
+fn form_by_station(stations: &[StationSummary]) -> Table {
+    let symbols = symbols(stations);
+    let mut header = vec!["station".to_owned(), "section".into(), "z mm".into(), "rms µm".into()];
+    header.extend(symbols.iter().map(|(symbol, unit)| format!("{symbol} {unit}")));
+    header.push("true error µm".into());
+    let mut table = Table::new(2, header);
+    for (station, section) in sections(stations) {
+        let mut row = vec![
+            station.station.clone(),
+            section.section.clone(),
+            significant(section.z_mm, 5),
+            with_std(section.form_rms_um, section.form_std_um),
+        ];
+        row.extend(symbols.iter().map(|(symbol, _)| known(value_of(section, symbol), 4)));
+        row.push(known(section.truth_form_rms_error_um, 2));
+        table.row(row);
+    }
+    table
+}
+
+fn form_gathered(stations: &[StationSummary]) -> Table {
+    let mut ids: Vec<&str> = sections(stations).map(|(_, section)| &*section.section).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    // Measured circles are sections of their own; those of a rig come back at every station.
+    if ids.len() > FEW_STATIONS {
+        ids = vec![""];
+    }
+    let mut table = Table::new(2, ["section", "value", "lowest", "median", "highest"]);
+    for id in ids {
+        let of: Vec<&SectionSummary> =
+            sections(stations).map(|(_, section)| section).filter(|one| id.is_empty() || one.section == id).collect();
+        let mut gather = |name: String, digits, value: &dyn Fn(&SectionSummary) -> Option<f64>| {
+            if let Some(values) = spread(of.iter().filter_map(|section| value(section))) {
+                let mut row = vec![id.to_owned(), name];
+                row.extend(values.map(|value| significant(value, digits)));
+                table.row(row);
+            }
+        };
+        gather("z mm".into(), 5, &|section| Some(section.z_mm));
+        gather("rms µm".into(), 4, &|section| Some(section.form_rms_um));
+        gather("± µm".into(), 2, &|section| section.form_std_um);
+        for (symbol, unit) in symbols(stations) {
+            gather(format!("{symbol} {unit}"), 4, &|section| value_of(section, &symbol));
+        }
+        gather("true error µm".into(), 2, &|section| section.truth_form_rms_error_um);
+    }
+    table
+}
+
+fn known(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(String::new, |value| significant(value, digits))
+}
+
+/// One value of a station.
+type OfStation<'a> = &'a dyn Fn(&StationSummary) -> Option<f64>;
+
+/// Rows of one value a station, gathered: the one where there is one station, lowest, median and highest else.
+fn gathered(rows: &[(&str, OfStation)], stations: &[StationSummary]) -> Table {
+    let single = stations.len() == 1;
+    let header: &[&str] = if single { &["", "value"] } else { &["", "lowest", "median", "highest"] };
+    let mut table = Table::new(1, header.iter().copied());
+    for (name, value) in rows {
+        if let Some(values) = spread(stations.iter().filter_map(value)) {
+            let shown = if single { &values[..1] } else { &values[..] };
+            let cells = shown.iter().map(|value| significant(*value, 3));
+            table.row(std::iter::once((*name).to_owned()).chain(cells));
+        }
+    }
+    table
+}
+
+fn residual(page: &mut Page, stations: &[StationSummary]) {
+    let table = gathered(
+        &[
+            ("left by the fit, rms µm", &|station| station.residual_rms_um),
+            ("expected from the turns' scatter, rms µm", &|station| station.expected_residual_rms_um),
+            ("chi squared per degree of freedom", &|station| station.chi2_per_dof),
+        ],
+        stations,
+    );
+    page.headed_table("Residual", &table);
+    if table.is_empty() {
+        page.heading("Residual");
+        page.line("  none: no reading is redundant, so nothing checks the fit");
+    }
+}
+
+fn motion_truth(page: &mut Page, stations: &[StationSummary]) {
+    let table = gathered(
+        &[
+            ("x, rms µm", &|station| station.truth.as_ref()?.x_rms_error_um),
+            ("y, rms µm", &|station| station.truth.as_ref()?.y_rms_error_um),
+            ("tilt x, rms µrad", &|station| station.truth.as_ref()?.tilt_x_rms_error_urad),
+            ("tilt y, rms µrad", &|station| station.truth.as_ref()?.tilt_y_rms_error_urad),
+        ],
+        stations,
+    );
+    page.headed_table("True error of the motion", &table);
+}
+
+fn lost_orders(page: &mut Page, summary: &Summary) {
+    // Measured points have no layout that could lose any.
+    if captures(&summary.stations).next().is_some() {
+        page.heading("Lost orders");
+        page.line(format_args!("  form    {}", ranges(&summary.lost_orders.form)));
+        page.line(format_args!("  motion  {}", ranges(&summary.lost_orders.motion)));
+    }
+}
+
+fn surface(page: &mut Page, summary: &Summary) {
+    let Some(surface) = &summary.surface else { return };
+    let [from, to] = surface.z_mm.map(|z_mm| significant(z_mm, 5));
+    page.heading("Surface");
+    page.line(format_args!("  {} angles × {} rings, z {from} to {to} mm", surface.angles, surface.rings));
+    page.line(format_args!("  between sections: {}", surface.interpolation));
+    let mut meetings: Vec<_> = surface.meetings.iter().collect();
+    meetings.sort_by(|a, b| b.rms_um.total_cmp(&a.rms_um));
+    let mut table = Table::new(1, ["sections that meet", "z mm", "differ by rms µm", "expected µm", "at most µm"]);
+    for meeting in meetings.iter().take(FEW_STATIONS) {
+        table.row([
+            meeting.sections.join(" and "),
+            significant(meeting.z_mm, 5),
+            significant(meeting.rms_um, 3),
+            known(meeting.expected_rms_um, 3),
+            significant(meeting.max_um, 3),
+        ]);
+    }
+    page.table(&table);
+    if meetings.len() > FEW_STATIONS {
+        page.line(format_args!("  and {} more that agree better", meetings.len() - FEW_STATIONS));
+    }
+}

@@ -1,0 +1,66 @@
+//! Tables of text.
+
+/// Rows under a header; columns as wide as they need.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// Columns of words, at the left; the rest are numbers and stand right-aligned.
+    words: usize,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// The first `words` columns stand left-aligned.
+    #[must_use]
+    pub fn new<S: Into<String>>(words: usize, header: impl IntoIterator<Item = S>) -> Self {
+        Self { words, rows: vec![header.into_iter().map(Into::into).collect()] }
+    }
+
+    /// Adds a row.
+    pub fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// Whether it has no rows yet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.len() < 2
+    }
+
+    /// The text, two blanks indented and two between columns; nothing without rows. Columns that are empty in every
+    /// row are left out.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let (Some(header), true) = (self.rows.first(), self.rows.len() > 1) else { return String::new() };
+        let cell = |row: &Vec<String>, column: usize| row.get(column).cloned().unwrap_or_default();
+        let used = |column: &usize| self.rows[1..].iter().any(|row| !cell(row, *column).is_empty());
+        let columns: Vec<usize> = (0..header.len()).filter(used).collect();
+        let width = |column: usize| self.rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0);
+        let mut text = String::new();
+        for row in &self.rows {
+            let mut line = String::new();
+            for &column in &columns {
+                let (cell, width) = (cell(row, column), width(column));
+                line.push_str("  ");
+                let cell = if column < self.words { format!("{cell:<width$}") } else { format!("{cell:>width$}") };
+                line.push_str(&cell);
+            }
+            text.push_str(line.trim_end());
+            text.push('\n');
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Table;
+
+    #[test]
+    fn words_stand_left_and_numbers_right() {
+        let mut table = Table::new(1, ["section", "never", "rms µm"]);
+        table.row(["a", "", "4.01"]);
+        table.row(["bearing", "", "12.50"]);
+        assert_eq!(table.text(), "  section  rms µm\n  a          4.01\n  bearing   12.50\n");
+        assert_eq!(Table::new(0, ["x"]).text(), "");
+    }
+}
