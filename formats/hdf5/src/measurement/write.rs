@@ -142,8 +142,8 @@ impl CaptureWriter<'_> {
         let angles = if capture.encoder {
             Some(self.line(ANGLE, shape.0).map_err(failure)?)
         } else {
-            let index = self.group.new_dataset_builder().with_data(capture.marks.as_slice());
-            index.create(INDEX).map_err(failure)?;
+            let index = self.line(INDEX, capture.marks.len()).map_err(failure)?;
+            index.write(capture.marks.as_slice()).map_err(failure)?;
             None
         };
         let target = Target { dataset: &dataset, angles: angles.as_ref(), ids: &ids, signs: &signs, coding: &coding };
@@ -168,10 +168,12 @@ impl CaptureWriter<'_> {
         builder.empty::<T>().shape((samples, channels)).create(SAMPLES)
     }
 
+    /// Numbers that nobody maps into memory: always in chunks with a checksum, where there are any.
     fn line(&self, name: &str, length: usize) -> hdf5_metno::Result<Dataset> {
         let builder = self.group.new_dataset_builder();
         let builder = match self.options.deflate {
-            None => builder,
+            _ if length == 0 => builder,
+            None => builder.chunk(CHUNK_LINE.min(length)).fletcher32(),
             Some(level) => builder.chunk(CHUNK_LINE.min(length)).shuffle().deflate(level),
         };
         builder.empty::<f64>().shape(length).create(name)

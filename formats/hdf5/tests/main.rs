@@ -1,0 +1,9 @@
+//! Measurement and result files, written, read, damaged, and seen by h5py.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod damage;
+mod double;
+mod foreign;
+mod mismatch;
+mod result;
+mod round_trip;
