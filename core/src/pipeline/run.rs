@@ -25,7 +25,7 @@ use crate::{
     rig::Rig,
     separation::{Assessment, Quantity, Separation},
     stage::{Averager, Conditioner, Export, PointSeparator, Source, Station, StationSeparator},
-    surface::{Meeting, SurfaceBuilder},
+    surface::{Meeting, Surface, SurfaceBuilder},
 };
 
 /// What exporters know when they begin.
@@ -223,7 +223,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     let info =
         RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
     let mut gathering = Gathering::begin(pipeline, &info)?;
-    let (inputs, radius_mm, remarks) = match (&source, &pipeline.route) {
+    let (inputs, surface, remarks) = match (&source, &pipeline.route) {
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator }) => {
             let rig = pipeline
                 .rig
@@ -232,17 +232,19 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
             let line =
                 Line { rig, recording: &**recording, conditioners, averager: &**averager, separator: &**separator };
             let inputs = line.run(threads, observer, &mut gathering)?;
-            (inputs, rig.part_radius_mm, recording.remarks())
+            (inputs, gathering.build_surface(rig.part_radius_mm)?, recording.remarks())
         }
         (Source::Points(points), Route::Points { separator }) => {
             fit_points(points, &**separator, pipeline.surface.angles, observer, &mut gathering)?;
-            (vec![Input::of(&points.input)?], separator.nominal_radius_mm(), Vec::new())
+            let surface = gathering.build_surface(separator.nominal_radius_mm())?;
+            let remarks = separator.remarks(points, surface.as_ref())?;
+            (vec![Input::of(&points.input)?], surface, remarks)
         }
         _ => return Err(Error::new("run", &pipeline.title, "the loader gave what it did not declare")),
     };
     gathering.summary.provenance.inputs = inputs;
     gathering.summary.warnings.extend(remarks);
-    gathering.finish(radius_mm)
+    gathering.finish(surface.as_ref())
 }
 
 /// Results on their way to the exporters.
@@ -256,7 +258,8 @@ struct Gathering {
 impl Gathering {
     fn begin(pipeline: &Pipeline, info: &RunInfo) -> Result<Self> {
         let exports: Result<Vec<_>> = pipeline.exporters.iter().map(|exporter| exporter.begin(info)).collect();
-        let wanted = pipeline.exporters.iter().any(|exporter| exporter.needs_surface());
+        let tested = matches!(&pipeline.route, Route::Points { separator } if separator.needs_surface());
+        let wanted = tested || pipeline.exporters.iter().any(|exporter| exporter.needs_surface());
         let first = pipeline.exporters.first().and_then(|exporter| exporter.outputs().into_iter().next());
         Ok(Self {
             exports: exports?,
@@ -289,8 +292,8 @@ impl Gathering {
         Ok(())
     }
 
-    fn finish(mut self, radius_mm: f64) -> Result<Summary> {
-        let surface = self.surface.map(|builder| builder.build(radius_mm)).transpose()?;
+    fn build_surface(&mut self, radius_mm: f64) -> Result<Option<Surface>> {
+        let surface = self.surface.take().map(|builder| builder.build(radius_mm)).transpose()?;
         self.summary.surface = surface.as_ref().map(|surface| SurfaceSummary {
             angles: surface.angles,
             rings: surface.z_mm.len(),
@@ -298,8 +301,12 @@ impl Gathering {
             interpolation: surface.interpolation.to_owned(),
             meetings: surface.meetings.clone(),
         });
+        Ok(surface)
+    }
+
+    fn finish(mut self, surface: Option<&Surface>) -> Result<Summary> {
         for export in self.exports {
-            let outputs = export.finish(&self.summary, surface.as_ref())?;
+            let outputs = export.finish(&self.summary, surface)?;
             self.summary.outputs.extend(outputs);
         }
         if let Some(path) = self.summary_path {

@@ -7,6 +7,7 @@ use crate::{
     profile::Profile,
     rig::Rig,
     separation::{Assessment, Separation},
+    surface::Surface,
 };
 
 /// A separator, by what it takes.
@@ -53,6 +54,20 @@ pub trait PointSeparator: Send + Sync {
 
     /// Nominal radius that the deviations are measured from, in mm.
     fn nominal_radius_mm(&self) -> f64;
+
+    /// Whether [`remarks`](Self::remarks) needs the surface.
+    fn needs_surface(&self) -> bool {
+        false
+    }
+
+    /// What the user should know of the whole, once it is done: what was fitted, and how well the surface predicts
+    /// points that were not used.
+    ///
+    /// # Errors
+    /// When the points do not hold what it needs.
+    fn remarks(&self, _points: &Points, _surface: Option<&Surface>) -> Result<Vec<String>> {
+        Ok(Vec::new())
+    }
 }
 
 /// What a separator is built with besides its own configuration.
