@@ -1,1 +1,112 @@
 //! Campaigns in the time domain with a declared truth.
+//!
+//! At each sample the spindle has an angle Φ; its axis is displaced by synchronous motion(Φ) and asynchronous
+//! motion(t), the part's axis stands off it by how the part is clamped, and each sensor's line meets the part's surface
+//! at a point whose distance is the reading: the geometry itself, solved for that point, not an expansion of it. Nothing
+//! here is shared with the separators, so that one checks the other. Sections stay planes z = const: what a tilt of some
+//! µrad does beyond displacing them is below 1e-5 µm and left out.
+//!
+//! Readings in double precision are those of the scenario to about 1e-11 µm, set by the rounding of angles (1e-15 rad)
+//! on the steepest form.
+
+mod asynchronous;
+mod chain;
+mod check;
+mod config;
+mod effects;
+mod form;
+mod geometry;
+mod motion;
+mod random;
+mod recording;
+mod series;
+mod spin;
+mod world;
+
+#[cfg(test)]
+mod tests;
+
+use runout_core::{
+    Result,
+    measurement::Recording,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
+    rig::Rig,
+    stage::Simulator,
+};
+
+pub use config::{
+    AsynchronousConfig, EccentricityConfig, FormConfig, FormHarmonic, Geometry, LineConfig, MotionConfig,
+    MotionHarmonic, NoiseConfig, Orders, Phase, RecordingConfig, SampleFormat, SpindleConfig, StationsConfig,
+    TiltHarmonic,
+};
+pub use effects::{
+    AsynchronousLine, AxialMotion, Effect, EvenOrderMotion, FilterAttenuation, PartEccentricity, ReversalAngle,
+    SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity, SetupMotionChange,
+    SpeedRipple, ThermalDrift,
+};
+pub use recording::SpindleRecording;
+
+use world::World;
+
+/// Computes recordings of a turned part on a spindle.
+#[derive(Debug)]
+pub struct SpindleSimulator {
+    world: World,
+    scenario: String,
+}
+
+/// Checks a scenario.
+///
+/// # Errors
+/// The first value that cannot be, with its key.
+pub fn simulator(config: &SpindleConfig) -> std::result::Result<SpindleSimulator, Fault> {
+    if i64::try_from(config.seed).is_err() {
+        return Err(Fault::at("seed", format!("expected a seed up to {}, found {}", i64::MAX, config.seed)));
+    }
+    let world = World::new(config)?;
+    let text = toml::to_string(config).map_err(|error| Fault::here(format!("the scenario cannot be told: {error}")))?;
+    Ok(SpindleSimulator { world, scenario: format!("plugin = \"{}\"\n{text}", SpindleConfig::NAME) })
+}
+
+impl SpindleSimulator {
+    /// The recording, computed as it is read.
+    #[must_use]
+    pub fn spindle_recording(&self) -> SpindleRecording<'_> {
+        self.recording_in_blocks(recording::BLOCK_SAMPLES)
+    }
+
+    /// The same with another number of samples in each block: the samples are the same.
+    #[must_use]
+    pub fn recording_in_blocks(&self, block_samples: usize) -> SpindleRecording<'_> {
+        SpindleRecording { world: &self.world, block_samples }
+    }
+}
+
+impl Simulator for SpindleSimulator {
+    fn rig(&self) -> &Rig {
+        &self.world.rig
+    }
+
+    fn recording(&self) -> Result<Box<dyn Recording + '_>> {
+        Ok(Box::new(self.spindle_recording()))
+    }
+
+    fn scenario(&self) -> &str {
+        &self.scenario
+    }
+}
+
+impl StageConfig for SpindleConfig {
+    type Stage = Box<dyn Simulator>;
+
+    const NAME: &'static str = "spindle";
+    const ABOUT: &'static str =
+        "a turned part on a spindle: form, error motion, and what goes wrong while measuring them";
+
+    fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        Ok(Box::new(simulator(&self)?))
+    }
+}

@@ -1,0 +1,124 @@
+//! The part: one function h(α, z), so that whatever looks at the same z sees the same circle.
+
+use std::f64::consts::TAU;
+
+use runout_core::{Complex64, pipeline::error::Fault};
+
+use super::{
+    check,
+    config::FormConfig,
+    random::{Place, Purpose, phase, stream},
+    series,
+};
+
+/// h(α, z) = Re Σ_bands e^{iκz} Σₙ cₙ e^{inα}, in µm.
+#[derive(Debug, Clone)]
+pub(super) struct Form {
+    bands: Vec<Band>,
+}
+
+/// Harmonics whose phase advances along z at one rate.
+#[derive(Debug, Clone)]
+struct Band {
+    /// κ, in rad/mm.
+    twist_rad_per_mm: f64,
+    /// cₙ, in µm, from order 0.
+    harmonics: Vec<Complex64>,
+}
+
+/// Wavelengths of the random changes along z, relative to the configured one: two that do not repeat together.
+const WAVELENGTHS: [f64; 2] = [1.0, 1.618];
+
+impl Form {
+    /// `sections_mm` are the z of all sections that are measured; `orders` is the first order that cannot be sampled.
+    pub fn new(config: &FormConfig, seed: u64, sections_mm: &[f64], orders: usize) -> Result<Self, Fault> {
+        check::not_negative("rms_um", config.rms_um)?;
+        check::finite("slope", config.slope)?;
+        check::positive("wavelength_mm", config.wavelength_mm)?;
+        if !(0.0..=1.0).contains(&config.own_share) {
+            return Err(Fault::at("own_share", format!("expected 0 to 1, found {}", config.own_share)));
+        }
+        let mut form = Self { bands: Vec::new() };
+        if config.rms_um > 0.0 {
+            check::order("max_order", config.max_order, 2, orders)?;
+            form.draw(config, seed);
+            let squares = sections_mm.iter().map(|z| series::rms(&form.at(*z)).powi(2));
+            let rms = (squares.sum::<f64>() / sections_mm.len().max(1) as f64).sqrt();
+            form.bands.iter_mut().flat_map(|band| &mut band.harmonics).for_each(|value| *value *= config.rms_um / rms);
+        }
+        for (index, harmonic) in config.harmonics.iter().enumerate() {
+            let checked = || {
+                check::order("order", harmonic.order, 2, orders)?;
+                check::finite("amplitude_um", harmonic.amplitude_um)?;
+                check::finite("phase_deg", harmonic.phase_deg)?;
+                check::finite("twist_deg_per_mm", harmonic.twist_deg_per_mm)
+            };
+            checked().map_err(|fault| fault.under_item("harmonics", index))?;
+            let value = Complex64::from_polar(harmonic.amplitude_um, harmonic.phase_deg.to_radians());
+            form.add(harmonic.twist_deg_per_mm.to_radians(), harmonic.order, value);
+        }
+        Ok(form)
+    }
+
+    fn draw(&mut self, config: &FormConfig, seed: u64) {
+        let mut random = stream(seed, Purpose::Form, Place::default());
+        let twists = WAVELENGTHS.iter().map(|ratio| TAU / (ratio * config.wavelength_mm));
+        // Both signs of a twist together: amplitudes change along z, not only phases.
+        let twists: Vec<f64> = twists.flat_map(|twist| [twist, -twist]).collect();
+        let shared = (1.0 - config.own_share).sqrt();
+        let own = (config.own_share / twists.len() as f64).sqrt();
+        for order in 2..=config.max_order {
+            let amplitude = (order as f64).powf(-config.slope);
+            self.add(0.0, order, amplitude * shared * phase(&mut random));
+            for twist in &twists {
+                self.add(*twist, order, amplitude * own * phase(&mut random));
+            }
+        }
+    }
+
+    #[allow(clippy::float_cmp, reason = "a band is found by the very value that it was made with")]
+    fn add(&mut self, twist_rad_per_mm: f64, order: usize, value: Complex64) {
+        match self.bands.iter_mut().find(|band| band.twist_rad_per_mm == twist_rad_per_mm) {
+            Some(band) => series::add(&mut band.harmonics, order, value),
+            None => {
+                let mut harmonics = Vec::new();
+                series::add(&mut harmonics, order, value);
+                self.bands.push(Band { twist_rad_per_mm, harmonics });
+            }
+        }
+    }
+
+    /// Harmonics of the circle at z, in µm, from order 0.
+    pub fn at(&self, z_mm: f64) -> Vec<Complex64> {
+        let mut harmonics = vec![Complex64::ZERO; self.orders()];
+        self.fill(z_mm, &mut harmonics);
+        harmonics
+    }
+
+    /// The same into memory that is there.
+    pub fn fill(&self, z_mm: f64, harmonics: &mut [Complex64]) {
+        harmonics.fill(Complex64::ZERO);
+        for band in &self.bands {
+            let turned = Complex64::cis(band.twist_rad_per_mm * z_mm);
+            for (sum, value) in harmonics.iter_mut().zip(&band.harmonics) {
+                *sum += turned * value;
+            }
+        }
+    }
+
+    /// One more than the highest order.
+    fn orders(&self) -> usize {
+        self.bands.iter().map(|band| band.harmonics.len()).max().unwrap_or(0)
+    }
+
+    /// No |h| is larger, in µm.
+    pub fn bound_um(&self) -> f64 {
+        self.bands.iter().map(|band| series::bound(&band.harmonics)).sum()
+    }
+
+    /// No |dh/dα| is larger, in µm/rad.
+    pub fn slope_bound_um(&self) -> f64 {
+        let values = self.bands.iter().flat_map(|band| band.harmonics.iter().enumerate());
+        values.map(|(order, value)| order as f64 * value.norm()).sum()
+    }
+}

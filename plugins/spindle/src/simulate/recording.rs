@@ -1,0 +1,232 @@
+//! The recording: samples are computed as they are read.
+
+use std::path::PathBuf;
+
+use runout_core::{
+    Complex64, Error, Result,
+    measurement::{Block, Capture, Recording, SampleStream, StationKey, StationTruth},
+};
+
+use super::{
+    asynchronous::Wandering,
+    chain::Channel,
+    config::{Geometry, Phase},
+    geometry::{self, Sight},
+    motion::Displacement,
+    random::{Place, Purpose, stream},
+    series::{self, LANES, Phasor},
+    spin::Spin,
+    world::{UM_PER_MM_URAD, World},
+};
+
+/// Samples of a block, unless asked otherwise: some hundred kilobytes.
+pub(super) const BLOCK_SAMPLES: usize = 4096;
+
+/// A simulated recording of all stations in all setups.
+pub struct SpindleRecording<'a> {
+    pub(super) world: &'a World,
+    pub(super) block_samples: usize,
+}
+
+impl Recording for SpindleRecording<'_> {
+    fn stations(&self) -> &[StationKey] {
+        &self.world.stations
+    }
+
+    fn open(&self, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
+        Ok(Box::new(SimulatedStream::new(self.world, self.block_samples, station, setup)?))
+    }
+
+    fn inputs(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
+
+    fn truth(&self, station: usize) -> Result<Option<StationTruth>> {
+        let world = self.world;
+        let key = world.stations.get(station).ok_or_else(|| missing("station", station))?;
+        let circle = |section: usize| {
+            let harmonics = world.form.at(key.z_mm + world.rig.section_z_mm(section));
+            series::turn(&harmonics, world.samples_per_rev, false)
+        };
+        let motion = world.motion.error_motion(world.rig.rotation.direction());
+        Ok(Some(StationTruth {
+            form_um: (0..world.rig.sections.len()).map(circle).collect(),
+            motion: Some(motion.axes.map(|axis| series::turn(&axis, world.samples_per_rev, true))),
+        }))
+    }
+}
+
+fn missing(noun: &str, index: usize) -> Error {
+    Error::new("simulate", format!("{noun} {index}"), "the scenario has none of this number")
+}
+
+/// One station in one setup.
+struct SimulatedStream<'a> {
+    world: &'a World,
+    capture: Capture,
+    block_samples: usize,
+    /// Index of the next sample.
+    position: u64,
+    spin: Spin,
+    wandering: Wandering,
+    motion_ratio: f64,
+    sensors: Vec<Looking<'a>>,
+}
+
+/// A sensor in one capture.
+struct Looking<'a> {
+    /// e^{iθ′}, the direction of its line.
+    line: Complex64,
+    /// e^{i(θ′ − β)}.
+    toward: Complex64,
+    z_mm: f64,
+    /// The part's axis in the part's own coordinates, in µm.
+    clamped: Complex64,
+    /// h at its z.
+    harmonics: Vec<Complex64>,
+    channel: Channel<'a>,
+}
+
+/// The spindle at some instants.
+struct Instants {
+    /// e^{iΦ} turned the way the part turns.
+    turned: Phasor<LANES>,
+    displacement: Displacement<LANES>,
+    axial_um: Option<[f64; LANES]>,
+}
+
+impl<'a> SimulatedStream<'a> {
+    fn new(world: &'a World, block_samples: usize, station: usize, setup: usize) -> Result<Self> {
+        let key = world.stations.get(station).ok_or_else(|| missing("station", station))?;
+        let clamped_in = world.setups.get(setup).ok_or_else(|| missing("setup", setup))?;
+        let name = world.rig.setups.get(setup).map_or("", |setup| setup.id.as_str());
+        let spin = world.course.spin(world.seed, setup, station);
+        let sensors = world.sensors.iter().enumerate().map(|(item, sensor)| {
+            let angle = sensor.angle_rad + clamped_in.sensors_rad;
+            let z_mm = world.sensor_z_mm(sensor, key);
+            let random = stream(world.seed, Purpose::Noise, Place { setup, station, item });
+            Looking {
+                line: Complex64::cis(angle),
+                toward: Complex64::cis(angle - clamped_in.part_rad),
+                z_mm,
+                clamped: world.clamped_at(clamped_in, sensor, z_mm),
+                harmonics: world.form.at(z_mm),
+                channel: Channel::new(&sensor.chain, random),
+            }
+        });
+        let limits: Option<Vec<[f64; 2]>> = world.sensors.iter().map(|sensor| sensor.chain.limits_um()).collect();
+        let capture = Capture {
+            object: format!("simulation:/{name}/{}", key.name),
+            setup,
+            station: key.name.clone(),
+            z_mm: key.z_mm,
+            stated_speed_rpm: Some(world.speed_rpm),
+            sample_rate_hz: Some(world.sample_rate_hz),
+            samples: world.course.samples(),
+            sensors: (0..world.sensors.len()).collect(),
+            sensor_ids: world.rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
+            converter_limits_um: limits,
+            marks: spin.marks(),
+            encoder: world.phase == Phase::Encoder,
+            trimmed: Vec::new(),
+            responses: Vec::new(),
+        };
+        Ok(Self {
+            world,
+            capture,
+            block_samples: block_samples.max(1),
+            position: 0,
+            spin,
+            wandering: world.asynchronous.capture(world.seed, setup, station),
+            motion_ratio: clamped_in.motion_ratio,
+            sensors: sensors.collect(),
+        })
+    }
+
+    /// The spindle at `count` samples from `start`; lanes behind repeat the last.
+    fn instants(&mut self, start: u64, count: usize, angle_rev: &mut Vec<f64>) -> Instants {
+        let mut turns = [(0.0, 0.0); LANES];
+        for (lane, angle) in turns.iter_mut().enumerate() {
+            *angle = self.spin.turns(start + lane.min(count - 1) as u64);
+        }
+        if self.capture.encoder {
+            angle_rev.extend(turns[..count].iter().map(|(whole, rest)| whole + rest));
+        }
+        let turn = Phasor::of_turns(&turns.map(|(_, rest)| rest));
+        let mut displacement = self.world.motion.at(&turn);
+        for value in displacement.iter_mut().flatten() {
+            *value *= self.motion_ratio;
+        }
+        self.wandering.add(start, count, &turns, &mut displacement);
+        let axial = &self.world.axial_um;
+        let axial_um = (!axial.is_empty()).then(|| series::sum(axial, &turn.conj()));
+        let turned = if self.world.rig.rotation.direction() > 0.0 { turn } else { turn.conj() };
+        Instants { turned, displacement, axial_um }
+    }
+}
+
+impl Looking<'_> {
+    /// What the sensor sees before its own electronics, in µm.
+    fn see(&mut self, world: &World, instants: &Instants) -> [f64; LANES] {
+        // α₀ = θ′ − direction·Φ − β.
+        let toward = instants.turned.conj().times(self.toward);
+        let lever = UM_PER_MM_URAD * self.z_mm;
+        let (mut along, mut across) = ([0.0; LANES], [0.0; LANES]);
+        let [x, y, tilt_x, tilt_y] = &instants.displacement;
+        for lane in 0..LANES {
+            let axis = Complex64::new(x[lane] + lever * tilt_y[lane], y[lane] - lever * tilt_x[lane]);
+            // The part's own x axis stands at angle −α₀ in the sensor's frame.
+            let clamped = self.clamped * Complex64::new(toward.re[lane], -toward.im[lane]);
+            let centre = axis * self.line.conj() + clamped;
+            (along[lane], across[lane]) = (centre.re, centre.im);
+        }
+        let sight = Sight { toward, along, across };
+        match &instants.axial_um {
+            None => meet(world, &self.harmonics, &sight),
+            Some(axial_um) => std::array::from_fn(|lane| {
+                // The part has moved up by a: the sensor sees what was at z − a.
+                world.form.fill(self.z_mm - 1e-3 * axial_um[lane], &mut self.harmonics);
+                meet(world, &self.harmonics, &sight.lane(lane))[0]
+            }),
+        }
+    }
+}
+
+fn meet<const L: usize>(world: &World, harmonics: &[Complex64], sight: &Sight<L>) -> [f64; L] {
+    match world.geometry {
+        Geometry::Exact => geometry::exact(world.radius_um, harmonics, sight, world.steps),
+        Geometry::Linear => geometry::linear(harmonics, sight),
+    }
+}
+
+impl SampleStream for SimulatedStream<'_> {
+    fn capture(&self) -> &Capture {
+        &self.capture
+    }
+
+    fn next_block(&mut self, block: &mut Block) -> Result<bool> {
+        block.clear();
+        block.start = self.position;
+        let left = self.capture.samples - self.position;
+        if left == 0 {
+            return Ok(false);
+        }
+        let samples = left.min(self.block_samples as u64) as usize;
+        let channels = self.sensors.len();
+        block.samples.resize(samples * channels, 0.0);
+        let world = self.world;
+        for (batch, rows) in block.samples.chunks_mut(LANES * channels).enumerate() {
+            let start = self.position + (batch * LANES) as u64;
+            let instants = self.instants(start, rows.len() / channels, &mut block.angle_rev);
+            for (index, sensor) in self.sensors.iter_mut().enumerate() {
+                let seen = sensor.see(world, &instants);
+                for (lane, (row, displacement_um)) in rows.chunks_mut(channels).zip(seen).enumerate() {
+                    let turns = (start + lane as u64) as f64 / world.samples_per_rev as f64;
+                    row[index] = sensor.channel.record(displacement_um, turns);
+                }
+            }
+        }
+        self.position += samples as u64;
+        Ok(true)
+    }
+}
