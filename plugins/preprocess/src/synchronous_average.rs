@@ -1,0 +1,200 @@
+//! Synchronous average: every turn is resampled in angle and taken apart into harmonics; the harmonics are averaged.
+//!
+//! Each turn, from one index mark to the next or through one turn of the encoder, is interpolated on equal angles
+//! ([`kernel`]), fine enough that nothing the recording can hold folds onto a kept order, and transformed. Of its
+//! harmonics, those that `samples_per_rev` equal angles can hold are kept: leaving out the rest is the anti-alias
+//! filter. Their mean and its covariance across channels over the turns are accumulated in one pass ([`mean`]).
+
+mod encoder;
+mod kernel;
+mod mean;
+mod outliers;
+mod resample;
+mod turns;
+mod window;
+
+use runout_core::{
+    Error, Result,
+    measurement::{Block, Capture, SampleStream},
+    numerics::fourier,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
+    profile::{Profile, TurnCount},
+    stage::{Averager, Preprocessor},
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use kernel::{Kernel, PASS_BAND};
+use resample::Resampling;
+use turns::Turn;
+
+/// Averages whole turns, one harmonic at a time, with the covariance across channels.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SynchronousAverageConfig {
+    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them.
+    pub samples_per_rev: usize,
+    /// Fewest turns that make an average, at least 1; the covariance needs 2.
+    #[serde(default = "default_min_turns")]
+    pub min_turns: usize,
+    /// Turns whose length is off the capture's median by more are left out, in percent, below 50.
+    #[serde(default = "default_turn_tolerance")]
+    pub turn_tolerance_percent: f64,
+    /// Turns are left out whose distance (root mean square over the turn, any channel) from the median turn around them
+    /// is more than this many times the usual distance; without it, none are.
+    #[serde(default)]
+    pub outlier_sigma: Option<f64>,
+    /// A mean speed that differs from the stated one by more is a warning, in percent.
+    #[serde(default = "default_speed_tolerance")]
+    pub speed_tolerance_percent: f64,
+}
+
+fn default_min_turns() -> usize {
+    5
+}
+
+fn default_turn_tolerance() -> f64 {
+    5.0
+}
+
+fn default_speed_tolerance() -> f64 {
+    2.0
+}
+
+impl StageConfig for SynchronousAverageConfig {
+    type Stage = Preprocessor;
+
+    const NAME: &'static str = "synchronous-average";
+    const ABOUT: &'static str = "averages turns on equal angles, one harmonic at a time, with their covariance";
+
+    fn check(self, _context: &Context) -> std::result::Result<Preprocessor, Fault> {
+        let expect = |good: bool, key: &str, expected: &str, found: &dyn std::fmt::Display| {
+            if good { Ok(()) } else { Err(Fault::at(key, format!("expected {expected}, found {found}"))) }
+        };
+        let samples = self.samples_per_rev;
+        expect((4..=1_000_000).contains(&samples), "samples_per_rev", "4 to 1000000", &samples)?;
+        expect(self.min_turns >= 1, "min_turns", "at least 1", &self.min_turns)?;
+        let percent = self.turn_tolerance_percent;
+        expect(percent > 0.0 && percent < 50.0, "turn_tolerance_percent", "a percentage above 0, below 50", &percent)?;
+        let percent = self.speed_tolerance_percent;
+        expect(percent > 0.0 && percent.is_finite(), "speed_tolerance_percent", "a percentage above 0", &percent)?;
+        if let Some(sigma) = self.outlier_sigma {
+            expect(sigma > 1.0 && sigma.is_finite(), "outlier_sigma", "a factor above 1", &sigma)?;
+        }
+        Ok(Preprocessor::Averager(Box::new(SynchronousAverage { config: self, kernel: Kernel::new() })))
+    }
+}
+
+/// The checked synchronous average.
+#[derive(Debug, Clone)]
+pub struct SynchronousAverage {
+    config: SynchronousAverageConfig,
+    kernel: Kernel,
+}
+
+impl SynchronousAverage {
+    /// That enough turns are left, or which were not and why.
+    fn enough(&self, capture: &Capture, turns: &TurnCount, usable: usize) -> Result<()> {
+        let wanted = self.config.min_turns;
+        if usable >= wanted {
+            return Ok(());
+        }
+        let mut problem = format!("{usable} of {} turns can be used, min_turns = {wanted}", turns.recorded);
+        let reasons = turns::reasons(capture, turns);
+        if !reasons.is_empty() {
+            problem = format!("{problem}; {}", reasons.join("; "));
+        }
+        let help = if capture.marks.is_empty() && turns.recorded == 0 {
+            "record a once-per-turn mark or the encoder's angle: without them there are no turns"
+        } else {
+            "record more turns, mend what is named above, or lower min_turns"
+        };
+        Err(Error::new("average", &capture.object, problem).help(help))
+    }
+
+    fn warnings(&self, capture: &Capture, speed_rpm: Option<f64>, exact: bool) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if let (Some(measured), Some(stated)) = (speed_rpm, capture.stated_speed_rpm) {
+            let tolerance_percent = self.config.speed_tolerance_percent;
+            if !((measured - stated).abs() <= 0.01 * tolerance_percent * stated.abs()) {
+                warnings.push(format!(
+                    "{}: the turns are {measured:.1} rpm, the recording states {stated:.1} rpm",
+                    capture.object
+                ));
+            }
+        }
+        let Some(turn) = capture.median_turn_samples() else { return warnings };
+        let held = (PASS_BAND * 0.5 * turn) as usize;
+        let filtered = |rate_hz: f64| {
+            let band_hz = PASS_BAND * 0.5 * rate_hz;
+            capture.responses.iter().any(|response| response.half_power_hz <= band_hz)
+        };
+        if !exact && self.max_order() > held && !capture.sample_rate_hz.is_some_and(filtered) {
+            warnings.push(format!(
+                "{}: {turn:.0} samples a turn carry orders to {held} through the resampling in angle; those above are \
+                 weakened",
+                capture.object
+            ));
+        }
+        warnings
+    }
+}
+
+impl Averager for SynchronousAverage {
+    fn max_order(&self) -> usize {
+        fourier::max_order(self.config.samples_per_rev)
+    }
+
+    fn average(&self, mut input: Box<dyn SampleStream + '_>) -> Result<Profile> {
+        let capture = input.capture().clone();
+        let first_turn = capture.first_turn();
+        let turns = turns::cut(&capture, 0.01 * self.config.turn_tolerance_percent);
+        let mut count = TurnCount {
+            recorded: turns.len() + capture.trimmed.iter().map(|trim| trim.turns).sum::<usize>(),
+            trimmed: capture.trimmed.clone(),
+            ..TurnCount::default()
+        };
+        let mut usable: Vec<Turn> = Vec::with_capacity(turns.len());
+        for (index, (turn, rejection)) in turns.into_iter().enumerate() {
+            match rejection {
+                None => usable.push(Turn { number: first_turn + index, ..turn }),
+                Some(reason) => count.rejected.push(turn.rejected(first_turn + index, reason)),
+            }
+        }
+        // Before anything is read: with too few marks a single turn could be larger than memory.
+        self.enough(&capture, &count, usable.len())?;
+
+        let mut resampling = Resampling::new(self, &capture, usable);
+        let mut block = Block::default();
+        while input.next_block(&mut block)? {
+            resampling.take(&mut block);
+        }
+        let outcome = resampling.finish();
+        count.used = outcome.used;
+        count.rejected.extend(outcome.rejected);
+        count.rejected.sort_by_key(|turn| turn.turn);
+        self.enough(&capture, &count, count.used)?;
+
+        let mean_turn = outcome.used_samples / outcome.used as f64;
+        let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
+        let warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        Ok(Profile {
+            object: capture.object,
+            setup: capture.setup,
+            sensors: capture.sensors,
+            samples_per_rev: self.config.samples_per_rev,
+            mean: outcome.mean,
+            covariance: outcome.covariance,
+            turns: count,
+            speed_rpm,
+            responses: capture.responses,
+            warnings,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

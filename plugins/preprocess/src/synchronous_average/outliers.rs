@@ -1,0 +1,103 @@
+//! Turns far from those around them.
+
+use runout_core::{Complex64, profile::Rejection};
+
+use super::{mean::Mean, turns::Turn};
+
+/// Turns that are looked at together, at least: enough for a median, few enough to drift little and to be kept.
+const TOGETHER: usize = 16;
+
+/// Holds the harmonics of a few turns back until it can be said which of them are outliers.
+///
+/// The distance of a turn in a channel is the root mean square over the turn of what separates it from the median turn
+/// (the median of real and of imaginary part, harmonic by harmonic). A turn is an outlier where this is more than
+/// `sigma` times the median distance in that channel.
+pub(super) struct Outliers {
+    sigma: f64,
+    held: Vec<(Turn, Vec<Complex64>)>,
+}
+
+/// What became of one turn.
+pub(super) struct Verdict {
+    pub turn: Turn,
+    /// The channel and its distance in µm, of an outlier.
+    pub outlier: Option<(usize, f64)>,
+}
+
+impl Outliers {
+    pub(super) fn new(sigma: f64) -> Self {
+        Self { sigma, held: Vec::new() }
+    }
+
+    /// Takes a turn; `judged` gets those that can now be told.
+    pub(super) fn add(&mut self, turn: Turn, harmonics: &[Complex64], mean: &mut Mean, judged: &mut Vec<Verdict>) {
+        self.held.push((turn, harmonics.to_vec()));
+        if self.held.len() >= 2 * TOGETHER {
+            self.judge(TOGETHER, mean, judged);
+        }
+    }
+
+    /// Judges the first `count` turns held, or all that there are.
+    pub(super) fn judge(&mut self, count: usize, mean: &mut Mean, judged: &mut Vec<Verdict>) {
+        let together: Vec<_> = self.held.drain(..count.min(self.held.len())).collect();
+        let channels = mean.channels();
+        let distances = distances_um(&together, channels);
+        let usual: Vec<f64> = (0..channels)
+            .map(|channel| median(&mut distances.iter().map(|turn| turn[channel]).collect::<Vec<_>>()))
+            .collect();
+        for ((turn, harmonics), distances) in together.into_iter().zip(distances) {
+            let farthest = distances.iter().zip(&usual).map(|(distance, usual)| distance - self.sigma * usual);
+            let outlier = farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
+            if outlier.is_none() {
+                mean.add(&harmonics);
+            }
+            judged.push(Verdict { turn, outlier: outlier.map(|(channel, _)| (channel, distances[channel])) });
+        }
+    }
+
+    /// All turns that are still held.
+    pub(super) fn judge_rest(&mut self, mean: &mut Mean, judged: &mut Vec<Verdict>) {
+        self.judge(usize::MAX, mean, judged);
+    }
+}
+
+/// Below, turns differ by rounding.
+const NOTHING_UM: f64 = 1e-9;
+
+/// `[turn][channel]`.
+fn distances_um(turns: &[(Turn, Vec<Complex64>)], channels: usize) -> Vec<Vec<f64>> {
+    let mut squares = vec![vec![0.0; channels]; turns.len()];
+    let length = turns.first().map_or(0, |(_, harmonics)| harmonics.len());
+    let mut parts = vec![0.0; turns.len()];
+    for at in 0..length {
+        let mut middle = |part: fn(&Complex64) -> f64| {
+            parts.clear();
+            parts.extend(turns.iter().map(|(_, harmonics)| part(&harmonics[at])));
+            median(&mut parts)
+        };
+        let middle = Complex64::new(middle(|value| value.re), middle(|value| value.im));
+        // A harmonic's mean square over the turn is half of its amplitude's square; that of the level is all of it.
+        let share = if at < channels { 1.0 } else { 0.5 };
+        for ((_, harmonics), squares) in turns.iter().zip(&mut squares) {
+            squares[at % channels] += share * (harmonics[at] - middle).norm_sqr();
+        }
+    }
+    squares.iter_mut().flatten().for_each(|square| *square = square.sqrt());
+    squares
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+impl Verdict {
+    /// Why the turn is not used, where it is not.
+    pub(super) fn rejection(&self, sensors: &[usize]) -> Option<Rejection> {
+        let (channel, distance_um) = self.outlier?;
+        Some(Rejection::Outlier { sensor: sensors.get(channel).copied().unwrap_or(channel), distance_um })
+    }
+}

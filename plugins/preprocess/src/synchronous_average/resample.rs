@@ -1,0 +1,251 @@
+//! From samples to the harmonics of each turn, block by block.
+
+use runout_core::{
+    Complex64,
+    measurement::{Block, Capture, Defect},
+    numerics::{
+        fourier::{Fourier, max_order},
+        lanes::in_lanes,
+    },
+    profile::{RejectedTurn, Rejection},
+};
+
+use super::{
+    SynchronousAverage, encoder,
+    kernel::{Interpolation, Kernel, REACH, on_sample},
+    mean::Mean,
+    outliers::Outliers,
+    turns::Turn,
+    window::{CONTINUED, Window},
+};
+
+/// What the samples of a capture gave.
+pub(super) struct Outcome {
+    pub mean: Vec<Complex64>,
+    pub covariance: Option<Vec<Complex64>>,
+    pub used: usize,
+    /// Length of all turns used together.
+    pub used_samples: f64,
+    pub rejected: Vec<RejectedTurn>,
+    /// All positions lay on samples: nothing was interpolated.
+    pub exact: bool,
+}
+
+/// The resampling of one capture under way. All buffers live as long as it.
+pub(super) struct Resampling<'a> {
+    kernel: &'a Kernel,
+    capture: &'a Capture,
+    turns: std::vec::IntoIter<Turn>,
+    window: Window,
+    defects: Vec<Defect>,
+    positions: Vec<f64>,
+    /// One turn on equal angles, `[channel][angle]`.
+    grid: Vec<f64>,
+    fourier: Fourier,
+    /// One channel's harmonics.
+    harmonics: Vec<Complex64>,
+    /// One turn's harmonics, `[order][channel]`.
+    turn: Vec<Complex64>,
+    mean: Mean,
+    outliers: Option<Outliers>,
+    used_samples: f64,
+    rejected: Vec<RejectedTurn>,
+    exact: bool,
+}
+
+impl<'a> Resampling<'a> {
+    /// `turns` are those that the marks allow, in order.
+    pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>) -> Self {
+        let config = &average.config;
+        let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
+        let length = grid_length(&turns, config.samples_per_rev, capture.encoder);
+        Self {
+            kernel: &average.kernel,
+            capture,
+            turns: turns.into_iter(),
+            window: Window::new(channels),
+            defects: Vec::new(),
+            positions: Vec::with_capacity(length),
+            grid: vec![0.0; length * channels],
+            fourier: Fourier::new(length),
+            harmonics: vec![Complex64::ZERO; orders],
+            turn: vec![Complex64::ZERO; orders * channels],
+            mean: Mean::new(orders, channels),
+            outliers: config.outlier_sigma.map(Outliers::new),
+            used_samples: 0.0,
+            rejected: Vec::new(),
+            exact: true,
+        }
+    }
+
+    fn next_turn(&self) -> Option<&Turn> {
+        self.turns.as_slice().first()
+    }
+
+    /// Takes a block and works on every turn that is now complete.
+    pub(super) fn take(&mut self, block: &mut Block) {
+        let Some(turn) = self.next_turn() else { return };
+        self.window.take(block, before(turn));
+        self.defects.append(&mut block.defects);
+        self.work();
+    }
+
+    fn work(&mut self) {
+        while let Some(turn) = self.next_turn().copied() {
+            if self.window.end() < behind(&turn) {
+                return;
+            }
+            self.turns.next();
+            if before(&turn) < self.window.start {
+                self.window.continue_before();
+            }
+            if before(&turn) < self.window.start {
+                self.rejected.push(turn.rejected(turn.number, Rejection::Incomplete));
+            } else {
+                self.turn(turn);
+            }
+            self.defects.retain(|defect| defect.samples.end as f64 > turn.end - REACH as f64 - 1.0);
+        }
+    }
+
+    /// Works on what only the end of the capture completes.
+    pub(super) fn finish(mut self) -> Outcome {
+        let recorded = self.window.end() as f64;
+        self.window.continue_behind();
+        let left = self.turns.as_slice().iter().take_while(|turn| turn.end <= recorded + 1e-6).count();
+        let incomplete = self.turns.as_slice()[left..].to_vec();
+        self.turns = self.turns.as_slice()[..left].to_vec().into_iter();
+        self.work();
+        for turn in self.turns.as_slice().iter().chain(&incomplete) {
+            self.rejected.push(turn.rejected(turn.number, Rejection::Incomplete));
+        }
+        if let Some(mut outliers) = self.outliers.take() {
+            let mut judged = Vec::new();
+            outliers.judge_rest(&mut self.mean, &mut judged);
+            self.sort(judged);
+        }
+        Outcome {
+            mean: self.mean.mean(),
+            covariance: self.mean.covariance(),
+            used: self.mean.turns(),
+            used_samples: self.used_samples,
+            rejected: self.rejected,
+            exact: self.exact,
+        }
+    }
+
+    /// Takes note of judged turns.
+    fn sort(&mut self, judged: Vec<super::outliers::Verdict>) {
+        for verdict in judged {
+            match verdict.rejection(&self.capture.sensors) {
+                None => self.used_samples += verdict.turn.samples(),
+                Some(reason) => self.rejected.push(verdict.turn.rejected(verdict.turn.number, reason)),
+            }
+        }
+    }
+
+    /// Works on one turn, whose frames are all in the window.
+    fn turn(&mut self, turn: Turn) {
+        let length = self.fourier.length();
+        let (start, end) = (turn.start - self.window.start as f64, turn.end - self.window.start as f64);
+        if self.capture.encoder {
+            let steady = self.window.angle_rev.len() == self.window.len()
+                && encoder::positions(&self.window.angle_rev, start, end, length, &mut self.positions);
+            let inside = REACH as f64..(self.window.len() - REACH) as f64;
+            if !(steady && self.positions.iter().all(|position| inside.contains(position))) {
+                self.rejected.push(turn.rejected(turn.number, Rejection::Angle));
+                return;
+            }
+        } else {
+            let step = (end - start) / length as f64;
+            self.positions.clear();
+            self.positions.extend((0..length).map(|angle| start + angle as f64 * step));
+        }
+        let exact = self.positions.iter().all(|position| on_sample(*position).is_some());
+        if let Some(defect) = self.defect(&turn, exact) {
+            let sensor = self.capture.sensors.get(defect.channel).copied().unwrap_or(defect.channel);
+            let reason = Rejection::Defect { sensor, kind: defect.kind };
+            self.rejected.push(turn.rejected(turn.number, reason));
+            return;
+        }
+        self.exact &= exact;
+        self.transform();
+        match &mut self.outliers {
+            None => {
+                self.mean.add(&self.turn);
+                self.used_samples += turn.samples();
+            }
+            Some(outliers) => {
+                let mut judged = Vec::new();
+                outliers.add(turn, &self.turn, &mut self.mean, &mut judged);
+                self.sort(judged);
+            }
+        }
+    }
+
+    /// The first bad run among the samples that the turn is made of.
+    fn defect(&self, turn: &Turn, exact: bool) -> Option<&Defect> {
+        let reach = if exact { 0.0 } else { REACH as f64 };
+        let (first, last) = (turn.start.round() - reach, turn.end.round() + reach);
+        self.defects.iter().find(|defect| (defect.samples.end as f64) > first && (defect.samples.start as f64) < last)
+    }
+
+    /// Interpolates the turn at its positions and takes it apart into harmonics.
+    fn transform(&mut self) {
+        let channels = self.capture.channels().max(1);
+        let mut interpolation = Interpolation {
+            kernel: self.kernel,
+            frames: &self.window.frames,
+            channels,
+            positions: &self.positions,
+            values: &mut self.grid,
+        };
+        in_lanes(channels, &mut interpolation);
+        for (channel, values) in self.grid.chunks_exact(self.positions.len()).enumerate() {
+            self.fourier.analyse(values.iter().copied(), &mut self.harmonics);
+            for (harmonic, turn) in self.harmonics.iter().zip(self.turn[channel..].iter_mut().step_by(channels)) {
+                // Profiles are Re Σ cₙ e^{−inΦ}.
+                *turn = harmonic.conj();
+            }
+        }
+    }
+}
+
+/// First frame that a turn needs: the kernel's reach, and a cubic through the encoder's angles.
+fn before(turn: &Turn) -> i64 {
+    turn.start.floor() as i64 - REACH as i64 - 1
+}
+
+/// Behind the last frame that a turn needs.
+fn behind(turn: &Turn) -> i64 {
+    (turn.end.ceil() as i64).saturating_add(REACH as i64 + 1).max(CONTINUED as i64 + 1)
+}
+
+/// Equal angles on which turns are interpolated.
+///
+/// Where every turn is the same whole multiple of `samples_per_rev` samples and begins at a sample, the samples
+/// themselves. Otherwise the shortest good length for a transform at which the highest order that a turn's samples can
+/// hold, half of them, folds to above the highest order that is kept.
+fn grid_length(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> usize {
+    let longest = turns.iter().map(Turn::samples).fold(0.0, f64::max);
+    if let Some(length) = on_sample(longest).filter(|length| *length > 0 && length % samples_per_rev == 0) {
+        let whole = |turn: &Turn| on_sample(turn.start).is_some() && on_sample(turn.samples()) == Some(length);
+        if turns.iter().all(whole) {
+            return length;
+        }
+    }
+    // Within a turn the encoder tells of faster and slower stretches: where it is slow, samples lie closer.
+    let densest = if encoder { 1.25 * longest } else { longest };
+    let needed = (0.5 * densest) as usize + max_order(samples_per_rev) + 1;
+    (needed.next_multiple_of(2)..).step_by(2).find(|length| is_smooth(*length)).unwrap_or(needed)
+}
+
+/// Whether 2, 3 and 5 are its only prime factors, which transforms are quick for.
+fn is_smooth(mut number: usize) -> bool {
+    for factor in [2, 3, 5] {
+        while number > 0 && number % factor == 0 {
+            number /= factor;
+        }
+    }
+    number == 1
+}

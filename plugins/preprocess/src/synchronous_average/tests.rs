@@ -1,0 +1,404 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::f64::consts::TAU;
+
+use runout_core::{
+    Complex64,
+    inspection::Inspection,
+    measurement::{DefectKind, MemoryStream, Trim},
+    profile::Rejection,
+};
+
+use super::*;
+use crate::testing::{RATE_HZ, averager, marks, scatter, stream};
+
+fn config(samples_per_rev: usize) -> SynchronousAverageConfig {
+    SynchronousAverageConfig {
+        samples_per_rev,
+        min_turns: 5,
+        turn_tolerance_percent: 5.0,
+        outlier_sigma: None,
+        speed_tolerance_percent: 2.0,
+    }
+}
+
+fn average_with(config: SynchronousAverageConfig, input: MemoryStream) -> Result<Profile> {
+    let profile = averager(config).average(Box::new(Inspection::new(Box::new(input))));
+    if let Ok(profile) = &profile {
+        let count = &profile.turns;
+        let trimmed: usize = count.trimmed.iter().map(|trim| trim.turns).sum();
+        assert_eq!(count.used + count.rejected.len() + trimmed, count.recorded, "every turn is accounted for");
+    }
+    profile
+}
+
+fn average(samples_per_rev: usize, input: MemoryStream) -> Result<Profile> {
+    average_with(config(samples_per_rev), input)
+}
+
+/// A few harmonics of Re Σ cₙ e^{−inΦ}, other ones in every channel.
+fn harmonics(channel: usize) -> Vec<(usize, Complex64)> {
+    let turned = |amplitude: f64, phase: f64| Complex64::from_polar(amplitude, phase + channel as f64);
+    vec![
+        (0, Complex64::new(3.0 - channel as f64, 0.0)),
+        (1, turned(5.0, 0.3)),
+        (2, turned(1.0, -1.2)),
+        (17, turned(0.1, 2.0)),
+        (150, turned(0.02, 0.9)),
+    ]
+}
+
+fn signal(harmonics: &[(usize, Complex64)], angle: f64) -> f64 {
+    harmonics.iter().map(|(order, value)| (value * Complex64::cis(-(*order as f64) * angle)).re).sum()
+}
+
+/// Channels that hold [`harmonics`] of the turn that begins at `first` and is `length` samples long.
+fn turning(channels: usize, frames: usize, first: f64, length: f64) -> Vec<Vec<f64>> {
+    let channel = |index: usize| {
+        let harmonics = harmonics(index);
+        (0..frames).map(|frame| signal(&harmonics, TAU * (frame as f64 - first) / length)).collect()
+    };
+    (0..channels).map(channel).collect()
+}
+
+/// Largest difference from [`harmonics`] over all orders and channels, in µm.
+fn worst(profile: &Profile) -> f64 {
+    let mut worst = 0.0_f64;
+    for channel in 0..profile.channels() {
+        let known = harmonics(channel);
+        for order in 0..=profile.max_order() {
+            let expected = known.iter().find(|(known, _)| *known == order).map_or(Complex64::ZERO, |(_, value)| *value);
+            worst = worst.max((profile.order(order)[channel] - expected).norm());
+        }
+    }
+    worst
+}
+
+fn reasons(profile: &Profile) -> Vec<(usize, &Rejection)> {
+    profile.turns.rejected.iter().map(|turn| (turn.turn, &turn.reason)).collect()
+}
+
+#[test]
+fn samples_on_the_angles_pass_exactly() {
+    for (length, samples_per_rev) in [(512, 512), (1024, 512), (1536, 512)] {
+        let input = stream(&turning(4, 6 * length, 0.0, length as f64), marks(0.0, length as f64, 7));
+        let profile = average(samples_per_rev, input).unwrap();
+        assert_eq!((profile.turns.recorded, profile.turns.used, profile.max_order()), (6, 6, 255));
+        // Rounding of a transform of values near 10.
+        assert!(worst(&profile) < 2e-14, "{length}: {:e}", worst(&profile));
+        assert_eq!(profile.warnings, [] as [String; 0]);
+    }
+}
+
+#[test]
+fn irrational_turns_are_resampled_to_the_kernels_error() {
+    // Below and above the samples per turn, hardly above, and many times: orders to 150 are in the pass band of all.
+    for length in [731.123_456, 1000.000_3, 1002.718_28, 1618.033_989, 7071.067_8] {
+        for channels in [1, 4, 9] {
+            let first = 30.4;
+            let frames = (8.1 * length) as usize + 60;
+            let input = stream(&turning(channels, frames, first, length), marks(first, length, 9));
+            let profile = average(1000, input).unwrap();
+            assert_eq!(profile.turns.used, 8);
+            // The kernel's share of an amplitude of 5 µm.
+            assert!(worst(&profile) < 5.0 * kernel::ERROR, "{length}: {:e}", worst(&profile));
+            let speed_rpm = profile.speed_rpm.unwrap();
+            assert!((speed_rpm - 60.0 * RATE_HZ / length).abs() < 1e-9 * speed_rpm);
+        }
+    }
+}
+
+#[test]
+fn what_lies_above_the_kept_orders_does_not_fold_onto_them() {
+    let (length, first) = (1000.7, 40.0);
+    let channel = |frame: usize| (140.0 * TAU * (frame as f64 - first) / length).cos();
+    let input = stream(&[(0..9000).map(channel).collect()], marks(first, length, 8));
+    let profile = average(200, input).unwrap();
+    assert_eq!(profile.max_order(), 99);
+    // On 200 angles it would appear as order 60, in full.
+    let largest = profile.mean.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    assert!(largest < kernel::ERROR, "{largest:e}");
+}
+
+#[test]
+fn turns_at_the_very_ends_are_used() {
+    let length = 800.0;
+    // A closing mark one past the last sample bounds the last turn; without it there is one turn less.
+    for (count, used) in [(7, 6), (6, 5)] {
+        let input = stream(&turning(2, 4800, 0.0, length), marks(0.0, length, count));
+        let profile = average(800, input).unwrap();
+        assert_eq!((profile.turns.recorded, profile.turns.used), (used, used));
+        assert!(worst(&profile) < 2e-14);
+    }
+    // Between samples, the continuation of the ends bends a few of 4800 positions by what the signal bends in 10 samples.
+    let (first, length) = (0.3, 799.7_f64);
+    let frames = (first + 6.0 * length).ceil() as usize;
+    let input = stream(&turning(2, frames, first, length), marks(first, length, 7));
+    let profile = average(800, input).unwrap();
+    assert_eq!(profile.turns.used, 6);
+    assert!(worst(&profile) < 1e-4, "{:e}", worst(&profile));
+    // A mark beyond the samples bounds nothing.
+    let input = stream(&turning(2, 4700, first, length), marks(first, length, 7));
+    let profile = average(800, input).unwrap();
+    assert_eq!(reasons(&profile), [(5, &Rejection::Incomplete)]);
+}
+
+#[test]
+fn blocks_of_any_size_give_the_same() {
+    let (length, first) = (523.21, 7.3);
+    let mut data = turning(3, 9 * 530, first, length);
+    let mut scatter = scatter(3);
+    data.iter_mut().flatten().for_each(|value| *value += 0.1 * scatter());
+    data[1][1300] = f64::NAN;
+    let whole = average(512, stream(&data, marks(first, length, 10))).unwrap();
+    assert_eq!(whole.turns.used, 8);
+    for block_samples in [1, 13, 500, 1234] {
+        let mut input = stream(&data, marks(first, length, 10));
+        input.block_samples = block_samples;
+        let profile = average(512, input).unwrap();
+        assert_eq!(profile.turns, whole.turns);
+        // Rounding of positions that are counted from another frame.
+        let off = profile.mean.iter().zip(&whole.mean).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(off < 1e-12, "{block_samples}: {off:e}");
+        let covariances = profile.covariance.unwrap().into_iter().zip(whole.covariance.clone().unwrap());
+        assert!(covariances.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) < 1e-14);
+    }
+}
+
+#[test]
+fn the_covariance_is_that_of_the_turns() {
+    let (length, turns, channels) = (64, 12, 3);
+    for channels in [channels, 5] {
+        let mut scatter = scatter(4);
+        let mut data = vec![Vec::new(); channels];
+        for _ in 0..turns * length {
+            // What all sensors see, and what each sees alone, on top of a level of 100 µm.
+            let common = scatter();
+            data.iter_mut().enumerate().for_each(|(index, channel)| {
+                channel.push(100.0 + (1.0 - index as f64) * common + 0.3 * scatter());
+            });
+        }
+        let profile = average(length, stream(&data, marks(0.0, length as f64, turns + 1))).unwrap();
+        let transform = |turn: usize, channel: usize, order: usize| -> Complex64 {
+            let samples = &data[channel][turn * length..(turn + 1) * length];
+            let terms = samples
+                .iter()
+                .enumerate()
+                .map(|(index, value)| value * Complex64::cis(TAU * (order * index) as f64 / length as f64));
+            terms.sum::<Complex64>() * if order == 0 { 1.0 } else { 2.0 } / length as f64
+        };
+        for order in [0, 1, 7, 31] {
+            let all: Vec<Vec<Complex64>> =
+                (0..turns).map(|turn| (0..channels).map(|channel| transform(turn, channel, order)).collect()).collect();
+            let mean = |channel: usize| all.iter().map(|turn| turn[channel]).sum::<Complex64>() / turns as f64;
+            for row in 0..channels {
+                assert!((profile.order(order)[row] - mean(row)).norm() < 1e-12);
+                for column in 0..channels {
+                    let products = all
+                        .iter()
+                        .map(|turn| (turn[row] - mean(row)) * (turn[column] - mean(column)).conj());
+                    let expected = products.sum::<Complex64>() / (turns * (turns - 1)) as f64;
+                    let found = profile.order_covariance(order).unwrap()[row * channels + column];
+                    // 1e-13: rounding of the test's own sums beside a level of 100.
+                    assert!((found - expected).norm() < 1e-13, "order {order}: {found} {expected}");
+                }
+            }
+        }
+    }
+    let one = stream(&[(0..64).map(f64::from).collect()], marks(0.0, 64.0, 2));
+    let profile = average_with(SynchronousAverageConfig { min_turns: 1, ..config(64) }, one).unwrap();
+    assert_eq!((profile.turns.used, profile.covariance), (1, None));
+}
+
+/// Twelve turns with a few marks gone or added.
+fn with_marks(change: impl FnOnce(&mut Vec<f64>)) -> Result<Profile> {
+    let mut places = marks(20.0, 600.0, 13);
+    change(&mut places);
+    average(512, stream(&turning(2, 7300, 20.0, 600.0), places))
+}
+
+#[test]
+fn a_missing_mark_costs_the_two_turns_beside_it() {
+    let profile = with_marks(|marks| drop(marks.remove(4))).unwrap();
+    assert_eq!((profile.turns.recorded, profile.turns.used), (11, 10));
+    let rejected = &profile.turns.rejected[0];
+    assert_eq!((rejected.turn, rejected.start_sample), (3, 1820));
+    assert!(matches!(rejected.reason, Rejection::MissingMark(length) if (length.samples - 1200.0).abs() < 1e-9));
+    assert!(worst(&profile) < 5.0 * kernel::ERROR);
+}
+
+#[test]
+fn a_doubled_mark_costs_the_turn_that_it_cuts() {
+    // Whether the other piece is a turn by its length (0.98 of one) or not.
+    for share in [0.02, 0.3, 0.5, 0.98] {
+        let profile = with_marks(|marks| marks.insert(5, marks[4] + share * 600.0)).unwrap();
+        assert_eq!((profile.turns.recorded, profile.turns.used), (13, 11), "{share}");
+        assert!(
+            matches!(reasons(&profile)[..], [(4, Rejection::DoubledMark(_)), (5, Rejection::DoubledMark(_))]),
+            "{share}: {:?}",
+            reasons(&profile)
+        );
+        assert!(worst(&profile) < 5.0 * kernel::ERROR);
+    }
+    // A mark that bounces belongs to either turn: neither is used.
+    let profile = with_marks(|marks| marks.insert(5, marks[4] + 1.0)).unwrap();
+    assert_eq!(profile.turns.used, 10);
+}
+
+#[test]
+fn a_turn_off_speed_is_left_out() {
+    let profile = with_marks(|marks| marks[6..].iter_mut().for_each(|mark| *mark += 60.0)).unwrap();
+    assert!(matches!(reasons(&profile)[..], [(5, Rejection::Speed(_)), (11, Rejection::Incomplete)]));
+}
+
+#[test]
+fn bad_samples_cost_their_turns() {
+    let places = marks(20.0, 600.3, 13);
+    let mut data = turning(2, 7300, 20.0, 600.3);
+    data[0][20 + 601 * 3 + 50] = f64::INFINITY;
+    // Half of the turn at the highest reading so far, come to in a step.
+    let top = data[1].iter().copied().fold(0.0, f64::max) + 1.0;
+    data[1][4600..4700].fill(top);
+    let profile = average(512, stream(&data, places)).unwrap();
+    let defect = |sensor, kind| Rejection::Defect { sensor, kind };
+    assert_eq!(
+        reasons(&profile),
+        [(3, &defect(0, DefectKind::NotFinite)), (7, &defect(1, DefectKind::Clipped))]
+    );
+    assert!(worst(&profile) < 5.0 * kernel::ERROR);
+}
+
+#[test]
+fn a_dead_channel_fails_by_name() {
+    let mut data = turning(3, 7300, 20.0, 600.0);
+    data[2].fill(0.25);
+    let error = average(512, stream(&data, marks(20.0, 600.0, 13))).unwrap_err().to_string();
+    assert!(error.contains("sensor S3, channel 3 of test.h5:/initial/s01"), "{error}");
+    assert!(error.contains("all 7300 samples read 0.25 µm"), "{error}");
+}
+
+#[test]
+fn too_few_turns_fail_with_every_reason() {
+    let mut data = turning(2, 3700, 20.0, 600.0);
+    data[1][700] = f64::NAN;
+    let mut places = marks(20.0, 600.0, 7);
+    places.remove(4);
+    let mut input = stream(&data, places);
+    input.capture.trimmed.push(Trim { first_turn: 0, turns: 2, reason: "start_turns".into() });
+    let error = average(512, input).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "cannot average test.h5:/initial/s01: 3 of 7 turns can be used, min_turns = 5; 2 set aside: start_turns; \
+         1 × a mark is missing (turn 5); 1 × sensor S2 is not a number (turn 3)"
+    );
+    let error = average(512, stream(&data, Vec::new())).unwrap_err();
+    assert!(error.to_string().contains("0 of 0 turns"), "{error}");
+    assert!(error.advice().unwrap().contains("once-per-turn mark"));
+}
+
+#[test]
+fn a_speed_far_from_the_stated_is_a_warning() {
+    for (stated_rpm, warnings) in [(2000.0, 0), (1965.0, 0), (1000.0, 1)] {
+        let mut input = stream(&turning(1, 6000, 0.0, 600.0), marks(0.0, 600.0, 11));
+        input.capture.stated_speed_rpm = Some(stated_rpm);
+        let profile = average(600, input).unwrap();
+        assert!((profile.speed_rpm.unwrap() - 2000.0).abs() < 1e-9);
+        assert_eq!(profile.warnings.len(), warnings, "{:?}", profile.warnings);
+    }
+}
+
+#[test]
+fn orders_that_the_recording_hardly_holds_are_a_warning() {
+    let input = || stream(&turning(1, 6100, 0.5, 600.0), marks(0.5, 600.0, 11));
+    assert!(average(600, input()).unwrap().warnings[0].contains("carry orders to 150"));
+    assert_eq!(average(300, input()).unwrap().warnings, [] as [String; 0]);
+}
+
+#[test]
+fn an_outlier_is_left_out_where_asked_for() {
+    let mut data = turning(2, 40 * 512, 0.0, 512.0);
+    let mut scatter = scatter(5);
+    data.iter_mut().flatten().for_each(|value| *value += 0.1 * scatter());
+    data[1][512 * 21 + 100..512 * 21 + 180].iter_mut().for_each(|value| *value += 1.0);
+    let input = || stream(&data, marks(0.0, 512.0, 41));
+    assert_eq!(average(512, input()).unwrap().turns.used, 40);
+    let profile = average_with(SynchronousAverageConfig { outlier_sigma: Some(3.0), ..config(512) }, input()).unwrap();
+    assert_eq!(profile.turns.used, 39);
+    let [(21, Rejection::Outlier { sensor: 1, distance_um })] = reasons(&profile)[..] else {
+        panic!("{:?}", reasons(&profile));
+    };
+    // 1 µm over 80 of 512 samples, and noise of 0.1/√3 µm.
+    let expected_um = (80.0 / 512.0 + 0.01 / 3.0_f64).sqrt();
+    assert!((distance_um - expected_um).abs() < 0.05 * expected_um, "{distance_um} {expected_um}");
+}
+
+/// Turns of about 1000 samples at a speed that swings, with the encoder's angle and the places of its whole turns.
+fn swinging(turns: usize) -> (MemoryStream, MemoryStream) {
+    let angle = |position: f64| {
+        let even = (position - 30.3) / 1000.7;
+        even + 0.002 * (3.0 * TAU * even).sin() + 0.001 * (2.0 * TAU * even).cos()
+    };
+    let frames = 1001 * turns + 100;
+    let data: Vec<Vec<f64>> = (0..2)
+        .map(|channel| {
+            let harmonics = harmonics(channel);
+            (0..frames).map(|frame| signal(&harmonics, TAU * angle(frame as f64))).collect()
+        })
+        .collect();
+    let place = |turn: usize| {
+        let (mut low, mut high) = (0.0, frames as f64);
+        while high - low > 1e-9 {
+            let middle = 0.5 * (low + high);
+            if angle(middle) < turn as f64 { low = middle } else { high = middle }
+        }
+        low
+    };
+    let index = stream(&data, (1..=turns).map(place).collect());
+    let mut encoder = index.clone();
+    encoder.capture.encoder = true;
+    encoder.angle_rev = (0..frames).map(|frame| angle(frame as f64)).collect();
+    (index, encoder)
+}
+
+#[test]
+fn the_encoder_sees_through_a_swinging_speed() {
+    let (index, encoder) = swinging(9);
+    // Marks alone put 5 µm of order 1 at angles that are wrong by up to 0.02 rad.
+    assert!(worst(&average(1000, index).unwrap()) > 0.01);
+    for block_samples in [1, 300, usize::MAX] {
+        let mut input = encoder.clone();
+        input.block_samples = block_samples;
+        let profile = average(1000, input).unwrap();
+        assert_eq!(profile.turns.used, 8);
+        assert!(worst(&profile) < 5.0 * kernel::ERROR, "{:e}", worst(&profile));
+    }
+}
+
+#[test]
+fn an_encoder_that_stumbles_costs_its_turn() {
+    let (_, mut encoder) = swinging(9);
+    encoder.angle_rev[3500] -= 0.01;
+    encoder.angle_rev[5700] = f64::NAN;
+    let profile = average(1000, encoder).unwrap();
+    assert_eq!(reasons(&profile), [(2, &Rejection::Angle), (4, &Rejection::Angle)]);
+    assert!(worst(&profile) < 5.0 * kernel::ERROR);
+}
+
+#[test]
+fn marks_that_make_no_sense_are_no_panic() {
+    let data = turning(1, 3000, 0.0, 100.0);
+    for places in [
+        vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0],
+        vec![0.0; 9],
+        vec![f64::NAN; 9],
+        vec![-300.0, -200.0, -100.0, 0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0],
+        vec![500.0, 600.0, 700.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0],
+        vec![1e300, 2e300, f64::INFINITY],
+    ] {
+        for block_samples in [1, 12, 3000] {
+            let mut input = stream(&data, places.clone());
+            input.block_samples = block_samples;
+            let _ = average(16, input);
+        }
+    }
+}
