@@ -1,0 +1,63 @@
+//! What other people's programs say of our files. `npm ci` in `tests/foreign` brings the validator.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+#[path = "../../mesh/tests/support/mod.rs"]
+mod support;
+
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use runout_core::pipeline::Registry;
+use support::{export, exporter, report, skip, surface, trimesh, volume_mm3};
+
+fn files(folder: &Path, keys: &str) -> Vec<PathBuf> {
+    let mut registry = Registry::default();
+    runout_gltf::register(&mut registry);
+    let toml = format!("plugin = \"gltf\"\npath = \"part.glb\"\n{keys}");
+    export(&*exporter(&registry, &toml, folder).unwrap(), Some(&surface())).unwrap()
+}
+
+#[test]
+fn khronos_validator_finds_nothing() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign");
+    let modules = std::env::var_os("RUNOUT_NODE_MODULES").map_or_else(|| here.join("node_modules"), PathBuf::from);
+    if !modules.join("gltf-validator").is_dir() {
+        return skip("gltf-validator is not installed in RUNOUT_NODE_MODULES (default tests/foreign/node_modules)");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for keys in ["", "capped = true\nmagnification = 1000", "colour_range_um = 0.001"] {
+        for file in files(folder.path(), keys) {
+            let output = Command::new("node").arg(here.join("validate.mjs")).arg(&modules).arg(&file).output();
+            let Ok(output) = output else { return skip("node is not installed") };
+            let report = report(&output);
+            let issues = &report["issues"];
+            for kind in ["numErrors", "numWarnings", "numInfos", "numHints"] {
+                assert_eq!(issues[kind], 0, "{}: {issues:#}", file.display());
+            }
+            assert_eq!(report["info"]["materialCount"], 0);
+        }
+    }
+}
+
+#[test]
+fn trimesh_finds_a_coloured_solid() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = surface();
+    for (file, scale) in files(folder.path(), "capped = true\nmagnification = 1000").iter().zip([1.0, 1000.0]) {
+        let Some(found) = trimesh(file) else { return };
+        assert_eq!(found["watertight"], true, "{found:#}");
+        assert_eq!(found["winding_consistent"], true);
+        let volume = found["volume"].as_f64().unwrap() * 1e9;
+        let expected = volume_mm3(&surface, scale);
+        // Triangles halve each cell by a diagonal (1e-5 of the magnified volume); f32 rounds to 1e-9 m (1e-7).
+        assert!((volume / expected - 1.0).abs() < if scale > 1.0 { 1e-4 } else { 1e-6 }, "{volume} {expected}");
+        assert!(found["colours"].as_u64().unwrap() > 100);
+        let range = found["deviation_range"].as_array().unwrap();
+        let lowest = surface.deviation_um.iter().copied().fold(f64::INFINITY, f64::min);
+        // Half a unit in the last place of an f32 near 8.
+        assert!((range[0].as_f64().unwrap() - lowest).abs() < 5e-7);
+    }
+}

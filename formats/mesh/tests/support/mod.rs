@@ -1,0 +1,152 @@
+//! What the tests of all mesh formats need: a surface with a known shape, and a way through the registry to a file.
+
+#![allow(dead_code, clippy::unwrap_used, clippy::print_stderr, reason = "tests, each of which uses a part")]
+
+use std::{
+    f64::consts::TAU,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+use runout_core::{
+    Complex64, Error,
+    pipeline::{
+        error::Fault,
+        registry::{Context, Registry},
+        run::{LostOrders, RunInfo, StationResult, Summary},
+    },
+    provenance::{Input, Provenance},
+    separation::{Quantity, Residual, SectionAt, Separation},
+    stage::Exporter,
+    surface::Surface,
+};
+use toml::de::DeTable;
+
+pub const RADIUS_MM: f64 = 15.0;
+pub const ANGLES: usize = 360;
+
+/// A lobed, bent and waisted part; in µm.
+pub fn deviation_um(angle: f64, z_mm: f64) -> f64 {
+    let along = (z_mm - 12.0) / 12.0;
+    3.0 * (3.0 * angle + 0.5).cos() + 1.5 * (11.0 * angle).sin() * along + 4.0 * along * along * (angle - 0.3).cos()
+        - 2.0 * (1.0 - along * along)
+        + 0.4 * (40.0 * angle).cos()
+}
+
+pub fn angle(index: usize) -> f64 {
+    TAU * index as f64 / ANGLES as f64
+}
+
+/// On rings at uneven distances.
+pub fn surface() -> Surface {
+    let z_mm = vec![0.0, 2.0, 5.0, 6.0, 9.0, 13.0, 14.5, 18.0, 22.0, 24.0];
+    let deviation_um = z_mm.iter().flat_map(|z| (0..ANGLES).map(|index| deviation_um(angle(index), *z))).collect();
+    Surface {
+        radius_mm: RADIUS_MM,
+        angles: ANGLES,
+        z_mm,
+        deviation_um,
+        interpolation: "linear along z between the two sections",
+        meetings: Vec::new(),
+    }
+}
+
+/// What the mesh of [`surface`] must enclose when its deviations are drawn `scale` times larger, in mm³: prisms between
+/// rings, each with the polygon area ½ sin(Δα) Σ rᵢ rᵢ₊₁, by the prismatoid's rule.
+pub fn volume_mm3(surface: &Surface, scale: f64) -> f64 {
+    let radius = |deviation: f64| surface.radius_mm + 1e-3 * scale * deviation;
+    let rings: Vec<Vec<f64>> =
+        (0..surface.z_mm.len()).map(|ring| surface.ring(ring).iter().map(|value| radius(*value)).collect()).collect();
+    let area = |radii: &[f64]| {
+        let around = radii.iter().zip(radii.iter().cycle().skip(1)).map(|(one, next)| one * next).sum::<f64>();
+        0.5 * (TAU / surface.angles as f64).sin() * around
+    };
+    let slices = rings.windows(2).zip(surface.z_mm.windows(2)).map(|(rings, z)| {
+        let middle: Vec<f64> = rings[0].iter().zip(&rings[1]).map(|(low, high)| 0.5 * (low + high)).collect();
+        (z[1] - z[0]) / 6.0 * (area(&rings[0]) + 4.0 * area(&middle) + area(&rings[1]))
+    });
+    slices.sum()
+}
+
+/// Builds an exporter as a pipeline does, from the keys of its table.
+pub fn exporter(registry: &Registry, toml: &str, folder: &Path) -> Result<Box<dyn Exporter>, Fault> {
+    registry.exporters.build(&DeTable::parse(toml).unwrap(), &Context { folder, rig: None })
+}
+
+/// Runs an exporter over a surface.
+pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<PathBuf>, Error> {
+    let title = "Waisted part\nwith a second line";
+    let run = RunInfo { title: title.into(), rig: None, assessment: None };
+    let mut export = exporter.begin(&run)?;
+    export.station(&station())?;
+    let summary = Summary {
+        title: title.into(),
+        provenance: Provenance {
+            program: "runout 0.0.0".into(),
+            configuration: String::new(),
+            inputs: vec![Input { path: "part.h5".into(), bytes: 3, blake3: "00ff".into() }],
+        },
+        lost_orders: LostOrders { form: vec![1, 4, 500], motion: Vec::new() },
+        stations: Vec::new(),
+        surface: None,
+        outputs: Vec::new(),
+        warnings: Vec::new(),
+    };
+    export.finish(&summary, surface)
+}
+
+/// A form that holds orders 2 to 250, of which the surface's 360 angles hold 179.
+fn station() -> StationResult {
+    let mut estimate = vec![Complex64::ZERO; 251];
+    estimate[2..].fill(Complex64::new(0.1, 0.0));
+    StationResult {
+        station: "s1".into(),
+        z_mm: 0.0,
+        angles: ANGLES,
+        separation: Separation {
+            sections: vec![SectionAt { id: "a".into(), z_mm: 0.0 }],
+            unknowns: vec![Quantity::Form(0)],
+            variance: vec![f64::NAN; estimate.len()],
+            observable: vec![true; estimate.len()],
+            estimate,
+            residual: Residual::default(),
+            warnings: Vec::new(),
+        },
+        profiles: Vec::new(),
+        values: Vec::new(),
+        truth: None,
+    }
+}
+
+/// Names in a folder.
+pub fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// Says that a foreign program is not there; fails where it has to be.
+pub fn skip(what: &str) {
+    assert!(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_none_or(|value| value != "1"), "{what}");
+    eprintln!("skipped: {what}");
+}
+
+/// What trimesh sees in a mesh file, as JSON; `None` where it is not installed.
+pub fn trimesh(file: &Path) -> Option<serde_json::Value> {
+    let python = std::env::var_os("RUNOUT_PYTHON").unwrap_or_else(|| "python3".into());
+    let there = Command::new(&python).args(["-c", "import trimesh"]).output().is_ok_and(|found| found.status.success());
+    if !there {
+        skip("trimesh is not installed for RUNOUT_PYTHON (default python3)");
+        return None;
+    }
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../mesh/tests/support/trimesh_report.py");
+    let output = Command::new(&python).arg(script).arg(file).output().unwrap();
+    Some(report(&output))
+}
+
+/// The JSON that a foreign program printed.
+pub fn report(output: &Output) -> serde_json::Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
