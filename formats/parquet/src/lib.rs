@@ -1,1 +1,142 @@
-//! Parquet tables of form, motion and harmonics.
+//! Parquet tables of form, motion and harmonics: the exporter `parquet`.
+//!
+//! Its path is a folder that receives
+//!
+//! - `form.parquet`: form of each section over the part's angle, one row a (station, section, angle);
+//! - `motion.parquet`: error motion over the spindle's angle, one row a (station, angle); only where a motion was
+//!   solved for. Columns of a motion that was not (a tilt seen by one section) are null;
+//! - `harmonics.parquet`: the coefficients that both are made of, one row a (station, quantity, section, order).
+//!   Orders run from 1; order 0, the mean level, has a row where the method knows it (its value is not 0).
+//!
+//! Orders that the layout cannot tell are NaN with `observable` false in the harmonics, and left out of the sums in
+//! the other two, whose metadata names them. Every column carries its unit and meaning, every file the configuration,
+//! the checksums of the inputs and the warnings.
+
+mod about;
+mod columns;
+mod table;
+
+use std::path::PathBuf;
+
+use runout_core::{
+    Error, Result,
+    atomic_file::PendingFile,
+    pipeline::{
+        error::Fault,
+        registry::{Context, Plugin, Registry, StageConfig},
+        run::{RunInfo, StationResult, Summary},
+    },
+    stage::{Export, Exporter},
+    surface::Surface,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use about::Content;
+use table::Table;
+
+/// Adds the exporter `parquet`.
+pub fn register(registry: &mut Registry) {
+    registry.exporters.add(Plugin::of::<ParquetConfig>());
+}
+
+/// `[[export]] plugin = "parquet"`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ParquetConfig {
+    /// Folder for form.parquet, motion.parquet and harmonics.parquet; made where it is missing.
+    pub path: PathBuf,
+}
+
+impl StageConfig for ParquetConfig {
+    type Stage = Box<dyn Exporter>;
+
+    const NAME: &'static str = "parquet";
+    const ABOUT: &'static str = "tables of form, motion and harmonics";
+
+    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        if self.path.as_os_str().is_empty() {
+            return Err(Fault::at("path", "expected the name of a folder"));
+        }
+        Ok(Box::new(Parquet { folder: context.path(&self.path) }))
+    }
+}
+
+/// The exporter `parquet`.
+struct Parquet {
+    folder: PathBuf,
+}
+
+impl Parquet {
+    fn form(&self) -> PathBuf {
+        self.folder.join("form.parquet")
+    }
+
+    fn motion(&self) -> PathBuf {
+        self.folder.join("motion.parquet")
+    }
+
+    fn harmonics(&self) -> PathBuf {
+        self.folder.join("harmonics.parquet")
+    }
+}
+
+impl Exporter for Parquet {
+    fn outputs(&self) -> Vec<PathBuf> {
+        vec![self.form(), self.motion(), self.harmonics()]
+    }
+
+    fn begin(&self, _run: &RunInfo) -> Result<Box<dyn Export>> {
+        if self.folder.is_file() {
+            let shown = self.folder.display().to_string();
+            return Err(Error::new("write to", shown, "there is a file of that name").help("name a folder"));
+        }
+        Ok(Box::new(Tables {
+            form: Table::create(self.form(), columns::form_schema())?,
+            harmonics: Table::create(self.harmonics(), columns::harmonics_schema())?,
+            motion: None,
+            motion_path: self.motion(),
+            content: Content::default(),
+        }))
+    }
+}
+
+/// The tables being written.
+struct Tables {
+    form: Table,
+    harmonics: Table,
+    motion: Option<Table>,
+    motion_path: PathBuf,
+    content: Content,
+}
+
+impl Export for Tables {
+    fn station(&mut self, result: &StationResult) -> Result<()> {
+        self.content.note(result);
+        self.form.append(columns::form(result))?;
+        self.harmonics.append(columns::harmonics(result))?;
+        if result.separation.unknowns.iter().any(|unknown| !unknown.is_form()) {
+            let table = match &mut self.motion {
+                Some(table) => table,
+                None => self.motion.insert(Table::create(self.motion_path.clone(), columns::motion_schema())?),
+            };
+            table.append(columns::motion(result))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PathBuf>> {
+        let entries = self.content.entries(summary);
+        let had_motion = self.motion.is_some();
+        let tables = [Some(self.form), self.motion, Some(self.harmonics)].into_iter().flatten();
+        // All are complete before the first gets its name.
+        let complete: Result<Vec<_>> = tables.map(|table| table.close(&entries)).collect();
+        let written: Result<Vec<_>> = complete?.into_iter().map(PendingFile::commit).collect();
+        if !had_motion && self.motion_path.is_file() {
+            // An earlier run's motion beside this run's form would be taken for this run's.
+            std::fs::remove_file(&self.motion_path)
+                .map_err(|error| Error::new("remove the outdated", self.motion_path.display().to_string(), error))?;
+        }
+        written
+    }
+}

@@ -1,0 +1,63 @@
+//! What a file says about itself: enough to know what its numbers are.
+
+use std::collections::BTreeSet;
+
+use runout_core::{
+    numerics::fourier,
+    pipeline::run::{StationResult, Summary},
+};
+use serde_json::json;
+
+/// What the stations hold, as they come in.
+#[derive(Debug, Default)]
+pub struct Content {
+    lost_form: BTreeSet<usize>,
+    lost_motion: BTreeSet<usize>,
+    level_known: bool,
+    highest_order: usize,
+    highest_on_angles: usize,
+}
+
+impl Content {
+    /// Takes note of a station.
+    pub fn note(&mut self, result: &StationResult) {
+        let separation = &result.separation;
+        for (unknown, quantity) in separation.unknowns.iter().enumerate() {
+            let lost = if quantity.is_form() { &mut self.lost_form } else { &mut self.lost_motion };
+            lost.extend(separation.lost_orders(unknown));
+            self.level_known |= separation.coefficients(unknown).next().is_some_and(|level| level.re != 0.0);
+        }
+        let highest = separation.max_order();
+        self.highest_order = self.highest_order.max(highest);
+        self.highest_on_angles = self.highest_on_angles.max(highest.min(fourier::max_order(result.angles)));
+    }
+
+    /// Keys and values for the files' metadata; lists are JSON.
+    pub fn entries(&self, summary: &Summary) -> Vec<(String, String)> {
+        let lowest = usize::from(!self.level_known);
+        let lost_form: BTreeSet<_> = self.lost_form.iter().chain(&summary.lost_orders.form).collect();
+        let lost_motion: BTreeSet<_> = self.lost_motion.iter().chain(&summary.lost_orders.motion).collect();
+        let of_stations = summary
+            .stations
+            .iter()
+            .flat_map(|station| station.warnings.iter().map(move |warning| format!("{}: {warning}", station.station)));
+        let warnings: Vec<String> = summary.warnings.iter().cloned().chain(of_stations).collect();
+        let entries = [
+            ("title", summary.title.clone()),
+            ("program", summary.provenance.program.clone()),
+            ("configuration", summary.provenance.configuration.clone()),
+            ("inputs", json!(summary.provenance.inputs).to_string()),
+            ("convention", CONVENTION.to_owned()),
+            ("lost_orders", json!({ "form": lost_form, "motion": lost_motion }).to_string()),
+            ("band_upr", json!([lowest, self.highest_order]).to_string()),
+            ("band_over_angle_upr", json!([lowest, self.highest_on_angles]).to_string()),
+            ("warnings", json!(warnings).to_string()),
+        ];
+        entries.map(|(key, value)| (format!("runout.{key}"), value)).into()
+    }
+}
+
+const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \
+    Re sum c exp(-i n Phi) over the spindle's angle Phi. Lost orders cannot be told by the layout: NaN in the \
+    harmonics, left out of form and motion. band_upr: lowest and highest order of the harmonics; \
+    band_over_angle_upr: of form and motion over angle.";

@@ -1,0 +1,114 @@
+//! One Parquet file, written row group by row group.
+
+use std::{fs::File, path::PathBuf, sync::Arc};
+
+use arrow_array::{ArrayRef, RecordBatch};
+use arrow_schema::{DataType, Schema};
+use parquet::{
+    arrow::ArrowWriter,
+    basic::{Compression, Encoding, ZstdLevel},
+    file::{
+        metadata::KeyValue,
+        properties::{WriterProperties, WriterPropertiesBuilder},
+    },
+    schema::types::ColumnPath,
+};
+use runout_core::{Result, atomic_file::PendingFile};
+
+/// Rows in a row group. What is buffered, some 2 MB, does not depend on the number of stations, and a reader that
+/// wants one station skips all other groups by their statistics.
+const ROWS_PER_GROUP: usize = 65_536;
+
+/// A table under a temporary name.
+pub struct Table {
+    writer: ArrowWriter<File>,
+    schema: Arc<Schema>,
+    // Last, so that the file is closed before its temporary name is removed.
+    pending: PendingFile,
+}
+
+impl Table {
+    /// Begins a file that will appear as `path`.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn create(path: PathBuf, schema: Schema) -> Result<Self> {
+        let pending = PendingFile::new(path)?;
+        let properties = properties(&schema).build();
+        let schema = Arc::new(schema);
+        let writer = ArrowWriter::try_new(pending.create()?, Arc::clone(&schema), Some(properties))
+            .map_err(|error| pending.failure(error))?;
+        Ok(Self { writer, schema, pending })
+    }
+
+    /// Appends rows, column by column in the order of the schema.
+    ///
+    /// # Errors
+    /// When the file system refuses them.
+    pub fn append(&mut self, columns: Vec<ArrayRef>) -> Result<()> {
+        RecordBatch::try_new(Arc::clone(&self.schema), columns)
+            .map_err(|error| self.pending.failure(error))
+            .and_then(|batch| self.writer.write(&batch).map_err(|error| self.pending.failure(error)))
+    }
+
+    /// Completes the file with metadata; it appears when the result is committed.
+    ///
+    /// # Errors
+    /// When the file system refuses the rest.
+    pub fn close(mut self, entries: &[(String, String)]) -> Result<PendingFile> {
+        for (key, value) in entries {
+            self.writer.append_key_value_metadata(KeyValue::new(key.clone(), value.clone()));
+        }
+        self.writer.close().map_err(|error| self.pending.failure(error))?;
+        Ok(self.pending)
+    }
+}
+
+/// Dictionaries for names and orders, which repeat; BYTE_STREAM_SPLIT for floats, which do not, but whose high bytes do.
+fn properties(schema: &Schema) -> WriterPropertiesBuilder {
+    let mut properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_max_row_group_row_count(Some(ROWS_PER_GROUP))
+        .set_created_by(format!("runout {}", runout_core::provenance::VERSION));
+    for field in schema.fields() {
+        if *field.data_type() == DataType::Float64 {
+            let column = ColumnPath::from(field.name().as_str());
+            properties = properties
+                .set_column_dictionary_enabled(column.clone(), false)
+                .set_column_encoding(column, Encoding::BYTE_STREAM_SPLIT);
+        }
+    }
+    properties
+}
+
+#[cfg(test)]
+mod tests {
+    use arrow_array::Float64Array;
+    use arrow_schema::Field;
+
+    use super::*;
+
+    #[test]
+    fn what_is_buffered_does_not_grow_and_nothing_appears_before_its_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("numbers.parquet");
+        let schema = Schema::new(vec![Field::new("number", DataType::Float64, false)]);
+        let mut table = Table::create(path.clone(), schema).unwrap();
+        let mut seed = 1_u64;
+        for _ in 0..200 {
+            let column = Float64Array::from_iter_values((0..5120).map(|_| {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                seed as f64
+            }));
+            table.append(vec![Arc::new(column)]).unwrap();
+            assert!(table.writer.in_progress_rows() < ROWS_PER_GROUP);
+            // A row group of one incompressible column takes 8 bytes a row; twice that leaves room for buffers.
+            assert!(table.writer.memory_size() < 16 * ROWS_PER_GROUP);
+        }
+        assert!(!path.exists());
+        let pending = table.close(&[]).unwrap();
+        assert!(!path.exists());
+        pending.commit().unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
