@@ -1,0 +1,6 @@
+//! Figures that the READMEs print: simulated campaigns, separated in memory.
+
+pub mod averaging;
+pub mod campaign;
+pub mod eccentricity;
+pub mod plot;

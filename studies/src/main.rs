@@ -1,0 +1,47 @@
+//! Figures that the READMEs print, all from simulated campaigns.
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program that prints tables")]
+
+use std::process::ExitCode;
+
+use runout_core::{Result, atomic_file};
+use runout_studies::{averaging, eccentricity};
+
+const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
+       runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = match words[..] {
+        ["eccentricity"] => eccentricity::rows(20).map(|rows| println!("{}", eccentricity::table(&rows))),
+        ["eccentricity", seeds] if seeds.parse::<u64>().is_ok() => {
+            eccentricity::rows(seeds.parse().unwrap_or_default()).map(|rows| println!("{}", eccentricity::table(&rows)))
+        }
+        ["averaging"] => averaging(None),
+        ["averaging", picture] => averaging(Some(picture)),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn averaging(picture: Option<&str>) -> Result<()> {
+    let figure = averaging::study(&averaging::figure_7())?;
+    println!("Fig. 7's settings, simulated: form and asynchronous motion only\n\n{}", figure.table());
+    let table = averaging::study(&averaging::table_1())?;
+    println!("Table 1's settings, simulated: with synchronous motion, eccentricity and noise\n\n{}", table.table());
+    if let Some(path) = picture {
+        let path = atomic_file::write(path, &figure.picture("Ra tends to the part's own (simulated)")?)?;
+        println!("picture: {}", path.display());
+    }
+    Ok(())
+}
