@@ -1,6 +1,7 @@
 //! Measurement and result files, written, read, damaged, and seen by h5py.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod beside_csv;
 mod damage;
 mod double;
 mod foreign;

@@ -1,0 +1,129 @@
+//! The first line that is no comment: which column is what.
+
+use std::path::Path;
+
+use runout_core::{Error, Result, rig::Rig};
+
+use crate::lines::{Lines, cells};
+
+/// Column of the once-per-turn mark.
+const INDEX: &str = "index";
+/// Column of the unwrapped spindle angle.
+const ANGLE: &str = "angle_deg";
+/// Column of the time.
+const TIME: &str = "time_s";
+
+/// What the header tells.
+#[derive(Debug, Clone)]
+pub(crate) struct Header {
+    pub(crate) shown: String,
+    pub(crate) delimiter: u8,
+    pub(crate) names: Vec<String>,
+    /// The column of each of the rig's sensors.
+    pub(crate) sensors: Vec<usize>,
+    pub(crate) phase: Phase,
+    pub(crate) time: Option<usize>,
+    /// What a reader should know.
+    pub(crate) remarks: Vec<String>,
+    /// Names of columns that are not used.
+    pub(crate) unknown: Vec<String>,
+}
+
+/// The column that tells the turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Phase {
+    Index(usize),
+    Angle(usize),
+}
+
+impl Phase {
+    pub(crate) fn column(self) -> usize {
+        match self {
+            Self::Index(column) | Self::Angle(column) => column,
+        }
+    }
+}
+
+impl Header {
+    /// Opens a file, reads its header, and leaves the lines at the first row.
+    pub(crate) fn open(path: &Path, rig: &Rig) -> Result<(Self, Lines)> {
+        let mut lines = Lines::open(path)?;
+        let shown = path.display().to_string();
+        let header = loop {
+            let Some(line) = lines.next()? else {
+                return Err(Error::new("read", shown, "expected a header that names the columns, found none"));
+            };
+            if !line.is_blank() && !line.bytes.starts_with(b"#") {
+                break Self::parse(line.bytes, line.number, shown, rig)?;
+            }
+        };
+        Ok((header, lines))
+    }
+
+    fn parse(line: &[u8], number: u64, shown: String, rig: &Rig) -> Result<Self> {
+        // A decimal comma is no delimiter: a header with semicolons or tabs is split there.
+        let delimiter = [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
+        let names: Vec<String> = cells(line, delimiter).map(decode).collect();
+        let object = format!("{shown}, line {number}");
+        let error = |problem: String| Error::new("read", &object, problem);
+        let find = |name: &str| -> Result<Option<usize>> {
+            let mut found = names.iter().enumerate().filter(|(_, known)| *known == name).map(|(column, _)| column);
+            match (found.next(), found.next()) {
+                (_, Some(_)) => Err(error(format!("the column `{name}` is there twice"))),
+                (first, None) => Ok(first),
+            }
+        };
+        let mut sensors = Vec::with_capacity(rig.sensors.len());
+        for sensor in &rig.sensors {
+            sensors.push(find(&sensor.id)?.ok_or_else(|| {
+                error(format!("expected a column for the sensor `{}`, found {}", sensor.id, names.join(", ")))
+                    .help("the header has to name the rig's sensors by their ids")
+            })?);
+        }
+        let (index, angle, time) = (find(INDEX)?, find(ANGLE)?, find(TIME)?);
+        let mut remarks = Vec::new();
+        let phase = match (index, angle) {
+            (None, None) => {
+                return Err(error(format!("expected a column `{INDEX}` or `{ANGLE}`, found {}", names.join(", "))));
+            }
+            (Some(column), None) => Phase::Index(column),
+            (index, Some(column)) => {
+                if index.is_some() {
+                    remarks.push(format!("{shown}: the encoder's angle was used, not the index"));
+                }
+                Phase::Angle(column)
+            }
+        };
+        let known = |name: &&String| {
+            name.is_empty() || [INDEX, ANGLE, TIME].contains(&name.as_str()) || rig.sensor(name).is_some()
+        };
+        let unknown = names.iter().filter(|name| !known(name)).cloned().collect();
+        Ok(Self { shown, delimiter, names, sensors, phase, time, remarks, unknown })
+    }
+
+    /// An error at a cell; both numbers as people count, from 1.
+    pub(crate) fn error(&self, line: u64, column: usize, problem: impl ToString) -> Error {
+        let name = self.names.get(column).map_or("", String::as_str);
+        Error::new("read", format!("{}, line {line}, column {} (`{name}`)", self.shown, column + 1), problem)
+    }
+
+    /// An error of a whole line.
+    pub(crate) fn line_error(&self, line: u64, problem: impl ToString) -> Error {
+        Error::new("read", format!("{}, line {line}", self.shown), problem)
+    }
+
+    /// An error of a cell that holds no number.
+    pub(crate) fn no_number(&self, line: u64, column: usize, cell: &[u8], decimal: u8) -> Error {
+        let shown: String = decode(cell).chars().take(40).collect();
+        let kind = if decimal == b',' { "a number with a decimal comma" } else { "a number" };
+        self.error(line, column, format!("expected {kind}, found `{shown}`"))
+    }
+}
+
+/// UTF-8, or else Latin-1, whose bytes are the first 256 characters.
+pub(crate) fn decode(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}

@@ -1,0 +1,124 @@
+//! A text file, line after line, in a buffer of its own.
+
+use std::{fs::File, io::Read, path::Path};
+
+use runout_core::{Error, Result};
+
+const BUFFER: usize = 1 << 18;
+/// No row of readings is longer; a file without line ends is no table.
+const LONGEST_LINE: usize = 1 << 20;
+
+/// Reads lines without their ends.
+pub(crate) struct Lines {
+    file: File,
+    shown: String,
+    buffer: Vec<u8>,
+    /// What is in the buffer and not yet handed on.
+    start: usize,
+    end: usize,
+    number: u64,
+}
+
+/// A line, and its number from 1.
+#[derive(Clone, Copy)]
+pub(crate) struct Line<'a> {
+    pub(crate) number: u64,
+    pub(crate) bytes: &'a [u8],
+}
+
+impl Line<'_> {
+    pub(crate) fn is_blank(&self) -> bool {
+        self.bytes.iter().all(u8::is_ascii_whitespace)
+    }
+}
+
+impl Lines {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let shown = path.display().to_string();
+        let file = File::open(path).map_err(|error| Error::new("open", &shown, error))?;
+        let mut lines = Self { file, shown, buffer: vec![0; BUFFER], start: 0, end: 0, number: 0 };
+        lines.fill()?;
+        let begin = &lines.buffer[..lines.end];
+        if begin.starts_with(&[0xFF, 0xFE]) || begin.starts_with(&[0xFE, 0xFF]) {
+            let error = Error::new("read", &lines.shown, "expected text in UTF-8 or Latin-1, found UTF-16");
+            return Err(error.help("save it as UTF-8"));
+        }
+        if begin.starts_with(&[0xEF, 0xBB, 0xBF]) {
+            lines.start = 3;
+        }
+        Ok(lines)
+    }
+
+    /// The next line; `None` at the end.
+    pub(crate) fn next(&mut self) -> Result<Option<Line<'_>>> {
+        let mut searched = 0;
+        let (length, ended) = loop {
+            let waiting = &self.buffer[self.start..self.end];
+            if let Some(place) = memchr::memchr(b'\n', &waiting[searched..]) {
+                break (searched + place, 1);
+            }
+            searched = waiting.len();
+            if searched > LONGEST_LINE {
+                let object = format!("{}, line {}", self.shown, self.number + 1);
+                return Err(Error::new("read", object, format!("expected a line end within {LONGEST_LINE} bytes")));
+            }
+            if self.fill()? == 0 {
+                if searched == 0 {
+                    return Ok(None);
+                }
+                break (searched, 0);
+            }
+        };
+        let line = &self.buffer[self.start..self.start + length];
+        self.start += length + ended;
+        self.number += 1;
+        Ok(Some(Line { number: self.number, bytes: line.strip_suffix(b"\r").unwrap_or(line) }))
+    }
+
+    /// Reads more, behind what is waiting; gives the number of bytes.
+    fn fill(&mut self) -> Result<usize> {
+        self.buffer.copy_within(self.start..self.end, 0);
+        self.end -= self.start;
+        self.start = 0;
+        if self.end == self.buffer.len() {
+            self.buffer.resize(2 * self.end, 0);
+        }
+        loop {
+            match self.file.read(&mut self.buffer[self.end..]) {
+                Ok(count) => {
+                    self.end += count;
+                    return Ok(count);
+                }
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(Error::new("read", &self.shown, error)),
+            }
+        }
+    }
+}
+
+/// The cells of a line, without quotes and surrounding blanks.
+pub(crate) fn cells(line: &[u8], delimiter: u8) -> impl Iterator<Item = &[u8]> {
+    let mut rest = Some(line);
+    std::iter::from_fn(move || {
+        let (cell, after) = split(rest?, delimiter);
+        rest = after;
+        Some(cell)
+    })
+}
+
+/// The first cell, and what follows its delimiter, where there is one.
+pub(crate) fn split(line: &[u8], delimiter: u8) -> (&[u8], Option<&[u8]>) {
+    let quoted = line.strip_prefix(b"\"").and_then(|inner| {
+        let end = memchr::memchr(b'"', inner)?;
+        match inner.get(end + 1) {
+            None => Some((&inner[..end], None)),
+            Some(next) if *next == delimiter => Some((&inner[..end], Some(&inner[end + 2..]))),
+            Some(_) => None,
+        }
+    });
+    let (cell, rest) = quoted.unwrap_or_else(|| match memchr::memchr(delimiter, line) {
+        Some(end) => (&line[..end], Some(&line[end + 1..])),
+        None => (line, None),
+    });
+    (cell.trim_ascii(), rest)
+}

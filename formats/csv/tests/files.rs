@@ -1,0 +1,239 @@
+//! CSV files as programs write them, and as they should not be.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::{fmt::Write as _, fs, path::Path};
+
+use runout_core::{
+    Result,
+    measurement::{Block, Capture, Recording},
+    pipeline::registry::{Context, StageConfig},
+    rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
+    stage::Source,
+};
+use runout_csv::{CsvConfig, FileConfig, StationConfig};
+
+/// Sensors `S1` and, turned round, `Fühler`.
+fn rig(setups: &[&str]) -> Rig {
+    let sensor = |id: &str, sign| SensorConfig { id: id.into(), angle_deg: 0.0, z_mm: 0.0, section: id.into(), sign };
+    let setup = |id: &&str| SetupConfig { id: (*id).into(), part_deg: 0.0, sensors_deg: 0.0 };
+    let config = RigConfig {
+        part_radius_mm: 30.0,
+        rotation: Rotation::Ccw,
+        sensors: vec![sensor("S1", 1), sensor("Fühler", -1)],
+        setups: setups.iter().map(setup).collect(),
+    };
+    config.check().unwrap()
+}
+
+fn config(pattern: Option<&str>) -> CsvConfig {
+    CsvConfig {
+        stations: vec![StationConfig { name: "s".into(), z_mm: 0.0 }],
+        pattern: pattern.map(str::to_owned),
+        files: Vec::new(),
+        sample_rate_hz: None,
+        speed_rpm: None,
+    }
+}
+
+fn open(folder: &Path, config: CsvConfig, rig: &Rig) -> Result<Box<dyn Recording>> {
+    let loader = config.check(&Context { folder, rig: Some(rig) }).unwrap();
+    match loader.open(Some(rig))? {
+        Source::Turns(recording) => Ok(recording),
+        Source::Points(_) => unreachable!("a CSV measurement is of turns"),
+    }
+}
+
+fn drain(recording: &dyn Recording) -> Result<(Capture, Vec<f64>, Vec<f64>)> {
+    let mut stream = recording.open(0, 0)?;
+    let (mut samples, mut angle_rev, mut block) = (Vec::new(), Vec::new(), Block::default());
+    while stream.next_block(&mut block)? {
+        assert_eq!(block.start as usize * 2, samples.len());
+        samples.extend_from_slice(&block.samples);
+        angle_rev.extend_from_slice(&block.angle_rev);
+    }
+    Ok((stream.capture().clone(), samples, angle_rev))
+}
+
+/// Reads one file of these bytes.
+fn read(bytes: impl AsRef<[u8]>) -> Result<(Capture, Vec<f64>, Vec<f64>)> {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("x.csv"), bytes).unwrap();
+    drain(&*open(folder.path(), config(Some("x.csv")), &rig(&["one"]))?)
+}
+
+/// What reading these bytes fails with.
+fn refusal(bytes: impl AsRef<[u8]>) -> String {
+    read(bytes).map(|_| ()).unwrap_err().to_string()
+}
+
+fn expect(found: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(found.contains(part), "`{part}` is not in: {found}");
+    }
+}
+
+#[test]
+fn delimiters_decimals_and_encodings_are_told_apart() {
+    let comma = "S1,index,Fühler\n1.5,0,2\n-0.25,1,.5\n1e-3,0,-7.125\n";
+    let semicolon = comma.replace(',', ";");
+    let decimal_comma = semicolon.replace('.', ",");
+    let tab = decimal_comma.replace(';', "\t");
+    let crlf = tab.replace('\n', "\r\n");
+    let latin1: Vec<u8> = tab.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect();
+    let quoted = semicolon.replace("S1;index;Fühler", "\"S1\";\"index\";\"Fühler\"").replace("1.5", "\"1.5\"");
+    let remarked = format!("# a remark; with, all\tof them\n\n#\n{comma}\n\n");
+    let padded = comma.replace(',', " , ");
+    let ended = semicolon.replace(".5\n", ".5;\n");
+    let unended = comma.trim_end();
+    let bom = format!("\u{feff}{comma}");
+    let texts = [comma, &semicolon, &decimal_comma, &tab, &crlf, &quoted, &remarked, &padded, &ended, unended, &bom];
+    for bytes in texts.iter().map(|text| text.as_bytes()).chain([latin1.as_slice()]) {
+        let (capture, samples, _) = read(bytes).unwrap();
+        let shown = String::from_utf8_lossy(bytes);
+        assert_eq!(samples, [1.5, -2.0, -0.25, -0.5, 1e-3, 7.125], "{shown}");
+        assert_eq!((capture.samples, capture.marks), (3, vec![0.5]), "{shown}");
+        assert_eq!(capture.sensor_ids, ["S1", "Fühler"]);
+    }
+}
+
+#[test]
+fn an_empty_cell_is_a_missing_reading() {
+    let (_, samples, _) = read("index;S1;Fühler\n0;1;\n1;;2\n").unwrap();
+    assert!((samples[0] - 1.0).abs() < 1e-15 && samples[1].is_nan() && samples[2].is_nan());
+    expect(&refusal("index;S1;Fühler\n0;1;1\n;1;2\n"), &["line 3, column 1 (`index`)", "expected a number"]);
+}
+
+#[test]
+fn turns_begin_where_the_mark_rises() {
+    let mut text = "index,S1,Fühler\n".to_owned();
+    for sample in 0..40_000 {
+        // Up for three samples; also at the very first, of which nobody knows when it rose.
+        writeln!(text, "{},{sample},{}", u8::from(sample % 100 < 3), -sample).unwrap();
+    }
+    let (capture, samples, angles) = read(text).unwrap();
+    assert_eq!(capture.marks, (1..400).map(|turn| f64::from(turn * 100) - 0.5).collect::<Vec<_>>());
+    assert!(!capture.encoder && angles.is_empty());
+    assert!(samples.chunks(2).enumerate().all(|(row, pair)| pair == [row as f64; 2]));
+    expect(&refusal("index,S1,Fühler\n0,0,0\n5,0,0\n"), &["line 3, column 1", "0 or 1, found 5"]);
+}
+
+#[test]
+fn an_encoder_s_angle_comes_with_each_block() {
+    let mut text = "S1\tFühler\tangle_deg\ttime_s\n".to_owned();
+    for sample in 0..20_000 {
+        writeln!(text, "0\t0\t{:.2}\t{:.4}", -0.9 * f64::from(sample), 0.0005 * f64::from(sample)).unwrap();
+    }
+    let (capture, _, angle_rev) = read(&text).unwrap();
+    assert!(capture.encoder);
+    assert_eq!(angle_rev.len(), 20_000);
+    assert!((angle_rev[19_999] - 19_999.0 / 400.0).abs() < 1e-12);
+    assert_eq!(capture.marks, (0..50).map(|turn| f64::from(turn * 400)).collect::<Vec<_>>());
+    // Times of four decimals at 2 kHz: the rounding of one step over 10 s.
+    assert!((capture.sample_rate_hz.unwrap() / 2000.0 - 1.0).abs() < 1e-9, "{:?}", capture.sample_rate_hz);
+    let backwards = text.replace("\t-90.00\t", "\t90.00\t");
+    expect(&refusal(backwards), &["line 102, column 3 (`angle_deg`)", "falling"]);
+}
+
+#[test]
+fn times_have_to_be_even() {
+    let rows = |times: &[&str]| {
+        let rows: String = times.iter().map(|time| format!("{time};0;1;1\n")).collect();
+        format!("time_s;index;S1;Fühler\n{rows}")
+    };
+    let (capture, ..) = read(rows(&["1,0", "1,1", "1,2", "1,3"])).unwrap();
+    assert!((capture.sample_rate_hz.unwrap() - 10.0).abs() < 1e-12);
+    expect(&refusal(rows(&["0", "0,1", "0,2", "0,4"])), &["line 5, column 1 (`time_s`)", "even steps", "0.4"]);
+    expect(&refusal(rows(&["0", "0,1", "0,1"])), &["line 4", "above 0.1"]);
+    expect(&refusal(rows(&["0", ""])), &["line 3, column 1", "expected a number"]);
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("x.csv"), rows(&["1,0", "1,1", "1,2"])).unwrap();
+    for (stated, fits) in [(10.0, true), (10.1, false)] {
+        let config = CsvConfig { sample_rate_hz: Some(stated), speed_rpm: Some(60.0), ..config(Some("x.csv")) };
+        let recording = open(folder.path(), config, &rig(&["one"])).unwrap();
+        let found = drain(&*recording);
+        assert_eq!(found.is_ok(), fits);
+        if let Ok((capture, ..)) = found {
+            assert_eq!((capture.sample_rate_hz, capture.stated_speed_rpm), (Some(stated), Some(60.0)));
+        }
+    }
+}
+
+#[test]
+fn mistakes_are_told_with_their_place() {
+    expect(&refusal(""), &["x.csv", "expected a header"]);
+    expect(&refusal("index,S1,Fühler\n"), &["expected samples"]);
+    expect(&refusal("index,S1,T2\n0,1,2\n"), &["x.csv, line 1", "`Fühler`", "found index, S1, T2"]);
+    expect(&refusal("S1,Fühler\n1,2\n"), &["`index` or `angle_deg`"]);
+    expect(&refusal("index,S1,S1,Fühler\n0,1,1,2\n"), &["`S1` is there twice"]);
+    expect(&refusal("index,S1,Fühler\n0,1,2\n0,1\n"), &["line 3", "expected 3 cells", "found 2"]);
+    expect(&refusal("index,S1,Fühler\n0,1,2\n0,1,2,3\n"), &["line 3", "expected 3 cells", "found 4"]);
+    expect(&refusal("S1,Fühler,index\n0,1\n"), &["line 2", "expected 3 cells", "found 2"]);
+    expect(&refusal("# x\nindex,S1,Fühler\n0,1,2µm\n"), &["line 3, column 3 (`Fühler`)", "found `2µm`"]);
+    expect(&refusal("index;S1;Fühler\n0;1,5;2\n0;1.5;2\n"), &["line 3, column 2", "decimal comma", "found `1.5`"]);
+    expect(&refusal("index;S1;Fühler\n0;1.5;2\n0;1,5;2\n"), &["line 3, column 2", "found `1,5`"]);
+    expect(&refusal("index,S1,Fühler\n0,1,2\n\n0,1,2\n"), &["line 3", "blank line"]);
+    expect(&refusal(b"\xff\xfei\0n\0d\0"), &["UTF-16"]);
+    expect(&refusal(vec![b'7'; 3 << 20]), &["line 1", "line end"]);
+    let folder = tempfile::tempdir().unwrap();
+    let missing = open(folder.path(), config(Some("none.csv")), &rig(&["one"]));
+    expect(&missing.map(|_| ()).unwrap_err().to_string(), &["none.csv", "No such file"]);
+}
+
+#[test]
+fn damaged_files_are_errors_or_data_but_no_panic() {
+    let text = "time_s;index;S1;Fühler\n0,0;0;1,25;\"2\"\n0,1;1;-0,5;3\n0,2;0;7;nan\n".as_bytes();
+    for place in 0..text.len() {
+        let _ = read(&text[..place]);
+        for byte in [0, b'\n', b'"', b';', b',', b'9', 0xFF] {
+            let mut damaged = text.to_vec();
+            damaged[place] = byte;
+            let _ = read(damaged);
+        }
+    }
+}
+
+#[test]
+fn files_are_found_by_pattern_or_by_list() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = rig(&["one", "two"]);
+    let stations =
+        vec![StationConfig { name: "up".into(), z_mm: 9.0 }, StationConfig { name: "down".into(), z_mm: 1.0 }];
+    let mut files = Vec::new();
+    for (index, (setup, station)) in [("one", "up"), ("one", "down"), ("two", "up"), ("two", "down")].iter().enumerate()
+    {
+        let text = format!("index,S1,Fühler,temperature\n0,{index},0,20\n");
+        let path = folder.path().join(format!("{setup}-{station}.csv"));
+        fs::write(&path, text).unwrap();
+        files.push(FileConfig {
+            path: path.file_name().unwrap().into(),
+            setup: (*setup).into(),
+            station: (*station).into(),
+        });
+    }
+    let by_pattern = CsvConfig { stations: stations.clone(), ..config(Some("{setup}-{station}.csv")) };
+    let by_list = CsvConfig { stations: stations.clone(), files: files.clone(), ..config(None) };
+    for config in [by_pattern.clone(), by_list.clone()] {
+        let recording = open(folder.path(), config, &rig).unwrap();
+        let names: Vec<&str> = recording.stations().iter().map(|key| key.name.as_str()).collect();
+        assert_eq!(names, ["down", "up"]);
+        let (capture, samples, _) = drain(&*recording).unwrap();
+        assert_eq!((capture.station.as_str(), samples[0].to_bits()), ("down", 1.0_f64.to_bits()));
+        assert_eq!(recording.inputs().len(), 4);
+        assert_eq!(recording.remarks(), ["columns that the rig does not name: temperature"]);
+    }
+    let fault = |config: CsvConfig| {
+        let context = Context { folder: folder.path(), rig: Some(&rig) };
+        config.check(&context).map(|_| ()).unwrap_err().to_string()
+    };
+    expect(&fault(CsvConfig { pattern: Some("{setup}.csv".into()), ..by_pattern.clone() }), &["`{station}`"]);
+    expect(&fault(CsvConfig { files: files.clone(), ..by_pattern.clone() }), &["found both"]);
+    expect(&fault(CsvConfig { pattern: None, ..by_pattern.clone() }), &["found neither"]);
+    expect(&fault(CsvConfig { files: files[1..].to_vec(), ..by_list.clone() }), &["`one` at `up`"]);
+    let mut twice = files.clone();
+    twice[1] = files[0].clone();
+    expect(&fault(CsvConfig { files: twice, ..by_list.clone() }), &["already in"]);
+    let mut unknown = files.clone();
+    unknown[2].setup = "tow".into();
+    expect(&fault(CsvConfig { files: unknown, ..by_list }), &["no setup `tow`"]);
+    expect(&fault(CsvConfig { sample_rate_hz: Some(-1.0), ..by_pattern }), &["above 0"]);
+}
