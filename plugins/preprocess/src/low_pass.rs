@@ -79,9 +79,9 @@ impl Conditioner for LowPass {
     fn attach<'a>(&'a self, input: Box<dyn SampleStream + 'a>) -> Result<Box<dyn SampleStream + 'a>> {
         let mut capture = input.capture().clone();
         let rate_hz = sample_rate_hz(&capture, "low-pass")?;
-        // Also refuses rates that are not numbers.
-        if !(self.cutoff_hz < 0.5 * rate_hz) {
-            let problem = format!("cutoff_hz = {} is not below half of the sampling rate, {rate_hz} Hz", self.cutoff_hz);
+        if self.cutoff_hz >= 0.5 * rate_hz || !rate_hz.is_finite() {
+            let problem =
+                format!("cutoff_hz = {} is not below half of the sampling rate, {rate_hz} Hz", self.cutoff_hz);
             let help = "lower cutoff_hz, or leave the low-pass out";
             return Err(Error::new("low-pass", &capture.object, problem).help(help));
         }

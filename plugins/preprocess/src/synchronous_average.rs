@@ -119,7 +119,7 @@ impl SynchronousAverage {
         let mut warnings = Vec::new();
         if let (Some(measured), Some(stated)) = (speed_rpm, capture.stated_speed_rpm) {
             let tolerance_percent = self.config.speed_tolerance_percent;
-            if !((measured - stated).abs() <= 0.01 * tolerance_percent * stated.abs()) {
+            if (measured - stated).abs() > 0.01 * tolerance_percent * stated.abs() {
                 warnings.push(format!(
                     "{}: the turns are {measured:.1} rpm, the recording states {stated:.1} rpm",
                     capture.object

@@ -68,7 +68,7 @@ impl EndTrim {
         let first_turn = capture.first_turn();
         let turns = capture.marks.len() - 1;
         let lengths: Vec<f64> = capture.marks.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let off_speed = |length: &f64| !((length - median).abs() <= self.tolerance * median);
+        let off_speed = |length: &f64| (length - median).abs() > self.tolerance * median || length.is_nan();
 
         let mut start = self.start_turns.min(turns);
         let mut end = turns - self.end_turns.min(turns - start);
@@ -141,12 +141,12 @@ mod tests {
 
     #[test]
     fn start_up_and_run_down_go_and_the_middle_stays() {
-        let lengths = [400.0, 150.0, 102.0, 100.5, 100.0, 130.0, 100.0, 99.5, 103.0];
+        let lengths = [400.0, 150.0, 102.0, 100.5, 100.0, 130.0, 100.0, 100.0, 100.0, 99.5, 103.0];
         let config = TrimConfig { speed_tolerance_percent: 1.0, start_turns: 0, end_turns: 0 };
         let capture = trimmed(&lengths, config);
-        assert_eq!(set_aside(&capture), [(0, 3, "start-up"), (8, 1, "run-down")]);
+        assert_eq!(set_aside(&capture), [(0, 3, "start-up"), (10, 1, "run-down")]);
         assert_eq!(capture.first_turn(), 3);
-        assert_eq!(capture.marks.len(), 6);
+        assert_eq!(capture.marks.len(), 8);
         assert!((capture.marks[0] - 664.5).abs() < 1e-9);
     }
 
@@ -154,8 +154,7 @@ mod tests {
     fn fixed_turns_go_first() {
         let config = TrimConfig { speed_tolerance_percent: 1.0, start_turns: 2, end_turns: 1 };
         let capture = trimmed(&[100.0, 100.0, 90.0, 100.0, 100.0, 100.0, 90.0, 100.0], config);
-        let expected =
-            [(0, 2, "start_turns"), (2, 1, "start-up"), (6, 1, "run-down"), (7, 1, "end_turns")];
+        let expected = [(0, 2, "start_turns"), (2, 1, "start-up"), (6, 1, "run-down"), (7, 1, "end_turns")];
         assert_eq!(set_aside(&capture), expected);
         assert_eq!((capture.first_turn(), capture.marks.len()), (3, 4));
     }

@@ -9,7 +9,7 @@
 use runout_core::numerics::lanes::{LaneWork, load};
 
 /// Samples on either side of a position that its value is made of.
-pub(super) const REACH: usize = 10;
+pub(super) const REACH: usize = 11;
 const TAPS: usize = 2 * REACH;
 /// Share of the Nyquist frequency up to which [`ERROR`] holds.
 pub(super) const PASS_BAND: f64 = 0.5;
@@ -17,7 +17,7 @@ pub(super) const PASS_BAND: f64 = 0.5;
 #[cfg(test)]
 pub(super) const ERROR: f64 = 1e-7;
 /// Shape of the window: √((π·REACH/2)² − π²) would put the zero exactly there.
-const BETA: f64 = 15.39;
+const BETA: f64 = 16.99;
 /// Between them, a cubic errs by 3/128·π⁴/5·PHASES⁻⁴ < 2e-9.
 const PHASES: usize = 128;
 /// Nearer to a sample than this, a position is the sample's, which then passes unchanged.
@@ -162,8 +162,13 @@ mod tests {
             let frames: Vec<f64> = (0..40 * channels).map(|index| (index as f64).sqrt()).collect();
             let positions = [10.0, 17.0 + 1e-10, 29.0 - 1e-10];
             let mut values = vec![0.0; 3 * channels];
-            let mut interpolation =
-                Interpolation { kernel: &kernel, frames: &frames, channels, positions: &positions, values: &mut values };
+            let mut interpolation = Interpolation {
+                kernel: &kernel,
+                frames: &frames,
+                channels,
+                positions: &positions,
+                values: &mut values,
+            };
             in_lanes(channels, &mut interpolation);
             for channel in 0..channels {
                 let expected = [10, 17, 29].map(|frame| frames[frame * channels + channel]);

@@ -12,6 +12,8 @@ pub(super) struct Mean {
     sum: Vec<Complex64>,
     /// Σ d dᴴ on and below the diagonal, `[order][row][column ≤ row]`.
     products: Vec<Complex64>,
+    /// One order's distance from the pivot.
+    difference: Vec<Complex64>,
 }
 
 impl Mean {
@@ -22,6 +24,7 @@ impl Mean {
             pivot: Vec::new(),
             sum: vec![Complex64::ZERO; orders * channels],
             products: vec![Complex64::ZERO; orders * triangle(channels)],
+            difference: vec![Complex64::ZERO; channels],
         }
     }
 
@@ -46,9 +49,15 @@ impl Mean {
             2 => self.add_known::<2>(turn),
             3 => self.add_known::<3>(turn),
             4 => self.add_known::<4>(turn),
+            5 => self.add_known::<5>(turn),
             6 => self.add_known::<6>(turn),
+            7 => self.add_known::<7>(turn),
             8 => self.add_known::<8>(turn),
-            channels => self.add_any(turn, channels, &mut vec![Complex64::ZERO; channels]),
+            channels => {
+                let mut difference = std::mem::take(&mut self.difference);
+                self.add_any(turn, channels, &mut difference);
+                self.difference = difference;
+            }
         }
     }
 

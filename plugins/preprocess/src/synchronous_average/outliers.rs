@@ -47,7 +47,8 @@ impl Outliers {
             .collect();
         for ((turn, harmonics), distances) in together.into_iter().zip(distances) {
             let farthest = distances.iter().zip(&usual).map(|(distance, usual)| distance - self.sigma * usual);
-            let outlier = farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
+            let outlier =
+                farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
             if outlier.is_none() {
                 mean.add(&harmonics);
             }

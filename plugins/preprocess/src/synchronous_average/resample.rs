@@ -1,5 +1,7 @@
 //! From samples to the harmonics of each turn, block by block.
 
+use std::collections::VecDeque;
+
 use runout_core::{
     Complex64,
     measurement::{Block, Capture, Defect},
@@ -14,8 +16,8 @@ use super::{
     SynchronousAverage, encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
     mean::Mean,
-    outliers::Outliers,
-    turns::Turn,
+    outliers::{Outliers, Verdict},
+    turns::{ROUNDING, Turn},
     window::{CONTINUED, Window},
 };
 
@@ -35,7 +37,7 @@ pub(super) struct Outcome {
 pub(super) struct Resampling<'a> {
     kernel: &'a Kernel,
     capture: &'a Capture,
-    turns: std::vec::IntoIter<Turn>,
+    turns: VecDeque<Turn>,
     window: Window,
     defects: Vec<Defect>,
     positions: Vec<f64>,
@@ -62,7 +64,7 @@ impl<'a> Resampling<'a> {
         Self {
             kernel: &average.kernel,
             capture,
-            turns: turns.into_iter(),
+            turns: turns.into(),
             window: Window::new(channels),
             defects: Vec::new(),
             positions: Vec::with_capacity(length),
@@ -78,28 +80,24 @@ impl<'a> Resampling<'a> {
         }
     }
 
-    fn next_turn(&self) -> Option<&Turn> {
-        self.turns.as_slice().first()
-    }
-
     /// Takes a block and works on every turn that is now complete.
     pub(super) fn take(&mut self, block: &mut Block) {
-        let Some(turn) = self.next_turn() else { return };
+        let Some(turn) = self.turns.front() else { return };
         self.window.take(block, before(turn));
         self.defects.append(&mut block.defects);
         self.work();
     }
 
     fn work(&mut self) {
-        while let Some(turn) = self.next_turn().copied() {
+        while let Some(turn) = self.turns.pop_front() {
             if self.window.end() < behind(&turn) {
+                self.turns.push_front(turn);
                 return;
             }
-            self.turns.next();
-            if before(&turn) < self.window.start {
+            if before(&turn) < self.window.start() {
                 self.window.continue_before();
             }
-            if before(&turn) < self.window.start {
+            if before(&turn) < self.window.start() {
                 self.rejected.push(turn.rejected(turn.number, Rejection::Incomplete));
             } else {
                 self.turn(turn);
@@ -110,13 +108,13 @@ impl<'a> Resampling<'a> {
 
     /// Works on what only the end of the capture completes.
     pub(super) fn finish(mut self) -> Outcome {
-        let recorded = self.window.end() as f64;
+        let recorded = self.window.end() as f64 - CONTINUED as f64;
         self.window.continue_behind();
-        let left = self.turns.as_slice().iter().take_while(|turn| turn.end <= recorded + 1e-6).count();
-        let incomplete = self.turns.as_slice()[left..].to_vec();
-        self.turns = self.turns.as_slice()[..left].to_vec().into_iter();
+        let (covered, cut): (Vec<Turn>, Vec<Turn>) =
+            self.turns.drain(..).partition(|turn| turn.end <= recorded + ROUNDING);
+        self.turns.extend(covered);
         self.work();
-        for turn in self.turns.as_slice().iter().chain(&incomplete) {
+        for turn in self.turns.iter().chain(&cut) {
             self.rejected.push(turn.rejected(turn.number, Rejection::Incomplete));
         }
         if let Some(mut outliers) = self.outliers.take() {
@@ -135,7 +133,7 @@ impl<'a> Resampling<'a> {
     }
 
     /// Takes note of judged turns.
-    fn sort(&mut self, judged: Vec<super::outliers::Verdict>) {
+    fn sort(&mut self, judged: Vec<Verdict>) {
         for verdict in judged {
             match verdict.rejection(&self.capture.sensors) {
                 None => self.used_samples += verdict.turn.samples(),
@@ -147,7 +145,7 @@ impl<'a> Resampling<'a> {
     /// Works on one turn, whose frames are all in the window.
     fn turn(&mut self, turn: Turn) {
         let length = self.fourier.length();
-        let (start, end) = (turn.start - self.window.start as f64, turn.end - self.window.start as f64);
+        let (start, end) = (self.window.position(turn.start), self.window.position(turn.end));
         if self.capture.encoder {
             let steady = self.window.angle_rev.len() == self.window.len()
                 && encoder::positions(&self.window.angle_rev, start, end, length, &mut self.positions);
@@ -211,14 +209,14 @@ impl<'a> Resampling<'a> {
     }
 }
 
-/// First frame that a turn needs: the kernel's reach, and a cubic through the encoder's angles.
-fn before(turn: &Turn) -> i64 {
-    turn.start.floor() as i64 - REACH as i64 - 1
+/// Place in the window of the first frame that a turn needs.
+fn before(turn: &Turn) -> usize {
+    (turn.start.floor() as usize).saturating_add(CONTINUED - REACH - 1)
 }
 
-/// Behind the last frame that a turn needs.
-fn behind(turn: &Turn) -> i64 {
-    (turn.end.ceil() as i64).saturating_add(REACH as i64 + 1).max(CONTINUED as i64 + 1)
+/// Place behind the last frame that a turn needs; at least as many as the continuation reflects.
+fn behind(turn: &Turn) -> usize {
+    (turn.end.ceil() as usize).saturating_add(CONTINUED + REACH + 1).max(2 * CONTINUED + 1)
 }
 
 /// Equal angles on which turns are interpolated.
@@ -243,7 +241,7 @@ fn grid_length(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> usize {
 /// Whether 2, 3 and 5 are its only prime factors, which transforms are quick for.
 fn is_smooth(mut number: usize) -> bool {
     for factor in [2, 3, 5] {
-        while number > 0 && number % factor == 0 {
+        while number > 0 && number.is_multiple_of(factor) {
             number /= factor;
         }
     }

@@ -8,7 +8,7 @@ use runout_core::{
 /// Below this share of the median, a turn is certainly two marks of one.
 const PIECE: f64 = 0.5;
 /// Room for rounding where the last mark stands just behind the last sample, in samples.
-const ROUNDING: f64 = 1e-6;
+pub(super) const ROUNDING: f64 = 1e-6;
 
 /// A turn, in sample positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,8 +34,7 @@ impl Turn {
 pub(super) fn cut(capture: &Capture, tolerance: f64) -> Vec<(Turn, Option<Rejection>)> {
     let Some(median) = capture.median_turn_samples() else { return Vec::new() };
     let marks = capture.marks.windows(2).enumerate();
-    let turns: Vec<Turn> =
-        marks.map(|(number, pair)| Turn { number, start: pair[0], end: pair[1] }).collect();
+    let turns: Vec<Turn> = marks.map(|(number, pair)| Turn { number, start: pair[0], end: pair[1] }).collect();
     let lengths: Vec<f64> = turns.iter().map(|turn| turn.samples() / median).collect();
     let doubled = doubled(&lengths, tolerance);
     let judge = |(index, turn): (usize, Turn)| {
@@ -66,14 +65,16 @@ fn doubled(lengths: &[f64], tolerance: f64) -> Vec<bool> {
     let mut doubled: Vec<bool> = lengths.iter().map(|length| *length < PIECE).collect();
     for (index, length) in lengths.iter().enumerate() {
         let neighbours = [index.checked_sub(1), Some(index + 1)].map(|neighbour| {
-            let neighbour = neighbour.filter(|neighbour| lengths.get(*neighbour).is_some_and(|other| *other >= PIECE))?;
+            let neighbour =
+                neighbour.filter(|neighbour| lengths.get(*neighbour).is_some_and(|other| *other >= PIECE))?;
             let off = (length + lengths[neighbour] - 1.0).abs();
             (off <= tolerance).then_some((neighbour, off))
         });
         let nearest = neighbours.iter().flatten().map(|(_, off)| *off).fold(f64::INFINITY, f64::min);
         // In 0.5 + 0.5 no piece is below the limit, so that any piece too short for a turn may have a partner.
         if *length < 1.0 - tolerance {
-            for (neighbour, _) in neighbours.into_iter().flatten().filter(|(_, off)| *off <= nearest + 0.1 * tolerance) {
+            for (neighbour, _) in neighbours.into_iter().flatten().filter(|(_, off)| *off <= nearest + 0.1 * tolerance)
+            {
                 doubled[neighbour] = true;
                 doubled[index] = true;
             }
