@@ -78,14 +78,12 @@ impl Form {
 
     #[allow(clippy::float_cmp, reason = "a band is found by the very value that it was made with")]
     fn add(&mut self, twist_rad_per_mm: f64, order: usize, value: Complex64) {
-        match self.bands.iter_mut().find(|band| band.twist_rad_per_mm == twist_rad_per_mm) {
-            Some(band) => series::add(&mut band.harmonics, order, value),
-            None => {
-                let mut harmonics = Vec::new();
-                series::add(&mut harmonics, order, value);
-                self.bands.push(Band { twist_rad_per_mm, harmonics });
-            }
-        }
+        let found = self.bands.iter().position(|band| band.twist_rad_per_mm == twist_rad_per_mm);
+        let index = found.unwrap_or_else(|| {
+            self.bands.push(Band { twist_rad_per_mm, harmonics: Vec::new() });
+            self.bands.len() - 1
+        });
+        series::add(&mut self.bands[index].harmonics, order, value);
     }
 
     /// Harmonics of the circle at z, in µm, from order 0.

@@ -29,15 +29,15 @@ impl<const L: usize> Sight<L> {
     }
 }
 
-/// How far displacements and slopes may go so that the root is unique and quickly found.
+/// How far displacements and slopes may go, in µm, so that the root is unique and quickly found.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reach {
-    /// No displacement of the part's axis is larger, in µm.
-    pub displacement_um: f64,
-    /// No |h| is larger, in µm.
-    pub form_um: f64,
-    /// No |dh/dα| is larger, in µm/rad.
-    pub slope_um: f64,
+    /// No displacement of the part's axis is larger.
+    pub displacement: f64,
+    /// No |h| is larger.
+    pub form: f64,
+    /// No |dh/dα| is larger, per rad.
+    pub slope: f64,
 }
 
 impl Reach {
@@ -45,7 +45,7 @@ impl Reach {
     const LARGEST: f64 = 0.1;
 
     pub fn fits(&self, radius_um: f64) -> bool {
-        [self.displacement_um, self.form_um, self.slope_um * Self::LARGEST]
+        [self.displacement, self.form, self.slope * Self::LARGEST]
             .iter()
             .all(|length| *length <= Self::LARGEST * radius_um)
     }
@@ -53,8 +53,8 @@ impl Reach {
     /// Newton steps to the root. Their slope leaves h′ out, so that each leaves at most the part `q` of the error before;
     /// within [`fits`](Self::fits) q stays below 0.25. A fixed number makes samples independent of their neighbours.
     pub fn steps(&self, radius_um: f64) -> usize {
-        let q = 2.0 * (self.slope_um + self.displacement_um) * self.displacement_um / radius_um.powi(2);
-        let mut error = self.form_um + self.displacement_um;
+        let q = 2.0 * (self.slope + self.displacement) * self.displacement / radius_um.powi(2);
+        let mut error = self.form + self.displacement;
         let mut steps = 0;
         while error > ROOT_UM && steps < 40 {
             error *= q.max(1e-9);
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn displaced_circle() {
         for displacement in [0.0_f64, 8.0, 150.0, 2_000.0] {
-            let reach = Reach { displacement_um: displacement, form_um: 0.0, slope_um: 0.0 };
+            let reach = Reach { displacement, form: 0.0, slope: 0.0 };
             for index in 0..36 {
                 let (sin, cos) = (0.3 + f64::from(index) * 0.17).sin_cos();
                 let (along, across) = (displacement * cos, displacement * sin);
@@ -142,9 +142,9 @@ mod tests {
         for (order, harmonic) in harmonics.iter_mut().enumerate().skip(2) {
             *harmonic = Complex64::from_polar(7.0 / order as f64, 1.0 + order as f64 * 2.3);
         }
-        let slope_um = (2..61).map(|order| order as f64 * harmonics[order].norm()).sum();
+        let slope = (2..61).map(|order| order as f64 * harmonics[order].norm()).sum();
         for displacement in [8.0_f64, 150.0] {
-            let reach = Reach { displacement_um: displacement, form_um: 30.0, slope_um };
+            let reach = Reach { displacement, form: 30.0, slope };
             for index in 0..90 {
                 let angle = f64::from(index) * 0.21;
                 let (across, along) =
@@ -175,7 +175,7 @@ mod tests {
                 terms.sum::<Complex64>() * if order == 0 { 1.0 } else { 2.0 } / f64::from(count)
             })
             .collect();
-        let reach = Reach { displacement_um: 150.0, form_um: 12.0, slope_um: 30.0 };
+        let reach = Reach { displacement: 150.0, form: 12.0, slope: 30.0 };
         for index in 0..40 {
             let angle = 0.1 + f64::from(index) * 0.157;
             let (along, across) = (90.0 * (5.0 * angle).cos(), 150.0 * (3.0 * angle).sin());

@@ -75,11 +75,15 @@ impl Motion {
         let [mut x, mut y, mut tilt_x, mut tilt_y] = self.axes.clone();
         keep_counter_rotating(&mut x, &mut y, direction);
         // A tilt (εx, εy) displaces the axis at z by z·(εy, −εx).
-        tilt_x.iter_mut().for_each(|value| *value = -*value);
+        tilt_x = negated(tilt_x);
         keep_counter_rotating(&mut tilt_y, &mut tilt_x, direction);
-        tilt_x.iter_mut().for_each(|value| *value = -*value);
+        tilt_x = negated(tilt_x);
         Self { axes: [x, y, tilt_x, tilt_y] }
     }
+}
+
+fn negated(harmonics: Vec<Complex64>) -> Vec<Complex64> {
+    harmonics.into_iter().map(|value| -value).collect()
 }
 
 /// With X and Y of Re c e^{−iΦ}, x + iy turns against the spindle where Y = −i·direction·X.
@@ -109,7 +113,9 @@ pub(super) fn random_harmonics(
         series::add(&mut harmonics, order, (order as f64).powf(-slope) * phase(&mut random));
     }
     let scale = rms / series::rms(&harmonics);
-    harmonics.iter_mut().for_each(|value| *value *= scale);
+    for value in &mut harmonics {
+        *value *= scale;
+    }
     harmonics
 }
 

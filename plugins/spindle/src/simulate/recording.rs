@@ -103,7 +103,7 @@ impl<'a> SimulatedStream<'a> {
         let spin = world.course.spin(world.seed, setup, station);
         let sensors = world.sensors.iter().enumerate().map(|(item, sensor)| {
             let angle = sensor.angle_rad + clamped_in.sensors_rad;
-            let z_mm = world.sensor_z_mm(sensor, key);
+            let z_mm = sensor.z_mm + key.z_mm;
             let random = stream(world.seed, Purpose::Noise, Place { setup, station, item });
             Looking {
                 line: Complex64::cis(angle),

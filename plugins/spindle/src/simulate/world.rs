@@ -151,7 +151,7 @@ impl World {
         if world.geometry == Geometry::Exact && !reach.fits(world.radius_um) {
             let message = format!(
                 "the axis moves by up to {:.0} µm and the form has up to {:.0} µm and {:.0} µm/rad: too much for a radius of {:.0} µm",
-                reach.displacement_um, reach.form_um, reach.slope_um, world.radius_um
+                reach.displacement, reach.form, reach.slope, world.radius_um
             );
             return Err(Fault::at("rig", message).help("displacement and form may reach a tenth of the radius"));
         }
@@ -169,11 +169,6 @@ impl World {
         self.rig.section_z_mm(0) + self.stations.first().map_or(0.0, |station| station.z_mm)
     }
 
-    /// True z of a sensor at a station, in mm.
-    pub fn sensor_z_mm(&self, sensor: &TrueSensor, station: &StationKey) -> f64 {
-        sensor.z_mm + station.z_mm
-    }
-
     /// The part's axis under a sensor, in the part's own coordinates, in µm.
     pub fn clamped_at(&self, setup: &TrueSetup, sensor: &TrueSensor, z_mm: f64) -> Complex64 {
         let Some(clamping) = setup.clamping.get(sensor.section) else { return Complex64::ZERO };
@@ -187,7 +182,7 @@ impl World {
         let (wandering_um, wandering_urad) = self.asynchronous.bounds();
         for station in ends.into_iter().flatten() {
             for sensor in &self.sensors {
-                let z_mm = self.sensor_z_mm(sensor, station);
+                let z_mm = sensor.z_mm + station.z_mm;
                 let lever = UM_PER_MM_URAD * z_mm.abs();
                 for setup in &self.setups {
                     let synchronous = x.hypot(y) + lever * tilt_x.hypot(tilt_y);
@@ -198,7 +193,7 @@ impl World {
                 }
             }
         }
-        Reach { displacement_um, form_um: self.form.bound_um(), slope_um: self.form.slope_bound_um() }
+        Reach { displacement: displacement_um, form: self.form.bound_um(), slope: self.form.slope_bound_um() }
     }
 }
 

@@ -231,3 +231,30 @@ fn integers_are_codes_within_limits() {
     }
     assert!(clipped > 0, "8 µm of eccentricity and 4 µm of form go beyond 12 µm");
 }
+
+/// The example of the paper's experiment: Ra of 4 to 5 µm or so, nothing clipped, sections that overlap.
+#[test]
+fn the_example_is_what_it_says() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/01-four-sensor/scenario.toml");
+    let mut table: toml::Table = std::fs::read_to_string(path).unwrap().parse().unwrap();
+    for key in ["title", "plugin", "output"] {
+        table.remove(key).unwrap();
+    }
+    let simulator = simulator(&table.try_into().unwrap()).unwrap();
+    let recording = simulator.spindle_recording();
+    assert_eq!(recording.stations().len(), 31);
+    assert_eq!(recording.stations()[30].z_mm, 60.0);
+    for station in [0, 15, 30] {
+        for circle in recording.truth(station).unwrap().unwrap().form_um {
+            let ra = circle.iter().map(|h| h.abs()).sum::<f64>() / circle.len() as f64;
+            assert!((3.5..5.5).contains(&ra), "station {station}: Ra {ra} µm");
+        }
+        for setup in 0..2 {
+            let limits = recording.open(station, setup).unwrap().capture().converter_limits_um.clone().unwrap();
+            let (channels, _) = read(&recording, station, setup);
+            for (channel, [low, high]) in channels.iter().zip(limits) {
+                assert!(channel.iter().all(|reading| *reading > 0.9 * low && *reading < 0.9 * high));
+            }
+        }
+    }
+}

@@ -40,11 +40,11 @@ const PART: [f64; 2] = [0.0, 99.844];
 /// Checks that `effect` leaves all channels of all setups as they are but `changed`, which become `expected`, a function
 /// of channel, setup and spindle angle. 1e-11 µm: rounding of angles on these orders.
 fn check(effect: Effect, changed: impl Fn(usize, usize) -> bool, expected: impl Fn(usize, usize, f64) -> f64) {
-    check_in(scene(), effect, changed, expected, 1e-11);
+    check_in(&scene(), effect, changed, expected, 1e-11);
 }
 
 fn check_in(
-    scene: SpindleConfig,
+    scene: &SpindleConfig,
     effect: Effect,
     changed: impl Fn(usize, usize) -> bool,
     expected: impl Fn(usize, usize, f64) -> f64,
@@ -52,7 +52,7 @@ fn check_in(
 ) {
     let with = SpindleConfig { effect: vec![effect], ..scene.clone() };
     for setup in [INITIAL, TURNED] {
-        let before = readings(&scene, 0, setup);
+        let before = readings(scene, 0, setup);
         let after = readings(&with, 0, setup);
         for channel in 0..4 {
             if changed(channel, setup) {
@@ -169,7 +169,7 @@ fn part_eccentricity() {
 fn second_order_geometry() {
     let effect = Effect::SecondOrderGeometry(SecondOrderGeometry::default());
     let exact = SpindleConfig { geometry: Geometry::Exact, ..scene() };
-    check_in(exact, effect.clone(), |_, _| false, |_, _, _| 0.0, 0.0);
+    check_in(&exact, effect.clone(), |_, _| false, |_, _, _| 0.0, 0.0);
     assert!(simulator(&SpindleConfig { effect: vec![effect], ..scene() }).is_err());
 }
 

@@ -1,0 +1,105 @@
+//! What happens besides: each effect changes the simulated world where it would change the real one.
+
+mod sensors;
+mod setups;
+mod spindle;
+
+use runout_core::pipeline::error::{Fault, known_names};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use sensors::{FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity, ThermalDrift};
+pub use setups::{PartEccentricity, ReversalAngle, SetupMotionChange};
+pub use spindle::{AsynchronousLine, AxialMotion, EvenOrderMotion, SecondOrderGeometry, SpeedRipple};
+
+use super::world::World;
+
+/// `[[effect]]`: one entry, named by `plugin`. `declared` says whether the separation will be told of it.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "plugin", rename_all = "kebab-case")]
+pub enum Effect {
+    /// Readings are too large or too small by a factor.
+    SensorGain(SensorGain),
+    /// The sensor looks at the part from another angle.
+    SensorAngle(SensorAngle),
+    /// The sensor sits at another z: another lever arm on tilt, and another circle of the part.
+    SensorAxialPosition(SensorAxialPosition),
+    /// Readings gain a part in u² and u³.
+    SensorNonlinearity(SensorNonlinearity),
+    /// The part was clamped at another angle.
+    ReversalAngle(ReversalAngle),
+    /// The part was clamped further off, at a known place.
+    PartEccentricity(PartEccentricity),
+    /// Says that readings follow the exact geometry, which they do unless `geometry = "linear"`.
+    SecondOrderGeometry(SecondOrderGeometry),
+    /// The synchronous motion is larger or smaller in a setup.
+    SetupMotionChange(SetupMotionChange),
+    /// Random synchronous motion of even orders in addition.
+    EvenOrderMotion(EvenOrderMotion),
+    /// The reading creeps from the start of each capture, ever slower.
+    ThermalDrift(ThermalDrift),
+    /// Motion to and fro at an order that is not whole.
+    AsynchronousLine(AsynchronousLine),
+    /// The spindle runs unevenly within the turn.
+    SpeedRipple(SpeedRipple),
+    /// The part moves along z, so that sensors see it elsewhere.
+    AxialMotion(AxialMotion),
+    /// A low-pass in one channel.
+    FilterAttenuation(FilterAttenuation),
+}
+
+/// What every effect can do.
+trait Acts {
+    /// Whether the separation will be told of it.
+    fn declared(&self) -> bool;
+
+    /// Changes the world; `index` is the effect's place in the list.
+    fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault>;
+}
+
+impl Effect {
+    /// Whether the separation will be told of it.
+    #[must_use]
+    pub fn declared(&self) -> bool {
+        self.acts().declared()
+    }
+
+    /// Changes the world; `index` is the effect's place in the list.
+    pub(super) fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault> {
+        self.acts().apply(world, index)
+    }
+
+    fn acts(&self) -> &dyn Acts {
+        match self {
+            Self::SensorGain(effect) => effect,
+            Self::SensorAngle(effect) => effect,
+            Self::SensorAxialPosition(effect) => effect,
+            Self::SensorNonlinearity(effect) => effect,
+            Self::ReversalAngle(effect) => effect,
+            Self::PartEccentricity(effect) => effect,
+            Self::SecondOrderGeometry(effect) => effect,
+            Self::SetupMotionChange(effect) => effect,
+            Self::EvenOrderMotion(effect) => effect,
+            Self::ThermalDrift(effect) => effect,
+            Self::AsynchronousLine(effect) => effect,
+            Self::SpeedRipple(effect) => effect,
+            Self::AxialMotion(effect) => effect,
+            Self::FilterAttenuation(effect) => effect,
+        }
+    }
+}
+
+/// Indices of the targets among the known ids.
+fn places(targets: &[String], known: &[&str], noun: &str) -> Result<Vec<usize>, Fault> {
+    if targets.is_empty() {
+        return Err(
+            Fault::at("targets", format!("name at least one {noun}")).help(known_names("", known.iter().copied()))
+        );
+    }
+    let place = |id: &String| {
+        known.iter().position(|other| other == id).ok_or_else(|| {
+            Fault::at("targets", format!("the rig has no {noun} `{id}`")).help(known_names(id, known.iter().copied()))
+        })
+    };
+    targets.iter().map(place).collect()
+}

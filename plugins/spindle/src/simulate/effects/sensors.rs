@@ -1,0 +1,183 @@
+//! Effects of a sensor.
+
+use runout_core::pipeline::error::Fault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Acts, places};
+use crate::simulate::{
+    chain::{Drift, LowPass},
+    check,
+    world::{TrueSensor, World},
+};
+
+/// Reading × (1 + gain).
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorGain {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// Relative: 0.01 reads 1 % too much.
+    pub relative_gain: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorGain {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("relative_gain", self.relative_gain)?;
+        on_sensors(world, &self.targets, |sensor| sensor.chain.gain *= 1.0 + self.relative_gain)
+    }
+}
+
+/// True angle = stated angle + this.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorAngle {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// In degrees about +z.
+    pub angle_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorAngle {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("angle_deg", self.angle_deg)?;
+        on_sensors(world, &self.targets, |sensor| sensor.angle_rad += self.angle_deg.to_radians())
+    }
+}
+
+/// True z = stated z + this.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorAxialPosition {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// In mm.
+    pub shift_mm: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorAxialPosition {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("shift_mm", self.shift_mm)?;
+        on_sensors(world, &self.targets, |sensor| sensor.z_mm += self.shift_mm)
+    }
+}
+
+/// Reading = u + quadratic · u² + cubic · u³, before any gain.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorNonlinearity {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// In 1/µm.
+    #[serde(default)]
+    pub quadratic_per_um: f64,
+    /// In 1/µm².
+    #[serde(default)]
+    pub cubic_per_um2: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorNonlinearity {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("quadratic_per_um", self.quadratic_per_um)?;
+        check::finite("cubic_per_um2", self.cubic_per_um2)?;
+        on_sensors(world, &self.targets, |sensor| {
+            sensor.chain.quadratic_per_um += self.quadratic_per_um;
+            sensor.chain.cubic_per_um2 += self.cubic_per_um2;
+        })
+    }
+}
+
+/// rate · τ · (1 − e^{−t/τ}), t in turns at the nominal speed since the capture began.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ThermalDrift {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// At the start, in µm per turn.
+    pub rate_um_per_rev: f64,
+    /// τ, in turns.
+    pub time_constant_turns: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for ThermalDrift {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("rate_um_per_rev", self.rate_um_per_rev)?;
+        check::positive("time_constant_turns", self.time_constant_turns)?;
+        let drift = Drift { rate_um_per_rev: self.rate_um_per_rev, time_constant_turns: self.time_constant_turns };
+        on_sensors(world, &self.targets, |sensor| sensor.chain.drifts.push(drift))
+    }
+}
+
+/// Causal digital Butterworth low-pass, made by the bilinear transform with the cut-off kept.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FilterAttenuation {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// −3 dB, in Hz.
+    pub cutoff_hz: f64,
+    /// 1 to 8.
+    #[serde(default = "first_order")]
+    pub order: usize,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+fn first_order() -> usize {
+    1
+}
+
+impl Acts for FilterAttenuation {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let filter = LowPass::butterworth(self.order, self.cutoff_hz, world.sample_rate_hz)?;
+        on_sensors(world, &self.targets, |sensor| sensor.chain.filters.push(filter.clone()))
+    }
+}
+
+fn on_sensors(world: &mut World, targets: &[String], change: impl Fn(&mut TrueSensor)) -> Result<(), Fault> {
+    let known: Vec<&str> = world.rig.sensors.iter().map(|sensor| sensor.id.as_str()).collect();
+    for index in places(targets, &known, "sensor")? {
+        change(&mut world.sensors[index]);
+    }
+    Ok(())
+}
