@@ -208,25 +208,13 @@ impl LeastSquaresCylinder {
         let scan = all.keep(&cleaned.kept);
         let mut warnings = Vec::new();
         if cleaned.left_out() > 0 {
-            let stretches = cleaned.stretches(&all);
-            let place = |(from, to, count): &(f64, f64, usize)| match count {
-                1 => format!("{from:.1}°"),
-                _ => format!("{from:.1}…{to:.1}° ({count})"),
-            };
-            let farthest =
-                (cleaned.distance_um.iter()).fold(0.0_f64, |far, off| if off.abs() > far.abs() { *off } else { far });
-            warnings.push(format!(
-                "left out {} of {} points, further than {outlier_mad} MAD ({:.2} µm) from the fit, the farthest {farthest:.1} µm: at {}",
-                cleaned.left_out(),
-                all.len(),
-                cleaned.limit_um,
-                stretches.iter().map(place).collect::<Vec<_>>().join(", ")
-            ));
+            warnings.push(format!("{} {}: {}", trace.kind, trace.id, left_out(&cleaned, &all, outlier_mad)));
         }
         let [from, to] = widest_gap_deg(&scan.angle_rad);
         // Half a wave of the highest order.
         if to - from > 180.0 / max_order as f64 {
-            warnings.push(format!("no point is used between {from:.2}° and {to:.2}°: the harmonics bridge it"));
+            let gap = format!("no point is used between {from:.2}° and {to:.2}°: the harmonics bridge it");
+            warnings.push(format!("{} {}: {gap}", trace.kind, trace.id));
         }
         Ok(Circle { trace, measured: all.len(), scan, warnings })
     }
@@ -269,6 +257,30 @@ impl LeastSquaresCylinder {
             cylinder.z_mm,
         )
     }
+}
+
+/// "left out 3 of 1046 points …", with their places.
+fn left_out(cleaned: &Cleaned, scan: &Scan, outlier_mad: f64) -> String {
+    /// A line holds no more than these; whatever has more is bad throughout.
+    const PLACES: usize = 20;
+    let stretches = cleaned.stretches(scan);
+    let place = |(from, to, count): &(f64, f64, usize)| match count {
+        1 => format!("{from:.1}°"),
+        _ => format!("{from:.1}…{to:.1}° ({count})"),
+    };
+    let mut places: Vec<String> = stretches.iter().take(PLACES).map(place).collect();
+    if stretches.len() > PLACES {
+        places.push(format!("{} more places", stretches.len() - PLACES));
+    }
+    let farthest = cleaned.distance_um.iter().fold(0.0_f64, |far, off| if off.abs() > far.abs() { *off } else { far });
+    format!(
+        "left out {} of {} points, further than {outlier_mad} MAD ({:.2} µm) from the fit, the farthest {farthest:.1} µm: \
+         at {}",
+        cleaned.left_out(),
+        scan.len(),
+        cleaned.limit_um,
+        places.join(", ")
+    )
 }
 
 fn cylinder(points: &Points, circles: &[Circle]) -> Result<Cylinder> {
