@@ -137,8 +137,7 @@ fn an_encoder_s_angle_comes_with_each_block() {
 #[test]
 fn times_have_to_be_even() {
     let rows = |times: &[&str]| {
-        let rows: String = times.iter().map(|time| format!("{time};0;1;1\n")).collect();
-        format!("time_s;index;S1;Fühler\n{rows}")
+        times.iter().fold("time_s;index;S1;Fühler\n".to_owned(), |text, time| text + time + ";0;1;1\n")
     };
     let (capture, ..) = read(rows(&["1,0", "1,1", "1,2", "1,3"])).unwrap();
     assert!((capture.sample_rate_hz.unwrap() - 10.0).abs() < 1e-12);

@@ -176,3 +176,22 @@ fn inspection_tells_what_is_there() {
     assert_eq!((capture.samples, capture.sample_type, capture.phase, capture.turns), (500, "i32", "index", 9));
     assert_eq!((capture.sample_rate_hz, capture.speed_rpm), (Some(50.0), Some(60.0)));
 }
+
+#[test]
+fn captures_can_be_read_from_several_threads_at_once() {
+    let (folder, rig) = (tempfile::tempdir().unwrap(), rig());
+    let path = folder.path().join("threads.h5");
+    let memory = Memory::new(&rig, &[("a", 1.0), ("b", 2.0)], 50_000, true);
+    write(&memory, &rig, &path, &WriteOptions::default()).unwrap();
+    let recording = load(&path, &rig).unwrap();
+    std::thread::scope(|scope| {
+        for capture in 0..4 {
+            let (recording, memory) = (&recording, &memory);
+            scope.spawn(move || {
+                let (station, setup) = (capture / 2, capture % 2);
+                let found = read(&**recording, station, setup).unwrap();
+                assert_eq!(found.samples, memory.captures[station][setup].samples);
+            });
+        }
+    });
+}
