@@ -85,10 +85,12 @@ fn bessel_i0(x: f64) -> f64 {
     sum
 }
 
-/// The nearest sample, where a position is as good as on it.
+/// The sample that a position of at least 0 is as good as on.
 pub(super) fn on_sample(position: f64) -> Option<usize> {
-    let nearest = position.round();
-    ((position - nearest).abs() < ON_SAMPLE).then_some(nearest as usize)
+    // Not `round`: without a processor's own instruction for it, that is a call.
+    let below = position as usize;
+    let fraction = position - below as f64;
+    if fraction < ON_SAMPLE { Some(below) } else { (fraction > 1.0 - ON_SAMPLE).then_some(below + 1) }
 }
 
 /// Interpolates all channels at many positions.
@@ -111,8 +113,9 @@ impl LaneWork for Interpolation<'_> {
             if let Some(sample) = on_sample(*position) {
                 sum = load(&self.frames[sample * channels..], offset);
             } else {
-                let first = *position as usize + 1 - REACH;
-                let weights = self.kernel.weights(position.fract());
+                let below = *position as usize;
+                let weights = self.kernel.weights(position - below as f64);
+                let first = below + 1 - REACH;
                 let window = &self.frames[first * channels..(first + TAPS) * channels];
                 for (frame, weight) in window.chunks_exact(channels).zip(weights) {
                     let value: [f64; C] = load(frame, offset);
