@@ -8,7 +8,7 @@ use super::{
     check,
     config::FormConfig,
     random::{Place, Purpose, phase, stream},
-    series,
+    series::{self, Phasor},
 };
 
 /// h(α, z) = Re Σ_bands e^{iκz} Σₙ cₙ e^{inα}, in µm.
@@ -89,17 +89,27 @@ impl Form {
     /// Harmonics of the circle at z, in µm, from order 0.
     pub fn at(&self, z_mm: f64) -> Vec<Complex64> {
         let mut harmonics = vec![Complex64::ZERO; self.orders()];
-        self.fill(z_mm, &mut harmonics);
-        harmonics
-    }
-
-    /// The same into memory that is there.
-    pub fn fill(&self, z_mm: f64, harmonics: &mut [Complex64]) {
-        harmonics.fill(Complex64::ZERO);
         for band in &self.bands {
             let turned = Complex64::cis(band.twist_rad_per_mm * z_mm);
             for (sum, value) in harmonics.iter_mut().zip(&band.harmonics) {
                 *sum += turned * value;
+            }
+        }
+        harmonics
+    }
+
+    /// The same at a z for each lane, into memory that is kept.
+    pub fn fill<const L: usize>(&self, z_mm: &[f64; L], harmonics: &mut Vec<Phasor<L>>) {
+        harmonics.clear();
+        harmonics.resize(self.orders(), Phasor::ZERO);
+        for band in &self.bands {
+            let turned = Phasor::of_turns(&z_mm.map(|z_mm| band.twist_rad_per_mm * z_mm / TAU));
+            for (sum, value) in harmonics.iter_mut().zip(&band.harmonics) {
+                let term = turned.times(*value);
+                for lane in 0..L {
+                    sum.re[lane] += term.re[lane];
+                    sum.im[lane] += term.im[lane];
+                }
             }
         }
     }

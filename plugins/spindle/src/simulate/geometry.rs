@@ -8,9 +8,7 @@
 //!
 //! α₀ being the part's angle under the sensor if both axes coincided. The reading u is the root of this equation.
 
-use runout_core::Complex64;
-
-use super::series::{Phasor, sum};
+use super::series::{Phasor, Series};
 
 /// What a sensor has before it.
 pub(super) struct Sight<const L: usize> {
@@ -20,13 +18,6 @@ pub(super) struct Sight<const L: usize> {
     pub along: [f64; L],
     /// Displacement across it, counter-clockwise from the line, in µm.
     pub across: [f64; L],
-}
-
-impl<const L: usize> Sight<L> {
-    /// One lane by itself.
-    pub fn lane(&self, lane: usize) -> Sight<1> {
-        Sight { toward: self.toward.lane(lane), along: [self.along[lane]], across: [self.across[lane]] }
-    }
 }
 
 /// How far displacements and slopes may go, in µm, so that the root is unique and quickly found.
@@ -51,9 +42,10 @@ impl Reach {
     }
 
     /// Newton steps to the root. Their slope leaves h′ out, so that each leaves at most the part `q` of the error before;
-    /// within [`fits`](Self::fits) q stays below 0.25. A fixed number makes samples independent of their neighbours.
+    /// within [`fits`](Self::fits) q stays below 0.2. A fixed number makes samples independent of their neighbours.
     pub fn steps(&self, radius_um: f64) -> usize {
-        let q = 2.0 * (self.slope + self.displacement) * self.displacement / radius_um.powi(2);
+        // |h′ · across / |q|²| and the curvature of |q|, where |q| has shrunk as far as it may.
+        let q = (self.slope + 0.5 * self.displacement) * self.displacement / (0.8 * radius_um).powi(2);
         let mut error = self.form + self.displacement;
         let mut steps = 0;
         while error > ROOT_UM && steps < 40 {
@@ -64,15 +56,15 @@ impl Reach {
     }
 }
 
-/// The root is found to this, in µm; rounding of R + u leaves more at displacements of some 100 µm.
-const ROOT_UM: f64 = 1e-13;
+/// The root is found to this at the very worst, in µm: largest slope, largest displacement, all at once.
+const ROOT_UM: f64 = 1e-12;
 
-/// Readings in µm: the exact meeting point. `harmonics` are those of h at the sensor's z.
+/// Readings in µm: the exact meeting point. `profile` is h at the sensor's z.
 ///
 /// The difference |q| − R is taken as (|q|² − R²) / (|q| + R), with R² cancelled by hand: nothing of R's rounding enters.
 pub(super) fn exact<const L: usize>(
     radius_um: f64,
-    harmonics: &[Complex64],
+    profile: &(impl Series<L> + ?Sized),
     sight: &Sight<L>,
     steps: usize,
 ) -> [f64; L] {
@@ -92,7 +84,7 @@ pub(super) fn exact<const L: usize>(
             surface_angle.re[lane] = a * cos - b * sin;
             surface_angle.im[lane] = a * sin + b * cos;
         }
-        let form = sum(harmonics, &surface_angle);
+        let form = profile.sum(&surface_angle);
         for lane in 0..L {
             reading[lane] -= (excess[lane] - form[lane]) * step[lane];
         }
@@ -101,8 +93,8 @@ pub(super) fn exact<const L: usize>(
 }
 
 /// Readings in µm as the linear equations have them: form under the sensor plus displacement along its line.
-pub(super) fn linear<const L: usize>(harmonics: &[Complex64], sight: &Sight<L>) -> [f64; L] {
-    let mut reading = sum(harmonics, &sight.toward);
+pub(super) fn linear<const L: usize>(profile: &(impl Series<L> + ?Sized), sight: &Sight<L>) -> [f64; L] {
+    let mut reading = profile.sum(&sight.toward);
     for lane in 0..L {
         reading[lane] += sight.along[lane];
     }
@@ -111,6 +103,8 @@ pub(super) fn linear<const L: usize>(harmonics: &[Complex64], sight: &Sight<L>) 
 
 #[cfg(test)]
 mod tests {
+    use runout_core::Complex64;
+
     use super::*;
 
     const RADIUS_UM: f64 = 30_000.0;
@@ -127,7 +121,12 @@ mod tests {
             for index in 0..36 {
                 let (sin, cos) = (0.3 + f64::from(index) * 0.17).sin_cos();
                 let (along, across) = (displacement * cos, displacement * sin);
-                let reading = exact(RADIUS_UM, &[], &sight(0.7, along, across), reach.steps(RADIUS_UM))[0];
+                let reading = exact(
+                    RADIUS_UM,
+                    [Complex64::ZERO; 0].as_slice(),
+                    &sight(0.7, along, across),
+                    reach.steps(RADIUS_UM),
+                )[0];
                 let drop = across * across / (RADIUS_UM + (RADIUS_UM.powi(2) - across * across).sqrt());
                 // 1e-12 µm: rounding of lengths up to 2 mm.
                 assert!((reading - (along - drop)).abs() < 1e-12, "{displacement}: {reading} {}", along - drop);
@@ -149,7 +148,8 @@ mod tests {
                 let angle = f64::from(index) * 0.21;
                 let (across, along) =
                     (displacement * (1.0 + 3.0 * angle).sin(), displacement * (1.0 + 3.0 * angle).cos());
-                let reading = exact(RADIUS_UM, &harmonics, &sight(angle, along, across), reach.steps(RADIUS_UM))[0];
+                let reading =
+                    exact(RADIUS_UM, harmonics.as_slice(), &sight(angle, along, across), reach.steps(RADIUS_UM))[0];
                 let (x, y) = (RADIUS_UM + reading - along, -across);
                 let alpha = angle + y.atan2(x);
                 let form: f64 = (2..61).map(|order| (harmonics[order] * Complex64::cis(order as f64 * alpha)).re).sum();
@@ -179,7 +179,8 @@ mod tests {
         for index in 0..40 {
             let angle = 0.1 + f64::from(index) * 0.157;
             let (along, across) = (90.0 * (5.0 * angle).cos(), 150.0 * (3.0 * angle).sin());
-            let reading = exact(RADIUS_UM, &harmonics, &sight(angle, along, across), reach.steps(RADIUS_UM))[0];
+            let reading =
+                exact(RADIUS_UM, harmonics.as_slice(), &sight(angle, along, across), reach.steps(RADIUS_UM))[0];
             // In the ellipse's axes: the line starts at the spindle's axis and runs at `angle`.
             let centre = Complex64::new(along, across) * Complex64::cis(angle);
             let (dx, dy) = (angle.cos() / a, angle.sin() / b);

@@ -6,7 +6,7 @@ use super::{
     check,
     config::{MotionConfig, Orders},
     random::{Place, Purpose, phase, stream},
-    series::{self, Phasor},
+    series::{self, Phasor, Series},
 };
 
 /// Harmonics over the spindle's angle, Re Σ cₙ e^{−inΦ}: x and y in µm, tilt about x and y in µrad.
@@ -66,7 +66,7 @@ impl Motion {
     /// At spindle angles Φ; `turn` is e^{iΦ}.
     pub fn at<const L: usize>(&self, turn: &Phasor<L>) -> Displacement<L> {
         let backwards = turn.conj();
-        self.axes.each_ref().map(|axis| series::sum(axis, &backwards))
+        self.axes.each_ref().map(|axis| axis.as_slice().sum(&backwards))
     }
 
     /// What a separation can find of it: of order 1 only the part that turns against the spindle, since the part that

@@ -14,7 +14,7 @@ use super::{
     geometry::{self, Sight},
     motion::Displacement,
     random::{Place, Purpose, stream},
-    series::{self, LANES, Phasor},
+    series::{self, LANES, Phasor, Series},
     spin::Spin,
     world::{UM_PER_MM_URAD, World},
 };
@@ -84,6 +84,8 @@ struct Looking<'a> {
     clamped: Complex64,
     /// h at its z.
     harmonics: Vec<Complex64>,
+    /// The same where axial motion has moved the part, instant by instant.
+    moved: Vec<Phasor<LANES>>,
     channel: Channel<'a>,
 }
 
@@ -111,6 +113,7 @@ impl<'a> SimulatedStream<'a> {
                 z_mm,
                 clamped: world.clamped_at(clamped_in, sensor, z_mm),
                 harmonics: world.form.at(z_mm),
+                moved: Vec::new(),
                 channel: Channel::new(&sensor.chain, random),
             }
         });
@@ -159,7 +162,7 @@ impl<'a> SimulatedStream<'a> {
         }
         self.wandering.add(start, count, &turns, &mut displacement);
         let axial = &self.world.axial_um;
-        let axial_um = (!axial.is_empty()).then(|| series::sum(axial, &turn.conj()));
+        let axial_um = (!axial.is_empty()).then(|| axial.as_slice().sum(&turn.conj()));
         let turned = if self.world.rig.rotation.direction() > 0.0 { turn } else { turn.conj() };
         Instants { turned, displacement, axial_um }
     }
@@ -182,20 +185,20 @@ impl Looking<'_> {
         }
         let sight = Sight { toward, along, across };
         match &instants.axial_um {
-            None => meet(world, &self.harmonics, &sight),
-            Some(axial_um) => std::array::from_fn(|lane| {
+            None => meet(world, self.harmonics.as_slice(), &sight),
+            Some(axial_um) => {
                 // The part has moved up by a: the sensor sees what was at z − a.
-                world.form.fill(self.z_mm - 1e-3 * axial_um[lane], &mut self.harmonics);
-                meet(world, &self.harmonics, &sight.lane(lane))[0]
-            }),
+                world.form.fill(&axial_um.map(|axial_um| self.z_mm - 1e-3 * axial_um), &mut self.moved);
+                meet(world, self.moved.as_slice(), &sight)
+            }
         }
     }
 }
 
-fn meet<const L: usize>(world: &World, harmonics: &[Complex64], sight: &Sight<L>) -> [f64; L] {
+fn meet<const L: usize>(world: &World, profile: &(impl Series<L> + ?Sized), sight: &Sight<L>) -> [f64; L] {
     match world.geometry {
-        Geometry::Exact => geometry::exact(world.radius_um, harmonics, sight, world.steps),
-        Geometry::Linear => geometry::linear(harmonics, sight),
+        Geometry::Exact => geometry::exact(world.radius_um, profile, sight, world.steps),
+        Geometry::Linear => geometry::linear(profile, sight),
     }
 }
 

@@ -5,7 +5,7 @@ use runout_core::Complex64;
 /// Samples that are worked on side by side.
 pub(super) const LANES: usize = 8;
 
-/// Points of the unit circle, one a lane.
+/// Complex numbers, one a lane: mostly points of the unit circle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Phasor<const L: usize> {
     pub re: [f64; L],
@@ -15,12 +15,14 @@ pub(super) struct Phasor<const L: usize> {
 impl<const L: usize> Phasor<L> {
     /// e^{i·2π·turns}; exact to rounding while |turns| stays near 1.
     pub fn of_turns(turns: &[f64; L]) -> Self {
-        let mut phasor = Self { re: [0.0; L], im: [0.0; L] };
+        let mut phasor = Self::ZERO;
         for lane in 0..L {
             (phasor.im[lane], phasor.re[lane]) = (std::f64::consts::TAU * turns[lane]).sin_cos();
         }
         phasor
     }
+
+    pub const ZERO: Self = Self { re: [0.0; L], im: [0.0; L] };
 
     pub fn conj(mut self) -> Self {
         for value in &mut self.im {
@@ -30,38 +32,56 @@ impl<const L: usize> Phasor<L> {
     }
 
     pub fn times(&self, factor: Complex64) -> Self {
-        let mut product = Self { re: [0.0; L], im: [0.0; L] };
+        let mut product = Self::ZERO;
         for lane in 0..L {
             product.re[lane] = self.re[lane] * factor.re - self.im[lane] * factor.im;
             product.im[lane] = self.re[lane] * factor.im + self.im[lane] * factor.re;
         }
         product
     }
+}
 
-    /// One lane by itself.
-    pub fn lane(&self, lane: usize) -> Phasor<1> {
-        Phasor { re: [self.re[lane]], im: [self.im[lane]] }
+/// Something periodic, given by harmonics from order 0.
+pub(super) trait Series<const L: usize> {
+    /// Re Σ cₙ zⁿ, by Horner's rule, whose rounding grows with n only where |cₙ| does.
+    fn sum(&self, z: &Phasor<L>) -> [f64; L];
+}
+
+/// The same harmonics in all lanes.
+impl<const L: usize> Series<L> for [Complex64] {
+    fn sum(&self, z: &Phasor<L>) -> [f64; L] {
+        let (mut re, mut im) = ([0.0; L], [0.0; L]);
+        for harmonic in self.iter().rev() {
+            for lane in 0..L {
+                let (a, b) = (re[lane], im[lane]);
+                re[lane] = a * z.re[lane] - b * z.im[lane] + harmonic.re;
+                im[lane] = a * z.im[lane] + b * z.re[lane] + harmonic.im;
+            }
+        }
+        re
     }
 }
 
-/// Re Σ cₙ zⁿ over n from 0, by Horner's rule, whose rounding grows with n only where |cₙ| does.
-pub(super) fn sum<const L: usize>(harmonics: &[Complex64], z: &Phasor<L>) -> [f64; L] {
-    let (mut re, mut im) = ([0.0; L], [0.0; L]);
-    for harmonic in harmonics.iter().rev() {
-        for lane in 0..L {
-            let (a, b) = (re[lane], im[lane]);
-            re[lane] = a * z.re[lane] - b * z.im[lane] + harmonic.re;
-            im[lane] = a * z.im[lane] + b * z.re[lane] + harmonic.im;
+/// Harmonics of its own in each lane.
+impl<const L: usize> Series<L> for [Phasor<L>] {
+    fn sum(&self, z: &Phasor<L>) -> [f64; L] {
+        let (mut re, mut im) = ([0.0; L], [0.0; L]);
+        for harmonic in self.iter().rev() {
+            for lane in 0..L {
+                let (a, b) = (re[lane], im[lane]);
+                re[lane] = a * z.re[lane] - b * z.im[lane] + harmonic.re[lane];
+                im[lane] = a * z.im[lane] + b * z.re[lane] + harmonic.im[lane];
+            }
         }
+        re
     }
-    re
 }
 
 /// Re Σ cₙ zⁿ on `count` equally spaced angles from 0, z = e^{iα} or, `backwards`, e^{−iα}.
 pub(super) fn turn(harmonics: &[Complex64], count: usize, backwards: bool) -> Vec<f64> {
     let at = |index: usize| {
         let phasor = Phasor::of_turns(&[index as f64 / count as f64]);
-        sum(harmonics, &if backwards { phasor.conj() } else { phasor })[0]
+        harmonics.sum(&if backwards { phasor.conj() } else { phasor })[0]
     };
     (0..count).map(at).collect()
 }
