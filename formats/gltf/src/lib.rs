@@ -23,6 +23,8 @@ use runout_mesh::{Format, Mesh, MeshConfig, Notes};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use vertices::Layout;
+
 /// The exporter `gltf`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(transparent)]
@@ -46,12 +48,12 @@ pub fn register(registry: &mut Registry) {
 
 /// Writes a GLB: header, JSON chunk, binary chunk (glTF 2.0 specification, 4.4).
 fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
-    let layout = vertices::Layout::of(mesh)?;
-    let (binary, bounds) = vertices::fill(mesh, &layout);
-    let mut json = document::json(&layout, &bounds, notes)?;
+    let layout = Layout::of(mesh);
+    let mut json = document::json(&layout, notes)?;
     json.resize(json.len().next_multiple_of(4), b' ');
-    let too_long = |_| io::Error::other("a GLB holds at most 4 GiB; take fewer angles or a larger step_mm");
-    let whole = u32::try_from(12 + 8 + json.len() + 8 + binary.len()).map_err(too_long)?;
+    let binary = layout.vertex_bytes() + layout.index_bytes();
+    let too_long = |_| io::Error::other("a GLB holds at most 4 GiB: take fewer angles or a larger step_mm");
+    let whole = u32::try_from(12 + 8 + json.len() + 8 + binary).map_err(too_long)?;
     let mut head = Vec::with_capacity(json.len() + 28);
     head.extend_from_slice(b"glTF");
     for number in [2, whole, json.len() as u32] {
@@ -59,8 +61,8 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
     }
     head.extend_from_slice(b"JSON");
     head.extend_from_slice(&json);
-    head.extend_from_slice(&(binary.len() as u32).to_le_bytes());
+    head.extend_from_slice(&(binary as u32).to_le_bytes());
     head.extend_from_slice(b"BIN\0");
     file.write_all(&head)?;
-    file.write_all(&binary)
+    vertices::write(mesh, file)
 }

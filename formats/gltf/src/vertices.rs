@@ -1,171 +1,157 @@
-//! The binary chunk: one buffer, one stretch of it an attribute.
+//! The binary chunk: vertices, all attributes of one side by side, then triangles.
+//!
+//! It is written in portions that stay in the processor's cache: a chunk held whole would first have to be given its
+//! memory page by page, which takes longer than filling it.
 
-use std::{io, ops::Range};
+use std::io::{self, Write};
 
-use runout_mesh::{COLOUR_STEPS, Mesh, UNMEASURED, linear, palette};
+use runout_mesh::{COLOUR_STEPS, Mesh, UNMEASURED, Vertex, linear, palette};
 
-/// Where each attribute lies in the binary chunk, in bytes. All of them begin at multiples of 4.
+/// Bytes from one vertex to the next.
+pub const STRIDE: usize = 32;
+/// Where each attribute lies within a vertex, in bytes.
+pub const POSITION: usize = 0;
+/// See [`POSITION`].
+pub const NORMAL: usize = 12;
+/// See [`POSITION`].
+pub const COLOUR: usize = 24;
+/// See [`POSITION`].
+pub const DEVIATION: usize = 28;
+/// Bytes of an index.
+const INDEX: usize = 4;
+/// Bytes that are handed on at a time.
+const PORTION: usize = 1 << 18;
+
+/// What the binary chunk holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Vertices of wall and caps.
     pub vertices: usize,
     /// Three a triangle.
     pub indices: usize,
-}
-
-/// Bytes of a position or a normal.
-const VECTOR: usize = 12;
-/// Bytes of a colour, a deviation or an index.
-const WORD: usize = 4;
-
-impl Layout {
-    /// Of a mesh.
-    ///
-    /// # Errors
-    /// When it does not fit into a GLB, whose lengths have 32 bits.
-    pub fn of(mesh: &Mesh) -> io::Result<Self> {
-        let (rings, angles, caps) = (mesh.rings(), mesh.angles(), mesh.caps().len());
-        let vertices = rings * angles + caps * (angles + 1);
-        let indices = 6 * (rings - 1) * angles + 3 * caps * angles;
-        let layout = Self { vertices, indices };
-        if layout.bytes() >= u32::MAX as usize {
-            return Err(io::Error::other("a GLB holds at most 4 GiB; take fewer angles or a larger step_mm"));
-        }
-        Ok(layout)
-    }
-
-    /// `POSITION`.
-    pub fn positions(&self) -> Range<usize> {
-        0..VECTOR * self.vertices
-    }
-
-    /// `NORMAL`.
-    pub fn normals(&self) -> Range<usize> {
-        follow(&self.positions(), VECTOR * self.vertices)
-    }
-
-    /// `COLOR_0`.
-    pub fn colours(&self) -> Range<usize> {
-        follow(&self.normals(), WORD * self.vertices)
-    }
-
-    /// `_DEVIATION_UM`.
-    pub fn deviations(&self) -> Range<usize> {
-        follow(&self.colours(), WORD * self.vertices)
-    }
-
-    /// Triangles.
-    pub fn triangles(&self) -> Range<usize> {
-        follow(&self.deviations(), WORD * self.indices)
-    }
-
-    /// Of the whole chunk.
-    pub fn bytes(&self) -> usize {
-        self.triangles().end
-    }
-}
-
-fn follow(before: &Range<usize>, length: usize) -> Range<usize> {
-    before.end..before.end + length
-}
-
-/// Smallest and largest position, of the numbers as written.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Bounds {
-    /// Smallest x, y and z.
+    /// Smallest x, y and z, of the numbers as written.
     pub min: [f32; 3],
     /// Largest x, y and z.
     pub max: [f32; 3],
 }
 
-/// The attributes of consecutive vertices, yet to be written.
-struct Cursor<'a> {
-    positions: std::slice::ChunksExactMut<'a, u8>,
-    normals: std::slice::ChunksExactMut<'a, u8>,
-    colours: std::slice::ChunksExactMut<'a, u8>,
-    deviations: std::slice::ChunksExactMut<'a, u8>,
-    bounds: Bounds,
-}
-
-impl Cursor<'_> {
-    #[inline]
-    fn push(&mut self, position_mm: [f64; 3], normal: [f64; 3], colour: [u8; 4], deviation_um: f64) {
-        let position = y_up(position_mm.map(|value| 1e-3 * value));
-        for (axis, value) in position.iter().enumerate() {
-            self.bounds.min[axis] = self.bounds.min[axis].min(*value);
-            self.bounds.max[axis] = self.bounds.max[axis].max(*value);
+impl Layout {
+    /// Of a mesh.
+    pub fn of(mesh: &Mesh) -> Self {
+        let (rings, angles, caps) = (mesh.rings(), mesh.angles(), mesh.caps().len());
+        let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let centres = mesh.caps().into_iter().map(|cap| [0.0, 0.0, cap.z_mm]);
+        for position in (0..rings).flat_map(|ring| mesh.rim(ring)).chain(centres) {
+            let position = metres_y_up(position);
+            for axis in 0..3 {
+                // Comparisons compile to single instructions; f32::min has to look after NaN, which a mesh never holds.
+                min[axis] = if position[axis] < min[axis] { position[axis] } else { min[axis] };
+                max[axis] = if position[axis] > max[axis] { position[axis] } else { max[axis] };
+            }
         }
-        put(self.positions.next(), &bytes(position));
-        put(self.normals.next(), &bytes(y_up(normal)));
-        put(self.colours.next(), &colour);
-        put(self.deviations.next(), &(deviation_um as f32).to_le_bytes());
+        Self {
+            vertices: rings * angles + caps * (angles + 1),
+            indices: 6 * (rings - 1) * angles + 3 * caps * angles,
+            min,
+            max,
+        }
+    }
+
+    /// Bytes of all vertices.
+    pub fn vertex_bytes(&self) -> usize {
+        STRIDE * self.vertices
+    }
+
+    /// Bytes of all triangles.
+    pub fn index_bytes(&self) -> usize {
+        INDEX * self.indices
     }
 }
 
-/// From z up to y up, a turn about x.
+/// From mm with z up to metres with y up: a turn about x.
+fn metres_y_up([x, y, z]: [f64; 3]) -> [f32; 3] {
+    y_up([1e-3 * x, 1e-3 * y, 1e-3 * z])
+}
+
 fn y_up([x, y, z]: [f64; 3]) -> [f32; 3] {
     [x as f32, z as f32, -y as f32]
 }
 
-fn bytes(vector: [f32; 3]) -> [u8; VECTOR] {
-    let [x, y, z] = vector.map(f32::to_le_bytes);
-    [x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], z[0], z[1], z[2], z[3]]
-}
-
-fn put(place: Option<&mut [u8]>, bytes: &[u8]) {
-    // The layout counts as many places as there are vertices.
-    if let Some(place) = place {
-        place.copy_from_slice(bytes);
-    }
-}
-
-/// Fills the chunk: the wall ring by ring, then each cap's rim and centre, then the triangles.
-pub fn fill(mesh: &Mesh, layout: &Layout) -> (Vec<u8>, Bounds) {
-    let mut chunk = vec![0_u8; layout.bytes()];
-    let (positions, rest) = chunk.split_at_mut(layout.positions().end);
-    let (normals, rest) = rest.split_at_mut(layout.normals().len());
-    let (colours, rest) = rest.split_at_mut(layout.colours().len());
-    let (deviations, triangles) = rest.split_at_mut(layout.deviations().len());
-    let mut cursor = Cursor {
-        positions: positions.chunks_exact_mut(VECTOR),
-        normals: normals.chunks_exact_mut(VECTOR),
-        colours: colours.chunks_exact_mut(WORD),
-        deviations: deviations.chunks_exact_mut(WORD),
-        bounds: Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] },
-    };
+/// Writes the chunk: the wall ring by ring, then each cap's rim and centre, then the triangles.
+pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     let colours: [[u8; 4]; COLOUR_STEPS] = palette().map(linear_rgba);
+    let mut portion = Portion { bytes: Vec::with_capacity(2 * PORTION), to };
     for ring in 0..mesh.rings() {
-        mesh.ring(ring, |vertex| {
-            cursor.push(vertex.position_mm, vertex.normal, colours[vertex.colour], vertex.deviation_um);
-        });
+        mesh.ring(ring, |vertex| portion.vertex(&vertex, colours[vertex.colour]));
+        portion.pass(PORTION)?;
     }
-    for cap in mesh.caps() {
+    let caps = mesh.caps();
+    for cap in &caps {
         // glTF has no "not measured": a cap's deviation is 0 and its colour says so.
-        for position in mesh.rim(cap.ring).chain([[0.0, 0.0, cap.z_mm]]) {
-            cursor.push(position, [0.0, 0.0, cap.normal_z], linear_rgba(UNMEASURED), 0.0);
+        let normal = [0.0, 0.0, cap.normal_z];
+        for position_mm in mesh.rim(cap.ring).chain([[0.0, 0.0, cap.z_mm]]) {
+            let vertex = Vertex { position_mm, normal, deviation_um: 0.0, colour: 0 };
+            portion.vertex(&vertex, linear_rgba(UNMEASURED));
         }
+        portion.pass(PORTION)?;
     }
-    let bounds = cursor.bounds;
-    let mut places = triangles.chunks_exact_mut(3 * WORD);
-    let mut put_triangle = |[a, b, c]: [u32; 3]| {
-        if let Some(place) = places.next() {
-            place[0..4].copy_from_slice(&a.to_le_bytes());
-            place[4..8].copy_from_slice(&b.to_le_bytes());
-            place[8..12].copy_from_slice(&c.to_le_bytes());
-        }
-    };
     for ring in 0..mesh.rings() - 1 {
         for [one, other] in mesh.band(ring) {
-            put_triangle(one);
-            put_triangle(other);
+            portion.triangle(one);
+            portion.triangle(other);
         }
+        portion.pass(PORTION)?;
     }
     let angles = mesh.angles() as u32;
-    for (index, cap) in mesh.caps().iter().enumerate() {
+    for (index, cap) in caps.iter().enumerate() {
         let rim = mesh.rings() as u32 * angles + index as u32 * (angles + 1);
-        cap.triangles(angles, rim + angles, rim).for_each(&mut put_triangle);
+        cap.triangles(angles, rim + angles, rim).for_each(|triangle| portion.triangle(triangle));
+        portion.pass(PORTION)?;
     }
-    (chunk, bounds)
+    portion.pass(0)
+}
+
+/// Bytes on their way.
+struct Portion<'a, W> {
+    bytes: Vec<u8>,
+    to: &'a mut W,
+}
+
+impl<W: Write> Portion<'_, W> {
+    #[inline]
+    fn vertex(&mut self, vertex: &Vertex, colour: [u8; 4]) {
+        let mut record = [0; STRIDE];
+        put_vector(&mut record[POSITION..NORMAL], metres_y_up(vertex.position_mm));
+        put_vector(&mut record[NORMAL..COLOUR], y_up(vertex.normal));
+        record[COLOUR..DEVIATION].copy_from_slice(&colour);
+        record[DEVIATION..].copy_from_slice(&(vertex.deviation_um as f32).to_le_bytes());
+        self.bytes.extend_from_slice(&record);
+    }
+
+    #[inline]
+    fn triangle(&mut self, triangle: [u32; 3]) {
+        let mut record = [0; 3 * INDEX];
+        for (place, vertex) in record.chunks_exact_mut(INDEX).zip(triangle) {
+            place.copy_from_slice(&vertex.to_le_bytes());
+        }
+        self.bytes.extend_from_slice(&record);
+    }
+
+    /// Hands on what has gathered, where it is more than `least` bytes.
+    fn pass(&mut self, least: usize) -> io::Result<()> {
+        if self.bytes.len() > least {
+            self.to.write_all(&self.bytes)?;
+            self.bytes.clear();
+        }
+        Ok(())
+    }
+}
+
+#[inline]
+fn put_vector(place: &mut [u8], vector: [f32; 3]) {
+    for (place, value) in place.chunks_exact_mut(4).zip(vector) {
+        place.copy_from_slice(&value.to_le_bytes());
+    }
 }
 
 /// glTF wants COLOR_0 in linear light (2.0 specification, 3.9.2).

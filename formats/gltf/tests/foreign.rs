@@ -1,4 +1,4 @@
-//! What other people's programs say of our files. `npm ci` in `tests/foreign` brings the validator.
+//! What other people's programs say of our files. `npm install` in `tests/foreign` brings the validator.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 

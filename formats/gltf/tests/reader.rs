@@ -1,6 +1,6 @@
 //! Files read back with the gltf crate.
 
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::float_cmp, reason = "tests; some numbers are exact by contract")]
 
 #[path = "../../mesh/tests/support/mod.rs"]
 mod support;
@@ -30,12 +30,15 @@ struct Read {
     extras: serde_json::Value,
 }
 
+/// Words of four bytes, so many an element.
 fn words<const N: usize>(blob: &[u8], accessor: &Accessor) -> Vec<[[u8; 4]; N]> {
-    let start = accessor.view().unwrap().offset() + accessor.offset();
-    let bytes = &blob[start..start + accessor.count() * accessor.size()];
     assert_eq!(accessor.size(), 4 * N);
-    let word = |bytes: &[u8]| <[u8; 4]>::try_from(bytes).unwrap();
-    bytes.chunks(4 * N).map(|item| std::array::from_fn(|index| word(&item[4 * index..4 * index + 4]))).collect()
+    let view = accessor.view().unwrap();
+    let start = view.offset() + accessor.offset();
+    let stride = view.stride().unwrap_or(accessor.size());
+    let element = |index: usize| &blob[start + index * stride..][..4 * N];
+    let word = |bytes: &[u8], index: usize| <[u8; 4]>::try_from(&bytes[4 * index..][..4]).unwrap();
+    (0..accessor.count()).map(|index| std::array::from_fn(|part| word(element(index), part))).collect()
 }
 
 fn read(file: &Path) -> Read {
@@ -99,8 +102,8 @@ fn every_vertex_is_where_it_was_measured() {
         // An f32 near 0.015 m is good to 1e-9 m; +Y is the spindle's z, and the part's angle runs from x to −Z.
         assert!((x.hypot(z) - 1e-3 * (RADIUS_MM + 1e-3 * expected_um)).abs() < 2e-9);
         assert!((y - 1e-3 * z_mm).abs() < 2e-9);
-        let turned = (-z).atan2(x).rem_euclid(std::f64::consts::TAU);
-        assert!((turned - angle).abs() < 1e-6 || (turned - angle).abs() > 6.28);
+        let (sine, cosine) = (angle - (-z).atan2(x)).sin_cos();
+        assert!(sine.abs() < 1e-6 && cosine > 0.0);
     }
     for axis in 0..3 {
         let values = || read.positions.iter().map(|position| position[axis]);
