@@ -1,7 +1,7 @@
 //! Band-limited interpolation between samples: a sinc under a Kaiser window.
 //!
 //! The window's width puts the first zero of its spectrum half of Nyquist away: a signal below half of the recording's
-//! Nyquist frequency ([`PASS_BAND`]) is interpolated to 1e-7 of its amplitude ([`ERROR`]), wherever the position; above,
+//! Nyquist frequency ([`PASS_BAND`]) is interpolated to 1e-7 of its amplitude, wherever the position; above,
 //! the interpolation weakens, to one half at Nyquist. (Kaiser, Schafer, IEEE Trans. ASSP 28(1), 1980: β from the
 //! transition's width.) Weights are tabulated at [`PHASES`] positions between two samples, each set scaled to the sum 1,
 //! and interpolated by cubics between them.
@@ -11,7 +11,7 @@ use runout_core::numerics::lanes::{LaneWork, load};
 /// Samples on either side of a position that its value is made of.
 pub(super) const REACH: usize = 11;
 const TAPS: usize = 2 * REACH;
-/// Share of the Nyquist frequency up to which [`ERROR`] holds.
+/// Share of the Nyquist frequency up to which the stated error holds.
 pub(super) const PASS_BAND: f64 = 0.5;
 /// Largest error of a sine in the pass band, as a share of its amplitude.
 #[cfg(test)]

@@ -268,6 +268,29 @@ fn bad_samples_cost_their_turns() {
 }
 
 #[test]
+fn turns_keep_their_numbers_through_trim_and_filter() {
+    use crate::{LowPassConfig, TrimConfig, testing::conditioner};
+    let mut data = turning(2, 9 * 600 + 300, 140.0, 600.0);
+    data[1][140 + 600 * 5 + 300] = f64::NAN;
+    let mut places = marks(140.0, 600.0, 10);
+    // Two turns of a start-up before the first at speed.
+    places.splice(..0, [20.0, 90.0]);
+    let trim = conditioner(TrimConfig { speed_tolerance_percent: 1.0, start_turns: 0, end_turns: 0 });
+    let filter = conditioner(LowPassConfig { cutoff_hz: 8000.0, order: 2 });
+    let mut input = stream(&data, places);
+    input.block_samples = 250;
+    let inspected = Box::new(Inspection::new(Box::new(input)));
+    let conditioned = filter.attach(trim.attach(inspected).unwrap()).unwrap();
+    let profile = averager(config(600)).average(conditioned).unwrap();
+    assert_eq!(profile.turns.recorded, 11);
+    assert_eq!((profile.turns.trimmed[0].first_turn, profile.turns.trimmed[0].turns), (0, 2));
+    let reason = Rejection::Defect { sensor: 1, kind: DefectKind::NotFinite };
+    assert_eq!(reasons(&profile), [(7, &reason)]);
+    assert_eq!(profile.turns.used, 8);
+    assert_eq!(profile.responses.len(), 1);
+}
+
+#[test]
 fn a_dead_channel_fails_by_name() {
     let mut data = turning(3, 7300, 20.0, 600.0);
     data[2].fill(0.25);
