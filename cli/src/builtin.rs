@@ -8,6 +8,8 @@ pub fn registry() -> Registry {
     let mut registry = Registry::default();
     for register in [
         runout_hdf5::register,
+        runout_csv::register,
+        runout_preprocess::register,
         runout_spindle::register,
         runout_cylinder::register,
         runout_parquet::register,

@@ -91,8 +91,9 @@ impl Failure {
         match self {
             Self::CommandLine(error) => {
                 let text = error.render().to_string();
-                let message = text.lines().next().unwrap_or_default();
-                json!({ "message": message.trim_start_matches("error: ") })
+                let first: Vec<&str> = text.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
+                let tip = text.lines().find_map(|line| line.trim().strip_prefix("tip: "));
+                json!({ "message": first.join(" ").trim_start_matches("error: "), "help": tip })
             }
             Self::Name { message, help } => json!({ "message": message, "help": help }),
             Self::Configuration(ConfigError::Text(diagnostic)) => {

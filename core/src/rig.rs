@@ -180,14 +180,14 @@ impl RigConfig {
             if let Some(first) = sensors.iter().find(|other: &&Sensor| other.section == section)
                 && (first.z_mm - checked.z_mm).abs() > SAME_SECTION_MM
             {
-                    return Err(fault(
-                        "z_mm",
-                        format!(
-                            "sensors of section `{}` must share one z: `{}` is at {} mm, `{}` at {} mm",
-                            sections[section], first.id, first.z_mm, checked.id, checked.z_mm
-                        ),
-                    )
-                    .help("give the sensor a section of its own"));
+                return Err(fault(
+                    "z_mm",
+                    format!(
+                        "sensors of section `{}` must share one z: `{}` is at {} mm, `{}` at {} mm",
+                        sections[section], first.id, first.z_mm, checked.id, checked.z_mm
+                    ),
+                )
+                .help("give the sensor a section of its own"));
             }
             sensors.push(checked);
         }

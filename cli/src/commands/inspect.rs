@@ -1,14 +1,50 @@
 //! `runout inspect`: what a file holds.
 
-use std::{fs::File, io::Read, path::Path};
+use std::{collections::BTreeMap, fs::File, io::Read, path::Path};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use runout_core::{Error, Result};
+use runout_hdf5::FileReport;
 use serde::Serialize;
-use serde_json::Value;
 
 use super::print;
-use crate::{args::InspectArgs, failure::Failure, render::tree};
+use crate::{args::InspectArgs, failure::Failure, render};
+
+/// What a file holds.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Report {
+    /// A measurement, a result, or another HDF5 file.
+    Hdf5(FileReport),
+    /// A table.
+    Parquet(TableReport),
+}
+
+/// A Parquet table in short.
+#[derive(Debug, Serialize)]
+pub struct TableReport {
+    /// "parquet".
+    pub format: &'static str,
+    /// Number of rows.
+    pub rows: i64,
+    /// Parts that a reader can skip.
+    pub row_groups: usize,
+    /// In the file's order.
+    pub columns: Vec<ColumnReport>,
+    /// What the writer noted.
+    pub metadata: BTreeMap<String, Option<String>>,
+}
+
+/// A column of a Parquet table.
+#[derive(Debug, Serialize)]
+pub struct ColumnReport {
+    /// Its name.
+    pub name: String,
+    /// As Parquet stores it.
+    pub r#type: String,
+    /// Whether values may be absent.
+    pub optional: bool,
+}
 
 /// Says what a file holds, told by its first bytes and not by its name.
 ///
@@ -16,45 +52,21 @@ use crate::{args::InspectArgs, failure::Failure, render::tree};
 /// When it cannot be read, or is of no known kind.
 pub fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failure> {
     let report = report(&args.file)?;
-    print(&report, json, tree::text)
+    print(&report, json, render::file::text)
 }
 
-fn report(path: &Path) -> Result<Value> {
-    let shown = path.display().to_string();
-    let failure = |problem: &dyn ToString| Error::new("inspect", &shown, problem.to_string());
+fn report(path: &Path) -> Result<Report> {
+    let failure = |problem: &dyn ToString| Error::new("inspect", path.display().to_string(), problem.to_string());
     let mut signature = Vec::new();
     let file = File::open(path).map_err(|error| failure(&error))?;
     file.take(8).read_to_end(&mut signature).map_err(|error| failure(&error))?;
     if signature == *b"\x89HDF\r\n\x1a\n" {
-        return serde_json::to_value(runout_hdf5::inspect(path)?).map_err(|error| failure(&error));
+        return runout_hdf5::inspect(path).map(Report::Hdf5);
     }
     if signature.starts_with(b"PAR1") {
-        return serde_json::to_value(table(path)?).map_err(|error| failure(&error));
+        return table(path).map(Report::Parquet);
     }
     Err(failure(&"it is neither HDF5 nor Parquet").help("inspect reads measurement files, results and Parquet tables"))
-}
-
-/// A Parquet table in short.
-#[derive(Debug, Serialize)]
-struct TableReport {
-    format: &'static str,
-    rows: i64,
-    row_groups: usize,
-    columns: Vec<ColumnReport>,
-    metadata: Vec<MetadataReport>,
-}
-
-#[derive(Debug, Serialize)]
-struct ColumnReport {
-    name: String,
-    r#type: String,
-    optional: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct MetadataReport {
-    key: String,
-    value: Option<String>,
 }
 
 /// Arrow's own schema, in Base64: the columns say the same.
@@ -77,6 +89,6 @@ fn table(path: &Path) -> Result<TableReport> {
         rows: about.num_rows(),
         row_groups: metadata.num_row_groups(),
         columns: columns.collect(),
-        metadata: entries.map(|entry| MetadataReport { key: entry.key.clone(), value: entry.value.clone() }).collect(),
+        metadata: entries.map(|entry| (entry.key.clone(), entry.value.clone())).collect(),
     })
 }

@@ -63,16 +63,19 @@ fn lost_orders(page: &mut Page, separability: &Separability) {
     page.heading("Lost orders");
     page.line(format_args!("  form    {}", ranges(&separability.lost_orders.form)));
     page.line(format_args!("  motion  {}", ranges(&separability.lost_orders.motion)));
-    let mut reasons: Vec<(&str, Vec<usize>)> = Vec::new();
+    let mut reasons: Vec<(String, &str, Vec<usize>)> = Vec::new();
     for order in &separability.orders {
         let Some(reason) = &order.lost_because else { continue };
-        match reasons.iter_mut().find(|(known, _)| known == reason) {
-            Some((_, at)) => at.push(order.order),
-            None => reasons.push((reason, vec![order.order])),
+        // A reason that names its own order is the same reason at every order.
+        let general = reason.replace(&format!("{}/rev", order.order), "n/rev");
+        match reasons.iter_mut().find(|(known, ..)| *known == general) {
+            Some((.., at)) => at.push(order.order),
+            None => reasons.push((general, reason, vec![order.order])),
         }
     }
-    for (reason, at) in reasons {
-        page.line(format_args!("  at {}: {reason}", ranges(&at)));
+    for (_, first, at) in reasons {
+        let example = if at.len() > 1 { "for example, " } else { "" };
+        page.line(format_args!("  at {}: {example}{first}", ranges(&at)));
     }
 }
 
@@ -81,12 +84,14 @@ fn noise_gain(page: &mut Page, separability: &Separability) {
     for (index, unknown) in separability.unknowns.iter().enumerate() {
         let gain = |order: &Order| order.noise_gain.get(index).copied().flatten();
         let gains = separability.orders.iter().filter_map(|order| Some((order.order, gain(order)?)));
-        let worst = gains.clone().max_by(|a, b| a.1.total_cmp(&b.1));
-        if let (Some((at, worst)), Some([_, median, _])) = (worst, spread(gains.map(|(_, gain)| gain))) {
-            let unit = if unknown.unit == "urad" { "µrad" } else { "µm" };
-            let name = format!("{} ({unit})", unknown.name());
-            table.row([name, significant(median, 3), significant(worst, 3), at.to_string()]);
-        }
+        let Some([lowest, median, worst]) = spread(gains.clone().map(|(_, gain)| gain)) else { continue };
+        // Equal up to rounding is equal.
+        let same = |gain: f64| worst - gain <= 1e-9 * worst;
+        let at = gains.filter(|(_, gain)| same(*gain)).map(|(order, _)| order.to_string()).next();
+        let at = if same(lowest) { "all".into() } else { at.unwrap_or_default() };
+        let unit = if unknown.unit == "urad" { "µrad" } else { "µm" };
+        let name = format!("{} ({unit})", unknown.name());
+        table.row([name, significant(median, 3), significant(worst, 3), at]);
     }
     page.headed_table("Noise gain: standard deviation of each unknown for 1 µm in every reading", &table);
 }

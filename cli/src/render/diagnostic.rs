@@ -5,6 +5,8 @@ use std::fmt;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
 use runout_core::pipeline::error::Diagnostic;
 
+use textwrap::WordSplitter;
+
 use super::fancy_stderr;
 
 /// Columns of a report that no terminal bounds.
@@ -16,19 +18,26 @@ pub fn report(diagnostic: &Diagnostic) -> String {
     let handler = if fancy_stderr() {
         GraphicalReportHandler::new_themed(GraphicalTheme::unicode())
     } else {
-        GraphicalReportHandler::new_themed(GraphicalTheme::none()).with_links(false).with_width(PLAIN_WIDTH)
+        let mut theme = GraphicalTheme::none();
+        "error:".clone_into(&mut theme.characters.error);
+        GraphicalReportHandler::new_themed(theme).with_links(false).with_width(PLAIN_WIDTH)
     };
     let shown = Shown {
         diagnostic,
         source: NamedSource::new(&diagnostic.source_name, diagnostic.source_text.clone()).with_language("toml"),
     };
     let mut text = String::new();
-    if handler.with_break_words(false).render_report(&mut text, &shown).is_err() {
+    if handler
+        .with_word_splitter(WordSplitter::NoHyphenation)
+        .with_break_words(false)
+        .render_report(&mut text, &shown)
+        .is_err()
+    {
         // A report that cannot be drawn still has to be read.
         let (line, column) = diagnostic.line_and_column();
         text = format!("error: {}:{line}:{column}: {}\n", diagnostic.source_name, diagnostic.message);
     }
-    text
+    text.trim_start_matches(' ').to_owned()
 }
 
 /// The core's diagnostic as miette knows it.

@@ -2,12 +2,12 @@
 
 pub mod check;
 pub mod diagnostic;
+pub mod file;
 pub mod keys;
 pub mod number;
 pub mod page;
 pub mod summary;
 pub mod table;
-pub mod tree;
 
 use std::io::{self, ErrorKind, IsTerminal, Write};
 

@@ -267,3 +267,6 @@ fn surface(page: &mut Page, summary: &Summary) {
         page.line(format_args!("  and {} more that agree better", meetings.len() - FEW_STATIONS));
     }
 }
+
+#[cfg(test)]
+mod tests;

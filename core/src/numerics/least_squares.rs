@@ -213,8 +213,7 @@ pub fn invert_lower(size: usize, lower: &[Complex64]) -> Vec<Complex64> {
     for col in 0..size {
         inverse[col * size + col] = lower[col * size + col].inv();
         for row in col + 1..size {
-            let sum: Complex64 =
-                (col..row).map(|inner| lower[row * size + inner] * inverse[inner * size + col]).sum();
+            let sum: Complex64 = (col..row).map(|inner| lower[row * size + inner] * inverse[inner * size + col]).sum();
             inverse[row * size + col] = -sum / lower[row * size + row];
         }
     }

@@ -86,11 +86,18 @@ impl Sources {
         sources.add(name, Role::Main, text);
         for assignment in overrides {
             let (path, value) = assignment.split_once('=').unwrap_or((assignment, ""));
-            let value = value.trim();
+            let (path, value) = (path.trim(), value.trim());
+            if path.is_empty() || value.is_empty() {
+                let message = "expected KEY=VALUE".into();
+                let (source_name, source_text) = ("--set".into(), assignment.clone());
+                return Err(
+                    Diagnostic { message, help: None, source_name, source_text, span: 0..assignment.len() }.into()
+                );
+            }
             // Quotes rarely survive a shell: what is no TOML value is meant as a string.
-            let bare = !value.is_empty() && DeValue::parse(value).is_err();
+            let bare = DeValue::parse(value).is_err();
             let line = if bare { format!("value = {value:?}") } else { format!("value = {value}") };
-            sources.add(&format!("--set {assignment}"), Role::Override(path.trim().to_owned()), &line);
+            sources.add(&format!("--set {assignment}"), Role::Override(path.to_owned()), &line);
         }
         if let Some(included) = sources.included(include_key)? {
             let path = sources.folder.join(&included);
@@ -190,7 +197,8 @@ impl<'a> Document<'a> {
         for part in &sources.parts {
             if let Role::Override(path) = &part.role {
                 let mut table = sources.parse(part)?;
-                let span = table.span();
+                // The table's own span begins before the blanks.
+                let span = part.start..part.start + part.text().len();
                 let refuse = |message: String| sources.locate_span(Fault::span(span.clone(), message));
                 let value = table.get_mut().remove("value").ok_or_else(|| refuse("expected key=value".into()))?;
                 let steps: Vec<&str> = path.split('.').map(str::trim).collect();
@@ -284,7 +292,7 @@ fn explain(span: Range<usize>, message: &str) -> Fault {
     let noun = match message {
         _ if message.starts_with("unknown field") => "key",
         _ if message.starts_with("unknown variant") => "value",
-        _ => return Fault::span(span, message.replace("missing field", "missing key")),
+        _ => return Fault::span(span, plain(message)),
     };
     match quoted.split_first() {
         Some((name, known)) => {
@@ -292,6 +300,25 @@ fn explain(span: Range<usize>, message: &str) -> Fault {
         }
         None => Fault::span(span, message),
     }
+}
+
+/// Serde's words without Rust's types.
+fn plain(message: &str) -> String {
+    let mismatch = message.strip_prefix("invalid type: ").or_else(|| message.strip_prefix("invalid value: "));
+    let Some((found, expected)) = mismatch.and_then(|rest| rest.rsplit_once(", expected ")) else {
+        return message.replace("missing field", "missing key");
+    };
+    let expected = match expected {
+        "usize" | "u8" | "u16" | "u32" | "u64" => "a whole number from 0",
+        "isize" | "i8" | "i16" | "i32" | "i64" => "a whole number",
+        "f32" | "f64" => "a number",
+        "a string" | "path string" => "a string",
+        "a boolean" => "true or false",
+        "a sequence" => "a list",
+        other if other.starts_with("struct ") => "a table",
+        other => other,
+    };
+    format!("expected {expected}, found {found}")
 }
 
 /// Resolves a fault's path against the table that was checked, so that it can travel on by itself.

@@ -1,0 +1,80 @@
+//! What a file holds, for people.
+
+use runout_hdf5::{FileReport, StationReport};
+
+use super::{number::significant, page::Page, table::Table};
+use crate::commands::inspect::{Report, TableReport};
+
+/// The text of a report.
+#[must_use]
+pub fn text(report: &Report) -> String {
+    let mut page = Page::default();
+    match report {
+        Report::Hdf5(file) => hdf5(&mut page, file),
+        Report::Parquet(table) => parquet(&mut page, table),
+    }
+    page.into_text()
+}
+
+fn hdf5(page: &mut Page, file: &FileReport) {
+    let version = file.version.map(|version| format!(", version {version}")).unwrap_or_default();
+    page.line(format_args!(
+        "{}{version}",
+        file.format.as_deref().unwrap_or("HDF5 without a format that is known here")
+    ));
+    for (name, value) in [("title", &file.title), ("program", &file.program)] {
+        if let Some(value) = value {
+            page.line(format_args!("  {name}: {value}"));
+        }
+    }
+    if file.truth {
+        page.line("  truth: the file says what is true");
+    }
+    page.headed_table("Captures", &captures(&file.stations));
+    let mut tables = Table::new(1, ["table", "rows", "columns"]);
+    for table in &file.tables {
+        tables.row([table.table.clone(), table.rows.to_string(), table.columns.join(", ")]);
+    }
+    page.headed_table("Tables", &tables);
+    page.bullets("Members", &file.members);
+}
+
+fn captures(stations: &[StationReport]) -> Table {
+    let header = ["station", "setup", "channels", "angle by", "type", "z mm", "turns", "samples", "rate Hz", "rpm"];
+    let mut table = Table::new(5, header);
+    let known = |value: Option<f64>| value.map_or_else(String::new, |value| significant(value, 5));
+    for station in stations {
+        for capture in &station.captures {
+            table.row([
+                station.station.clone(),
+                capture.setup.clone(),
+                capture.channels.join(" "),
+                capture.phase.to_owned(),
+                capture.sample_type.to_owned(),
+                significant(station.z_mm, 5),
+                capture.turns.to_string(),
+                capture.samples.to_string(),
+                known(capture.sample_rate_hz),
+                known(capture.speed_rpm),
+            ]);
+        }
+    }
+    table
+}
+
+fn parquet(page: &mut Page, table: &TableReport) {
+    page.line(format_args!("Parquet, {} rows in {} row groups", table.rows, table.row_groups));
+    let mut columns = Table::new(3, ["column", "type", ""]);
+    for column in &table.columns {
+        let optional = if column.optional { "may be absent" } else { "" };
+        columns.row([column.name.as_str(), &column.r#type, optional]);
+    }
+    page.headed_table("Columns", &columns);
+    page.heading("Metadata");
+    for (key, value) in &table.metadata {
+        match value.as_deref().unwrap_or_default() {
+            text if text.contains('\n') => page.line(format_args!("  {key}: {} lines", text.lines().count())),
+            text => page.line(format_args!("  {key}: {text}")),
+        }
+    }
+}

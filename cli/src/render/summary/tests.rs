@@ -1,0 +1,100 @@
+use insta::assert_snapshot;
+use runout_core::{
+    evaluate::Value,
+    pipeline::run::{
+        CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
+        SurfaceSummary,
+    },
+    provenance::Provenance,
+    surface::Meeting,
+};
+
+use super::text;
+
+fn capture(setup: &str, rejected: usize) -> CaptureSummary {
+    let turn = |turn| RejectedTurnSummary { turn, start_sample: 512 * turn as u64, reason: "S2: clipped".into() };
+    CaptureSummary {
+        setup: setup.into(),
+        turns_recorded: 60,
+        turns_used: 57 - rejected,
+        trimmed: vec!["3 turns: start-up".into()],
+        rejected: (10..10 + rejected).map(turn).collect(),
+        speed_rpm: Some(500.02),
+        filters: vec!["low-pass, −3 dB at 451 Hz".into()],
+    }
+}
+
+fn section(id: &str, z_mm: f64) -> SectionSummary {
+    let value = |symbol: &str, value| Value {
+        symbol: symbol.into(),
+        unit: "um".into(),
+        value,
+        source: String::new(),
+        band_upr: [2, 80],
+        lost_orders: vec![],
+        filter: "none".into(),
+        reference: "LSCI".into(),
+    };
+    SectionSummary {
+        section: id.into(),
+        z_mm,
+        form_rms_um: 4.012_34 + z_mm / 1000.0,
+        form_std_um: Some(0.0034),
+        values: vec![value("RONt", 21.6412), value("Ra", 3.2)],
+        truth_form_rms_error_um: Some(0.0051),
+    }
+}
+
+fn summary(stations: usize) -> Summary {
+    let station = |index: usize| {
+        let z_mm = 10.0 * index as f64;
+        StationSummary {
+            station: format!("s{index:02}"),
+            z_mm,
+            captures: vec![capture("initial", 0), capture("reversed", index % 2)],
+            sections: vec![section("a", 200.0 + z_mm), section("b", 230.0 + z_mm)],
+            residual_rms_um: Some(0.0066 + 1e-4 * index as f64),
+            expected_residual_rms_um: Some(0.0065),
+            chi2_per_dof: Some(1.02),
+            truth: Some(MotionTruth {
+                x_rms_error_um: Some(0.012),
+                y_rms_error_um: Some(0.013),
+                tilt_x_rms_error_urad: None,
+                tilt_y_rms_error_urad: None,
+            }),
+            warnings: vec!["the speed is 3 % off the stated one".into()],
+        }
+    };
+    let meeting = Meeting {
+        z_mm: 230.0,
+        sections: ["b@s00".into(), "a@s03".into()],
+        rms_um: 0.0048,
+        max_um: 0.015,
+        expected_rms_um: None,
+    };
+    Summary {
+        title: "Turned shaft".into(),
+        provenance: Provenance::default(),
+        lost_orders: LostOrders { form: (2..=80).step_by(2).collect(), motion: vec![1] },
+        stations: (0..stations).map(station).collect(),
+        surface: Some(SurfaceSummary {
+            angles: 720,
+            rings: 2 * stations,
+            z_mm: [200.0, 260.0],
+            interpolation: "monotone".into(),
+            meetings: vec![meeting],
+        }),
+        outputs: vec!["out/form.parquet".into()],
+        warnings: vec![],
+    }
+}
+
+#[test]
+fn few_stations_stand_row_by_row() {
+    assert_snapshot!(text(&summary(2)));
+}
+
+#[test]
+fn many_stations_are_gathered() {
+    assert_snapshot!(text(&summary(40)));
+}

@@ -1,0 +1,125 @@
+//! What the program says when all is well.
+
+use crate::folder::{Folder, RIG, pipeline};
+use insta::assert_snapshot;
+use serde_json::{Value, json};
+
+#[test]
+fn list_of_plugins() {
+    assert_snapshot!(Folder::with(&[]).run(&["plugins"]).shown());
+}
+
+#[test]
+fn keys_of_a_plugin() {
+    assert_snapshot!(Folder::with(&[]).run(&["plugins", "synchronous-average"]).shown());
+}
+
+#[test]
+fn help() {
+    assert_snapshot!(Folder::with(&[]).run(&["--help"]).shown());
+}
+
+#[test]
+fn check_of_a_rig_that_tells_everything() {
+    let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
+    assert_snapshot!(folder.run(&["check", "pipeline.toml"]).shown());
+}
+
+/// The paper's own layout: with the sensors fixed, even orders cannot be told (physics of a half turn, not of a seed).
+#[test]
+fn check_names_the_orders_that_fixed_sensors_lose() {
+    let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
+    let fixed = ["check", "pipeline.toml", "--set", "rig.setups.1.sensors_deg=0"];
+    assert_snapshot!(folder.run(&fixed).shown());
+
+    let ran = folder.run(&[&fixed[..], &["--json"]].concat());
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let highest = report["orders"].as_array().unwrap().len();
+    let even: Vec<usize> = (2..=highest).step_by(2).collect();
+    assert_eq!(report["lost_orders"], json!({ "form": even, "motion": even }));
+    assert_eq!(report["orders"][2]["order"], 3);
+    assert_eq!(report["orders"][2]["residual_dof"], 2);
+    assert_eq!(report["orders"][3]["residual_dof"], 4);
+    assert_eq!(report["orders"][3]["noise_gain"][0], Value::Null);
+}
+
+const SCENARIO: &str = r#"title = "Small campaign"
+plugin = "spindle"
+output = "shaft.h5"
+seed = 7
+rig = "rig.toml"
+
+[recording]
+revolutions = 12
+samples_per_rev = 128
+
+[recording.stations]
+first_z_mm = 0
+step_mm = 30
+count = 2
+
+[form]
+rms_um = 4
+max_order = 20
+
+[motion]
+x_rms_um = 1.5
+y_rms_um = 1.5
+tilt_rms_urad = 5
+
+[eccentricity]
+offset_um = 8
+
+[noise]
+rms_um = 0.05
+"#;
+
+/// From a scenario to files, each step with one JSON document on stdout and nothing else anywhere.
+#[test]
+fn scenario_to_results() {
+    let text = pipeline() + "\n[[export]]\nplugin = \"hdf5\"\npath = \"result.h5\"\n";
+    let files = [("pipeline.toml", &*text), ("scenario.toml", SCENARIO), ("rig.toml", RIG)];
+    let folder = Folder::with(&files);
+    let document = |arguments: &[&str]| -> Value {
+        let ran = folder.run(arguments);
+        assert_eq!((ran.status, ran.stderr.as_str()), (0, ""), "{arguments:?}");
+        serde_json::from_str(&ran.stdout).unwrap()
+    };
+
+    let made = document(&["simulate", "scenario.toml", "--json"]);
+    assert_eq!(made["output"], "shaft.h5");
+    assert_eq!([&made["setups"], &made["stations"], &made["sensors"]], [2, 2, 4]);
+
+    let held = document(&["inspect", "shaft.h5", "--json"]);
+    assert_eq!(held["format"], "runout-measurement");
+    assert_eq!(held["setups"], json!(["initial", "reversed"]));
+
+    let summary = document(&["run", "pipeline.toml", "--json"]);
+    assert_eq!(summary["title"], "Turned shaft");
+    assert_eq!(summary["lost_orders"], json!({ "form": [], "motion": [] }));
+    for station in summary["stations"].as_array().unwrap() {
+        assert_eq!(station["captures"][0]["turns_used"], 12);
+        for section in station["sections"].as_array().unwrap() {
+            // Noise 0.05 µm over 12 turns, two setups and 128 samples a turn leaves about 0.01 µm; motion or
+            // eccentricity left in the form would be above 0.1 µm.
+            let error_um = section["truth_form_rms_error_um"].as_f64().unwrap();
+            assert!(error_um < 0.05, "{error_um} µm");
+        }
+    }
+    for output in summary["outputs"].as_array().unwrap() {
+        assert!(folder.path().join(output.as_str().unwrap()).is_file(), "{output}");
+    }
+
+    assert_eq!(document(&["inspect", "result.h5", "--json"])["format"], "runout-result");
+    let table = document(&["inspect", "out/form.parquet", "--json"]);
+    assert_eq!(table["format"], "parquet");
+    let names: Vec<&Value> = table["columns"].as_array().unwrap().iter().map(|column| &column["name"]).collect();
+    assert_eq!(names, ["section", "station", "z_mm", "angle_deg", "form_um", "std_um"]);
+
+    let shown = folder.run(&["run", "pipeline.toml"]);
+    assert_eq!((shown.status, shown.stderr.as_str()), (0, ""), "no progress in a pipe");
+    for word in ["Turned shaft", "RONt", "Lost orders", "out/form.parquet", "true error"] {
+        assert!(shown.stdout.contains(word), "no {word} in\n{}", shown.stdout);
+    }
+}

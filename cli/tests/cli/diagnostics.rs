@@ -1,0 +1,180 @@
+//! What the program says when something is wrong, with its exit status: reviewed text.
+
+use crate::folder::{Folder, RIG, STAGES, pipeline};
+use insta::assert_snapshot;
+
+/// `runout check pipeline.toml` on the good pipeline with one text replaced by another.
+fn check(good: &str, bad: &str) -> String {
+    let text = pipeline();
+    assert!(text.contains(good), "the pipeline has no {good:?}");
+    Folder::with(&[("pipeline.toml", &text.replacen(good, bad, 1))]).run(&["check", "pipeline.toml"]).shown()
+}
+
+/// `runout check pipeline.toml` on the good pipeline with more arguments.
+fn check_with(arguments: &[&str]) -> String {
+    let all = [&["check", "pipeline.toml"], arguments].concat();
+    Folder::with(&[("pipeline.toml", &pipeline())]).run(&all).shown()
+}
+
+#[test]
+fn unknown_key_of_a_plugin() {
+    assert_snapshot!(check("samples_per_rev = 128", "sample_per_rev = 128"));
+}
+
+#[test]
+fn unknown_key_at_the_top() {
+    assert_snapshot!(check("[separate]", "[seperate]"));
+}
+
+#[test]
+fn unknown_plugin() {
+    assert_snapshot!(check("\"four-sensor-reversal\"", "\"four-senser-reversal\""));
+}
+
+#[test]
+fn missing_plugin() {
+    assert_snapshot!(check("plugin = \"hdf5\"\n", ""));
+}
+
+#[test]
+fn wrong_type() {
+    assert_snapshot!(check("samples_per_rev = 128", "samples_per_rev = \"many\""));
+}
+
+#[test]
+fn missing_key() {
+    assert_snapshot!(check("path = \"shaft.h5\"\n", ""));
+}
+
+#[test]
+fn missing_table() {
+    assert_snapshot!(check("[separate]\nplugin = \"four-sensor-reversal\"\n", ""));
+}
+
+#[test]
+fn value_out_of_range_in_the_rig() {
+    assert_snapshot!(check("part_radius_mm = 30.0", "part_radius_mm = -30.0"));
+}
+
+#[test]
+fn sensors_of_one_section_apart() {
+    assert_snapshot!(check(
+        "z_mm = 200, section = \"a\" },\n  { id = \"S3\"",
+        "z_mm = 210, section = \"a\" },\n  { id = \"S3\""
+    ));
+}
+
+#[test]
+fn no_toml() {
+    assert_snapshot!(check("plugin = \"hdf5\"", "plugin = hdf5"));
+}
+
+#[test]
+fn turns_never_averaged() {
+    assert_snapshot!(check("[[preprocess]]\nplugin = \"synchronous-average\"\nsamples_per_rev = 128\n", ""));
+}
+
+#[test]
+fn empty_file() {
+    assert_snapshot!(Folder::with(&[("pipeline.toml", "")]).run(&["check", "pipeline.toml"]).shown());
+}
+
+#[test]
+fn missing_pipeline() {
+    assert_snapshot!(Folder::with(&[]).run(&["check", "pipeline.toml"]).shown());
+}
+
+#[test]
+fn fault_in_a_rig_file() {
+    let text = format!("rig = \"rig.toml\"\n{STAGES}");
+    let rig = RIG.replace("angle_deg = 90, z_mm = 230", "angle = 90, z_mm = 230");
+    let folder = Folder::with(&[("pipeline.toml", &text), ("rig.toml", &rig)]);
+    assert_snapshot!(folder.run(&["check", "pipeline.toml"]).shown());
+}
+
+#[test]
+fn missing_rig_file() {
+    let text = format!("rig = \"rig.toml\"\n{STAGES}");
+    assert_snapshot!(Folder::with(&[("pipeline.toml", &text)]).run(&["check", "pipeline.toml"]).shown());
+}
+
+#[test]
+fn set_to_an_unknown_plugin() {
+    assert_snapshot!(check_with(&["--set", "separate.plugin=four-sensor"]));
+}
+
+#[test]
+fn set_without_a_value() {
+    assert_snapshot!(check_with(&["--set", "separate.plugin"]));
+}
+
+#[test]
+fn set_beyond_the_last_stage() {
+    assert_snapshot!(check_with(&["--set", "preprocess.7.samples_per_rev=64"]));
+}
+
+#[test]
+fn set_an_unknown_key() {
+    assert_snapshot!(check_with(&["--set", "load.file=other.h5"]));
+}
+
+#[test]
+fn set_below_a_value() {
+    assert_snapshot!(check_with(&["--set", "title.text=other"]));
+}
+
+#[test]
+fn json_error_has_its_place() {
+    assert_snapshot!(check_with(&["--json", "--set", "rig.part_radius_mm=0"]));
+}
+
+#[test]
+fn json_error_of_the_command_line() {
+    assert_snapshot!(Folder::with(&[]).run(&["run", "--json"]).shown());
+}
+
+#[test]
+fn missing_measurement() {
+    let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
+    assert_snapshot!(folder.run(&["run", "pipeline.toml"]).shown());
+    assert!(!folder.path().join("out").exists(), "a failed run leaves no output");
+}
+
+#[test]
+fn measurement_that_is_none() {
+    let folder = Folder::with(&[("pipeline.toml", &pipeline()), ("shaft.h5", "not HDF5")]);
+    assert_snapshot!(folder.run(&["run", "pipeline.toml"]).shown());
+}
+
+#[test]
+fn json_error_of_the_work() {
+    let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
+    assert_snapshot!(folder.run(&["run", "pipeline.toml", "--json"]).shown());
+}
+
+#[test]
+fn scenario_without_output() {
+    let text = format!("plugin = \"spindle\"\n\n[rig]\n{RIG}");
+    assert_snapshot!(Folder::with(&[("scenario.toml", &text)]).run(&["simulate", "scenario.toml"]).shown());
+}
+
+#[test]
+fn scenario_with_an_unknown_key() {
+    let text = format!("plugin = \"spindle\"\noutput = \"shaft.h5\"\nsede = 4\n\n[rig]\n{RIG}");
+    assert_snapshot!(Folder::with(&[("scenario.toml", &text)]).run(&["simulate", "scenario.toml"]).shown());
+}
+
+#[test]
+fn inspect_what_is_no_data() {
+    assert_snapshot!(Folder::with(&[("notes.txt", "Hello")]).run(&["inspect", "notes.txt"]).shown());
+}
+
+#[test]
+fn unknown_name_of_a_plugin() {
+    assert_snapshot!(Folder::with(&[]).run(&["plugins", "low-pas"]).shown());
+}
+
+#[test]
+fn ambiguous_name_of_a_schema() {
+    assert_snapshot!(Folder::with(&[]).run(&["schema", "hdf5"]).shown());
+}
