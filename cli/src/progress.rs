@@ -11,18 +11,23 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A bar for so many things of this name ("stations").
+    /// A bar for things of this name ("stations"); it shows once it is known how many there are.
     #[must_use]
-    pub fn new(things: &'static str, count: usize) -> Self {
+    pub fn new(things: &'static str) -> Self {
         // Hidden by itself where stderr is no terminal.
-        let bar = ProgressBar::new(count as u64);
+        let bar = ProgressBar::new(0);
         if let Ok(style) = ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix} {msg} ({elapsed}, {eta} to go)")
         {
             bar.set_style(style);
         }
         bar.set_prefix(things);
-        bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar }
+    }
+
+    /// There are so many.
+    pub fn expect(&self, count: usize) {
+        self.bar.set_length(count as u64);
+        self.bar.enable_steady_tick(Duration::from_millis(200));
     }
 
     /// One more thing is done.
@@ -40,7 +45,7 @@ impl Drop for Progress {
 
 impl Observer for Progress {
     fn begin(&self, stations: usize) {
-        self.bar.set_length(stations as u64);
+        self.expect(stations);
     }
 
     fn station(&self, name: &str) {

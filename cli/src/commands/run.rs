@@ -11,7 +11,7 @@ use crate::{args::RunArgs, failure::Failure, progress::Progress, render};
 /// When the configuration is wrong, or the data or a file fails.
 pub fn execute(args: &RunArgs, json: bool) -> Result<(), Failure> {
     let (_, pipeline) = pipeline(&args.pipeline)?;
-    let progress = Progress::new("stations", 0);
+    let progress = Progress::new("stations");
     let summary = run::run(&pipeline, args.threads, &progress)?;
     drop(progress);
     print(&summary, json, render::summary::text)

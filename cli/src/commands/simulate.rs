@@ -105,7 +105,8 @@ fn write(scenario: &Scenario) -> Result<Report, Error> {
         scenario: Some(scenario.simulator.scenario()),
         ..WriteOptions::default()
     };
-    let progress = Progress::new("captures", stations * rig.setups.len());
+    let progress = Progress::new("captures");
+    progress.expect(stations * rig.setups.len());
     let output = write_measurement(&*recording, rig, &scenario.output, &options, &mut |name| progress.advance(name))?;
     drop(progress);
     let bytes = std::fs::metadata(&output).map_err(|error| Error::new("read", output.display().to_string(), error))?;
