@@ -141,8 +141,10 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
     header.push("true error µm".into());
     let mut table = Table::new(2, header);
     for (station, section) in sections(stations) {
+        // A measured circle is its own station.
+        let name = if station.station == section.section { "" } else { &station.station };
         let mut row = vec![
-            station.station.clone(),
+            name.to_owned(),
             section.section.clone(),
             significant(section.z_mm, 5),
             with_std(section.form_rms_um, section.form_std_um),
