@@ -5,7 +5,9 @@
 
 use std::fmt::Write;
 
-use runout_core::{Complex64, Error, Result, evaluate::texture::ra_um, numerics::fourier::Fourier};
+use runout_core::{
+    Complex64, Error, Result, evaluate::texture::ra_um, measurement::Recording, numerics::fourier::Fourier,
+};
 use runout_spindle::{
     separators::four_sensor_reversal::FourSensorReversal,
     simulate::{SpindleConfig, simulator},
@@ -44,26 +46,38 @@ pub struct Study {
 }
 
 /// Fig. 7: form of Ra 1.85 µm in both sections, asynchronous motion of Ra 1.53 µm, no synchronous motion.
-#[must_use]
-pub fn figure_7() -> SpindleConfig {
+///
+/// # Errors
+/// When the scenario cannot be computed.
+pub fn figure_7() -> Result<SpindleConfig> {
     let mut config = settings();
-    config.form.rms_um = 1.85 / RA_OF_RMS;
     config.form.own_share = 0.0;
-    config
+    with_mean_ra(config, 1.85)
 }
 
-/// Table 1: form of Ra near 4.28 and 5.44 µm in sections 1 and 2, with synchronous motion besides.
-#[must_use]
-pub fn table_1() -> SpindleConfig {
+/// Table 1: form of Ra 4.86 µm, the mean of the paper's two sections, with synchronous motion besides.
+///
+/// # Errors
+/// When the scenario cannot be computed.
+pub fn table_1() -> Result<SpindleConfig> {
     let mut config = settings();
-    config.form.rms_um = 4.86 / RA_OF_RMS;
     config.form.own_share = 0.3;
     config.motion.x_rms_um = 2.0;
     config.motion.y_rms_um = 2.0;
     config.motion.tilt_rms_urad = 5.0;
     config.eccentricity.offset_um = 8.0;
     config.noise.rms_um = 0.05;
-    config
+    with_mean_ra(config, 4.86)
+}
+
+/// Scales the form, which is proportional to its `rms_um`, to a mean Ra of its sections.
+fn with_mean_ra(mut config: SpindleConfig, ra_mean_um: f64) -> Result<SpindleConfig> {
+    config.form.rms_um = 1.0;
+    let simulator = simulator(&config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let truth = simulator.spindle_recording().truth(0)?.unwrap_or_default();
+    let sections = truth.form_um.len() as f64;
+    config.form.rms_um = ra_mean_um * sections / truth.form_um.iter().map(|form| ra_um(form)).sum::<f64>();
+    Ok(config)
 }
 
 fn settings() -> SpindleConfig {

@@ -4,3 +4,4 @@ pub mod averaging;
 pub mod campaign;
 pub mod eccentricity;
 pub mod plot;
+pub mod surface;

@@ -2,13 +2,14 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program that prints tables")]
 
-use std::process::ExitCode;
+use std::{path::Path, process::ExitCode};
 
 use runout_core::{Result, atomic_file};
-use runout_studies::{averaging, eccentricity};
+use runout_studies::{averaging, eccentricity, surface as unrolled};
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
-       runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file";
+       runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
+       runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -18,6 +19,7 @@ fn main() -> ExitCode {
         ["eccentricity", seeds] if seeds.parse::<u64>().is_ok() => {
             eccentricity::rows(seeds.parse().unwrap_or_default()).map(|rows| println!("{}", eccentricity::table(&rows)))
         }
+        ["surface", pipeline, picture] => surface(pipeline, picture),
         ["averaging"] => averaging(None),
         ["averaging", picture] => averaging(Some(picture)),
         _ => {
@@ -35,13 +37,19 @@ fn main() -> ExitCode {
 }
 
 fn averaging(picture: Option<&str>) -> Result<()> {
-    let figure = averaging::study(&averaging::figure_7())?;
+    let figure = averaging::study(&averaging::figure_7()?)?;
     println!("Fig. 7's settings, simulated: form and asynchronous motion only\n\n{}", figure.table());
-    let table = averaging::study(&averaging::table_1())?;
+    let table = averaging::study(&averaging::table_1()?)?;
     println!("Table 1's settings, simulated: with synchronous motion, eccentricity and noise\n\n{}", table.table());
     if let Some(path) = picture {
         let path = atomic_file::write(path, &figure.picture("Ra tends to the part's own (simulated)")?)?;
         println!("picture: {}", path.display());
     }
+    Ok(())
+}
+
+fn surface(pipeline: &str, picture: &str) -> Result<()> {
+    let path = atomic_file::write(picture, &unrolled::picture(Path::new(pipeline))?)?;
+    println!("picture: {}", path.display());
     Ok(())
 }

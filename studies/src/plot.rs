@@ -2,7 +2,7 @@
 
 use kuva::{
     backend::png::PngBackend,
-    plot::{LinePlot, scatter::ScatterPlot},
+    plot::{ColorMap, Heatmap, LinePlot, scatter::ScatterPlot},
     render::{layout::Layout, plots::Plot, render::render_multiple},
 };
 
@@ -54,6 +54,42 @@ pub fn curves(axes: &Axes, curves: &[Curve]) -> Result<Vec<u8>, String> {
         .with_x_label(axes.x)
         .with_y_label(axes.y)
         .with_width(720.0)
+        .with_height(420.0);
+    PngBackend::new().render_scene(&render_multiple(plots, layout)).map_err(|error| error.to_string())
+}
+
+/// Values on a rectangle, rows from the top.
+pub struct Map {
+    /// `[row][column]`.
+    pub values: Vec<Vec<f64>>,
+    /// First and last column.
+    pub x: [f64; 2],
+    /// Bottom and top row.
+    pub y: [f64; 2],
+}
+
+/// Draws a map of deviations in µm as PNG.
+///
+/// # Errors
+/// When the library cannot draw.
+pub fn map(axes: &Axes, map: &Map) -> Result<Vec<u8>, String> {
+    let heatmap = Heatmap::new()
+        .with_data(map.values.clone())
+        .with_color_map(ColorMap::Viridis)
+        .with_x_range(map.x[0], map.x[1])
+        .with_y_range(map.y[0], map.y[1])
+        .with_legend("deviation / µm");
+    let plots = vec![Plot::Heatmap(heatmap)];
+    let layout = Layout::auto_from_plots(&plots)
+        .with_title(axes.title)
+        .with_x_label(axes.x)
+        .with_y_label(axes.y)
+        .with_x_axis_min(map.x[0])
+        .with_x_axis_max(map.x[1])
+        .with_y_axis_min(map.y[0])
+        .with_y_axis_max(map.y[1])
+        .with_x_tick_step(45.0)
+        .with_width(860.0)
         .with_height(420.0);
     PngBackend::new().render_scene(&render_multiple(plots, layout)).map_err(|error| error.to_string())
 }

@@ -208,6 +208,17 @@ impl Layout {
         PivotedQr::new(self.readings.len(), columns, matrix, RANK_TOLERANCE)
     }
 
+    /// Takes motion from the sensors' mean z, now at `mean_z_mm`, to the spindle's reference: x = X − z E_y,
+    /// y = Y + z E_x.
+    #[must_use]
+    pub fn to_reference(&self, mean_z_mm: f64) -> ToReference {
+        let lever = mean_z_mm * UM_PER_MM_URAD;
+        let position = |wanted| self.unknowns.iter().position(|unknown| *unknown == wanted);
+        let tilt = |(shift, tilt, factor)| Some((position(shift)?, position(tilt)?, factor));
+        let pairs = [(Quantity::X, Quantity::TiltY, -lever), (Quantity::Y, Quantity::TiltX, lever)];
+        ToReference { width: self.unknowns.len(), pairs: pairs.into_iter().filter_map(tilt).collect() }
+    }
+
     /// Whether each unknown can be told at an order.
     ///
     /// At order 1 form is 0 by definition and motion is its counter-rotating part; both are lost where one clamping
@@ -236,7 +247,8 @@ impl Layout {
         observable
     }
 
-    /// What can be told at orders 1 to `max_order`, with plain (unweighted) least squares.
+    /// What can be told at orders 1 to `max_order`, with plain (unweighted) least squares; motion at the spindle's
+    /// reference, with the carriage at 0.
     #[must_use]
     pub fn assess(&self, max_order: usize) -> Assessment {
         let orders = (1..=max_order).map(|order| self.assess_order(order)).collect();
@@ -247,12 +259,9 @@ impl Layout {
         let qr = self.factor(order);
         let observable = self.observable(order);
         let covariance = qr.covariance();
-        let width = self.unknowns.len();
-        let noise_gain = observable
-            .iter()
-            .enumerate()
-            .map(|(index, seen)| if *seen { covariance[index * width + index].re.sqrt() } else { f64::NAN })
-            .collect();
+        let gains = self.to_reference(self.mean_z_mm).spread(&covariance);
+        let told = observable.iter().zip(gains);
+        let noise_gain = told.map(|(seen, gain)| if *seen { gain.sqrt() } else { f64::NAN }).collect();
         let lost_because = observable.contains(&false).then(|| {
             let names = self.unknowns.iter().zip(&observable).filter(|(_, seen)| !**seen);
             let names: Vec<&str> = names.map(|(quantity, _)| quantity.id()).collect();
@@ -270,6 +279,37 @@ impl Layout {
             noise_gain,
             lost_because,
         }
+    }
+}
+
+/// Moves motion along z: adds a multiple of a tilt to a shift.
+#[derive(Debug, Clone)]
+pub struct ToReference {
+    width: usize,
+    /// Shift, tilt, factor.
+    pairs: Vec<(usize, usize, f64)>,
+}
+
+impl ToReference {
+    /// Moves estimates, or the rows (`[unknown][row_length]`) of the operator that makes them.
+    pub fn apply(&self, rows: &mut [Complex64]) {
+        let length = rows.len() / self.width;
+        for (shift, tilt, factor) in &self.pairs {
+            for column in 0..length {
+                rows[shift * length + column] += rows[tilt * length + column] * *factor;
+            }
+        }
+    }
+
+    /// Variances after the move, from the covariance `[unknown][unknown]` before.
+    #[must_use]
+    pub fn spread(&self, covariance: &[Complex64]) -> Vec<f64> {
+        let entry = |row: usize, col: usize| covariance[row * self.width + col].re;
+        let mut variances: Vec<f64> = (0..self.width).map(|unknown| entry(unknown, unknown)).collect();
+        for (shift, tilt, factor) in &self.pairs {
+            variances[*shift] += 2.0 * factor * entry(*shift, *tilt) + factor * factor * entry(*tilt, *tilt);
+        }
+        variances
     }
 }
 

@@ -8,7 +8,7 @@ use runout_core::{
 };
 
 use super::{readings::Readings, second_order::SecondOrder, swapped_setups, weights};
-use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
+use crate::layout::{FirstOrder, Layout};
 
 /// Three passes settle the second order; more are allowed for large eccentricities.
 const MAX_PASSES: usize = 8;
@@ -188,25 +188,27 @@ impl Solver<'_> {
     ) -> Separation {
         let layout = self.layout;
         let (width, count) = (layout.unknowns.len(), readings.count);
-        let to_reference = to_spindle_reference(layout, layout.mean_z_mm + station.z_mm);
+        let to_reference = layout.to_reference(layout.mean_z_mm + station.z_mm);
         let mut values = vec![Complex64::ZERO; (readings.max_order + 1) * width];
         let mut variance = vec![0.0; values.len()];
         let mut observable = vec![true; values.len()];
         for order in 1..=readings.max_order {
             let row = order * width..(order + 1) * width;
-            let mut solved = apply_real(&to_reference, &estimate.values[row.clone()]);
+            let mut solved = estimate.values[row.clone()].to_vec();
+            to_reference.apply(&mut solved);
             let told = &operators.observable[order - 1];
             if layout.direction < 0.0 {
                 let forms = layout.unknowns.iter().zip(&mut solved).filter(|(unknown, _)| unknown.is_form());
                 forms.for_each(|(_, form)| *form = form.conj());
             }
             let spread = readings.order_covariance(order).map(|covariance| {
-                let operator = if order == 1 {
+                let mut operator = if order == 1 {
                     self.first_order_operator(&operators.orders[0].operator, count)
                 } else {
                     operators.orders[order - 1].operator.clone()
                 };
-                variances(&rows_combined(&to_reference, &operator, count), &covariance, count)
+                to_reference.apply(&mut operator);
+                variances(&operator, &covariance, count)
             });
             for unknown in 0..width {
                 let index = row.start + unknown;
@@ -249,45 +251,9 @@ impl Solver<'_> {
     }
 }
 
-/// Takes motion from the sensors' mean z to the spindle's reference: x = X − z E_y, y = Y + z E_x.
-fn to_spindle_reference(layout: &Layout, mean_z_mm: f64) -> Vec<f64> {
-    let width = layout.unknowns.len();
-    let lever = mean_z_mm * UM_PER_MM_URAD;
-    let mut matrix = vec![0.0; width * width];
-    for (row, unknown) in layout.unknowns.iter().enumerate() {
-        matrix[row * width + row] = 1.0;
-        let (tilt, sign) = match unknown {
-            Quantity::X => (Quantity::TiltY, -1.0),
-            Quantity::Y => (Quantity::TiltX, 1.0),
-            _ => continue,
-        };
-        if let Some(col) = layout.unknowns.iter().position(|other| *other == tilt) {
-            matrix[row * width + col] = sign * lever;
-        }
-    }
-    matrix
-}
-
 /// Matrix (`[row][col]`) times vector.
 pub fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
     matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
-}
-
-fn apply_real(matrix: &[f64], vector: &[Complex64]) -> Vec<Complex64> {
-    matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| b * *a).sum()).collect()
-}
-
-fn rows_combined(matrix: &[f64], operator: &[Complex64], count: usize) -> Vec<Complex64> {
-    let width = operator.len() / count;
-    let mut combined = vec![Complex64::ZERO; operator.len()];
-    for (row, weights) in matrix.chunks_exact(width).enumerate() {
-        for (source, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
-            for reading in 0..count {
-                combined[row * count + reading] += operator[source * count + reading] * *weight;
-            }
-        }
-    }
-    combined
 }
 
 /// I − A·P, `[reading][reading]`.
