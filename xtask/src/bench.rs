@@ -1,0 +1,91 @@
+//! The peers' campaign, by runout and by the peers themselves: `benchmarks/campaign`.
+
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use crate::{
+    process::{Outcome, answer, root, run, say, target, tools},
+    setup::{self, cargo},
+};
+
+const PYTHON_PACKAGES: [&str; 3] = ["numpy", "scipy", "h5py"];
+/// Samples a turn and turns of a section, as in the record that the peers are measured with.
+const SAMPLES_PER_REV: usize = 2560;
+const TURNS: usize = 120;
+
+/// What is asked for.
+struct Wanted {
+    scratch: PathBuf,
+    stations: usize,
+    rounds: usize,
+    i16: bool,
+}
+
+impl Wanted {
+    fn read(words: &[&str]) -> Outcome<Self> {
+        let mut wanted = Self { scratch: target().join("bench"), stations: 40, rounds: 5, i16: false };
+        let mut words = words.iter();
+        while let Some(word) = words.next() {
+            let mut number = || {
+                let value = words.next().and_then(|value| value.parse().ok()).filter(|value| *value > 0);
+                value.ok_or_else(|| format!("{word} needs a number of at least 1"))
+            };
+            match *word {
+                "--stations" => wanted.stations = number()?,
+                "--rounds" => wanted.rounds = number()?,
+                "--i16" => wanted.i16 = true,
+                option if option.starts_with('-') => {
+                    return Err(format!("unknown option `{option}`; known: --stations K, --rounds N, --i16"));
+                }
+                folder => {
+                    wanted.scratch = std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?;
+                }
+            }
+        }
+        Ok(wanted)
+    }
+}
+
+/// Writes the record once, times both programs on it in turns and prints a table.
+pub fn campaign(words: &[&str]) -> Outcome {
+    let wanted = Wanted::read(words)?;
+    let peers = std::env::var_os("RUNOUT_PEERS").map_or_else(|| root().join("../shared/peers"), PathBuf::from);
+    if !peers.join("record.py").is_file() || !peers.join("pipeline.py").is_file() {
+        say(&format!(
+            "skipped: there are no peers in {} (record.py, pipeline.py); RUNOUT_PEERS can name their folder",
+            peers.display()
+        ));
+        return Ok(());
+    }
+    let python = python()?;
+    let script = |name: &str| {
+        let mut command = Command::new(&python);
+        command.arg("-B").arg(Path::new("benchmarks/campaign").join(name));
+        command
+    };
+    let mut write = script("write_record.py");
+    write.arg(&peers).arg(&wanted.scratch);
+    write.args([SAMPLES_PER_REV, TURNS, wanted.stations].map(|number| number.to_string()));
+    write.args(wanted.i16.then_some("--i16"));
+    run(&mut write)?;
+    run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
+    for name in ["f64", "i16"].into_iter().take(if wanted.i16 { 2 } else { 1 }) {
+        let mut compare = script("compare.py");
+        compare.arg(target().join("release/runout")).arg(&peers).arg(&wanted.scratch);
+        run(compare.arg(wanted.rounds.to_string()).arg(name))?;
+    }
+    Ok(())
+}
+
+/// A Python with what the peers need, installed below target/ where it is not yet.
+fn python() -> Outcome<PathBuf> {
+    let folder = tools().join("peers-venv");
+    setup::python_environment(&folder)?;
+    let interpreter = folder.join("bin/python");
+    if answer(&interpreter, &["-c", &format!("import {}", PYTHON_PACKAGES.join(", "))]).is_none() {
+        run(Command::new(folder.join("bin/pip")).args(["install", "--quiet"]).args(PYTHON_PACKAGES))?;
+    }
+    Ok(interpreter)
+}
