@@ -5,11 +5,12 @@ use std::{fs, path::Path, process::Command, time::SystemTime};
 use crate::{
     foreign,
     process::{Outcome, answer, root, run, say, target},
-    setup::cargo,
+    setup::{self, cargo},
 };
 
 /// Format, lints, tests.
 pub fn test(foreign_readers: bool) -> Outcome {
+    setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
     run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;
     let nextest = answer("cargo-nextest", &["--version"]).is_some();
@@ -41,10 +42,8 @@ pub fn demo() -> Outcome {
         run(Command::new(&program).arg("simulate").arg(&scenario).arg("--out").arg(&campaign))?;
     }
     run(Command::new(&program).arg("run").arg(example.join("pipeline.toml")))?;
-    say(&format!(
-        "\nThe program is {}; the files above open in MeshLab, Blender, ParaView, Python.",
-        program.display()
-    ));
+    let shown = program.strip_prefix(root()).unwrap_or(&program).display();
+    say(&format!("\nThe program is {shown}; meshes open in MeshLab and Blender, tables in Python."));
     Ok(())
 }
 

@@ -33,6 +33,17 @@ fn ready() -> Outcome<PathBuf> {
     cmake()
 }
 
+/// The parts of Rust that a minimal installation leaves out.
+pub fn components() -> Outcome {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    for (component, command) in [("rustfmt", "fmt"), ("clippy", "clippy")] {
+        if answer(&cargo, &[command, "--version"]).is_none() {
+            run(Command::new("rustup").args(["component", "add", component]))?;
+        }
+    }
+    Ok(())
+}
+
 fn compiler() -> Outcome {
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     if answer(&compiler, &["--version"]).is_none() {
