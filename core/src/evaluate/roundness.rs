@@ -1,6 +1,6 @@
 //! Roundness (ISO 12181-1) of a profile about its least-squares circle.
 
-/// Peak-to-valley deviation RONt about the least-squares reference circle LSCI (ISO 12181-1, 3.3 and 3.6), in µm.
+/// Peak-to-valley deviation RONt about the least-squares reference circle LSCI (ISO 12181-1), in µm.
 ///
 /// `form_um` lies on equal angles and holds no orders 0 and 1: its least-squares circle is then the nominal circle, up
 /// to terms of form²/radius.

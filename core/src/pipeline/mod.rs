@@ -4,7 +4,9 @@ pub mod config;
 pub mod document;
 pub mod error;
 pub mod registry;
+pub mod result;
 pub mod run;
+pub mod summary;
 
 pub use config::Pipeline;
 pub use registry::Registry;
