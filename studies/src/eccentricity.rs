@@ -1,5 +1,7 @@
 //! Form error against clamping eccentricity, with exact geometry and with the linear equations.
 
+use std::fmt::Write;
+
 use runout_core::{Error, Result};
 use runout_spindle::{
     separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
@@ -64,8 +66,10 @@ pub fn table(rows: &[Row]) -> String {
     );
     for row in rows {
         let below = row.exact_um.iter().filter(|error| **error <= LIMIT_UM).count();
-        text.push_str(&format!(
-            "| {:.0} µm | {:.4}, {:.4} µm rms | {below} of {} | {:.2} | {:.4}, {:.4} µm rms | {:.1} |\n",
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "| {:.0} µm | {:.4}, {:.4} µm rms | {below} of {} | {:.2} | {:.4}, {:.4} µm rms | {:.1} |",
             row.eccentricity_um,
             median(&row.exact_um),
             worst(&row.exact_um),
@@ -74,7 +78,7 @@ pub fn table(rows: &[Row]) -> String {
             median(&row.linear_um),
             worst(&row.linear_um),
             median(&row.linear_chi2),
-        ));
+        );
     }
     text
 }

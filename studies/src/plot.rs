@@ -55,7 +55,7 @@ pub fn curves(axes: &Axes, curves: &[Curve]) -> Result<Vec<u8>, String> {
         .with_y_label(axes.y)
         .with_width(720.0)
         .with_height(420.0);
-    PngBackend::new().render_scene(&render_multiple(plots, layout)).map_err(|error| error.to_string())
+    PngBackend::new().render_scene(&render_multiple(plots, layout))
 }
 
 /// Values on a rectangle, rows from the top.
@@ -91,5 +91,5 @@ pub fn map(axes: &Axes, map: &Map) -> Result<Vec<u8>, String> {
         .with_x_tick_step(45.0)
         .with_width(860.0)
         .with_height(420.0);
-    PngBackend::new().render_scene(&render_multiple(plots, layout)).map_err(|error| error.to_string())
+    PngBackend::new().render_scene(&render_multiple(plots, layout))
 }

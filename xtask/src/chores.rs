@@ -47,6 +47,13 @@ pub fn demo() -> Outcome {
     Ok(())
 }
 
+/// Prints the figures that the READMEs show.
+pub fn studies(arguments: &[&str]) -> Outcome {
+    let mut words = vec!["run", "--release", "--quiet", "--package", "runout-studies", "--"];
+    words.extend(arguments);
+    run(&mut cargo(&words)?)
+}
+
 /// Whether `made` is there and not older than what it is made from.
 fn newer(made: &Path, from: &Path) -> bool {
     let changed = |path: &Path| -> Option<SystemTime> { fs::metadata(root().join(path)).ok()?.modified().ok() };

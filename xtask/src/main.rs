@@ -15,6 +15,7 @@ cargo xtask COMMAND
   setup         find or bring what a build needs besides Rust: a C compiler, make, CMake 3.26 or newer
   demo          build runout, make the campaign of examples/01-four-sensor once, run its pipeline
   test [--ci]   format, lints, tests; with --ci also files read by Python and Node, which it installs below target/
+  studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types
 
 Every command does the set-up it needs first.
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1")),
         ["test", "--ci"] => chores::test(true),
         ["schemas"] => chores::schemas(),
+        ["studies", ref arguments @ ..] => chores::studies(arguments),
         _ => {
             say(&format!("unknown command `{}`\n\n{HELP}", words.join(" ")));
             return ExitCode::from(2);
