@@ -263,12 +263,13 @@ impl Layout {
         let told = observable.iter().zip(gains);
         let noise_gain = told.map(|(seen, gain)| if *seen { gain.sqrt() } else { f64::NAN }).collect();
         let lost_because = observable.contains(&false).then(|| {
-            let names = self.unknowns.iter().zip(&observable).filter(|(_, seen)| !**seen);
-            let names: Vec<&str> = names.map(|(quantity, _)| quantity.id()).collect();
+            let lost = self.unknowns.iter().zip(&observable).filter(|(_, seen)| !**seen);
+            let mut names: Vec<&str> = lost.map(|(quantity, _)| quantity.id()).collect();
+            names.dedup();
             if order == 1 {
                 "1/rev: eccentricity of the part and motion that turns with it are the same in every reading".to_owned()
             } else {
-                format!("a {order}/rev change of {} leaves every reading as it is", names.join(", "))
+                format!("{order}/rev changes of {} can leave every reading as it is", names.join(", "))
             }
         });
         OrderAssessment {

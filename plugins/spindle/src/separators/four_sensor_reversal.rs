@@ -51,7 +51,7 @@ impl StageConfig for FourSensorReversalConfig {
     type Stage = Separator;
 
     const NAME: &'static str = "four-sensor-reversal";
-    const ABOUT: &'static str = "Two sensors at right angles in each of two sections, part reversed by 180°";
+    const ABOUT: &'static str = "two sensors at right angles in each of two sections, part reversed by 180°";
 
     fn check(self, context: &Context) -> std::result::Result<Separator, Fault> {
         let rig = require_rig(context.rig)?;

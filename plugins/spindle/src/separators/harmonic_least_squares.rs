@@ -51,7 +51,7 @@ impl StageConfig for HarmonicLeastSquaresConfig {
     type Stage = Separator;
 
     const NAME: &'static str = "harmonic-least-squares";
-    const ABOUT: &'static str = "Any rig: least squares order by order, weighted by the scatter over the turns";
+    const ABOUT: &'static str = "any rig: least squares order by order, weighted by the scatter over the turns";
 
     fn check(self, context: &Context) -> std::result::Result<Separator, Fault> {
         let rig = require_rig(context.rig)?;
