@@ -68,7 +68,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
         }
         (Source::Points(points), Route::Points { separator }) => {
             fit_points(points, &**separator, pipeline.surface.angles, observer, &mut gathering)?;
-            let surface = gathering.build_surface(separator.nominal_radius_mm())?;
+            let surface = gathering.build_surface(separator.reference_radius_mm(points)?)?;
             let remarks = separator.remarks(points, surface.as_ref())?;
             (vec![Input::of(&points.input)?], surface, remarks)
         }

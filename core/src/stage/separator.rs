@@ -52,8 +52,11 @@ pub trait PointSeparator: Send + Sync {
     /// When the points do not hold what the method needs.
     fn separate(&self, points: &Points) -> Result<Vec<Separation>>;
 
-    /// Nominal radius that the deviations are measured from, in mm.
-    fn nominal_radius_mm(&self) -> f64;
+    /// Radius of the cylinder that the deviations of [`separate`](Self::separate) count from, in mm.
+    ///
+    /// # Errors
+    /// When the points do not hold what the method needs.
+    fn reference_radius_mm(&self, points: &Points) -> Result<f64>;
 
     /// Whether [`remarks`](Self::remarks) needs the surface.
     fn needs_surface(&self) -> bool {

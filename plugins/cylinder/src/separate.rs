@@ -124,8 +124,8 @@ impl PointSeparator for LeastSquaresCylinder {
         Ok(sections)
     }
 
-    fn nominal_radius_mm(&self) -> f64 {
-        self.0.radius_mm
+    fn reference_radius_mm(&self, points: &Points) -> Result<f64> {
+        Ok(self.radius_mm(&self.cylinder(points)?))
     }
 
     fn needs_surface(&self) -> bool {
@@ -240,6 +240,11 @@ impl LeastSquaresCylinder {
         })
     }
 
+    /// Radius of a cylinder that was fitted to deviations from the nominal one.
+    fn radius_mm(&self, cylinder: &Cylinder) -> f64 {
+        self.0.radius_mm + 1e-3 * cylinder.radius_offset_um
+    }
+
     fn describe(&self, circles: &[Circle], cylinder: &Cylinder) -> String {
         let left = |circle: &Circle| circle.scan.less(|angle, z| cylinder.deviation_um(angle, z)).deviation_um;
         let rms_um = rms(circles.iter().flat_map(left));
@@ -251,7 +256,7 @@ impl LeastSquaresCylinder {
              ({:.3}, {:.3}) µm at z = {:.3} mm, tilted by {tilt_x:.1} µrad about x and {tilt_y:.1} µrad about y; it leaves \
              {rms_um:.3} µm rms",
             circles.len(),
-            self.0.radius_mm + 1e-3 * cylinder.radius_offset_um,
+            self.radius_mm(cylinder),
             cylinder.x_um,
             cylinder.y_um,
             cylinder.z_mm,

@@ -62,7 +62,7 @@ fn surface(separator: &LeastSquaresCylinder, points: &Points) -> Surface {
             truth: None,
         });
     }
-    builder.build(separator.nominal_radius_mm()).unwrap()
+    builder.build(separator.reference_radius_mm(points).unwrap()).unwrap()
 }
 
 fn run_pipeline(text: &str) -> runout_core::Result<Summary> {
@@ -253,6 +253,22 @@ fn a_made_surface_is_predicted_between_its_circles() {
     // z = 2 to 17 mm in steps of 0.5 mm; the lobes grow linearly, which the surface follows: the ripple is left.
     assert_eq!((found.points, found.beyond, found.outliers), (31, 9, 0));
     assert!(found.rms_um < 0.012, "{found:?}");
+}
+
+#[test]
+fn the_surface_stands_on_the_fitted_radius() {
+    // 3 µm of the deviations are the radius's, whatever the nominal one: form counts from 15.056 mm + 3 µm.
+    let points = made(&[2.0, 7.0, 12.0, 17.0]);
+    let separator = separator(15, &[]);
+    let surface = surface(&separator, &points);
+    // 1e-6 mm: the ripple of 0.007 µm rms over 1600 points.
+    assert!((surface.radius_mm - 15.059).abs() < 1e-6, "{}", surface.radius_mm);
+    // Radius and deviation together are what was measured there: level, axis and lobes at 0° on the circle at 7 mm.
+    let level = 3.0 + (4.0 + 0.2 * 7.0) + (1.0 + 0.1 * 7.0);
+    let axis = separator.cylinder(&points).unwrap().deviation_um(0.0, 7.0) - 3.0;
+    let found = 1e3 * (surface.radius_mm - 15.056) + surface.sample(0.0, 7.0).unwrap() + axis;
+    // 0.01 µm: the ripple itself.
+    assert!((found - level).abs() < 0.01, "{found} instead of {level}");
 }
 
 #[test]
