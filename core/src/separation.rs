@@ -2,6 +2,11 @@
 
 use crate::Complex64;
 
+/// What the numbers of form, motion and harmonics are, for files that explain themselves.
+pub const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \
+    Re sum c exp(-i n Phi) over the spindle's angle Phi. Lost orders cannot be told by the layout: NaN in the \
+    harmonics, left out of form and motion.";
+
 /// Something that a separation solves for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {

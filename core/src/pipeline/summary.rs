@@ -34,6 +34,16 @@ pub struct Summary {
     pub warnings: Vec<String>,
 }
 
+impl Summary {
+    /// The run's warnings, then each station's behind its name.
+    pub fn all_warnings(&self) -> impl Iterator<Item = String> + '_ {
+        let of_station = |station: &'_ StationSummary| -> Vec<String> {
+            station.warnings.iter().map(|warning| format!("{}: {warning}", station.station)).collect()
+        };
+        self.warnings.iter().cloned().chain(self.stations.iter().flat_map(of_station))
+    }
+}
+
 /// Orders that cannot be separated.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LostOrders {

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
-use hdf5_metno::{File, H5Type, types::FixedUnicode};
+use hdf5_metno::{
+    File, H5Type, Location,
+    types::{FixedUnicode, VarLenUnicode},
+};
 use runout_core::{
     Complex64,
     pipeline::{
         registry::{Context, StageConfig},
-        run::{LostOrders, RunInfo, StationResult, Summary},
+        run::{LostOrders, RunInfo, StationResult, StationSummary, Summary},
     },
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
@@ -55,7 +58,17 @@ pub fn summary() -> Summary {
             inputs: vec![Input { path: "shaft.h5".into(), bytes: 1234, blake3: "ab".repeat(32) }],
         },
         lost_orders: LostOrders { form: vec![1], motion: Vec::new() },
-        stations: Vec::new(),
+        stations: vec![StationSummary {
+            station: "s1".into(),
+            z_mm: 12.5,
+            captures: Vec::new(),
+            sections: Vec::new(),
+            residual_rms_um: None,
+            expected_residual_rms_um: None,
+            chi2_per_dof: None,
+            truth: None,
+            warnings: vec!["left out 3 points".into()],
+        }],
         surface: None,
         outputs: Vec::new(),
         warnings: vec!["order 1 of the form is lost".into()],
@@ -122,6 +135,36 @@ fn tables_hold_every_station() {
     assert_eq!(report.format.as_deref(), Some("runout-result"));
     let rows: Vec<(&str, usize)> = report.tables.iter().map(|table| (table.table.as_str(), table.rows)).collect();
     assert_eq!(rows, [("form", 16), ("motion", 16), ("harmonics", 8)]);
+}
+
+#[test]
+fn a_result_explains_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("result.h5");
+    write(&path);
+    let file = File::open(&path).unwrap();
+    let text = |location: &Location, name: &str| -> String {
+        location.attr(name).unwrap().read_scalar::<VarLenUnicode>().unwrap().as_str().to_owned()
+    };
+    assert!(text(&file, "convention").contains("outward positive"));
+    for group in ["form", "motion", "harmonics"] {
+        for column in file.group(group).unwrap().datasets().unwrap() {
+            let (name, unit) = (column.name(), text(&column, "unit"));
+            assert!(!text(&column, "meaning").is_empty(), "{name}");
+            let expected = ["um", "urad", "mm", "deg"].into_iter().find(|unit| name.ends_with(&format!("_{unit}")));
+            if let Some(expected) = expected {
+                assert_eq!(unit, expected, "{name}");
+            }
+        }
+    }
+    for name in ["re", "im", "std"] {
+        let column = file.dataset(&format!("harmonics/{name}")).unwrap();
+        assert_eq!(text(&column, "unit"), "um; urad for tilt_x, tilt_y");
+    }
+    assert!(text(&file.dataset("harmonics/std").unwrap(), "meaning").starts_with("sqrt(E|delta|^2)"));
+    let warnings: Vec<String> =
+        column::<VarLenUnicode>(&file, "warnings").iter().map(|text| text.as_str().to_owned()).collect();
+    assert_eq!(warnings, ["order 1 of the form is lost", "s1: left out 3 points"]);
 }
 
 #[test]

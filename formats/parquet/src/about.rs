@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use runout_core::{
     numerics::fourier,
     pipeline::run::{StationResult, Summary},
+    separation::CONVENTION,
 };
 use serde_json::json;
 
@@ -37,17 +38,13 @@ impl Content {
         let lowest = usize::from(!self.level_known);
         let lost_form: BTreeSet<_> = self.lost_form.iter().chain(&summary.lost_orders.form).collect();
         let lost_motion: BTreeSet<_> = self.lost_motion.iter().chain(&summary.lost_orders.motion).collect();
-        let of_stations = summary
-            .stations
-            .iter()
-            .flat_map(|station| station.warnings.iter().map(move |warning| format!("{}: {warning}", station.station)));
-        let warnings: Vec<String> = summary.warnings.iter().cloned().chain(of_stations).collect();
+        let warnings: Vec<String> = summary.all_warnings().collect();
         let entries = [
             ("title", summary.title.clone()),
             ("program", summary.provenance.program.clone()),
             ("configuration", summary.provenance.configuration.clone()),
             ("inputs", json!(summary.provenance.inputs).to_string()),
-            ("convention", CONVENTION.to_owned()),
+            ("convention", format!("{CONVENTION} {BANDS}")),
             ("lost_orders", json!({ "form": lost_form, "motion": lost_motion }).to_string()),
             ("band_upr", json!([lowest, self.highest_order]).to_string()),
             ("band_over_angle_upr", json!([lowest, self.highest_on_angles]).to_string()),
@@ -57,7 +54,6 @@ impl Content {
     }
 }
 
-const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \
-    Re sum c exp(-i n Phi) over the spindle's angle Phi. Lost orders cannot be told by the layout: NaN in the \
-    harmonics, left out of form and motion. band_upr: lowest and highest order of the harmonics; \
-    band_over_angle_upr: of form and motion over angle.";
+/// What `band_upr` and `band_over_angle_upr` are.
+const BANDS: &str =
+    "band_upr: lowest and highest order of the harmonics; band_over_angle_upr: of form and motion over angle.";

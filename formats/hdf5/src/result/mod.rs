@@ -1,17 +1,17 @@
 //! The exporter: form, motion and harmonics in one file, with everything that is needed to repeat the run.
 //!
 //! ```text
-//! /            format = "runout-result", version = 1, title, program
+//! /            format = "runout-result", version = 1, title, program, convention
 //! /form        section, station, z_mm, angle_deg, form_um, std_um: one dataset a column
 //! /motion      station, angle_deg, x_um, y_um, tilt_x_urad, tilt_y_urad, and std_… of each
 //! /harmonics   quantity, section, station, order, re, im, std, observable
 //! /provenance  configuration, inputs/{path, bytes, blake3}
-//! /warnings    [n] texts
+//! /warnings    [n] texts: the run's, then each station's behind its name
 //! /summary     the run's summary as JSON
 //! ```
 //!
 //! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; texts of the tables are
-//! UTF-8 of fixed length (`.asstr()` in h5py). What was not solved for, and what the layout cannot tell, is NaN.
+//! UTF-8 of fixed length (`.asstr()` in h5py). Each column has the attributes `unit` and `meaning`. What was not solved for, and what the layout cannot tell, is NaN.
 
 mod table;
 
@@ -27,7 +27,7 @@ use runout_core::{
         run::{RunInfo, StationResult, Summary},
     },
     provenance::Input,
-    separation::Quantity,
+    separation::{CONVENTION, Quantity},
     stage::{Export, Exporter},
     surface::Surface,
 };
@@ -74,6 +74,7 @@ impl Exporter for ResultExporter {
             node::put_text(&file, "format", RESULT_FORMAT)?;
             node::put(&file, "version", &VERSION)?;
             node::put_text(&file, "title", &run.title)?;
+            node::put_text(&file, "convention", CONVENTION)?;
             Ok(ResultExport {
                 form: FormTable::create(&file)?,
                 motion: MotionTable::create(&file)?,
@@ -111,7 +112,7 @@ impl ResultExport {
         let json = serde_json::to_string_pretty(summary)
             .map_err(|error| hdf5_metno::Error::from(format!("the summary: {error}")))?;
         put_dataset(&self.file, "summary", &json)?;
-        put_texts(&self.file, "warnings", summary.warnings.iter())?;
+        put_texts(&self.file, "warnings", summary.all_warnings())?;
         let group = self.file.create_group("provenance")?;
         put_dataset(&group, "configuration", &provenance.configuration)?;
         let inputs = group.create_group("inputs")?;
@@ -164,7 +165,7 @@ fn put_dataset(group: &Group, name: &str, text: &str) -> hdf5_metno::Result<()> 
     group.new_dataset::<VarLenUnicode>().create(name)?.write_scalar(&node::unicode(text)?)
 }
 
-fn put_texts<'a>(group: &Group, name: &str, texts: impl Iterator<Item = &'a String>) -> hdf5_metno::Result<()> {
-    let texts: hdf5_metno::Result<Vec<VarLenUnicode>> = texts.map(|text| node::unicode(text)).collect();
+fn put_texts(group: &Group, name: &str, texts: impl Iterator<Item = impl AsRef<str>>) -> hdf5_metno::Result<()> {
+    let texts: hdf5_metno::Result<Vec<VarLenUnicode>> = texts.map(|text| node::unicode(text.as_ref())).collect();
     group.new_dataset_builder().with_data(&texts?).create(name).map(|_| ())
 }

@@ -10,6 +10,8 @@ use runout_core::{
     separation::{Quantity, SectionAt, Separation},
 };
 
+use crate::node;
+
 /// A name in a table.
 pub(super) type Name = FixedUnicode<NAME_BYTES>;
 /// Longest name in UTF-8: names that repeat on every row compress to nothing only at a fixed length.
@@ -18,12 +20,12 @@ const NAME_BYTES: usize = 64;
 const CHUNK_ROWS: usize = 8192;
 const DEFLATE: u8 = 4;
 
-/// Quantity, name of its column and of its uncertainty's.
+/// Quantity, name of its column, and what it is.
 pub(super) const MOTION: [(Quantity, &str, &str); 4] = [
-    (Quantity::X, "x_um", "std_x_um"),
-    (Quantity::Y, "y_um", "std_y_um"),
-    (Quantity::TiltX, "tilt_x_urad", "std_tilt_x_urad"),
-    (Quantity::TiltY, "tilt_y_urad", "std_tilt_y_urad"),
+    (Quantity::X, "x_um", "error motion along x"),
+    (Quantity::Y, "y_um", "error motion along y"),
+    (Quantity::TiltX, "tilt_x_urad", "tilt about x, right-handed"),
+    (Quantity::TiltY, "tilt_y_urad", "tilt about y, right-handed"),
 ];
 
 /// A name of at most 64 bytes.
@@ -38,9 +40,15 @@ struct Column<T> {
 }
 
 impl<T: H5Type> Column<T> {
-    fn create(group: &Group, name: &str) -> Result<Self> {
-        let builder = group.new_dataset_builder().chunk(CHUNK_ROWS).shuffle().deflate(DEFLATE);
+    fn create(group: &Group, name: &str, unit: &str, meaning: &str) -> Result<Self> {
+        // Rows come in order: only the last chunk is ever written again. The library's own cache keeps megabytes of
+        // each column.
+        let bytes = CHUNK_ROWS * size_of::<T>();
+        let builder =
+            group.new_dataset_builder().chunk(CHUNK_ROWS).shuffle().deflate(DEFLATE).chunk_cache(1, bytes, 1.0);
         let dataset = builder.empty::<T>().shape(0..).create(name)?;
+        node::put_text(&dataset, "unit", unit)?;
+        node::put_text(&dataset, "meaning", meaning)?;
         Ok(Self { dataset, rows: 0, element: PhantomData })
     }
 
@@ -57,6 +65,12 @@ impl<T: H5Type + Clone> Column<T> {
     fn repeat(&mut self, value: &T, times: usize) -> Result<()> {
         self.append(&vec![value.clone(); times])
     }
+}
+
+const STATION: &str = "name of the axial station";
+
+fn std_of(column: &str) -> String {
+    format!("standard uncertainty of {column} at any one angle, from the scatter; NaN if not known")
 }
 
 fn angles_deg(angles: usize) -> Vec<f64> {
@@ -77,12 +91,17 @@ impl FormTable {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("form")?;
         Ok(Self {
-            section: Column::create(&group, "section")?,
-            station: Column::create(&group, "station")?,
-            z_mm: Column::create(&group, "z_mm")?,
-            angle_deg: Column::create(&group, "angle_deg")?,
-            form_um: Column::create(&group, "form_um")?,
-            std_um: Column::create(&group, "std_um")?,
+            section: Column::create(&group, "section", "", "id of the section")?,
+            station: Column::create(&group, "station", "", STATION)?,
+            z_mm: Column::create(&group, "z_mm", "mm", "place of the section along the axis")?,
+            angle_deg: Column::create(&group, "angle_deg", "deg", "the part's own angle")?,
+            form_um: Column::create(
+                &group,
+                "form_um",
+                "um",
+                "deviation of the section's form, outward positive; orders that are lost are left out",
+            )?,
+            std_um: Column::create(&group, "std_um", "um", &std_of("form_um"))?,
         })
     }
 
@@ -115,12 +134,15 @@ pub(super) struct MotionTable {
 impl MotionTable {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("motion")?;
-        let pair = |(_, value, std): &(Quantity, &str, &str)| {
-            Ok([Column::create(&group, value)?, Column::create(&group, std)?])
+        let pair = |(quantity, name, what): &(Quantity, &str, &str)| {
+            let meaning = format!("{what}; orders that are lost are left out; NaN where it was not solved for");
+            let value = Column::create(&group, name, quantity.unit(), &meaning)?;
+            let std = Column::create(&group, &format!("std_{name}"), quantity.unit(), &std_of(name))?;
+            Ok([value, std])
         };
         Ok(Self {
-            station: Column::create(&group, "station")?,
-            angle_deg: Column::create(&group, "angle_deg")?,
+            station: Column::create(&group, "station", "", STATION)?,
+            angle_deg: Column::create(&group, "angle_deg", "deg", "the spindle's angle")?,
             motions: MOTION.iter().map(pair).collect::<Result<_>>()?,
         })
     }
@@ -160,18 +182,26 @@ pub(super) struct HarmonicsTable {
     observable: Column<bool>,
 }
 
+/// Unit of coefficients, whose rows are of all quantities.
+const MIXED: &str = "um; urad for tilt_x, tilt_y";
+
 impl HarmonicsTable {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("harmonics")?;
         Ok(Self {
-            quantity: Column::create(&group, "quantity")?,
-            section: Column::create(&group, "section")?,
-            station: Column::create(&group, "station")?,
-            order: Column::create(&group, "order")?,
-            re: Column::create(&group, "re")?,
-            im: Column::create(&group, "im")?,
-            std: Column::create(&group, "std")?,
-            observable: Column::create(&group, "observable")?,
+            quantity: Column::create(&group, "quantity", "", "form, x, y, tilt_x or tilt_y")?,
+            section: Column::create(&group, "section", "", "id of the section; empty for motion")?,
+            station: Column::create(&group, "station", "", STATION)?,
+            order: Column::create(&group, "order", "1/rev", "undulations per revolution")?,
+            re: Column::create(&group, "re", MIXED, "real part of c; NaN where the layout cannot tell it")?,
+            im: Column::create(&group, "im", MIXED, "imaginary part of c; NaN where the layout cannot tell it")?,
+            std: Column::create(
+                &group,
+                "std",
+                MIXED,
+                "sqrt(E|delta|^2) of the complex coefficient c, both parts together, from the scatter; NaN if not known",
+            )?,
+            observable: Column::create(&group, "observable", "", "whether the layout can tell this order")?,
         })
     }
 
@@ -205,5 +235,25 @@ impl HarmonicsTable {
         self.im.append(&im)?;
         self.std.append(&std)?;
         self.observable.append(&observable)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    #[test]
+    fn a_column_caches_its_last_chunk_and_no_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = File::create(folder.path().join("table.h5")).unwrap();
+        let mut column = Column::<f64>::create(&file, "z_mm", "mm", "").unwrap();
+        let rows: Vec<f64> = (0..3 * CHUNK_ROWS + 7).map(|row| row as f64).collect();
+        for some in rows.chunks(1000) {
+            column.append(some).unwrap();
+        }
+        assert_eq!(column.dataset.access_plist().unwrap().chunk_cache().nbytes, 8 * CHUNK_ROWS);
+        assert_eq!(column.dataset.read_raw::<f64>().unwrap(), rows);
     }
 }
