@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
     sync::atomic::{AtomicU64, Ordering},
 };
 
@@ -27,8 +27,9 @@ impl PendingFile {
         static SERIAL: AtomicU64 = AtomicU64::new(0);
         let destination = destination.into();
         let shown = destination.display().to_string();
-        if destination.is_dir() {
-            return Err(Error::new("write", shown, "there is a folder of that name").help("name a file"));
+        // A rename would put a file in the place of a folder, a device or a pipe.
+        if fs::metadata(&destination).is_ok_and(|found| !found.is_file()) {
+            return Err(Error::new("write", shown, "what is there is no file").help("name a file"));
         }
         let name = destination
             .file_name()
@@ -41,6 +42,7 @@ impl PendingFile {
         };
         fs::create_dir_all(folder)
             .map_err(|error| Error::new("create the folder", folder.display().to_string(), error))?;
+        remove_stale(folder, &name);
         let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
         let temporary = folder.join(format!(".{name}.{}-{serial}.partial", std::process::id()));
         Ok(Self { temporary, destination, committed: false })
@@ -88,6 +90,53 @@ impl Drop for PendingFile {
             // Nothing more can be done about a temporary file that will not go.
             let _ = fs::remove_file(&self.temporary);
         }
+    }
+}
+
+/// Removes what runs that were killed left of the same file: temporary files of processes that are no more. Where the
+/// system does not tell (no /proc), they stay.
+fn remove_stale(folder: &Path, name: &str) {
+    let (Ok(entries), true) = (fs::read_dir(folder), Path::new("/proc/self").exists()) else { return };
+    for entry in entries.flatten() {
+        let found = entry.file_name();
+        let process = found
+            .to_str()
+            .and_then(|found| found.strip_prefix('.')?.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(".partial"))
+            .and_then(|rest| rest.split_once('-')?.0.parse::<u32>().ok());
+        if process.is_some_and(|process| !Path::new(&format!("/proc/{process}")).exists()) {
+            // Another run may have removed it just now.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Gives finished files their names, one right after the other.
+///
+/// # Errors
+/// When the file system refuses a rename.
+pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
+    files.into_iter().map(PendingFile::commit).collect()
+}
+
+/// One spelling of a path, by which two paths to the same file can be told to be so, whether or not it exists yet.
+#[must_use]
+pub fn resolved(path: &Path) -> PathBuf {
+    if let Ok(found) = path.canonicalize() {
+        return found;
+    }
+    let mut spelled = PathBuf::new();
+    for component in std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).components() {
+        match component {
+            Component::ParentDir => {
+                spelled.pop();
+            }
+            other => spelled.push(other),
+        }
+    }
+    // Links are followed as far as there is something.
+    match (spelled.parent().and_then(|parent| parent.canonicalize().ok()), spelled.file_name()) {
+        (Some(parent), Some(name)) => parent.join(name),
+        _ => spelled,
     }
 }
 

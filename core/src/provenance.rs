@@ -15,7 +15,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub struct Provenance {
     /// "runout 0.1.0".
     pub program: String,
-    /// The pipeline as it ran: the file's text, a rig file's text, and every `--set`.
+    /// The pipeline as it ran, with a rig file and every `--set` in their places: it runs again as it is.
     pub configuration: String,
     /// The files that were read.
     pub inputs: Vec<Input>,
@@ -24,7 +24,7 @@ pub struct Provenance {
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Input {
-    /// Its path as configured.
+    /// Its path, as it was opened.
     pub path: String,
     /// Its size in bytes.
     pub bytes: u64,

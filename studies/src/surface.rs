@@ -4,6 +4,7 @@ use std::{path::Path, path::PathBuf, sync::Mutex};
 
 use runout_core::{
     Error, Result,
+    atomic_file::PendingFile,
     pipeline::{
         Pipeline, Registry,
         config::INCLUDE_KEY,
@@ -88,7 +89,7 @@ impl Export for Keep {
         Ok(())
     }
 
-    fn finish(self: Box<Self>, _summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PathBuf>> {
+    fn finish(self: Box<Self>, _summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
         if let Ok(mut kept) = self.0.lock() {
             *kept = surface.cloned();
         }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use runout_core::{
     Error,
+    atomic_file::resolved,
     pipeline::{
         Registry,
         config::INCLUDE_KEY,
@@ -67,6 +68,9 @@ impl Scenario {
                 return Err(fault.help("name the measurement file to write, here or by --out"));
             }
         };
+        if sources.files().any(|file| resolved(file) == resolved(&output)) {
+            return Err(Fault::at("output", format!("{} is the scenario itself", output.display())));
+        }
         let mut own = root.clone();
         own.get_mut().remove("title");
         own.get_mut().remove("output");

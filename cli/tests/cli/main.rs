@@ -4,4 +4,5 @@
 mod commands;
 mod diagnostics;
 mod folder;
+mod safety;
 mod schemas;

@@ -1,5 +1,7 @@
 //! A pipeline, from TOML to stages that can only be valid.
 
+use std::path::{Path, PathBuf};
+
 use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -11,6 +13,7 @@ use super::{
     registry::{Catalogue, Context, Plugin, Registry},
 };
 use crate::{
+    atomic_file::resolved,
     rig::{Rig, RigConfig},
     separation::Assessment,
     stage::{
@@ -38,7 +41,7 @@ pub struct Pipeline {
     pub exporters: Vec<Box<dyn Exporter>>,
     /// What the separator can tell with the rig.
     pub assessment: Option<Assessment>,
-    /// The configuration's texts, for provenance.
+    /// The configuration with includes and overrides in their places, for provenance: it runs again as it is.
     pub configuration: String,
 }
 
@@ -159,21 +162,55 @@ impl Pipeline {
                 }
             }
         };
-        let mut exporters = Vec::new();
-        let mut outputs = Vec::new();
+        let mut exporters: Vec<Box<dyn Exporter>> = Vec::new();
+        let mut outputs: Vec<_> = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
         for table in tables(root, "export")? {
             let exporter = registry.exporters.build(&table, &context)?;
             for output in exporter.outputs() {
-                if outputs.contains(&output) {
-                    let message = format!("{} is already written by an exporter above", output.display());
+                let place = resolved(&output);
+                if let Some((_, use_of_it)) = outputs.iter().find(|(other, _)| *other == place) {
+                    let message = format!("{} is already {use_of_it}", output.display());
                     return Err(document::resolve(Fault::at("path", message), &table));
                 }
-                outputs.push(output);
+                if outputs.iter().all(|(_, use_of_it)| *use_of_it != SUMMARY_USE) {
+                    outputs.push((resolved(&beside(&output)), SUMMARY_USE));
+                }
+                outputs.push((place, "written by an exporter"));
             }
             exporters.push(exporter);
         }
-        Ok(Self { title, rig, loader, route, surface, exporters, assessment, configuration: sources.texts() })
+        Ok(Self {
+            title,
+            rig,
+            loader,
+            route,
+            surface,
+            exporters,
+            assessment,
+            configuration: document::resolved_text(root, sources)?,
+        })
     }
+}
+
+impl Pipeline {
+    /// Every file that a run writes.
+    #[must_use]
+    pub fn outputs(&self) -> Vec<PathBuf> {
+        let exported = self.exporters.iter().flat_map(|exporter| exporter.outputs());
+        exported.chain(self.summary_path()).collect()
+    }
+
+    /// Where the summary goes: beside the first export.
+    #[must_use]
+    pub fn summary_path(&self) -> Option<PathBuf> {
+        self.exporters.iter().find_map(|exporter| exporter.outputs().first().map(|path| beside(path)))
+    }
+}
+
+const SUMMARY_USE: &str = "where the run's summary goes";
+
+fn beside(output: &Path) -> PathBuf {
+    output.with_file_name("summary.json")
 }
 
 fn turns(

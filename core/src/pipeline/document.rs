@@ -112,11 +112,10 @@ impl Sources {
         &self.folder
     }
 
-    /// Every text by name, in the order read: what a run was configured with.
-    #[must_use]
-    pub fn texts(&self) -> String {
-        let shown = self.parts.iter().map(|part| format!("# {}\n{}\n", part.name, part.text().trim_end()));
-        shown.collect()
+    /// The files among the texts.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let files = self.parts.iter().filter(|part| !matches!(part.role, Role::Override(_)));
+        files.map(|part| Path::new(&part.name))
     }
 
     fn add(&mut self, name: &str, role: Role, text: &str) {
@@ -279,6 +278,23 @@ pub fn read<T: DeserializeOwned>(table: &Table) -> Result<T, Fault> {
         let span = error.span().filter(|span| *span != table.span());
         explain(span.unwrap_or_else(|| head(table.span())), error.message())
     })
+}
+
+/// The document as one TOML text that reads as it does: the file itself, or, where other files or overrides went into
+/// it, all of it written anew.
+///
+/// # Errors
+/// When a value cannot be written.
+pub fn resolved_text(root: &Table, sources: &Sources) -> Result<String, Fault> {
+    match &sources.parts[..] {
+        [only] => Ok(only.text().to_owned()),
+        parts => {
+            let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+            let table: toml::Table = read(root)?;
+            let text = toml::to_string(&table).map_err(|error| Fault::here(error.to_string()))?;
+            Ok(format!("# joined from {}; paths are relative to the first\n\n{text}", names.join(", ")))
+        }
+    }
 }
 
 /// A table's own span may cover many lines; its beginning is where a reader looks.

@@ -23,12 +23,14 @@ pub use super::{
 };
 use crate::{
     Error, Result,
+    atomic_file::{PendingFile, commit_all, resolved},
     inspection::Inspection,
     measurement::{Recording, StationKey},
     points::Points,
     profile::Profile,
     provenance::{Input, Provenance, VERSION},
     rig::Rig,
+    separation::Separation,
     stage::{Averager, Conditioner, Export, PointSeparator, Source, Station, StationSeparator},
     surface::{Surface, SurfaceBuilder},
 };
@@ -54,6 +56,11 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     let source = pipeline.loader.open(pipeline.rig.as_ref())?;
     let info =
         RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
+    let inputs = match &source {
+        Source::Turns(recording) => recording.inputs(),
+        Source::Points(points) => vec![points.input.clone()],
+    };
+    spare_inputs(pipeline, &inputs)?;
     let mut gathering = Gathering::begin(pipeline, &info)?;
     let (inputs, surface, remarks) = match (&source, &pipeline.route) {
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator }) => {
@@ -79,6 +86,9 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     gathering.finish(surface.as_ref())
 }
 
+/// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.
+const MISFIT_CHI2: f64 = 4.0;
+
 /// Results on their way to the exporters.
 struct Gathering {
     exports: Vec<Box<dyn Export>>,
@@ -92,11 +102,10 @@ impl Gathering {
         let exports: Result<Vec<_>> = pipeline.exporters.iter().map(|exporter| exporter.begin(info)).collect();
         let tested = matches!(&pipeline.route, Route::Points { separator } if separator.needs_surface());
         let wanted = tested || pipeline.exporters.iter().any(|exporter| exporter.needs_surface());
-        let first = pipeline.exporters.first().and_then(|exporter| exporter.outputs().into_iter().next());
         Ok(Self {
             exports: exports?,
             surface: wanted.then(|| SurfaceBuilder::new(&pipeline.surface)),
-            summary_path: first.map(|path| path.with_file_name("summary.json")),
+            summary_path: pipeline.summary_path(),
             summary: Summary {
                 title: pipeline.title.clone(),
                 provenance: Provenance {
@@ -137,17 +146,65 @@ impl Gathering {
     }
 
     fn finish(mut self, surface: Option<&Surface>) -> Result<Summary> {
+        self.summary.warnings.extend(misfit(&self.summary.stations));
+        let mut complete = Vec::new();
         for export in self.exports {
-            let outputs = export.finish(&self.summary, surface)?;
-            self.summary.outputs.extend(outputs);
+            complete.extend(export.finish(&self.summary, surface)?);
         }
+        let named = complete.iter().map(|file| file.destination().to_path_buf());
+        self.summary.outputs = named.chain(self.summary_path.clone()).collect();
         if let Some(path) = self.summary_path {
-            self.summary.outputs.push(path.clone());
-            let text = serde_json::to_vec_pretty(&self.summary)
-                .map_err(|error| Error::new("write", path.display().to_string(), error))?;
-            crate::atomic_file::write(path, &text)?;
+            let file = PendingFile::new(path)?;
+            let text = serde_json::to_vec_pretty(&self.summary).map_err(|error| file.failure(error))?;
+            std::fs::write(file.path(), text).map_err(|error| file.failure(error))?;
+            complete.push(file);
         }
+        commit_all(complete)?;
         Ok(self.summary)
+    }
+}
+
+/// Refuses to write over what the run reads.
+fn spare_inputs(pipeline: &Pipeline, inputs: &[PathBuf]) -> Result<()> {
+    let read: Vec<PathBuf> = inputs.iter().map(|input| resolved(input)).collect();
+    for output in pipeline.outputs() {
+        if read.contains(&resolved(&output)) {
+            let problem = "it is what the run reads";
+            return Err(Error::new("write", output.display().to_string(), problem).help("export to another path"));
+        }
+    }
+    Ok(())
+}
+
+/// What a rig that is not as declared looks like: a residual far above what the turns' scatter lets expect.
+fn misfit(stations: &[StationSummary]) -> Option<String> {
+    let beyond = stations.iter().filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > MISFIT_CHI2));
+    let count = beyond.clone().count();
+    let worst =
+        beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;
+    let left = worst.residual_rms_um.unwrap_or(f64::NAN);
+    let expected = worst.expected_residual_rms_um.unwrap_or(f64::NAN);
+    Some(format!(
+        "at {count} of {} stations the readings contradict each other: the fit leaves up to {left:.2e} µm rms ({}), where \
+         the turns' scatter lets expect {expected:.2e}; something is not as the rig declares it, and the stated \
+         uncertainties, which come from that scatter alone, do not cover it",
+        stations.len(),
+        worst.station,
+    ))
+}
+
+/// Refuses what is not a number where the layout could tell one.
+fn finite(station: &str, separation: &Separation) -> Result<()> {
+    let width = separation.unknowns.len().max(1);
+    let told = separation.estimate.iter().zip(&separation.observable);
+    match told.enumerate().find(|(_, (value, told))| **told && !value.is_finite()) {
+        None => Ok(()),
+        Some((index, _)) => {
+            let quantity = separation.unknowns[index % width].id();
+            let problem = format!("{quantity} of order {} comes out as no number", index / width);
+            Err(Error::new("separate", format!("station {station}"), problem)
+                .help("look for absurd readings, and check the rig's radius and positions"))
+        }
     }
 }
 
@@ -220,6 +277,7 @@ impl Line<'_> {
             (0..self.rig.setups.len()).map(|setup| self.profile(index, setup)).collect();
         let station = Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? };
         let separation = self.separator.separate(&station)?;
+        finite(&key.name, &separation)?;
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = self.recording.truth(index)?;
         Ok(complete(key.name.clone(), key.z_mm, angles, separation, station.profiles, truth))

@@ -208,6 +208,9 @@ fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
         |turn: &TurnLength| format!("{:.1} samples long, the median turn has {:.1}", turn.samples, turn.median_samples);
     let reason = |rejection: &Rejection| match rejection {
         Rejection::MissingMark(turn) => format!("a mark is missing: {}", length(turn)),
+        Rejection::DoubledMark(turn) if turn.samples > 0.9 * turn.median_samples => {
+            "next to a mark that was counted twice: where it begins or ends is open".into()
+        }
         Rejection::DoubledMark(turn) => format!("a mark was counted twice: {}", length(turn)),
         Rejection::Speed(turn) => format!("off speed: {}", length(turn)),
         Rejection::Defect { sensor: index, kind } => format!("{}: {kind}", sensor(*index)),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::{
     Result,
+    atomic_file::PendingFile,
     pipeline::run::{RunInfo, StationResult, Summary},
     surface::Surface,
 };
@@ -33,9 +34,9 @@ pub trait Export: Send {
     /// When it cannot be written.
     fn station(&mut self, result: &StationResult) -> Result<()>;
 
-    /// Completes the files and gives them their names.
+    /// Completes the files. The run gives them their names when every exporter's are complete.
     ///
     /// # Errors
     /// When they cannot be completed.
-    fn finish(self: Box<Self>, summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PathBuf>>;
+    fn finish(self: Box<Self>, summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PendingFile>>;
 }

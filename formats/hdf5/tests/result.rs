@@ -8,6 +8,7 @@ use hdf5_metno::{
 };
 use runout_core::{
     Complex64,
+    atomic_file::commit_all,
     pipeline::{
         registry::{Context, StageConfig},
         run::{LostOrders, RunInfo, StationResult, StationSummary, Summary},
@@ -89,7 +90,7 @@ pub fn write(path: &Path) {
         export.station(&station(name)).unwrap();
     }
     assert!(!path.exists(), "no file before it is finished");
-    assert_eq!(export.finish(&summary(), None).unwrap(), [path]);
+    assert_eq!(commit_all(export.finish(&summary(), None).unwrap()).unwrap(), [path]);
 }
 
 fn column<T: H5Type>(file: &File, name: &str) -> Vec<T> {

@@ -79,7 +79,7 @@ impl Export for MeshExport {
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>, summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PathBuf>> {
+    fn finish(mut self: Box<Self>, summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
         let surface = surface.ok_or_else(|| {
             Error::new("write", self.config.path.display().to_string(), "the run built no surface to draw")
         })?;
@@ -89,11 +89,7 @@ impl Export for MeshExport {
             let notes = Notes::new(&self.format, &mesh, surface, &checksum, &self.band, summary);
             (self.format.write)(&mesh, &notes, file).map_err(|error| place.failure(error))?;
         }
-        // Named only when all of them are written. Closed first: some systems do not rename what is open.
-        let written = self.files.into_iter().map(|Target { place, file, .. }| {
-            drop(file);
-            place.commit()
-        });
-        written.collect()
+        // Closed: some systems do not rename what is open.
+        Ok(self.files.into_iter().map(|Target { place, .. }| place).collect())
     }
 }

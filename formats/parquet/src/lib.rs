@@ -125,18 +125,16 @@ impl Export for Tables {
         Ok(())
     }
 
-    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PathBuf>> {
+    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
         let entries = self.content.entries(summary);
         let had_motion = self.motion.is_some();
         let tables = [Some(self.form), self.motion, Some(self.harmonics)].into_iter().flatten();
-        // All are complete before the first gets its name.
-        let complete: Result<Vec<_>> = tables.map(|table| table.close(&entries)).collect();
-        let written: Result<Vec<_>> = complete?.into_iter().map(PendingFile::commit).collect();
+        let complete: Vec<PendingFile> = tables.map(|table| table.close(&entries)).collect::<Result<_>>()?;
         if !had_motion && self.motion_path.is_file() {
             // An earlier run's motion beside this run's form would be taken for this run's.
             std::fs::remove_file(&self.motion_path)
                 .map_err(|error| Error::new("remove the outdated", self.motion_path.display().to_string(), error))?;
         }
-        written
+        Ok(complete)
     }
 }

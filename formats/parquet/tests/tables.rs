@@ -8,6 +8,7 @@ use arrow_array::{Array, BooleanArray, Float64Array, RecordBatch, StringArray, U
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use runout_core::{
     Complex64,
+    atomic_file::commit_all,
     pipeline::{
         registry::{Context, StageConfig},
         run::{LostOrders, RunInfo, StationResult, Summary},
@@ -82,7 +83,7 @@ fn export(folder: &Path, stations: usize, motion: bool) {
     for index in 0..stations {
         export.station(&station(index, motion)).unwrap();
     }
-    let written = export.finish(&summary(), None).unwrap();
+    let written = commit_all(export.finish(&summary(), None).unwrap()).unwrap();
     assert!(written.iter().all(|path| exporter.outputs().contains(path) && path.is_file()));
 }
 

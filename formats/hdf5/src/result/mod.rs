@@ -153,11 +153,11 @@ impl Export for ResultExport {
         Ok(())
     }
 
-    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PathBuf>> {
+    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
         self.complete(summary).map_err(|error| self.failure(error))?;
         let Self { form, motion, harmonics, file, pending } = *self;
         drop((form, motion, harmonics, file));
-        pending.map(PendingFile::commit).into_iter().collect()
+        Ok(pending.into_iter().collect())
     }
 }
 

@@ -8,7 +8,7 @@ use std::{
     process::{Command, Output},
 };
 
-use runout_core::{
+use runout_core::{atomic_file::commit_all, 
     Complex64, Error,
     pipeline::{
         error::Fault,
@@ -92,7 +92,7 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
         outputs: Vec::new(),
         warnings: Vec::new(),
     };
-    export.finish(&summary, surface)
+    commit_all(export.finish(&summary, surface)?)
 }
 
 /// A form that holds orders 2 to 250, of which the surface's 360 angles hold 179.
