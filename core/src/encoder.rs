@@ -10,6 +10,7 @@ pub struct EncoderScan {
     samples: u64,
     last_deg: f64,
     direction: f64,
+    longest_step_deg: f64,
     marks: Vec<f64>,
 }
 
@@ -25,12 +26,15 @@ pub struct EncoderFault {
 
 /// A longer step between two samples leaves open which way the spindle went.
 const LONGEST_STEP_DEG: f64 = 180.0;
+/// A step longer than twice the longest before it by more than this is a jump: twice, as an encoder coarser than the
+/// samples may pass one line or two.
+const JUMP_DEG: f64 = 0.05 * 360.0;
 
 impl EncoderScan {
     /// Takes the next sample's angle.
     ///
     /// # Errors
-    /// When it is not finite, jumps by half a turn or more, or goes back.
+    /// When it is not finite, jumps by half a turn or by 0.05 turn beyond twice the longest step before, or goes back.
     pub fn push(&mut self, angle_deg: f64) -> Result<(), EncoderFault> {
         let fault = |problem| Err(EncoderFault { sample: self.samples, problem });
         if !angle_deg.is_finite() {
@@ -58,6 +62,17 @@ impl EncoderScan {
                     self.last_deg
                 ));
             }
+            // Before the first movement nothing is known of its steps.
+            if self.longest_step_deg > 0.0 && step_deg.abs() > 2.0 * self.longest_step_deg + JUMP_DEG {
+                return fault(format!(
+                    "expected steps like those before (up to {:.3}°), found a jump of {:.3} turns from {}° to \
+                     {angle_deg}°; a recording whose zero moved cannot be averaged as one",
+                    self.longest_step_deg,
+                    step_deg / 360.0,
+                    self.last_deg
+                ));
+            }
+            self.longest_step_deg = self.longest_step_deg.max(step_deg.abs());
             let (before, now) = (self.turns(self.last_deg), self.turns(angle_deg));
             let whole = before.floor() + 1.0;
             if whole <= now {
@@ -102,7 +117,7 @@ mod tests {
 
     #[test]
     fn whole_turns_lie_between_samples() {
-        let scan = scan([350.0, 358.0, 366.0, 540.0, 700.0, 720.0, 720.0, 721.0]).unwrap();
+        let scan = scan([190.0, 330.0, 450.0, 540.0, 700.0, 720.0, 720.0, 721.0]).unwrap();
         assert_eq!(scan.marks(), [1.25, 5.0]);
     }
 
@@ -113,6 +128,27 @@ mod tests {
         // −360° lies between samples 51 and 52, at 360/7.
         assert!((scan.marks()[1] - 360.0 / 7.0).abs() < 1e-12, "{:?}", scan.marks());
         assert!((scan.turns(-720.0) - 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_jump_is_a_fault_that_names_sample_and_jump() {
+        for way in [1.0, -1.0] {
+            let jumping = |size_deg: f64| {
+                scan(
+                    (0..2000).map(|sample| way * (f64::from(sample) * 0.7 + if sample < 900 { 0.0 } else { size_deg })),
+                )
+            };
+            let fault = jumping(108.0).unwrap_err();
+            assert_eq!(fault.sample, 900);
+            // 0.3 turn, and the 0.7° of the step itself.
+            let expected = format!("jump of {:.3} turns", way * 108.7 / 360.0);
+            assert!(fault.problem.contains(&expected), "{fault}");
+            assert!(jumping(20.0).is_err());
+            assert!(jumping(1.0).is_ok(), "a line passed over is no jump");
+        }
+        // A start-up from rest, and an encoder of ten lines at nearly as many samples a turn.
+        scan((0..2000).map(|sample| 0.01 * f64::from(sample * sample))).unwrap();
+        scan((0..500).map(|sample| 36.0 * (f64::from(sample) * 10.0 / 9.5).floor())).unwrap();
     }
 
     #[test]
