@@ -10,6 +10,10 @@
 //!   [`STEEP_STEPS`] of the channel's finest steps over the [`APPROACH_TURN`] of a turn before the run is steep. A run
 //!   of [`PEGGED_TURN`] of a turn at the extreme is clipped however it began. Without marks there is no turn to measure
 //!   by, and no such look.
+//! - A run of exactly equal samples of [`PEGGED_TURN`] of a turn or more that is not clipped is stuck, wherever it lies:
+//!   its first reading is good, those that repeat it are marked. A signal that swings by few of the converter's steps
+//!   may truly stand so long (a sine of amplitude 3.4 steps does, at its crest), so that a channel is not judged while
+//!   its swing so far is at most [`STUCK_STEPS`] of its finest steps, unless it has not moved at all.
 //! - A channel that never moves is an error at the end of the stream.
 
 mod channel;
@@ -35,12 +39,15 @@ pub const STEEP_STEPS: f64 = 16.0;
 /// Length of a flat run that needs no steep approach, in turns.
 pub const PEGGED_TURN: f64 = 0.25;
 
+/// Swing of a channel, in its finest steps, up to which it may truly stand still for long.
+pub const STUCK_STEPS: f64 = 16.0;
+
 /// Frames that are looked over at once.
 const CHUNK: usize = 1024;
 
 /// Passes samples on, with defects marked and unusable values bridged so that filters stay finite.
 ///
-/// A sample is held back while it may turn out to begin a clipped run, at most for [`PEGGED_TURN`] of a turn.
+/// A sample is held back while it may turn out to begin a clipped or stuck run, at most for [`PEGGED_TURN`] of a turn.
 pub struct Inspection<'a> {
     input: Box<dyn SampleStream + 'a>,
     raw: Block,
@@ -50,6 +57,8 @@ pub struct Inspection<'a> {
     past: Vec<f64>,
     channels: Vec<Channel>,
     rule: Rule,
+    /// Equal samples in a row that are stuck; `None` without marks.
+    stuck: Option<u64>,
     ended: bool,
 }
 
@@ -59,18 +68,20 @@ impl<'a> Inspection<'a> {
     pub fn new(input: Box<dyn SampleStream + 'a>) -> Self {
         let capture = input.capture();
         let count = capture.channels();
-        let rule = match (&capture.converter_limits_um, capture.median_turn_samples()) {
+        let turn = capture.median_turn_samples().filter(|turn| *turn > 0.0);
+        let stuck = turn.map(|turn| (PEGGED_TURN * turn).ceil().max(FLAT_RUN) as u64);
+        let rule = match (&capture.converter_limits_um, turn.zip(stuck)) {
             (Some(limits), _) if limits.len() == count => Rule::Limits(limits.clone()),
-            (_, Some(turn)) if turn > 0.0 => Rule::Flat {
+            (_, Some((turn, pegged))) => Rule::Flat {
                 shortest: (FLAT_RUN_TURN * turn).ceil().max(FLAT_RUN) as u64,
-                pegged: (PEGGED_TURN * turn).ceil().max(FLAT_RUN) as u64,
+                pegged,
                 approach: (APPROACH_TURN * turn).ceil().max(1.0) as u64,
             },
             _ => Rule::None,
         };
         let channels = vec![Channel::default(); count];
         let (raw, held, past) = (Block::default(), Block::default(), Vec::new());
-        Self { input, raw, held, past, channels, rule, ended: false }
+        Self { input, raw, held, past, channels, rule, stuck, ended: false }
     }
 
     /// Looks at the block in `raw` and joins it to those held.
@@ -93,6 +104,7 @@ impl<'a> Inspection<'a> {
             let mut look = Look {
                 channels: &mut self.channels,
                 rule: &self.rule,
+                stuck: self.stuck,
                 block: &mut self.held,
                 past: &self.past,
                 frames: from / count..to / count,
@@ -102,13 +114,13 @@ impl<'a> Inspection<'a> {
         }
     }
 
-    /// Frames held that can no longer turn out to be clipped.
+    /// Frames held that can no longer turn out to be clipped or stuck.
     fn decided(&self) -> usize {
         let frames = self.held.samples.len() / self.channels.len().max(1);
         if self.ended {
             return frames;
         }
-        let undecided = self.channels.iter().filter_map(|channel| channel.undecided(&self.rule)).min();
+        let undecided = self.channels.iter().filter_map(|channel| channel.undecided(&self.rule, self.stuck)).min();
         undecided.map_or(frames, |start| (start.saturating_sub(self.held.start) as usize).min(frames))
     }
 

@@ -206,6 +206,8 @@ pub enum DefectKind {
     NotFinite,
     /// At the converter's limit, or flat at the channel's extreme.
     Clipped,
+    /// Exactly equal for a good part of a turn, anywhere.
+    Stuck,
 }
 
 impl std::fmt::Display for DefectKind {
@@ -213,6 +215,7 @@ impl std::fmt::Display for DefectKind {
         formatter.write_str(match self {
             Self::NotFinite => "not a number",
             Self::Clipped => "clipped",
+            Self::Stuck => "stuck at one value",
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{LIMIT_RUN, STEEP_STEPS};
+use super::{FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS};
 use crate::{
     measurement::{Block, Defect, DefectKind},
     numerics::lanes::{LaneWork, load},
@@ -50,6 +50,15 @@ pub(super) struct Channel {
     finest_step: f64,
     seen: u64,
     run: Run,
+    same: Same,
+}
+
+/// Samples in a row that repeat the one before.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Same {
+    start: u64,
+    repeats: u64,
+    stuck: bool,
 }
 
 /// Samples in a row that may turn out to be clipped.
@@ -72,19 +81,24 @@ impl Default for Channel {
             finest_step: f64::INFINITY,
             seen: 0,
             run: Run::default(),
+            same: Same::default(),
         }
     }
 }
 
 impl Channel {
     /// Where the run begins whose end must be awaited.
-    pub(super) fn undecided(&self, rule: &Rule) -> Option<u64> {
+    pub(super) fn undecided(&self, rule: &Rule, stuck: Option<u64>) -> Option<u64> {
         let open = match rule {
             Rule::Limits(_) => self.run.length < LIMIT_RUN,
             Rule::Flat { pegged, .. } => self.run.length < *pegged,
             Rule::None => false,
         };
-        (self.run.suspect && !self.run.clipped && open).then_some(self.run.start)
+        let clipped = (self.run.suspect && !self.run.clipped && open).then_some(self.run.start);
+        let repeats = self.same.repeats;
+        let open = repeats > 0 && stuck.is_some_and(|stuck| repeats + 1 < stuck) && !self.run.clipped;
+        let same = open.then_some(self.same.start);
+        clipped.into_iter().chain(same).min()
     }
 
     /// What shows that the channel never moved.
@@ -104,7 +118,7 @@ impl Channel {
         index: usize,
         frames: Range<usize>,
         channels: usize,
-        rule: &Rule,
+        (rule, stuck): (&Rule, Option<u64>),
         block: &mut Block,
         past: &[f64],
     ) {
@@ -118,6 +132,7 @@ impl Channel {
                 block.samples[at] = self.last.unwrap_or(0.0);
                 mark(&mut block.defects, index, DefectKind::NotFinite, place..place + 1);
                 self.run = Run::default();
+                self.same = Same::default();
                 continue;
             }
             let suspect = match rule {
@@ -134,6 +149,13 @@ impl Channel {
             } else {
                 self.run = Run { start: place, length: 1, suspect, ..Run::default() };
             }
+            if self.last != Some(value) {
+                self.same = Same::default();
+            } else if self.same.repeats == 0 {
+                self.same = Same { start: place, repeats: 1, stuck: false };
+            } else {
+                self.same.repeats += 1;
+            }
             if let Some(last) = self.last {
                 let step = (value - last).abs();
                 if step > 0.0 {
@@ -145,6 +167,25 @@ impl Channel {
             self.highest = self.highest.max(value);
             if self.run.suspect {
                 self.judge(index, rule, block, past, channels, value);
+            }
+            if !self.run.clipped && stuck.is_some_and(|stuck| self.same.repeats + 1 >= stuck) {
+                self.judge_same(index, stuck, block);
+            }
+        }
+    }
+
+    /// Decides on samples that have just become too many equal ones, and follows those that were.
+    fn judge_same(&mut self, index: usize, stuck: Option<u64>, block: &mut Block) {
+        let Same { start, repeats, .. } = self.same;
+        let end = start + repeats;
+        if self.same.stuck {
+            mark(&mut block.defects, index, DefectKind::Stuck, end - 1..end);
+        } else if stuck == Some(repeats + 1) {
+            let swing = self.highest - self.lowest;
+            self.same.stuck = swing == 0.0 || swing > STUCK_STEPS * self.finest_step;
+            if self.same.stuck {
+                // Undecided repeats were held back, so that they still begin in this block.
+                mark(&mut block.defects, index, DefectKind::Stuck, start..end);
             }
         }
     }
@@ -197,6 +238,8 @@ fn mark(defects: &mut Vec<Defect>, channel: usize, kind: DefectKind, samples: Ra
 pub(super) struct Look<'a> {
     pub(super) channels: &'a mut [Channel],
     pub(super) rule: &'a Rule,
+    /// Equal samples in a row that are stuck.
+    pub(super) stuck: Option<u64>,
     pub(super) block: &'a mut Block,
     /// The frames before the block.
     pub(super) past: &'a [f64],
@@ -205,7 +248,7 @@ pub(super) struct Look<'a> {
 
 impl LaneWork for Look<'_> {
     /// Nearly always a glance at the extremes of all frames is enough: no value that is not finite, at a limit, or
-    /// equal to the one before. Only where it is not, each channel is looked at sample by sample.
+    /// equal to the one before (integers: to many before). Only where it is not, each channel is looked at sample by sample.
     fn lanes<const C: usize>(&mut self, offset: usize) {
         let count = self.channels.len();
         let group = &mut self.channels[offset..offset + C];
@@ -213,6 +256,8 @@ impl LaneWork for Look<'_> {
         let mut lowest = [f64::INFINITY; C];
         let mut highest = [f64::NEG_INFINITY; C];
         let mut finest = [f64::INFINITY; C];
+        let mut repeats: [f64; C] = std::array::from_fn(|lane| group[lane].same.repeats as f64);
+        let mut most = [0.0; C];
         // 0 · value is 0 for finite values only.
         let mut zero = [0.0; C];
         let mut last: [f64; C] = std::array::from_fn(|lane| group[lane].last.unwrap_or(f64::NAN));
@@ -222,19 +267,23 @@ impl LaneWork for Look<'_> {
                 let step = (value[lane] - last[lane]).abs();
                 lowest[lane] = if value[lane] < lowest[lane] { value[lane] } else { lowest[lane] };
                 highest[lane] = if value[lane] > highest[lane] { value[lane] } else { highest[lane] };
-                finest[lane] = if step < finest[lane] { step } else { finest[lane] };
+                finest[lane] = if step > 0.0 && step < finest[lane] { step } else { finest[lane] };
+                repeats[lane] = if step == 0.0 { repeats[lane] + 1.0 } else { 0.0 };
+                most[lane] = if repeats[lane] > most[lane] { repeats[lane] } else { most[lane] };
                 zero[lane] += 0.0 * value[lane];
             }
             last = value;
         }
         let flat = matches!(self.rule, Rule::Flat { .. });
+        // Fewer equal samples than these can be neither clipped nor stuck.
+        let few = if flat { 1.0 } else { FLAT_RUN - 1.0 };
         let quiet = (0..C).all(|lane| {
             let [low, high] = self.rule.inside(offset + lane);
-            zero[lane] == 0.0 && lowest[lane] > low && highest[lane] < high && !(flat && finest[lane] == 0.0)
+            zero[lane] == 0.0 && lowest[lane] > low && highest[lane] < high && most[lane] < few
         });
         if !quiet {
             for (lane, channel) in group.iter_mut().enumerate() {
-                channel.look(offset + lane, self.frames.clone(), count, self.rule, self.block, self.past);
+                channel.look(offset + lane, self.frames.clone(), count, (self.rule, self.stuck), self.block, self.past);
             }
             return;
         }
@@ -244,8 +293,11 @@ impl LaneWork for Look<'_> {
             channel.highest = channel.highest.max(highest[lane]);
             channel.finest_step = channel.finest_step.min(finest[lane]);
             channel.seen += self.frames.len() as u64;
+            let end = self.block.start + self.frames.end as u64;
+            let repeated = repeats[lane] as u64;
+            channel.same = Same { start: end - repeated, repeats: repeated, stuck: false };
             channel.run = Run {
-                start: self.block.start + self.frames.end as u64 - 1,
+                start: end - 1,
                 length: 1,
                 suspect: flat && (last[lane] <= channel.lowest || last[lane] >= channel.highest),
                 ..Run::default()

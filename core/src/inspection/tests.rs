@@ -155,3 +155,37 @@ fn a_dead_channel_is_an_error_that_names_it() {
         }
     }
 }
+
+#[test]
+fn a_channel_stuck_inside_its_swing_is_a_defect_from_the_first_repeat() {
+    let step = 10.0 / 32768.0;
+    let convert = |value: f64| (value / step).round() * step;
+    for limits in [None, Some([-32768.0 * step, 32767.0 * step])] {
+        let whole = sine(20 * TURN, 5.0, 0.3).into_iter().map(convert).collect::<Vec<_>>();
+        let mut channel = whole.clone();
+        let (value, short) = (channel[7400], channel[15_500]);
+        channel[7400..11_390].fill(value);
+        // Not yet a quarter of a turn.
+        channel[15_500..15_749].fill(short);
+        let (_, defects) = inspect_in_blocks(&[whole, channel], limits);
+        assert_eq!(defects, [defect(1, 7401..11_390, DefectKind::Stuck)], "{limits:?}");
+    }
+}
+
+#[test]
+fn an_integer_channel_stuck_from_the_start_is_a_defect() {
+    let mut channel = sine(4 * TURN, 5.0, 0.0);
+    channel[..1250].fill(0.5);
+    let (_, defects) = inspect_in_blocks(&[channel], Some([-10.0, 10.0]));
+    assert_eq!(defects, [defect(0, 1..1250, DefectKind::Stuck)]);
+}
+
+#[test]
+fn a_slow_swing_of_few_steps_is_not_stuck() {
+    // At its crest a sine of 3 steps stands still for up to a quarter of a turn; of 1.2 steps, much longer.
+    for steps in [1.2, 2.0, 3.0, 3.5, 5.0, 20.0] {
+        let coarse: Vec<f64> = sine(20 * TURN, steps, 0.4).into_iter().map(|value| 0.01 * value.round()).collect();
+        let (_, defects) = inspect_in_blocks(&[coarse], Some([-10.0, 10.0]));
+        assert_eq!(defects, [], "{steps} steps");
+    }
+}
