@@ -87,7 +87,7 @@ pub struct RejectedTurn {
 pub enum Rejection {
     /// About twice as long as the others: a mark is missing.
     MissingMark(TurnLength),
-    /// Much shorter than the others: a mark was counted twice.
+    /// A piece of a turn, or next to one: a mark was counted twice.
     DoubledMark(TurnLength),
     /// Its length is off by more than the tolerance.
     Speed(TurnLength),

@@ -92,10 +92,10 @@ impl Conditioner for LowPass {
         let half_power_hz = two_pass_half_power_hz(self.order, self.cutoff_hz, rate_hz);
         capture.responses.push(Response {
             description: format!(
-                "low-pass, zero-phase Butterworth, order {} twice, −3 dB at {} Hz (each pass at {} Hz)",
+                "low-pass, zero-phase Butterworth, order {} at {} Hz twice, −3 dB at {} Hz",
                 self.order,
-                significant(half_power_hz),
-                significant(self.cutoff_hz)
+                significant(self.cutoff_hz, 4),
+                significant(half_power_hz, 4)
             ),
             half_power_hz,
         });
@@ -119,9 +119,9 @@ impl Conditioner for LowPass {
     }
 }
 
-/// Four significant digits.
-fn significant(value: f64) -> String {
-    let decimals = (3.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+/// A number in so many significant digits.
+pub(crate) fn significant(value: f64, digits: u8) -> String {
+    let decimals = (f64::from(digits) - 1.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
     let text = format!("{value:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }

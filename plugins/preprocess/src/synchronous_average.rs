@@ -15,7 +15,7 @@ mod window;
 
 use runout_core::{
     Error, Result,
-    measurement::{Block, Capture, SampleStream},
+    measurement::{Block, Capture, Response, SampleStream},
     numerics::fourier,
     pipeline::{
         error::Fault,
@@ -31,11 +31,14 @@ use kernel::{Kernel, PASS_BAND};
 use resample::Resampling;
 use turns::Turn;
 
+use crate::low_pass::significant;
+
 /// Averages whole turns, one harmonic at a time, with the covariance across channels.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SynchronousAverageConfig {
-    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them.
+    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them, which may not lie
+    /// above half the samples that a turn was recorded with.
     pub samples_per_rev: usize,
     /// Fewest turns that make an average, at least 1; the covariance needs 2.
     #[serde(default = "default_min_turns")]
@@ -115,6 +118,28 @@ impl SynchronousAverage {
         Err(Error::new("average", &capture.object, problem).help(help))
     }
 
+    /// That the marks make turns which can hold what is asked for.
+    fn holds(&self, capture: &Capture) -> Result<()> {
+        let Some(turn) = capture.median_turn_samples() else { return Ok(()) };
+        let error = |problem| Error::new("average", &capture.object, problem);
+        if turn < SHORTEST_TURN {
+            let problem = format!("its median turn is {turn:.4} samples long, at least {SHORTEST_TURN} are needed");
+            let help = "are the marks sample positions? Marks in seconds are to be multiplied by the sampling rate";
+            return Err(error(problem).help(help));
+        }
+        if self.max_order() as f64 > 0.5 * turn {
+            let problem = format!(
+                "samples_per_rev = {} asks for orders to {}, {turn:.1} samples a turn hold none above {:.1}",
+                self.config.samples_per_rev,
+                self.max_order(),
+                0.5 * turn
+            );
+            let most = 2 * (0.5 * turn) as usize;
+            return Err(error(problem).help(format!("set samples_per_rev to an even number, at most {most}")));
+        }
+        Ok(())
+    }
+
     fn warnings(&self, capture: &Capture, speed_rpm: Option<f64>, exact: bool) -> Vec<String> {
         let mut warnings = Vec::new();
         if let (Some(measured), Some(stated)) = (speed_rpm, capture.stated_speed_rpm) {
@@ -143,13 +168,30 @@ impl SynchronousAverage {
     }
 }
 
+/// Fewest samples that a turn may have: fewer come from marks in another unit.
+const SHORTEST_TURN: f64 = 8.0;
+/// A filter below this order weakens the form from its lowest order on.
+const FORM_FROM_ORDER: f64 = 2.0;
+
+/// Says of each filter at which order it is −3 dB, and warns of those that take the form away.
+fn in_orders(responses: &mut [Response], speed_rpm: f64, object: &str, warnings: &mut Vec<String>) {
+    for response in responses {
+        let order = response.half_power_hz * 60.0 / speed_rpm;
+        response.description.push_str(&format!(" = order {}", significant(order, 3)));
+        if order < FORM_FROM_ORDER {
+            warnings.push(format!("{object}: the filter removes the form itself: {}", response.description));
+        }
+    }
+}
+
 impl Averager for SynchronousAverage {
     fn max_order(&self) -> usize {
         fourier::max_order(self.config.samples_per_rev)
     }
 
     fn average(&self, mut input: Box<dyn SampleStream + '_>) -> Result<Profile> {
-        let capture = input.capture().clone();
+        let mut capture = input.capture().clone();
+        self.holds(&capture)?;
         let first_turn = capture.first_turn();
         let turns = turns::cut(&capture, 0.01 * self.config.turn_tolerance_percent);
         let mut count = TurnCount {
@@ -180,7 +222,10 @@ impl Averager for SynchronousAverage {
 
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
-        let warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        if let Some(speed_rpm) = speed_rpm {
+            in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
+        }
         Ok(Profile {
             object: capture.object,
             setup: capture.setup,

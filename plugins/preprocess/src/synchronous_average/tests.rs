@@ -98,7 +98,8 @@ fn irrational_turns_are_resampled_to_the_kernels_error() {
             let first = 30.4;
             let frames = (8.1 * length) as usize + 60;
             let input = stream(&turning(channels, frames, first, length), marks(first, length, 9));
-            let profile = average(1000, input).unwrap();
+            let samples_per_rev = if length < 1000.0 { 730 } else { 1000 };
+            let profile = average(samples_per_rev, input).unwrap();
             assert_eq!(profile.turns.used, 8);
             // The kernel's share of an amplitude of 5 µm.
             assert!(worst(&profile) < 5.0 * kernel::ERROR, "{length}: {:e}", worst(&profile));
@@ -288,6 +289,11 @@ fn turns_keep_their_numbers_through_trim_and_filter() {
     assert_eq!(reasons(&profile), [(7, &reason)]);
     assert_eq!(profile.turns.used, 8);
     assert_eq!(profile.responses.len(), 1);
+    // 2000 rpm: 33.33 Hz an order.
+    let response = &profile.responses[0];
+    let order: f64 = response.description.rsplit(" = order ").next().unwrap().parse().unwrap();
+    // Three digits.
+    assert!((order - response.half_power_hz * 600.0 / RATE_HZ).abs() < 0.6, "{}", response.description);
 }
 
 #[test]
@@ -423,4 +429,39 @@ fn marks_that_make_no_sense_are_no_panic() {
             let _ = average(16, input);
         }
     }
+}
+
+#[test]
+fn a_filter_that_removes_the_form_is_a_warning() {
+    use crate::{LowPassConfig, testing::conditioner};
+    // 33.33 Hz an order; of order 4 twice, −3 dB lies a tenth below the cut-off.
+    for (cutoff_hz, warned) in [(20.0, true), (60.0, true), (90.0, false)] {
+        let filter = conditioner(LowPassConfig { cutoff_hz, order: 4 });
+        let input = stream(&turning(1, 6000, 0.0, 600.0), marks(0.0, 600.0, 11));
+        let profile = averager(config(300)).average(filter.attach(Box::new(input)).unwrap()).unwrap();
+        let found = profile
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("removes the form") && warning.contains(" = order "));
+        assert_eq!(found, warned, "{cutoff_hz}: {:?}", profile.warnings);
+    }
+}
+
+#[test]
+fn marks_in_seconds_are_an_error() {
+    let places = marks(0.0, 600.0 / RATE_HZ, 11);
+    let error = average(300, stream(&turning(1, 6000, 0.0, 600.0), places)).unwrap_err();
+    assert!(error.to_string().contains("median turn is 0.0300 samples long"), "{error}");
+    assert!(error.advice().unwrap().contains("sample positions"));
+}
+
+#[test]
+fn orders_above_half_a_turns_samples_are_an_error() {
+    let input = |length: f64| stream(&turning(1, 6000, 0.0, length), marks(0.0, length, 11));
+    assert_eq!(average(512, input(511.8)).unwrap().max_order(), 255);
+    assert!(average(512, input(509.0)).is_err());
+    let error = average(4096, input(511.8)).unwrap_err();
+    let said = error.to_string();
+    assert!(said.contains("orders to 2047") && said.contains("none above 255.9"), "{said}");
+    assert!(error.advice().unwrap().contains("at most 510"), "{:?}", error.advice());
 }

@@ -113,7 +113,7 @@ fn reason(capture: &Capture, rejection: &Rejection) -> String {
     };
     match rejection {
         Rejection::MissingMark(_) => "a mark is missing".into(),
-        Rejection::DoubledMark(_) => "a mark was counted twice".into(),
+        Rejection::DoubledMark(_) => "cut by or next to a mark that was counted twice".into(),
         Rejection::Speed(_) => "off speed".into(),
         Rejection::Defect { sensor: index, kind } => format!("{} is {kind}", sensor(index)),
         Rejection::Outlier { sensor: index, .. } => format!("{} is far from the other turns", sensor(index)),
