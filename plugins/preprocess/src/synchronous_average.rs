@@ -37,8 +37,7 @@ use crate::low_pass::significant;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SynchronousAverageConfig {
-    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them, which may not lie
-    /// above half the samples that a turn was recorded with.
+    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them.
     pub samples_per_rev: usize,
     /// Fewest turns that make an average, at least 1; the covariance needs 2.
     #[serde(default = "default_min_turns")]
@@ -177,7 +176,7 @@ const FORM_FROM_ORDER: f64 = 2.0;
 fn in_orders(responses: &mut [Response], speed_rpm: f64, object: &str, warnings: &mut Vec<String>) {
     for response in responses {
         let order = response.half_power_hz * 60.0 / speed_rpm;
-        response.description.push_str(&format!(" = order {}", significant(order, 3)));
+        response.description = format!("{} = order {}", response.description, significant(order, 3));
         if order < FORM_FROM_ORDER {
             warnings.push(format!("{object}: the filter removes the form itself: {}", response.description));
         }
