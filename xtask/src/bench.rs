@@ -74,7 +74,7 @@ pub fn campaign(words: &[&str]) -> Outcome {
     for name in ["f64", "i16"].into_iter().take(if wanted.i16 { 2 } else { 1 }) {
         let mut compare = script("compare.py");
         compare.arg(target().join("release/runout")).arg(&peers).arg(&wanted.scratch);
-        run(compare.arg(wanted.rounds.to_string()).arg(name))?;
+        run(compare.arg(wanted.rounds.to_string()).arg(name).arg(wanted.stations.to_string()))?;
     }
     Ok(())
 }

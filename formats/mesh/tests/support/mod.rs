@@ -8,8 +8,9 @@ use std::{
     process::{Command, Output},
 };
 
-use runout_core::{atomic_file::commit_all, 
+use runout_core::{
     Complex64, Error,
+    atomic_file::commit_all,
     pipeline::{
         error::Fault,
         registry::{Context, Registry},
