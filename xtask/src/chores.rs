@@ -14,8 +14,11 @@ pub fn test(foreign_readers: bool) -> Outcome {
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
     run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;
     let nextest = answer("cargo-nextest", &["--version"]).is_some();
-    let runner: &[&str] =
-        if nextest { &["nextest", "run", "--workspace"] } else { &["test", "--workspace", "--all-targets"] };
+    let runner: &[&str] = if nextest {
+        &["nextest", "run", "--workspace", "--no-fail-fast"]
+    } else {
+        &["test", "--workspace", "--all-targets", "--no-fail-fast"]
+    };
     let mut tests = cargo(runner)?;
     if foreign_readers {
         foreign::equip(&mut tests)?;
