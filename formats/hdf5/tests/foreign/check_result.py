@@ -38,7 +38,7 @@ with h5py.File(sys.argv[1]) as file:
     assert list(harmonics["order"][:]) == [1, 2] * 4
 
     assert json.loads(file["summary"].asstr()[()])["lost_orders"]["form"] == [1]
-    assert list(file["warnings"].asstr()[:]) == ["order 1 of the form is lost"]
+    assert list(file["warnings"].asstr()[:]) == ["order 1 of the form is lost", "s1: left out 3 points"]
     provenance = file["provenance"]
     assert "µm" in provenance["configuration"].asstr()[()]
     assert list(provenance["inputs/path"].asstr()[:]) == ["shaft.h5"]
