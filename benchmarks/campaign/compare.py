@@ -1,0 +1,100 @@
+"""Times runout and the peers in turns on the same campaign and prints a Markdown table.
+
+usage: compare.py RUNOUT PEERS SCRATCH ROUNDS NAME STATIONS
+
+NAME is f64 or i16, as write_record.py wrote them. Standard library only: a process starts with its parent's peak memory to its name, and this one is
+small.
+"""
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+runout, peers, scratch, rounds, name, stations = sys.argv[1:7]
+here = Path(__file__).parent
+runout, peers, scratch = (Path(path).resolve() for path in (runout, peers, scratch))
+out = scratch / "out"
+WORKERS = (1, 2)
+
+
+def python(script, *arguments):
+    return [sys.executable, "-B", str(here / script), *map(str, arguments)]
+
+
+def answer(command):
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+
+
+def run_runout(threads):
+    """Wall and processor seconds of the whole process, and its peak memory in MiB."""
+    command = [runout, "run", str(here / "pipeline.toml"), "--threads", str(threads)]
+    for key, value in (
+        ("load.path", f"{scratch}/record-{name}-{stations}.h5"),
+        ("export.0.path", out),
+        ("export.1.path", out / "result.h5"),
+    ):
+        command += ["--set", f"{key}={value}"]
+    started = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.perf_counter() - started
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        sys.exit(f"{' '.join(command)} failed ({process.returncode})")
+    return {"seconds": seconds, "busy": usage.ru_utime + usage.ru_stime, "peak_mib": usage.ru_maxrss / 1024}
+
+
+def run_peers(processes):
+    return answer(python("peers.py", peers, f"{scratch}/peers-{name}-{stations}.h5", processes))
+
+
+def busy():
+    """Processor seconds that everybody used so far: user, nice, system, interrupts, stolen."""
+    fields = Path("/proc/stat").read_text().split(maxsplit=9)[1:9]
+    return sum(int(fields[i]) for i in (0, 1, 2, 5, 6, 7)) / os.sysconf("SC_CLK_TCK")
+
+
+def own():
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
+
+
+found = {(who, workers): [] for who in (run_runout, run_peers) for workers in WORKERS}
+for who, workers in found:
+    who(workers)  # files into the page cache, programs into memory
+began, elsewhere = time.perf_counter(), busy() - own()
+for round in range(int(rounds)):
+    for (who, workers), runs in found.items():
+        runs.append(who(workers))
+elsewhere = max(0.0, busy() - own() - elsewhere) / (time.perf_counter() - began)
+
+
+def median(who, workers, value):
+    return statistics.median(run[value] for run in found[who, workers])
+
+
+print(f"\n{stations} stations, {name} samples; median of {rounds} runs each, in turns\n")
+print("| workers | runout, s | its CPU, s | peers, s | peers / runout | runout, peak MiB | peers, peak MiB |")
+print("| --- | --- | --- | --- | --- | --- | --- |")
+for workers in WORKERS:
+    ours, theirs = median(run_runout, workers, "seconds"), median(run_peers, workers, "seconds")
+    cells = [
+        f"{workers}",
+        f"{ours:.2f}",
+        f"{median(run_runout, workers, 'busy'):.2f}",
+        f"{theirs:.2f}",
+        f"{theirs / ours:.2f}",
+        f"{median(run_runout, workers, 'peak_mib'):.0f}",
+        f"{median(run_peers, workers, 'peak_mib'):.0f}",
+    ]
+    print(f"| {' | '.join(cells)} |")
+checked = answer(python("check.py", out / "result.h5"))
+theirs = found[run_peers, 1][-1]["form_error_um"]
+print(f"\nForm against the record's own, rms µm, median and worst station: runout {checked['form_error_um'][0]:.5f} "
+      f"{checked['form_error_um'][1]:.5f}, peers {theirs[0]:.5f} {theirs[1]:.5f}.")
+print(f"Motion, worst station: runout x {checked['motion_error_um'][0]:.5f}, y {checked['motion_error_um'][1]:.5f}.")
+if elsewhere > 0.3:
+    print(f"\nOther programs kept {elsewhere:.1f} processors busy meanwhile: do not trust these times.")

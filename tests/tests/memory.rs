@@ -1,0 +1,184 @@
+//! Peak memory does not grow with the number of stations.
+//!
+//! One recording in a file, run from loading to exporting with 16 and with 48 stations. An allocator of this test's own
+//! counts every byte that Rust code holds; what libhdf5 holds shows in the process's resident memory.
+//!
+//! Parquet tables are written in groups of 65 536 rows, which are held until they are full: with 4096 angles a turn the
+//! largest table has its first group full after 16 stations.
+
+#![allow(unsafe_code, reason = "an allocator that counts is one by nature")]
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    fs,
+    num::NonZeroUsize,
+    path::Path,
+    sync::atomic::{AtomicUsize, Ordering},
+};
+
+use runout_core::{
+    pipeline::{
+        Registry,
+        config::{INCLUDE_KEY, Pipeline},
+        document::Sources,
+        run::{Silent, run},
+    },
+    stage::Simulator,
+};
+use runout_hdf5::{WriteOptions, write_measurement};
+use runout_spindle::simulate::{SpindleConfig, simulator};
+
+/// The system's allocator, with the bytes that are held and the most that were since the count was last set back.
+struct Counting;
+
+static HELD: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+
+fn taken(bytes: usize) {
+    let held = HELD.fetch_add(bytes, Ordering::Relaxed) + bytes;
+    PEAK.fetch_max(held, Ordering::Relaxed);
+}
+
+// SAFETY: every call goes on to the system's allocator as it came; `realloc` is the trait's own, made of these.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller's.
+        let place = unsafe { System.alloc(layout) };
+        if !place.is_null() {
+            taken(layout.size());
+        }
+        place
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        // SAFETY: the caller's.
+        unsafe { System.dealloc(place, layout) };
+        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const SCENARIO: &str = r#"
+    seed = 7
+    geometry = "linear"
+    [rig]
+    part_radius_mm = 30
+    sensors = [
+      { id = "S1", angle_deg = 0,  z_mm = 200, section = "a" },
+      { id = "S2", angle_deg = 90, z_mm = 200, section = "a" },
+      { id = "S3", angle_deg = 0,  z_mm = 230, section = "b" },
+      { id = "S4", angle_deg = 90, z_mm = 230, section = "b" },
+    ]
+    setups = [
+      { id = "initial" },
+      { id = "reversed", part_deg = 180, sensors_deg = 180 },
+    ]
+    [recording]
+    revolutions = 6
+    samples_per_rev = 4096
+    [form]
+    rms_um = 4
+    max_order = 30
+    [motion]
+    x_rms_um = 1
+    y_rms_um = 1
+    [noise]
+    rms_um = 0.05
+"#;
+
+const STAGES: &str = r#"
+    [[preprocess]]
+    plugin = "low-pass"
+    cutoff_hz = 8000
+    [[preprocess]]
+    plugin = "synchronous-average"
+    samples_per_rev = 4096
+    [separate]
+    plugin = "harmonic-least-squares"
+"#;
+
+/// Samples of one station: 2 setups, 4 sensors, 6 turns of 4096, in f64.
+const STATION_BYTES: usize = 2 * 4 * 6 * 4096 * 8;
+const FEW: usize = 16;
+const MANY: usize = 48;
+/// What a station may leave behind: its lines in the summary and in the tables' indices, as values, then as text.
+const LEFT_BYTES: usize = 24 * 1024;
+
+fn registry() -> Registry {
+    let mut registry = Registry::default();
+    runout_hdf5::register(&mut registry);
+    runout_preprocess::register(&mut registry);
+    runout_spindle::register(&mut registry);
+    runout_parquet::register(&mut registry);
+    registry
+}
+
+/// Writes a recording of so many stations.
+fn record(stations: usize, path: &Path) {
+    let scenario = format!("{SCENARIO}\n[recording.stations]\ncount = {stations}\n");
+    let config: SpindleConfig = toml::from_str(&scenario).unwrap();
+    let simulator = simulator(&config).unwrap();
+    let options = WriteOptions { deflate: None, ..WriteOptions::default() };
+    write_measurement(&simulator.spindle_recording(), simulator.rig(), path, &options, &mut |_| {}).unwrap();
+}
+
+/// What a run over so many stations needs.
+struct Peaks {
+    /// Most bytes of Rust code's at a time, above those held before.
+    counted: usize,
+    /// Most resident memory of the whole process, where the system tells.
+    resident: Option<usize>,
+}
+
+fn measure(stations: usize, folder: &Path) -> Peaks {
+    let name = format!("of-{stations}");
+    record(stations, &folder.join(format!("{name}.h5")));
+    let rig =
+        SCENARIO.split("[recording]").next().unwrap().replace("seed = 7", "").replace("geometry = \"linear\"", "");
+    let text = format!(
+        "{rig}\n[load]\nplugin = \"hdf5\"\npath = \"{name}.h5\"\n{STAGES}\n\
+         [[export]]\nplugin = \"parquet\"\npath = \"{name}\"\n\
+         [[export]]\nplugin = \"hdf5\"\npath = \"{name}/result.h5\"\n"
+    );
+    let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY).unwrap();
+    let pipeline = Pipeline::from_sources(&sources, &registry()).unwrap();
+
+    // Writing 5 there sets the process's peak back to what it holds now (proc(5)).
+    let told = fs::write("/proc/self/clear_refs", "5").is_ok();
+    let before = HELD.load(Ordering::Relaxed);
+    PEAK.store(before, Ordering::Relaxed);
+    let summary = run(&pipeline, NonZeroUsize::new(1), &Silent).unwrap();
+    let counted = PEAK.load(Ordering::Relaxed) - before;
+    assert_eq!(summary.stations.len(), stations);
+    Peaks { counted, resident: told.then(resident_peak).flatten() }
+}
+
+fn resident_peak() -> Option<usize> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<usize>().ok()? * 1024)
+}
+
+#[test]
+fn peak_memory_does_not_grow_with_stations() {
+    let folder = tempfile::tempdir().unwrap();
+    // What is made once in a process shall not count for the first of the runs.
+    measure(2, folder.path());
+    let [few, many] = [FEW, MANY].map(|stations| measure(stations, folder.path()));
+    let more = MANY - FEW;
+    println!("counted: {} bytes with {FEW} stations, {} with {MANY}", few.counted, many.counted);
+    let grown = many.counted.saturating_sub(few.counted);
+    assert!(grown < more * LEFT_BYTES, "{grown} bytes more with {more} stations more");
+    // A station's samples are far more than what it may leave; else this would show nothing.
+    const { assert!(STATION_BYTES > 50 * LEFT_BYTES) };
+
+    if let (Some(few), Some(many)) = (few.resident, many.resident) {
+        println!("resident: {few} bytes with {FEW} stations, {many} with {MANY}");
+        let grown = many.saturating_sub(few);
+        // libhdf5's caches of groups and attributes fill up meanwhile, to a limit of their own.
+        assert!(grown < more * STATION_BYTES / 4, "{grown} bytes more resident with {more} stations more");
+    }
+}
