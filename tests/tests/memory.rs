@@ -3,8 +3,8 @@
 //! One recording in a file, run from loading to exporting with 16 and with 48 stations. An allocator of this test's own
 //! counts every byte that Rust code holds; what libhdf5 holds shows in the process's resident memory.
 //!
-//! Parquet tables are written in groups of 65 536 rows, which are held until they are full: with 4096 angles a turn the
-//! largest table has its first group full after 16 stations.
+//! Parquet tables are written in groups of 65 536 rows, which are held until they are full: with 4096 angles a turn every
+//! table has filled one after 16 stations.
 
 #![allow(unsafe_code, reason = "an allocator that counts is one by nature")]
 #![allow(clippy::unwrap_used, reason = "tests")]
