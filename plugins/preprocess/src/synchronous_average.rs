@@ -37,7 +37,8 @@ use crate::low_pass::significant;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SynchronousAverageConfig {
-    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them.
+    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them, as far as the recording
+    /// has them.
     pub samples_per_rev: usize,
     /// Fewest turns that make an average, at least 1; the covariance needs 2.
     #[serde(default = "default_min_turns")]
@@ -117,24 +118,14 @@ impl SynchronousAverage {
         Err(Error::new("average", &capture.object, problem).help(help))
     }
 
-    /// That the marks make turns which can hold what is asked for.
-    fn holds(&self, capture: &Capture) -> Result<()> {
+    /// That the marks make turns.
+    fn are_turns(capture: &Capture) -> Result<()> {
         let Some(turn) = capture.median_turn_samples() else { return Ok(()) };
         let error = |problem| Error::new("average", &capture.object, problem);
         if turn < SHORTEST_TURN {
             let problem = format!("its median turn is {turn:.4} samples long, at least {SHORTEST_TURN} are needed");
             let help = "are the marks sample positions? Marks in seconds are to be multiplied by the sampling rate";
             return Err(error(problem).help(help));
-        }
-        if self.max_order() as f64 > 0.5 * turn {
-            let problem = format!(
-                "samples_per_rev = {} asks for orders to {}, {turn:.1} samples a turn hold none above {:.1}",
-                self.config.samples_per_rev,
-                self.max_order(),
-                0.5 * turn
-            );
-            let most = 2 * (0.5 * turn) as usize;
-            return Err(error(problem).help(format!("set samples_per_rev to an even number, at most {most}")));
         }
         Ok(())
     }
@@ -151,12 +142,19 @@ impl SynchronousAverage {
             }
         }
         let Some(turn) = capture.median_turn_samples() else { return warnings };
+        if self.max_order() > orders_held(turn) {
+            warnings.push(format!(
+                "{turn:.0} samples a turn hold no orders above {}: the average ends there, on {} angles",
+                orders_held(turn),
+                self.config.samples_per_rev
+            ));
+        }
         let held = (PASS_BAND * 0.5 * turn) as usize;
         let filtered = |rate_hz: f64| {
             let band_hz = PASS_BAND * 0.5 * rate_hz;
             capture.responses.iter().any(|response| response.half_power_hz <= band_hz)
         };
-        if !exact && self.max_order() > held && !capture.sample_rate_hz.is_some_and(filtered) {
+        if !exact && self.max_order().min(orders_held(turn)) > held && !capture.sample_rate_hz.is_some_and(filtered) {
             warnings.push(format!(
                 "{}: {turn:.0} samples a turn carry orders to {held} through the resampling in angle; those above are \
                  weakened",
@@ -165,6 +163,11 @@ impl SynchronousAverage {
         }
         warnings
     }
+}
+
+/// Highest order that turns of this many samples hold.
+fn orders_held(turn_samples: f64) -> usize {
+    (0.5 * turn_samples) as usize
 }
 
 /// Fewest samples that a turn may have: fewer come from marks in another unit.
@@ -190,7 +193,7 @@ impl Averager for SynchronousAverage {
 
     fn average(&self, mut input: Box<dyn SampleStream + '_>) -> Result<Profile> {
         let mut capture = input.capture().clone();
-        self.holds(&capture)?;
+        Self::are_turns(&capture)?;
         let first_turn = capture.first_turn();
         let turns = turns::cut(&capture, 0.01 * self.config.turn_tolerance_percent);
         let mut count = TurnCount {
@@ -213,12 +216,20 @@ impl Averager for SynchronousAverage {
         while input.next_block(&mut block)? {
             resampling.take(&mut block);
         }
-        let outcome = resampling.finish();
+        let mut outcome = resampling.finish();
         count.used = outcome.used;
         count.rejected.extend(outcome.rejected);
         count.rejected.sort_by_key(|turn| turn.turn);
         self.enough(&capture, &count, count.used)?;
 
+        if let Some(turn) = capture.median_turn_samples() {
+            // What the recording cannot hold is not found to be 0: it is not there.
+            let (orders, channels) = (orders_held(turn) + 1, capture.channels());
+            outcome.mean.truncate(orders * channels);
+            if let Some(covariance) = &mut outcome.covariance {
+                covariance.truncate(orders * channels * channels);
+            }
+        }
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
