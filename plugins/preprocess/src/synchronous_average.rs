@@ -165,9 +165,9 @@ impl SynchronousAverage {
     }
 }
 
-/// Highest order that turns of this many samples hold.
+/// Highest order that turns of this many samples hold, below Nyquist as for whole numbers of samples.
 fn orders_held(turn_samples: f64) -> usize {
-    (0.5 * turn_samples) as usize
+    (0.5 * (turn_samples - 1.0)) as usize
 }
 
 /// Fewest samples that a turn may have: fewer come from marks in another unit.
