@@ -185,8 +185,8 @@ fn misfit(stations: &[StationSummary]) -> Option<String> {
     let left = worst.residual_rms_um.unwrap_or(f64::NAN);
     let expected = worst.expected_residual_rms_um.unwrap_or(f64::NAN);
     Some(format!(
-        "at {count} of {} stations the readings contradict each other: the fit leaves up to {left:.2e} µm rms ({}), where \
-         the turns' scatter lets expect {expected:.2e}; something is not as the rig declares it, and the stated \
+        "at {count} of {} stations the readings contradict each other: the fit leaves up to {left:.4} µm rms ({}), where \
+         the turns' scatter lets expect {expected:.4}; something is not as the rig declares it, and the stated \
          uncertainties, which come from that scatter alone, do not cover it",
         stations.len(),
         worst.station,
