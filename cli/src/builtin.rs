@@ -12,6 +12,7 @@ pub fn registry() -> Registry {
         runout_preprocess::register,
         runout_spindle::register,
         runout_cylinder::register,
+        runout_straightness::register,
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,

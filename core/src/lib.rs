@@ -17,6 +17,7 @@ pub mod provenance;
 pub mod rig;
 pub mod separation;
 pub mod stage;
+pub mod straightness;
 pub mod surface;
 
 pub use error::{Error, Result};

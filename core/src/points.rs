@@ -29,7 +29,7 @@ pub struct Column {
 pub struct Trace {
     /// Its name in the file.
     pub id: String,
-    /// What it runs along: "circle", "generatrix".
+    /// What it runs along ("circle", "generatrix"), or the setup that it was measured in ("initial").
     pub kind: String,
     /// Its points.
     pub points: Range<usize>,

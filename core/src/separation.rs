@@ -115,10 +115,25 @@ pub struct Separation {
     pub variance: Vec<f64>,
     /// Whether the layout can tell it, `[order][unknown]`.
     pub observable: Vec<bool>,
+    /// Where x and y are the axis's displacement, in mm along the spindle: 0 where tilt is told, the sensors' plane
+    /// where it is not.
+    pub motion_z_mm: f64,
     /// What the fit leaves of the readings.
     pub residual: Residual,
     /// What the user should know.
     pub warnings: Vec<String>,
+}
+
+/// How small changes of the averaged readings move the estimates: δ estimate = operator · δ readings.
+///
+/// With it, two methods' results on the same readings can be compared: their errors are not independent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensitivity {
+    /// Readings an order: the channels of all profiles of the station, in their order.
+    pub readings: usize,
+    /// `[order][unknown][reading]` from order 0; 0 where the layout cannot tell. Forms of a clockwise part are meant
+    /// before they are conjugated.
+    pub operator: Vec<Complex64>,
 }
 
 /// A circle of the part.

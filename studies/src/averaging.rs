@@ -9,7 +9,8 @@ use runout_core::{
     Complex64, Error, Result, evaluate::texture::ra_um, measurement::Recording, numerics::fourier::Fourier,
 };
 use runout_spindle::{
-    separators::four_sensor_reversal::FourSensorReversal,
+    selection::Selection,
+    separators::four_sensor_reversal,
     simulate::{SpindleConfig, simulator},
 };
 
@@ -100,7 +101,7 @@ fn settings() -> SpindleConfig {
 pub fn study(config: &SpindleConfig) -> Result<Study> {
     let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
     let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
-    let separator = FourSensorReversal::new(rig.clone(), true, false)
+    let separator = four_sensor_reversal::separator(Selection::whole(&rig), true, false)
         .map_err(|fault| Error::new("set up", "the separator", fault))?;
     let samples = config.recording.samples_per_rev;
     let mut study = Study { own_um: [f64::NAN; 2], rows: Vec::new() };

@@ -46,7 +46,7 @@ pub fn rows(seeds: u64) -> Result<Vec<Row>> {
             for (second_order, errors, chi2) in
                 [(true, &mut row.exact_um, &mut row.chi2), (false, &mut row.linear_um, &mut row.linear_chi2)]
             {
-                let separator = HarmonicLeastSquares::new(rig.clone(), second_order, Weighting::TurnCovariance);
+                let separator = HarmonicLeastSquares::new(&rig, second_order, Weighting::TurnCovariance);
                 let outcome = campaign::separate(&station, &truth, &separator)?;
                 errors.push(outcome.form_error_um(2..=60));
                 chi2.push(outcome.separation.residual.chi2_per_dof);

@@ -1,6 +1,7 @@
 //! The standards' values of a separated form.
 
 pub mod roundness;
+pub mod straightness;
 pub mod texture;
 
 use schemars::JsonSchema;

@@ -18,6 +18,7 @@ use crate::{
     separation::Assessment,
     stage::{
         Averager, Conditioner, Exporter, Loader, PointSeparator, Preprocessor, Separator, SourceKind, StationSeparator,
+        TraceSeparator,
     },
     surface::SurfaceConfig,
 };
@@ -45,7 +46,7 @@ pub struct Pipeline {
     pub configuration: String,
 }
 
-/// The two ways from a measurement to form.
+/// The ways from a measurement to form.
 pub enum Route {
     /// Recorded turns, station by station.
     Turns {
@@ -60,6 +61,11 @@ pub enum Route {
     Points {
         /// Points to form.
         separator: Box<dyn PointSeparator>,
+    },
+    /// Measured traces along an axis, all at once.
+    Traces {
+        /// Traces to straightness.
+        separator: Box<dyn TraceSeparator>,
     },
 }
 
@@ -155,6 +161,12 @@ impl Pipeline {
                 }
                 match registry.separators.build(&separate_table, &context)? {
                     Separator::Points(separator) => (Route::Points { separator }, None),
+                    Separator::Traces(separator) => {
+                        if let Some(table) = table(root, "surface")? {
+                            return Err(Fault::span(table.span(), "straightness along one line makes no surface"));
+                        }
+                        (Route::Traces { separator }, None)
+                    }
                     Separator::Stations(_) => {
                         let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
                         return Err(document::resolve(fault, &separate_table));
@@ -166,6 +178,10 @@ impl Pipeline {
         let mut outputs: Vec<_> = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
         for table in tables(root, "export")? {
             let exporter = registry.exporters.build(&table, &context)?;
+            if matches!(route, Route::Traces { .. }) && exporter.straightness().is_none() {
+                let fault = Fault::at("plugin", "this exporter takes form; [separate] gives straightness along a line");
+                return Err(document::resolve(fault.help("take one that writes tables"), &table));
+            }
             for output in exporter.outputs() {
                 let place = resolved(&output);
                 if let Some((_, use_of_it)) = outputs.iter().find(|(other, _)| *other == place) {
@@ -241,7 +257,7 @@ fn turns(
                 separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
             Ok((Route::Turns { conditioners, averager, separator }, Some(assessment)))
         }
-        Separator::Points(_) => {
+        Separator::Points(_) | Separator::Traces(_) => {
             let fault = Fault::at("plugin", "this separator takes measured points; [load] gives recorded turns");
             Err(document::resolve(fault, separate_table))
         }

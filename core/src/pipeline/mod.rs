@@ -7,6 +7,7 @@ pub mod registry;
 pub mod result;
 pub mod run;
 pub mod summary;
+mod traces;
 
 pub use config::Pipeline;
 pub use registry::Registry;

@@ -13,12 +13,13 @@ use super::{
     config::{Pipeline, Route},
     result::complete,
     summary::summarise,
+    traces,
 };
 pub use super::{
     result::{RunInfo, StationResult},
     summary::{
-        CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
-        SurfaceSummary,
+        CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary,
+        StraightnessSummary, StraightnessValues, Summary, SurfaceSummary,
     },
 };
 use crate::{
@@ -61,6 +62,9 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
         Source::Points(points) => vec![points.input.clone()],
     };
     spare_inputs(pipeline, &inputs)?;
+    if let (Source::Points(points), Route::Traces { separator }) = (&source, &pipeline.route) {
+        return traces::run(pipeline, points, &**separator);
+    }
     let mut gathering = Gathering::begin(pipeline, &info)?;
     let (inputs, surface, remarks) = match (&source, &pipeline.route) {
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator }) => {
@@ -106,19 +110,7 @@ impl Gathering {
             exports: exports?,
             surface: wanted.then(|| SurfaceBuilder::new(&pipeline.surface)),
             summary_path: pipeline.summary_path(),
-            summary: Summary {
-                title: pipeline.title.clone(),
-                provenance: Provenance {
-                    program: format!("runout {VERSION}"),
-                    configuration: pipeline.configuration.clone(),
-                    inputs: Vec::new(),
-                },
-                lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
-                stations: Vec::new(),
-                surface: None,
-                outputs: Vec::new(),
-                warnings: pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default(),
-            },
+            summary: begun(pipeline),
         })
     }
 
@@ -151,17 +143,44 @@ impl Gathering {
         for export in self.exports {
             complete.extend(export.finish(&self.summary, surface)?);
         }
-        let named = complete.iter().map(|file| file.destination().to_path_buf());
-        self.summary.outputs = named.chain(self.summary_path.clone()).collect();
-        if let Some(path) = self.summary_path {
-            let file = PendingFile::new(path)?;
-            let text = serde_json::to_vec_pretty(&self.summary).map_err(|error| file.failure(error))?;
-            std::fs::write(file.path(), text).map_err(|error| file.failure(error))?;
-            complete.push(file);
-        }
-        commit_all(complete)?;
-        Ok(self.summary)
+        conclude(self.summary, complete, self.summary_path)
     }
+}
+
+/// A summary of nothing yet.
+pub(super) fn begun(pipeline: &Pipeline) -> Summary {
+    Summary {
+        title: pipeline.title.clone(),
+        provenance: Provenance {
+            program: format!("runout {VERSION}"),
+            configuration: pipeline.configuration.clone(),
+            inputs: Vec::new(),
+        },
+        lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
+        stations: Vec::new(),
+        surface: None,
+        straightness: None,
+        outputs: Vec::new(),
+        warnings: pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default(),
+    }
+}
+
+/// Writes the summary and gives all files their names.
+pub(super) fn conclude(
+    mut summary: Summary,
+    mut complete: Vec<PendingFile>,
+    summary_path: Option<PathBuf>,
+) -> Result<Summary> {
+    let named = complete.iter().map(|file| file.destination().to_path_buf());
+    summary.outputs = named.chain(summary_path.clone()).collect();
+    if let Some(path) = summary_path {
+        let file = PendingFile::new(path)?;
+        let text = serde_json::to_vec_pretty(&summary).map_err(|error| file.failure(error))?;
+        std::fs::write(file.path(), text).map_err(|error| file.failure(error))?;
+        complete.push(file);
+    }
+    commit_all(complete)?;
+    Ok(summary)
 }
 
 /// Refuses to write over what the run reads.

@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use super::result::{StationResult, true_error};
 use crate::{
-    evaluate::Value,
+    evaluate::{Value, straightness::strt_lsli_um},
     profile::{Profile, Rejection, TurnLength},
     provenance::Provenance,
     rig::Rig,
     separation::{Assessment, Quantity},
+    straightness::Straightness,
     surface::Meeting,
 };
 
@@ -28,6 +29,8 @@ pub struct Summary {
     pub stations: Vec<StationSummary>,
     /// The surface, where one was built.
     pub surface: Option<SurfaceSummary>,
+    /// Straightness of part and slide, where traces along an axis were separated.
+    pub straightness: Option<StraightnessSummary>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
     /// What the user should know.
@@ -155,6 +158,60 @@ pub struct SurfaceSummary {
     pub interpolation: String,
     /// Where sections of different sensors meet, and how well they agree.
     pub meetings: Vec<Meeting>,
+}
+
+/// Straightness of part and slide in a [`Summary`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StraightnessSummary {
+    /// First and last position, in mm.
+    pub z_mm: [f64; 2],
+    /// Positions.
+    pub points: usize,
+    /// Of the part.
+    pub part: StraightnessValues,
+    /// Of the slide.
+    pub slide: StraightnessValues,
+    /// Standard deviation of one trace at one position (root mean square over the positions), in µm; null without
+    /// repeated traces.
+    pub repeatability_um: Option<f64>,
+    /// Degrees of freedom behind each position's standard uncertainty.
+    pub degrees_of_freedom: usize,
+}
+
+/// One straightness deviation of a [`StraightnessSummary`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StraightnessValues {
+    /// Peak-to-valley straightness deviation STRt about the least-squares line LSLI (ISO 12780-1), unfiltered, in µm.
+    pub strt_um: f64,
+    /// Root mean square deviation about that line, in µm.
+    pub rms_um: f64,
+    /// Standard uncertainty of the deviation at a position (root mean square over the positions), in µm; null without
+    /// repeated traces.
+    pub std_um: Option<f64>,
+}
+
+impl From<&Straightness> for StraightnessSummary {
+    fn from(result: &Straightness) -> Self {
+        let known = |value: f64| value.is_finite().then_some(value);
+        let values = |deviation_um: &[f64], std_um: &[f64]| StraightnessValues {
+            strt_um: strt_lsli_um(&result.z_mm, deviation_um),
+            rms_um: rms(deviation_um),
+            std_um: known(rms(std_um)),
+        };
+        let end = |z_mm: Option<&f64>| z_mm.copied().unwrap_or(f64::NAN);
+        Self {
+            z_mm: [end(result.z_mm.first()), end(result.z_mm.last())],
+            points: result.z_mm.len(),
+            part: values(&result.part_um, &result.part_std_um),
+            slide: values(&result.slide_um, &result.slide_std_um),
+            repeatability_um: known(result.repeatability_um),
+            degrees_of_freedom: result.degrees_of_freedom,
+        }
+    }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSummary {

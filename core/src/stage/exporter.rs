@@ -6,6 +6,7 @@ use crate::{
     Result,
     atomic_file::PendingFile,
     pipeline::run::{RunInfo, StationResult, Summary},
+    straightness::Straightness,
     surface::Surface,
 };
 
@@ -19,11 +20,25 @@ pub trait Exporter: Send + Sync {
         false
     }
 
+    /// How it writes straightness; `None` where it has no place for it, so that `check` can refuse it.
+    fn straightness(&self) -> Option<&dyn StraightnessExporter> {
+        None
+    }
+
     /// Begins an export. Files appear under their names only when it is finished.
     ///
     /// # Errors
     /// When the place cannot be written to.
     fn begin(&self, run: &RunInfo) -> Result<Box<dyn Export>>;
+}
+
+/// Writes the straightness of part and slide, all at once.
+pub trait StraightnessExporter {
+    /// Completes the files. The run gives them their names when every exporter's are complete.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    fn write(&self, result: &Straightness, summary: &Summary) -> Result<Vec<PendingFile>>;
 }
 
 /// An export under way: stations come in order, one at a time.

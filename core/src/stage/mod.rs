@@ -6,8 +6,8 @@ pub mod preprocessor;
 pub mod separator;
 pub mod simulator;
 
-pub use exporter::{Export, Exporter};
+pub use exporter::{Export, Exporter, StraightnessExporter};
 pub use loader::{Loader, Source, SourceKind};
 pub use preprocessor::{Averager, Conditioner, Preprocessor};
-pub use separator::{PointSeparator, Separator, Station, StationSeparator};
+pub use separator::{PointSeparator, Separator, Station, StationSeparator, TraceSeparator};
 pub use simulator::Simulator;

@@ -6,7 +6,8 @@ use crate::{
     points::Points,
     profile::Profile,
     rig::Rig,
-    separation::{Assessment, Separation},
+    separation::{Assessment, Sensitivity, Separation},
+    straightness::Straightness,
     surface::Surface,
 };
 
@@ -16,6 +17,8 @@ pub enum Separator {
     Stations(Box<dyn StationSeparator>),
     /// All points at once.
     Points(Box<dyn PointSeparator>),
+    /// All traces along an axis at once.
+    Traces(Box<dyn TraceSeparator>),
 }
 
 /// Separates the profiles of one station. Built for one rig, which it has checked.
@@ -31,6 +34,12 @@ pub trait StationSeparator: Send + Sync {
     /// # Errors
     /// When the profiles do not fit the rig.
     fn separate(&self, station: &Station) -> Result<Separation>;
+
+    /// How its estimates follow from the readings of one station.
+    ///
+    /// # Errors
+    /// When the profiles do not fit the rig.
+    fn sensitivity(&self, station: &Station) -> Result<Sensitivity>;
 }
 
 /// One axial station, measured in every setup of the rig.
@@ -71,6 +80,15 @@ pub trait PointSeparator: Send + Sync {
     fn remarks(&self, _points: &Points, _surface: Option<&Surface>) -> Result<Vec<String>> {
         Ok(Vec::new())
     }
+}
+
+/// Separates traces along an axis into the straightness of the part and of the slide.
+pub trait TraceSeparator: Send + Sync {
+    /// Straightness of both.
+    ///
+    /// # Errors
+    /// When the traces do not hold what the method needs.
+    fn separate(&self, points: &Points) -> Result<Straightness>;
 }
 
 /// What a separator is built with besides its own configuration.

@@ -41,6 +41,7 @@ pub fn station(name: &str) -> StationResult {
             ],
             variance: vec![0.0, 0.0, f64::NAN, 0.01, 0.04, 0.09],
             observable: vec![true, true, false, true, true, true],
+            motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),
         },
@@ -71,6 +72,7 @@ pub fn summary() -> Summary {
             warnings: vec!["left out 3 points".into()],
         }],
         surface: None,
+        straightness: None,
         outputs: Vec::new(),
         warnings: vec!["order 1 of the form is lost".into()],
     }

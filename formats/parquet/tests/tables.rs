@@ -52,6 +52,7 @@ fn station(index: usize, motion: bool) -> StationResult {
         variance: places().map(|(order, _)| if lost(order) { f64::NAN } else { 0.02 }).collect(),
         observable: places().map(|(order, _)| !lost(order)).collect(),
         unknowns,
+        motion_z_mm: 0.0,
         residual: Residual::default(),
         warnings: Vec::new(),
     };
@@ -70,6 +71,7 @@ fn summary() -> Summary {
         lost_orders: LostOrders { form: vec![LOST], motion: vec![LOST] },
         stations: Vec::new(),
         surface: None,
+        straightness: None,
         outputs: Vec::new(),
         warnings: vec!["order 4 is lost".into()],
     }

@@ -34,7 +34,10 @@ pub struct Layout {
     pub mean_z_mm: f64,
     /// +1 where the part turns counter-clockwise.
     pub direction: f64,
-    sections: usize,
+    /// An unknown whose noise gain is above this is lost. Tilts count by what they move at the sensors' rms lever.
+    pub max_noise_gain: f64,
+    /// Sections that some sensor looks at.
+    sections: Vec<usize>,
     setups: usize,
     odd_motion: bool,
 }
@@ -96,7 +99,9 @@ impl Layout {
         let sees_x = readings.iter().any(|reading| reading.angle_rad.cos().abs() > ALONG_AXIS);
         let sees_y = readings.iter().any(|reading| reading.angle_rad.sin().abs() > ALONG_AXIS);
         let sees_tilt = readings.iter().any(|reading| reading.lever_mm != 0.0);
-        let mut unknowns: Vec<Quantity> = (0..rig.sections.len()).map(Quantity::Form).collect();
+        let looked_at = |section: &usize| rig.sensors.iter().any(|sensor| sensor.section == *section);
+        let sections: Vec<usize> = (0..rig.sections.len()).filter(looked_at).collect();
+        let mut unknowns: Vec<Quantity> = sections.iter().copied().map(Quantity::Form).collect();
         for (quantity, seen) in [
             (Quantity::X, sees_x),
             (Quantity::Y, sees_y),
@@ -112,10 +117,17 @@ impl Layout {
             unknowns,
             mean_z_mm,
             direction: rig.rotation.direction(),
-            sections: rig.sections.len(),
+            max_noise_gain: f64::INFINITY,
+            sections,
             setups: rig.setups.len(),
             odd_motion,
         }
+    }
+
+    /// The same layout, with a limit on the noise that an order may carry.
+    #[must_use]
+    pub fn limited_to(self, max_noise_gain: f64) -> Self {
+        Self { max_noise_gain, ..self }
     }
 
     /// +1, or −1 where motion of this order is assumed to change sign in this setup.
@@ -163,7 +175,8 @@ impl Layout {
     #[must_use]
     pub fn first_order_unknowns(&self) -> Vec<FirstOrder> {
         let setups = 0..self.setups;
-        let each = |setup| (0..self.sections).map(move |section| FirstOrder::Eccentricity { setup, section });
+        let each =
+            |setup| self.sections.iter().map(move |section| FirstOrder::Eccentricity { setup, section: *section });
         let mut unknowns: Vec<FirstOrder> = setups.flat_map(each).collect();
         unknowns.push(FirstOrder::CounterRotatingShift);
         if self.unknowns.iter().any(|unknown| matches!(unknown, Quantity::TiltX | Quantity::TiltY)) {
@@ -226,25 +239,47 @@ impl Layout {
     /// the counter-rotating part.
     #[must_use]
     pub fn observable(&self, order: usize) -> Vec<bool> {
-        let mut observable = self.factor(order).observable(NULL_TOLERANCE);
+        self.told(&self.factor(order), order)
+    }
+
+    fn told(&self, qr: &PivotedQr, order: usize) -> Vec<bool> {
+        let mut observable = qr.observable(NULL_TOLERANCE);
         if order == 1 {
             let unknowns = self.first_order_unknowns();
             let first = self.factor_matrix(unknowns.len(), &self.first_order_matrix()).observable(NULL_TOLERANCE);
-            let told = |wanted| unknowns.iter().zip(&first).any(|(unknown, told)| *unknown == wanted && *told);
+            let told =
+                |wanted| !unknowns.contains(&wanted) || unknowns.iter().zip(&first).any(|(u, t)| *u == wanted && *t);
             for (quantity, observable) in self.unknowns.iter().zip(&mut observable) {
                 *observable &= match quantity {
                     Quantity::Form(_) => true,
-                    // Motion is reported at the spindle's reference, where shift and tilt mix.
-                    Quantity::X | Quantity::Y => {
-                        told(FirstOrder::CounterRotatingShift)
-                            && (!unknowns.contains(&FirstOrder::CounterRotatingTilt)
-                                || told(FirstOrder::CounterRotatingTilt))
-                    }
+                    Quantity::X | Quantity::Y => told(FirstOrder::CounterRotatingShift),
                     Quantity::TiltX | Quantity::TiltY => told(FirstOrder::CounterRotatingTilt),
                 };
             }
+        } else if self.max_noise_gain.is_finite() {
+            for (observable, noisy) in observable.iter_mut().zip(self.too_noisy(qr)) {
+                *observable &= !noisy;
+            }
+        }
+        // Motion is reported at the spindle's reference, where shift and tilt mix.
+        for (shift, tilt) in [(Quantity::X, Quantity::TiltY), (Quantity::Y, Quantity::TiltX)] {
+            let position = |wanted| self.unknowns.iter().position(|unknown| *unknown == wanted);
+            if let (Some(shift), Some(tilt)) = (position(shift), position(tilt)) {
+                observable[shift] &= observable[tilt];
+            }
         }
         observable
+    }
+
+    /// Which unknowns carry more than [`max_noise_gain`](Self::max_noise_gain) times the readings' noise.
+    fn too_noisy(&self, qr: &PivotedQr) -> impl Iterator<Item = bool> {
+        let squares: f64 = self.readings.iter().map(|reading| reading.lever_mm.powi(2)).sum();
+        let rms_lever = (squares / self.readings.len() as f64).sqrt() * UM_PER_MM_URAD;
+        let (width, covariance) = (self.unknowns.len(), qr.covariance());
+        self.unknowns.iter().enumerate().map(move |(index, unknown)| {
+            let lever = if matches!(unknown, Quantity::TiltX | Quantity::TiltY) { rms_lever } else { 1.0 };
+            covariance[index * width + index].re.sqrt() * lever > self.max_noise_gain
+        })
     }
 
     /// What can be told at orders 1 to `max_order`, with plain (unweighted) least squares; motion at the spindle's
@@ -257,7 +292,7 @@ impl Layout {
 
     fn assess_order(&self, order: usize) -> OrderAssessment {
         let qr = self.factor(order);
-        let observable = self.observable(order);
+        let observable = self.told(&qr, order);
         let covariance = qr.covariance();
         let gains = self.to_reference(self.mean_z_mm).spread(&covariance);
         let told = observable.iter().zip(gains);
@@ -268,6 +303,9 @@ impl Layout {
             names.dedup();
             if order == 1 {
                 "1/rev: eccentricity of the part and motion that turns with it are the same in every reading".to_owned()
+            } else if qr.rank() == self.unknowns.len() {
+                let limit = self.max_noise_gain;
+                format!("{order}/rev of {} would carry more than {limit} times the readings' noise", names.join(", "))
             } else {
                 format!("{order}/rev changes of {} can leave every reading as it is", names.join(", "))
             }

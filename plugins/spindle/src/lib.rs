@@ -1,16 +1,24 @@
 //! Spindles: separators of the part's form from the axis's error motion, and a simulator of both.
 
 pub mod layout;
+pub mod plan;
+pub mod selection;
 pub mod separators;
 pub mod simulate;
 
 use runout_core::pipeline::{Registry, registry::Plugin};
-use separators::{four_sensor_reversal::FourSensorReversalConfig, harmonic_least_squares::HarmonicLeastSquaresConfig};
+use separators::{
+    closed_form::MethodConfig, donaldson_reversal::DonaldsonReversal, four_sensor_reversal::FourSensorReversalConfig,
+    harmonic_least_squares::HarmonicLeastSquaresConfig, multi_step::MultiStep, three_point::ThreePoint,
+};
 use simulate::SpindleConfig;
 
 /// Adds what this crate has.
 pub fn register(registry: &mut Registry) {
+    registry.separators.add(Plugin::of::<MethodConfig<DonaldsonReversal>>());
     registry.separators.add(Plugin::of::<FourSensorReversalConfig>());
+    registry.separators.add(Plugin::of::<MethodConfig<ThreePoint>>());
+    registry.separators.add(Plugin::of::<MethodConfig<MultiStep>>());
     registry.separators.add(Plugin::of::<HarmonicLeastSquaresConfig>());
     registry.simulators.add(Plugin::of::<SpindleConfig>());
 }

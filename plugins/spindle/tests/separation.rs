@@ -6,18 +6,19 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::{FOUR_SENSORS, Truth, linear_station, random_sum, rig, value};
+use common::{FOUR_SENSORS, Truth, disturb, linear_station, random_sum, rig, value};
 use runout_core::{
     Complex64,
     numerics::fourier::Fourier,
     rig::{Rig, Rotation},
     separation::{Quantity, Separation},
-    stage::{Station, StationSeparator},
+    stage::StationSeparator,
 };
 use runout_spindle::{
     layout::Layout,
+    selection::Selection,
     separators::{
-        four_sensor_reversal::FourSensorReversal,
+        four_sensor_reversal,
         harmonic_least_squares::{HarmonicLeastSquares, Weighting},
     },
 };
@@ -34,7 +35,7 @@ fn truth(highest: usize) -> Truth {
 }
 
 fn least_squares(rig: &Rig) -> HarmonicLeastSquares {
-    HarmonicLeastSquares::new(rig.clone(), false, Weighting::None)
+    HarmonicLeastSquares::new(rig, false, Weighting::None)
 }
 
 /// Largest rms error of form (µm) and of shift and tilt (µm, µrad) against the truth.
@@ -62,7 +63,7 @@ fn the_papers_simulation_comes_back_to_rounding() {
     let samples = 2560;
     let truth = truth(60);
     let station = linear_station(&rig, &truth, samples, 8.0);
-    let separator = FourSensorReversal::new(rig, false, false).unwrap();
+    let separator = four_sensor_reversal::separator(Selection::whole(&rig), false, false).unwrap();
     let (form_um, shift_um, tilt_urad) = errors(&separator.separate(&station).unwrap(), &truth, samples);
     println!(
         "simulated, N = 2560, L1 = 100 mm, L2 = 30 mm: RMSE form {:.2e} mm, shift {:.2e} mm, tilt {tilt_urad:.2e} µrad",
@@ -91,9 +92,11 @@ fn closed_form_and_least_squares_agree_to_rounding() {
         let mut station = linear_station(&rig, &truth(200), samples, 8.0);
         disturb(&mut station);
         for second_order in [false, true] {
-            let closed = FourSensorReversal::new(rig.clone(), second_order, false).unwrap().separate(&station).unwrap();
-            let general =
-                HarmonicLeastSquares::new(rig.clone(), second_order, Weighting::None).separate(&station).unwrap();
+            let closed = four_sensor_reversal::separator(Selection::whole(&rig), second_order, false)
+                .unwrap()
+                .separate(&station)
+                .unwrap();
+            let general = HarmonicLeastSquares::new(&rig, second_order, Weighting::None).separate(&station).unwrap();
             assert_eq!(closed.observable, general.observable, "{name}");
             for (index, (a, b)) in closed.estimate.iter().zip(&general.estimate).enumerate() {
                 if closed.observable[index] {
@@ -102,15 +105,6 @@ fn closed_form_and_least_squares_agree_to_rounding() {
                 }
             }
             assert!((closed.residual.rms_um - general.residual.rms_um).abs() < 1e-12);
-        }
-    }
-}
-
-/// Readings that no form and motion explain, so that methods have something to weigh.
-fn disturb(station: &mut Station) {
-    for (setup, profile) in station.profiles.iter_mut().enumerate() {
-        for (index, entry) in profile.mean.iter_mut().enumerate() {
-            *entry += Complex64::from_polar(0.01, (index * (setup + 3)) as f64);
         }
     }
 }
@@ -141,8 +135,10 @@ fn the_papers_assumption_mixes_even_motion_into_form_and_shows_in_the_residual()
         motion: [scaled(random_sum(3, 30, 1.0), 2.0), scaled(random_sum(4, 30, 1.0), 2.0), Vec::new(), Vec::new()],
     };
     let station = linear_station(&rig, &truth, 256, 0.0);
-    let assumed = FourSensorReversal::new(rig.clone(), false, true).unwrap().separate(&station).unwrap();
-    let honest = FourSensorReversal::new(rig, false, false).unwrap().separate(&station).unwrap();
+    let assumed =
+        four_sensor_reversal::separator(Selection::whole(&rig), false, true).unwrap().separate(&station).unwrap();
+    let honest =
+        four_sensor_reversal::separator(Selection::whole(&rig), false, false).unwrap().separate(&station).unwrap();
     let (form_um, ..) = errors(&assumed, &truth, 256);
     println!(
         "simulated: assume_odd_motion, form error {form_um:.2} µm rms, residual {:.2} µm rms",
@@ -224,7 +220,7 @@ fn setups_in_another_order_are_suspected() {
         profile.covariance = Some(matrix.repeat(orders));
         profile.turns.used = 60;
     }
-    let separator = HarmonicLeastSquares::new(rig, false, Weighting::TurnCovariance);
+    let separator = HarmonicLeastSquares::new(&rig, false, Weighting::TurnCovariance);
     assert!(separator.separate(&station).unwrap().warnings.is_empty());
     station.profiles.swap(1, 2);
     station.profiles[1].setup = 1;

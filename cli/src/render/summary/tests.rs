@@ -84,6 +84,7 @@ fn summary(stations: usize) -> Summary {
             interpolation: "monotone".into(),
             meetings: vec![meeting],
         }),
+        straightness: None,
         outputs: vec!["out/form.parquet".into()],
         warnings: vec![],
     }

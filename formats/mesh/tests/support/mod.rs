@@ -90,6 +90,7 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
         lost_orders: LostOrders { form: vec![1, 4, 500], motion: Vec::new() },
         stations: Vec::new(),
         surface: None,
+        straightness: None,
         outputs: Vec::new(),
         warnings: Vec::new(),
     };
@@ -110,6 +111,7 @@ fn station() -> StationResult {
             variance: vec![f64::NAN; estimate.len()],
             observable: vec![true; estimate.len()],
             estimate,
+            motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),
         },

@@ -5,35 +5,38 @@
 //! readings is form, half their difference motion; the difference between the sections over their distance is tilt.
 //! The paper writes S2 with +L·ε_x; here ε_x is right-handed, of the opposite sign.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use runout_core::{
-    Complex64, Result,
+    Complex64,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
     rig::Rig,
-    separation::{Assessment, Quantity, Separation},
-    stage::{Separator, Station, StationSeparator, separator::require_rig},
+    separation::Quantity,
+    stage::{Separator, separator::require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{
-    harmonic_least_squares::{Weighting, operators},
-    readings::Readings,
-    solution::{Operators, OrderOperator, Solver},
+use super::closed_form::{
+    ClosedForm, ClosedFormSeparator, SectionMotion, add_motion, refusal, same_angle, sections_with, yes,
 };
-use crate::layout::{Layout, UM_PER_MM_URAD};
+use crate::{layout::Layout, selection::Selection};
 
-/// A reversal is one of exactly half a turn; what is off by more is for the general separator.
-const ANGLE_TOLERANCE_RAD: f64 = 1e-9;
+const NAME: &str = "four-sensor-reversal";
 
 /// `plugin = "four-sensor-reversal"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FourSensorReversalConfig {
+    /// Sensors to use; without it, the first of the rig that the method can take.
+    #[serde(default)]
+    pub sensors: Option<Vec<String>>,
+    /// Setups to use; without it, the first of the rig that the method can take.
+    #[serde(default)]
+    pub setups: Option<Vec<String>>,
     /// Whether readings follow exact geometry (a line meets the displaced profile) or the paper's linear equations.
     #[serde(default = "yes")]
     pub second_order: bool,
@@ -43,32 +46,80 @@ pub struct FourSensorReversalConfig {
     pub assume_odd_motion: bool,
 }
 
-fn yes() -> bool {
-    true
-}
-
 impl StageConfig for FourSensorReversalConfig {
     type Stage = Separator;
 
-    const NAME: &'static str = "four-sensor-reversal";
+    const NAME: &'static str = NAME;
     const ABOUT: &'static str = "two sensors at right angles in each of two sections, part reversed by 180°";
 
-    fn check(self, context: &Context) -> std::result::Result<Separator, Fault> {
+    fn check(self, context: &Context) -> Result<Separator, Fault> {
         let rig = require_rig(context.rig)?;
-        Ok(Separator::Stations(Box::new(FourSensorReversal::new(
-            rig.clone(),
-            self.second_order,
-            self.assume_odd_motion,
-        )?)))
+        let selection = Selection::named(rig, self.sensors.as_deref(), self.setups.as_deref(), choose)?;
+        Ok(Separator::Stations(Box::new(separator(selection, self.second_order, self.assume_odd_motion)?)))
     }
 }
 
-/// The paper's separator, for one rig.
-#[derive(Debug, Clone)]
-pub struct FourSensorReversal {
-    rig: Rig,
-    layout: Layout,
+/// The paper's separator, for a rig of four sensors in two sections and two setups.
+///
+/// # Errors
+/// When the rig is another one.
+pub fn separator(
+    selection: Selection,
     second_order: bool,
+    assume_odd_motion: bool,
+) -> Result<ClosedFormSeparator, Fault> {
+    let method =
+        FourSensorReversal::new(&selection.rig, assume_odd_motion).map_err(|problem| refusal(NAME, &problem))?;
+    if assume_odd_motion && method.sensors_reversed {
+        return Err(Fault::at("assume_odd_motion", "the rig's sensors are reversed too: there is nothing to assume")
+            .help("leave assume_odd_motion out, or set sensors_deg = 0 where the sensors stayed"));
+    }
+    let layout = Layout::new(&selection.rig, assume_odd_motion);
+    Ok(ClosedFormSeparator::new(selection, layout, second_order, Box::new(method)))
+}
+
+/// Two sensors at right angles in each of two sections, the same two directions; two setups with the part reversed,
+/// sensors too where there are such.
+#[must_use]
+pub fn choose(rig: &Rig) -> (Vec<usize>, Vec<usize>) {
+    let setups = 0..rig.setups.len();
+    let pairs: Vec<[usize; 2]> =
+        setups.clone().flat_map(|first| (first + 1..setups.end).map(move |second| [first, second])).collect();
+    let pair = (pairs.iter().find(|pair| reversal(rig, **pair) == Some(true)))
+        .or_else(|| pairs.iter().find(|pair| reversal(rig, **pair).is_some()));
+    let mut sensors: Vec<usize> = match &sections_with(rig, 2)[..] {
+        [near, far] => square_pairs(rig, near)
+            .find_map(|[along, across]| {
+                let mut same = square_pairs(rig, far);
+                let parallel =
+                    same.find(|[other, _]| same_angle(rig.sensors[*other].angle_rad, rig.sensors[along].angle_rad));
+                parallel.map(|[first, second]| vec![along, across, first, second])
+            })
+            .unwrap_or_else(|| (0..rig.sensors.len()).collect()),
+        _ => (0..rig.sensors.len()).collect(),
+    };
+    sensors.sort_unstable();
+    (sensors, pair.map_or_else(|| setups.collect(), |pair| pair.to_vec()))
+}
+
+/// Sensors of which the second is a quarter turn further than the first.
+fn square_pairs<'a>(rig: &'a Rig, sensors: &'a [usize]) -> impl Iterator<Item = [usize; 2]> + 'a {
+    let pairs = sensors.iter().flat_map(move |first| sensors.iter().map(move |second| [*first, *second]));
+    pairs
+        .filter(|[first, second]| same_angle(rig.sensors[*second].angle_rad - rig.sensors[*first].angle_rad, FRAC_PI_2))
+}
+
+/// Whether the sensors turn with the part in a reversal; `None` where it is none.
+fn reversal(rig: &Rig, [first, second]: [usize; 2]) -> Option<bool> {
+    let [first, second] = [&rig.setups[first], &rig.setups[second]];
+    let moved = second.sensors_rad - first.sensors_rad;
+    let reversed = same_angle(moved, PI);
+    (same_angle(second.part_rad - first.part_rad, PI) && (reversed || same_angle(moved, 0.0))).then_some(reversed)
+}
+
+/// The paper's formulas, for one rig.
+#[derive(Debug, Clone)]
+struct FourSensorReversal {
     /// Sensor along the first direction and the one a quarter turn further, in each section.
     pairs: [[usize; 2]; 2],
     sensors_reversed: bool,
@@ -76,148 +127,102 @@ pub struct FourSensorReversal {
 }
 
 impl FourSensorReversal {
-    /// For a rig of four sensors in two sections and two setups.
-    ///
-    /// # Errors
-    /// When the rig is another one.
-    pub fn new(rig: Rig, second_order: bool, assume_odd_motion: bool) -> std::result::Result<Self, Fault> {
-        let refuse = |message: String| {
-            Err(Fault::at("plugin", format!("four-sensor-reversal {message}"))
-                .help("plugin = \"harmonic-least-squares\" takes any rig"))
-        };
-        if rig.sensors.len() != 4 || rig.sections.len() != 2 || rig.setups.len() != 2 {
-            return refuse(format!(
+    fn new(rig: &Rig, assume_odd_motion: bool) -> Result<Self, String> {
+        let mut sections: Vec<usize> = rig.sensors.iter().map(|sensor| sensor.section).collect();
+        sections.sort_unstable();
+        sections.dedup();
+        let ([near, far], 4, 2) = (&sections[..], rig.sensors.len(), rig.setups.len()) else {
+            return Err(format!(
                 "needs 4 sensors in 2 sections and 2 setups; the rig has {} in {} and {}",
                 rig.sensors.len(),
-                rig.sections.len(),
+                sections.len(),
                 rig.setups.len()
             ));
+        };
+        let (near, far) = (*near, *far);
+        if (rig.section_z_mm(near) - rig.section_z_mm(far)).abs() < f64::EPSILON {
+            return Err("needs its sections at different z".into());
         }
-        if (rig.section_z_mm(0) - rig.section_z_mm(1)).abs() < f64::EPSILON {
-            return refuse("needs its sections at different z".into());
-        }
-        let turn = rig.setups[1].part_rad - rig.setups[0].part_rad;
-        if !same_angle(turn, PI) {
-            return refuse(format!("needs the part reversed by 180°; the setups differ by {}°", turn.to_degrees()));
-        }
-        let moved = rig.setups[1].sensors_rad - rig.setups[0].sensors_rad;
-        let sensors_reversed = same_angle(moved, PI);
-        if !sensors_reversed && !same_angle(moved, 0.0) {
-            return refuse(format!("needs sensors that stay or turn by 180°; they turn by {}°", moved.to_degrees()));
-        }
-        if assume_odd_motion && sensors_reversed {
-            return Err(Fault::at(
-                "assume_odd_motion",
-                "the rig's sensors are reversed too: there is nothing to assume",
-            )
-            .help("leave assume_odd_motion out, or set sensors_deg = 0 where the sensors stayed"));
-        }
+        let Some(sensors_reversed) = reversal(rig, [0, 1]) else {
+            let [turn, moved] = [
+                rig.setups[1].part_rad - rig.setups[0].part_rad,
+                rig.setups[1].sensors_rad - rig.setups[0].sensors_rad,
+            ]
+            .map(f64::to_degrees);
+            if same_angle(turn.to_radians(), PI) {
+                return Err(format!("needs sensors that stay or turn by 180°; they turn by {moved}°"));
+            }
+            return Err(format!("needs the part reversed by 180°; the setups differ by {turn}°"));
+        };
         let mut pairs = [[0; 2]; 2];
-        for (section, pair) in pairs.iter_mut().enumerate() {
+        for (section, pair) in [near, far].into_iter().zip(&mut pairs) {
             let found: Vec<usize> = (0..4).filter(|sensor| rig.sensors[*sensor].section == section).collect();
-            let angle = |sensor: usize| rig.sensors[sensor].angle_rad;
-            *pair = match found[..] {
-                [first, second] if same_angle(angle(second) - angle(first), FRAC_PI_2) => [first, second],
-                [first, second] if same_angle(angle(first) - angle(second), FRAC_PI_2) => [second, first],
-                _ => {
-                    return refuse(format!("needs two sensors at right angles in section `{}`", rig.sections[section]));
-                }
-            };
+            *pair = square_pairs(rig, &found)
+                .next()
+                .filter(|_| found.len() == 2)
+                .ok_or_else(|| format!("needs two sensors at right angles in section `{}`", rig.sections[section]))?;
         }
         if !same_angle(rig.sensors[pairs[0][0]].angle_rad, rig.sensors[pairs[1][0]].angle_rad) {
-            return refuse("needs the same two directions in both sections".into());
+            return Err("needs the same two directions in both sections".into());
         }
-        let layout = Layout::new(&rig, assume_odd_motion);
-        Ok(Self { rig, layout, second_order, pairs, sensors_reversed, assume_odd_motion })
+        Ok(Self { pairs, sensors_reversed, assume_odd_motion })
     }
+}
 
-    /// Rows of H_a, H_b, X, Y, E_x, E_y at one order: sums and differences of the two setups.
-    fn closed_form(&self, order: usize) -> Vec<Complex64> {
-        let layout = &self.layout;
-        let mut operator = vec![Complex64::ZERO; layout.unknowns.len() * 8];
-        // Motion in the second setup counts with this sign where form counts +1.
+impl ClosedForm for FourSensorReversal {
+    fn operator(&self, layout: &Layout, order: usize) -> Option<Vec<Complex64>> {
+        if !self.sensors_reversed && !self.assume_odd_motion && order.is_multiple_of(2) {
+            return None;
+        }
+        let count = layout.readings.len();
+        let mut operator = vec![Complex64::ZERO; layout.unknowns.len() * count];
+        // Form in the second setup, where motion counts with the opposite sign.
         let second = |sensor: usize| {
             let phases = layout.part_phase(&layout.readings[sensor], order).conj()
                 * layout.part_phase(&layout.readings[4 + sensor], order);
             // Real and of size 1: +1 with the sensors reversed, (−1)ⁿ without.
             phases.re.signum()
         };
-        let row = |quantity: Quantity| layout.unknowns.iter().position(|unknown| *unknown == quantity).unwrap_or(0) * 8;
-        for (section, pair) in self.pairs.iter().enumerate() {
+        for pair in &self.pairs {
             for sensor in *pair {
-                let phase = layout.part_phase(&layout.readings[sensor], order).conj();
+                let reading = &layout.readings[sensor];
+                let phase = layout.part_phase(reading, order).conj();
                 // Form is half the sum of both setups, the mean of what the section's two sensors say.
-                let form = row(Quantity::Form(section));
+                let form = layout.unknowns.iter().position(|known| *known == Quantity::Form(reading.section))? * count;
                 operator[form + sensor] = phase * 0.25;
                 operator[form + 4 + sensor] = phase * 0.25 * second(sensor);
             }
         }
         let (sine, cosine) = layout.readings[self.pairs[0][0]].angle_rad.sin_cos();
         for (direction, along) in [[cosine, sine], [-sine, cosine]].into_iter().enumerate() {
-            let [near, far] = self.pairs.map(|pair| pair[direction]);
-            let [near_mm, far_mm] = [near, far].map(|sensor| layout.readings[sensor].lever_mm);
-            let distance_mm = far_mm - near_mm;
-            // Motion m along a direction is half the difference of both setups. With m = shift + z·tilt in each
-            // section, tilt = (m_b − m_a)/L and shift = (z_b m_a − z_a m_b)/L.
-            for (sensor, shift, tilt) in [(near, far_mm, -1.0), (far, -near_mm, 1.0)] {
-                let shift = 0.5 * shift / distance_mm;
-                let tilt = 0.5 * tilt / (distance_mm * UM_PER_MM_URAD);
-                for (quantity, share) in [
-                    (Quantity::X, shift * along[0]),
-                    (Quantity::Y, shift * along[1]),
-                    (Quantity::TiltY, tilt * along[0]),
-                    (Quantity::TiltX, -tilt * along[1]),
-                ] {
-                    operator[row(quantity) + sensor] += share;
-                    operator[row(quantity) + 4 + sensor] -= share * second(sensor);
-                }
-            }
+            // Motion along a direction is half the difference of both setups.
+            let sections = self.pairs.map(|pair| {
+                let sensor = pair[direction];
+                let mut row = vec![Complex64::ZERO; count];
+                row[sensor] = Complex64::from(0.5);
+                row[4 + sensor] = Complex64::from(-0.5 * second(sensor));
+                SectionMotion { lever_mm: layout.readings[sensor].lever_mm, row }
+            });
+            add_motion(&mut operator, layout, along, &sections);
         }
-        operator
+        Some(operator)
     }
 
-    fn operators(&self, readings: &Readings) -> Operators {
-        // Order 1 follows the 1/rev rule, which is the general separator's.
-        let general = operators(&self.layout, &Readings { max_order: 1, ..readings.clone() }, Weighting::None);
-        let mut orders = general.orders;
-        for order in 2..=readings.max_order {
-            let qr = self.layout.factor(order);
-            let lost = !self.sensors_reversed && !self.assume_odd_motion && order.is_multiple_of(2);
-            // What is left of a lost order is still a residual: any least-squares solution shows it.
-            let operator = if lost { qr.operator(None) } else { self.closed_form(order) };
-            orders.push(OrderOperator { operator, rank: qr.rank() });
-        }
-        let observable = (1..=readings.max_order).map(|order| self.layout.observable(order)).collect();
-        Operators { orders, observable, weights: None }
-    }
-}
-
-impl StationSeparator for FourSensorReversal {
-    fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
-        let mut assessment = self.layout.assess(max_order);
+    fn notes(&self) -> Vec<String> {
         if self.assume_odd_motion {
-            assessment.notes.push(
+            vec![
                 "assume_odd_motion: the paper's equation (7) takes motion after half a turn for the negative, which \
                  holds for odd orders only; even-order motion goes into form, and shows only in the residual"
                     .into(),
-            );
-        } else if !self.sensors_reversed {
-            assessment.notes.push(
+            ]
+        } else if self.sensors_reversed {
+            Vec::new()
+        } else {
+            vec![
                 "the sensors stay while the part is reversed: even orders of form and motion are the same in every \
                  reading and are lost; reverse the sensors too, or add a setup at another part angle"
                     .into(),
-            );
+            ]
         }
-        Ok(assessment)
     }
-
-    fn separate(&self, station: &Station) -> Result<Separation> {
-        let solver = Solver { rig: &self.rig, layout: &self.layout, second_order: self.second_order };
-        solver.separate(station, |readings| self.operators(readings))
-    }
-}
-
-fn same_angle(angle_rad: f64, other_rad: f64) -> bool {
-    let difference = (angle_rad - other_rad).rem_euclid(TAU);
-    difference.min(TAU - difference) < ANGLE_TOLERANCE_RAD
 }

@@ -7,18 +7,19 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     rig::Rig,
-    separation::{Assessment, Separation},
+    separation::{Assessment, Sensitivity, Separation},
     stage::{Separator, Station, StationSeparator, separator::require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
+    closed_form::{checked_gain, yes},
     readings::Readings,
     solution::{Operators, OrderOperator, Solver},
     weights,
 };
-use crate::layout::Layout;
+use crate::{layout::Layout, selection::Selection};
 
 /// How readings are weighed against each other where there are more than unknowns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -35,16 +36,22 @@ pub enum Weighting {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HarmonicLeastSquaresConfig {
+    /// Sensors to use; without it, all of the rig.
+    #[serde(default)]
+    pub sensors: Option<Vec<String>>,
+    /// Setups to use; without it, all of the rig.
+    #[serde(default)]
+    pub setups: Option<Vec<String>>,
     /// Whether readings follow exact geometry (a line meets the displaced profile) or the linear equations.
     #[serde(default = "yes")]
     pub second_order: bool,
     /// How readings are weighed.
     #[serde(default)]
     pub weighting: Weighting,
-}
-
-fn yes() -> bool {
-    true
+    /// An order is lost where form or motion would carry more than this many times the readings' noise; without it,
+    /// where the layout cannot tell it at all.
+    #[serde(default)]
+    pub max_noise_gain: Option<f64>,
 }
 
 impl StageConfig for HarmonicLeastSquaresConfig {
@@ -55,35 +62,55 @@ impl StageConfig for HarmonicLeastSquaresConfig {
 
     fn check(self, context: &Context) -> std::result::Result<Separator, Fault> {
         let rig = require_rig(context.rig)?;
-        Ok(Separator::Stations(Box::new(HarmonicLeastSquares::new(rig.clone(), self.second_order, self.weighting))))
+        let whole = |rig: &Rig| ((0..rig.sensors.len()).collect(), (0..rig.setups.len()).collect());
+        let selection = Selection::named(rig, self.sensors.as_deref(), self.setups.as_deref(), whole)?;
+        let max_noise_gain = checked_gain(self.max_noise_gain)?.unwrap_or(f64::INFINITY);
+        let separator = HarmonicLeastSquares::of(selection, self.second_order, self.weighting, max_noise_gain);
+        Ok(Separator::Stations(Box::new(separator)))
     }
 }
 
 /// The general separator, for one rig.
 #[derive(Debug, Clone)]
 pub struct HarmonicLeastSquares {
-    rig: Rig,
+    selection: Selection,
     layout: Layout,
     second_order: bool,
     weighting: Weighting,
 }
 
 impl HarmonicLeastSquares {
-    /// For one rig.
+    /// For one rig, with every order that it can tell.
     #[must_use]
-    pub fn new(rig: Rig, second_order: bool, weighting: Weighting) -> Self {
-        Self { layout: Layout::new(&rig, false), rig, second_order, weighting }
+    pub fn new(rig: &Rig, second_order: bool, weighting: Weighting) -> Self {
+        Self::of(Selection::whole(rig), second_order, weighting, f64::INFINITY)
+    }
+
+    /// For a part of a rig, without the orders whose noise gain is above a limit.
+    #[must_use]
+    pub fn of(selection: Selection, second_order: bool, weighting: Weighting, max_noise_gain: f64) -> Self {
+        let layout = Layout::new(&selection.rig, false).limited_to(max_noise_gain);
+        Self { selection, layout, second_order, weighting }
+    }
+
+    fn solver(&self) -> Solver<'_> {
+        Solver { selection: &self.selection, layout: &self.layout, second_order: self.second_order }
     }
 }
 
 impl StationSeparator for HarmonicLeastSquares {
     fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
-        Ok(self.layout.assess(max_order))
+        let mut assessment = self.layout.assess(max_order);
+        assessment.notes.extend(self.selection.left_out.iter().map(|unused| format!("not used: {unused}")));
+        Ok(assessment)
     }
 
     fn separate(&self, station: &Station) -> Result<Separation> {
-        let solver = Solver { rig: &self.rig, layout: &self.layout, second_order: self.second_order };
-        solver.separate(station, |readings| operators(&self.layout, readings, self.weighting))
+        self.solver().separate(station, |readings| operators(&self.layout, readings, self.weighting))
+    }
+
+    fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
+        self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting))
     }
 }
 

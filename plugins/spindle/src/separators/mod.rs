@@ -1,9 +1,14 @@
 //! Separators: each gives one linear operator an order; solving, second-order geometry and uncertainty are shared.
 
+pub mod closed_form;
+pub mod donaldson_reversal;
 pub mod four_sensor_reversal;
 pub mod harmonic_least_squares;
+pub mod multi_step;
+mod one_direction;
 mod readings;
 mod second_order;
 mod solution;
 mod swapped_setups;
+pub mod three_point;
 mod weights;

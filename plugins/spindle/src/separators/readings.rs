@@ -1,8 +1,8 @@
 //! One station's averaged readings, in the layout's order.
 
-use runout_core::{Complex64, Error, Result, rig::Rig, stage::Station};
+use runout_core::{Complex64, Error, Result, profile::Profile, stage::Station};
 
-use crate::layout::Layout;
+use crate::{layout::Layout, selection::Selection};
 
 /// Averaged readings of one station: Re Σ uₙ e^{−inΦ}, with their covariance.
 #[derive(Debug, Clone)]
@@ -19,6 +19,8 @@ pub struct Readings {
     pub covariance: Option<Vec<Vec<Complex64>>>,
     /// Turns averaged in each setup.
     pub turns: Vec<usize>,
+    /// Place of each reading among the channels of all profiles of the station.
+    pub places: Vec<usize>,
 }
 
 impl Readings {
@@ -26,23 +28,25 @@ impl Readings {
     ///
     /// # Errors
     /// When a setup or a sensor of the rig is missing, or the profiles' angles differ.
-    pub fn gather(rig: &Rig, layout: &Layout, station: &Station) -> Result<Self> {
+    pub fn gather(selection: &Selection, layout: &Layout, station: &Station) -> Result<Self> {
         let object = || format!("station {}", station.name);
+        let rig = &selection.rig;
         let sensors = rig.sensors.len();
         let mut ordered = Vec::with_capacity(rig.setups.len());
-        for (setup, clamping) in rig.setups.iter().enumerate() {
-            let profile = station
-                .profiles
-                .iter()
-                .find(|profile| profile.setup == setup)
+        let mut places = Vec::with_capacity(layout.readings.len());
+        for (setup, clamping) in selection.setups.iter().zip(&rig.setups) {
+            let position = (station.profiles.iter().position(|profile| profile.setup == *setup))
                 .ok_or_else(|| Error::new("separate", object(), format!("setup `{}` is missing", clamping.id)))?;
+            let profile = &station.profiles[position];
+            let before: usize = station.profiles[..position].iter().map(Profile::channels).sum();
             let mut channels = Vec::with_capacity(sensors);
-            for (index, sensor) in rig.sensors.iter().enumerate() {
-                let channel = profile.sensors.iter().position(|found| *found == index);
+            for (index, sensor) in selection.sensors.iter().zip(&rig.sensors) {
+                let channel = profile.sensors.iter().position(|found| found == index);
                 channels.push(channel.ok_or_else(|| {
                     Error::new("separate", &profile.object, format!("sensor `{}` was not recorded", sensor.id))
                 })?);
             }
+            places.extend(channels.iter().map(|channel| before + channel));
             ordered.push((profile, channels));
         }
         let max_order = ordered.iter().map(|(profile, _)| profile.max_order()).min().unwrap_or(0);
@@ -78,6 +82,7 @@ impl Readings {
             mean,
             covariance,
             turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
+            places,
         })
     }
 

@@ -83,13 +83,18 @@ impl<'a> SecondOrder<'a> {
 
     /// Form of each section on the fine grid, over the part's angle.
     fn tabulate(&mut self, estimate: &Estimate, max_order: usize) {
+        let layout = self.layout;
+        let sections = layout.readings.iter().map(|reading| reading.section + 1).max().unwrap_or(0);
         self.table.clear();
-        let sections = self.layout.unknowns.iter().filter(|unknown| unknown.is_form()).count();
         for section in 0..sections {
+            let Some(unknown) = layout.unknowns.iter().position(|known| *known == Quantity::Form(section)) else {
+                self.table.push(Vec::new());
+                continue;
+            };
             let forms =
-                (0..=max_order).map(|order| if order < 2 { Complex64::ZERO } else { estimate.told(order, section) });
+                (0..=max_order).map(|order| if order < 2 { Complex64::ZERO } else { estimate.told(order, unknown) });
             // The unknown of a clockwise part is the conjugate: see `Layout`.
-            let forms = forms.map(|form| if self.layout.direction < 0.0 { form.conj() } else { form });
+            let forms = forms.map(|form| if layout.direction < 0.0 { form.conj() } else { form });
             self.table.push(self.fine.synthesise(forms).to_vec());
         }
     }

@@ -2,13 +2,16 @@
 
 use runout_core::{
     Complex64, Result,
-    rig::Rig,
-    separation::{Quantity, Residual, SectionAt, Separation},
+    profile::Profile,
+    separation::{Quantity, Residual, SectionAt, Sensitivity, Separation},
     stage::Station,
 };
 
 use super::{readings::Readings, second_order::SecondOrder, swapped_setups, weights};
-use crate::layout::{FirstOrder, Layout};
+use crate::{
+    layout::{FirstOrder, Layout},
+    selection::Selection,
+};
 
 /// Three passes settle the second order; more are allowed for large eccentricities.
 const MAX_PASSES: usize = 8;
@@ -57,7 +60,7 @@ impl Estimate {
 
 /// Solves one station.
 pub struct Solver<'a> {
-    pub rig: &'a Rig,
+    pub selection: &'a Selection,
     pub layout: &'a Layout,
     pub second_order: bool,
 }
@@ -68,13 +71,14 @@ impl Solver<'_> {
     /// # Errors
     /// When the station's profiles do not fit the rig.
     pub fn separate(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Separation> {
-        let mut readings = Readings::gather(self.rig, self.layout, station)?;
+        let mut readings = Readings::gather(self.selection, self.layout, station)?;
         weights::smooth(&mut readings);
         let operators = method(&readings);
         let mut estimate = self.estimate(&operators, &readings.mean, readings.max_order);
         let mut linear = readings.mean.clone();
         if self.second_order {
-            let mut geometry = SecondOrder::new(self.layout, self.rig.part_radius_mm, readings.samples_per_rev);
+            let mut geometry =
+                SecondOrder::new(self.layout, self.selection.rig.part_radius_mm, readings.samples_per_rev);
             let mut excess = vec![Complex64::ZERO; readings.mean.len()];
             for _ in 0..MAX_PASSES {
                 geometry.excess(&estimate, &mut excess);
@@ -93,9 +97,34 @@ impl Solver<'_> {
         let mut warnings = Vec::new();
         let residual = self.residual(&operators, &readings, &linear);
         if residual.chi2_per_dof > swapped_setups::SUSPICIOUS_CHI2 {
-            warnings.extend(swapped_setups::suspect(self.rig, self.layout, &operators, &readings));
+            warnings.extend(swapped_setups::suspect(&self.selection.rig, self.layout, &operators, &readings));
         }
         Ok(self.report(station, &operators, &readings, &estimate, residual, warnings))
+    }
+
+    /// How the estimates follow from all readings of a station, also those that the selection leaves out.
+    ///
+    /// # Errors
+    /// When the station's profiles do not fit the rig.
+    pub fn sensitivity(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Sensitivity> {
+        let mut readings = Readings::gather(self.selection, self.layout, station)?;
+        weights::smooth(&mut readings);
+        let operators = method(&readings);
+        let to_reference = self.layout.to_reference(self.layout.mean_z_mm + station.z_mm);
+        let (width, count) = (self.layout.unknowns.len(), readings.count);
+        let all: usize = station.profiles.iter().map(Profile::channels).sum();
+        let mut operator = vec![Complex64::ZERO; (readings.max_order + 1) * width * all];
+        for order in 1..=readings.max_order {
+            let mut rows = self.order_operator(&operators, order, count);
+            to_reference.apply(&mut rows);
+            for (unknown, row) in rows.chunks_exact(count).enumerate() {
+                if operators.observable[order - 1][unknown] {
+                    let start = (order * width + unknown) * all;
+                    row.iter().zip(&readings.places).for_each(|(entry, place)| operator[start + place] = *entry);
+                }
+            }
+        }
+        Ok(Sensitivity { readings: all, operator })
     }
 
     fn estimate(&self, operators: &Operators, readings: &[Complex64], max_order: usize) -> Estimate {
@@ -202,11 +231,7 @@ impl Solver<'_> {
                 forms.for_each(|(_, form)| *form = form.conj());
             }
             let spread = readings.order_covariance(order).map(|covariance| {
-                let mut operator = if order == 1 {
-                    self.first_order_operator(&operators.orders[0].operator, count)
-                } else {
-                    operators.orders[order - 1].operator.clone()
-                };
+                let mut operator = self.order_operator(operators, order, count);
                 to_reference.apply(&mut operator);
                 variances(&operator, &covariance, count)
             });
@@ -221,21 +246,26 @@ impl Solver<'_> {
                 };
             }
         }
-        let sections = self
-            .rig
-            .sections
-            .iter()
-            .enumerate()
-            .map(|(index, id)| SectionAt { id: id.clone(), z_mm: self.rig.section_z_mm(index) + station.z_mm });
+        let rig = &self.selection.rig;
+        let sections = (rig.sections.iter().enumerate())
+            .map(|(index, id)| SectionAt { id: id.clone(), z_mm: rig.section_z_mm(index) + station.z_mm });
+        let tells_tilt = layout.unknowns.iter().any(|unknown| matches!(unknown, Quantity::TiltX | Quantity::TiltY));
         Separation {
             sections: sections.collect(),
             unknowns: layout.unknowns.clone(),
             estimate: values,
             variance,
             observable,
+            motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
             warnings,
         }
+    }
+
+    /// The operator of an order, with the unknowns of orders from 2 as rows.
+    fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
+        let operator = &operators.orders[order - 1].operator;
+        if order == 1 { self.first_order_operator(operator, count) } else { operator.clone() }
     }
 
     /// The operator of order 1 with the other orders' unknowns as rows.

@@ -1,5 +1,7 @@
 //! Rigs and readings for tests, written in the angle domain and independent of the layout's algebra.
 
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
 use std::f64::consts::TAU;
 
 use runout_core::{
@@ -7,6 +9,7 @@ use runout_core::{
     numerics::fourier::Fourier,
     profile::{Profile, TurnCount},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
+    separation::Separation,
     stage::Station,
 };
 
@@ -114,4 +117,22 @@ pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
         responses: Vec::new(),
         warnings: Vec::new(),
     }
+}
+
+/// Readings that no form and motion explain, so that methods have something to weigh.
+pub fn disturb(station: &mut Station) {
+    for (setup, profile) in station.profiles.iter_mut().enumerate() {
+        for (index, entry) in profile.mean.iter_mut().enumerate() {
+            *entry += Complex64::from_polar(0.01, (index * (setup + 3)) as f64);
+        }
+    }
+}
+
+/// Error of one order of an unknown against the sum of cosines that is true, in µm or µrad.
+pub fn coefficient_error(separation: &Separation, unknown: usize, order: usize, truth: &Sum) -> f64 {
+    let (_, amplitude, phase) = truth.iter().find(|(known, ..)| *known == order).copied().unwrap_or((order, 0.0, 0.0));
+    // cos(nα + φ) is Re e^{iφ} e^{+inα}, and Re e^{−iφ} e^{−inΦ}.
+    let turned = if separation.unknowns[unknown].is_form() { phase } else { -phase };
+    let found = separation.estimate[order * separation.unknowns.len() + unknown];
+    (found - Complex64::from_polar(amplitude, turned)).norm()
 }

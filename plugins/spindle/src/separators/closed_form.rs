@@ -1,0 +1,242 @@
+//! What methods with a formula of their own share: their configuration, and the way from a formula to a separation.
+
+use std::{f64::consts::TAU, marker::PhantomData};
+
+use runout_core::{
+    Complex64, Result,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
+    rig::Rig,
+    separation::{Assessment, Quantity, Sensitivity, Separation},
+    stage::{Separator, Station, StationSeparator, separator::require_rig},
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{
+    harmonic_least_squares::{Weighting, operators},
+    readings::Readings,
+    solution::{Operators, OrderOperator, Solver},
+};
+use crate::{
+    layout::{Layout, UM_PER_MM_URAD},
+    selection::Selection,
+};
+
+/// Angles that differ by less are the same; what is off by more is for the general separator.
+const ANGLE_TOLERANCE_RAD: f64 = 1e-9;
+
+/// A formula for form and motion, one order at a time.
+pub trait ClosedForm: Send + Sync {
+    /// Unknowns = operator · readings at an order from 2, `[unknown][reading]`; `None` where the formula has a pole.
+    fn operator(&self, layout: &Layout, order: usize) -> Option<Vec<Complex64>>;
+
+    /// What the user should know before any data.
+    fn notes(&self) -> Vec<String>;
+}
+
+/// A method that a rig fits or not.
+pub trait Method: ClosedForm + Sized + 'static {
+    /// Its id.
+    const NAME: &'static str;
+    /// One line about it.
+    const ABOUT: &'static str;
+    /// Where the configuration gives no limit.
+    const MAX_NOISE_GAIN: f64 = f64::INFINITY;
+
+    /// Sensors and setups that it takes from a rig with more than it needs.
+    fn choose(rig: &Rig) -> (Vec<usize>, Vec<usize>);
+
+    /// For a rig.
+    ///
+    /// # Errors
+    /// What it needs and the rig has not.
+    fn new(rig: &Rig) -> std::result::Result<Self, String>;
+}
+
+/// Keys of a method with a formula of its own.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, bound = "")]
+#[schemars(bound = "")]
+pub struct MethodConfig<M> {
+    /// Sensors to use; without it, the first of the rig that the method can take.
+    #[serde(default)]
+    pub sensors: Option<Vec<String>>,
+    /// Setups to use; without it, the first of the rig that the method can take.
+    #[serde(default)]
+    pub setups: Option<Vec<String>>,
+    /// Whether readings follow exact geometry (a line meets the displaced profile) or the linear equations.
+    #[serde(default = "yes")]
+    pub second_order: bool,
+    /// An order is lost where form or motion would carry more than this many times the readings' noise, as near the
+    /// zeros of a transfer function; without it, 30 for three-point, and no limit for the others.
+    #[serde(default)]
+    pub max_noise_gain: Option<f64>,
+    /// Which method.
+    #[serde(skip)]
+    pub method: PhantomData<M>,
+}
+
+pub(super) fn yes() -> bool {
+    true
+}
+
+impl<M: Method> StageConfig for MethodConfig<M> {
+    type Stage = Separator;
+
+    const NAME: &'static str = M::NAME;
+    const ABOUT: &'static str = M::ABOUT;
+
+    fn check(self, context: &Context) -> std::result::Result<Separator, Fault> {
+        let rig = require_rig(context.rig)?;
+        let selection = Selection::named(rig, self.sensors.as_deref(), self.setups.as_deref(), M::choose)?;
+        let max_noise_gain = checked_gain(self.max_noise_gain)?.unwrap_or(M::MAX_NOISE_GAIN);
+        let separator = ClosedFormSeparator::of::<M>(selection, self.second_order, max_noise_gain)?;
+        Ok(Separator::Stations(Box::new(separator)))
+    }
+}
+
+/// A limit of noise gain, as a file gives it.
+///
+/// # Errors
+/// When it is no positive number.
+pub(super) fn checked_gain(gain: Option<f64>) -> std::result::Result<Option<f64>, Fault> {
+    match gain {
+        Some(gain) if !(gain > 0.0) => {
+            Err(Fault::at("max_noise_gain", format!("expected a factor above 0, found {gain}")))
+        }
+        gain => Ok(gain),
+    }
+}
+
+/// A method for one rig.
+pub struct ClosedFormSeparator {
+    selection: Selection,
+    layout: Layout,
+    second_order: bool,
+    method: Box<dyn ClosedForm>,
+}
+
+impl ClosedFormSeparator {
+    /// Any formula for the layout of a selection.
+    #[must_use]
+    pub fn new(selection: Selection, layout: Layout, second_order: bool, method: Box<dyn ClosedForm>) -> Self {
+        Self { selection, layout, second_order, method }
+    }
+
+    /// One of the methods.
+    ///
+    /// # Errors
+    /// When the selected part of the rig does not fit it.
+    pub fn of<M: Method>(
+        selection: Selection,
+        second_order: bool,
+        max_noise_gain: f64,
+    ) -> std::result::Result<Self, Fault> {
+        let method = M::new(&selection.rig).map_err(|problem| refusal(M::NAME, &problem))?;
+        let layout = Layout::new(&selection.rig, false).limited_to(max_noise_gain);
+        Ok(Self::new(selection, layout, second_order, Box::new(method)))
+    }
+
+    fn solver(&self) -> Solver<'_> {
+        Solver { selection: &self.selection, layout: &self.layout, second_order: self.second_order }
+    }
+
+    fn operators(&self, readings: &Readings) -> Operators {
+        // Order 1 follows the 1/rev rule, which is the general separator's.
+        let general = operators(&self.layout, &Readings { max_order: 1, ..readings.clone() }, Weighting::None);
+        let mut orders = general.orders;
+        for order in 2..=readings.max_order {
+            let qr = self.layout.factor(order);
+            // What is left of a lost order is still a residual: any least-squares solution shows it.
+            let operator = self.method.operator(&self.layout, order).unwrap_or_else(|| qr.operator(None));
+            orders.push(OrderOperator { operator, rank: qr.rank() });
+        }
+        let observable = (1..=readings.max_order).map(|order| self.layout.observable(order)).collect();
+        Operators { orders, observable, weights: None }
+    }
+}
+
+impl StationSeparator for ClosedFormSeparator {
+    fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
+        let mut assessment = self.layout.assess(max_order);
+        assessment.notes.extend(self.selection.left_out.iter().map(|unused| format!("not used: {unused}")));
+        assessment.notes.extend(self.method.notes());
+        Ok(assessment)
+    }
+
+    fn separate(&self, station: &Station) -> Result<Separation> {
+        self.solver().separate(station, |readings| self.operators(readings))
+    }
+
+    fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
+        self.solver().sensitivity(station, |readings| self.operators(readings))
+    }
+}
+
+/// A rig that does not fit a method.
+pub(super) fn refusal(method: &str, problem: &str) -> Fault {
+    Fault::at("plugin", format!("{method} {problem}")).help("plugin = \"harmonic-least-squares\" takes any rig")
+}
+
+/// Whether two angles are the same direction.
+pub(super) fn same_angle(angle_rad: f64, other_rad: f64) -> bool {
+    let difference = (angle_rad - other_rad).rem_euclid(TAU);
+    difference.min(TAU - difference) < ANGLE_TOLERANCE_RAD
+}
+
+/// Motion along a direction, as a row over the readings, in a section at a lever from the sensors' mean z.
+pub(super) struct SectionMotion {
+    pub lever_mm: f64,
+    pub row: Vec<Complex64>,
+}
+
+/// Adds to an operator what motion along a direction (cos, sin) in one or two sections says of shift and tilt.
+///
+/// With m = shift + z·tilt in each of two sections, tilt = (m_b − m_a)/L and shift = (z_b m_a − z_a m_b)/L.
+pub(super) fn add_motion(operator: &mut [Complex64], layout: &Layout, along: [f64; 2], sections: &[SectionMotion]) {
+    let count = layout.readings.len();
+    let [cosine, sine] = along;
+    let mut add = |quantity: Quantity, share: f64, row: &[Complex64]| {
+        let Some(unknown) = layout.unknowns.iter().position(|known| *known == quantity) else { return };
+        let target = &mut operator[unknown * count..(unknown + 1) * count];
+        target.iter_mut().zip(row).for_each(|(entry, reading)| *entry += reading * share);
+    };
+    match sections {
+        [near, far] => {
+            let distance_mm = far.lever_mm - near.lever_mm;
+            for (section, shift_mm, sign) in [(near, far.lever_mm, -1.0), (far, -near.lever_mm, 1.0)] {
+                let shift = shift_mm / distance_mm;
+                let tilt = sign / (distance_mm * UM_PER_MM_URAD);
+                add(Quantity::X, shift * cosine, &section.row);
+                add(Quantity::Y, shift * sine, &section.row);
+                add(Quantity::TiltY, tilt * cosine, &section.row);
+                add(Quantity::TiltX, -tilt * sine, &section.row);
+            }
+        }
+        sections => {
+            for section in sections {
+                add(Quantity::X, cosine, &section.row);
+                add(Quantity::Y, sine, &section.row);
+            }
+        }
+    }
+}
+
+/// The sensors of the first two sections at different z that `count` sensors or more look at.
+pub(super) fn sections_with(rig: &Rig, count: usize) -> Vec<Vec<usize>> {
+    let of = |section: usize| -> Vec<usize> {
+        (0..rig.sensors.len()).filter(|sensor| rig.sensors[*sensor].section == section).collect()
+    };
+    let mut chosen: Vec<Vec<usize>> = Vec::new();
+    for sensors in (0..rig.sections.len()).map(of).filter(|sensors| sensors.len() >= count) {
+        let z_mm = |sensors: &[usize]| sensors.first().map_or(f64::NAN, |sensor| rig.sensors[*sensor].z_mm);
+        let elsewhere = |known: &Vec<usize>| (z_mm(known) - z_mm(&sensors)).abs() > f64::EPSILON;
+        if chosen.len() < 2 && chosen.iter().all(elsewhere) {
+            chosen.push(sensors);
+        }
+    }
+    chosen
+}

@@ -1,0 +1,57 @@
+//! The loader `axial-traces`: a CSV file of traces along an axis, in two setups.
+
+use std::path::PathBuf;
+
+use runout_core::{
+    Result,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
+    rig::Rig,
+    stage::{Loader, Source, SourceKind},
+};
+use runout_traces::Columns;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// `[load] plugin = "axial-traces"`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AxialTracesConfig {
+    /// CSV file with the columns trace, setup, z_mm, reading_um, in any order; the points of a trace follow one
+    /// another, with z rising or falling throughout. A reading grows when the surface comes nearer to the probe.
+    /// Separated by comma, semicolon or tab; the last two allow a decimal comma.
+    pub path: PathBuf,
+}
+
+impl StageConfig for AxialTracesConfig {
+    type Stage = Box<dyn Loader>;
+
+    const NAME: &'static str = "axial-traces";
+    const ABOUT: &'static str = "traces along a cylinder or a straightedge in two setups, from CSV";
+
+    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        if self.path.as_os_str().is_empty() {
+            return Err(Fault::at("path", "expected the name of a file"));
+        }
+        Ok(Box::new(AxialTraces { path: context.path(&self.path) }))
+    }
+}
+
+const COLUMNS: Columns = Columns { kind: "setup", numbers: &["z_mm", "reading_um"] };
+
+/// The loader `axial-traces`.
+struct AxialTraces {
+    path: PathBuf,
+}
+
+impl Loader for AxialTraces {
+    fn kind(&self) -> SourceKind {
+        SourceKind::Points
+    }
+
+    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
+        COLUMNS.read(&self.path).map(Source::Points)
+    }
+}

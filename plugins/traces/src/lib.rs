@@ -1,0 +1,211 @@
+//! CSV files of traces, which the loaders of measured points share.
+//!
+//! A row is a point: the trace that it belongs to, what tells the traces apart (their kind, their setup), and numbers.
+//! The points of a trace follow one another. Columns come in any order, separated by comma, semicolon or tab; the last
+//! two allow a decimal comma.
+
+use std::{
+    fs::File,
+    io::{BufRead, BufReader, Read, Seek},
+    path::Path,
+};
+
+use csv::{ByteRecord, ReaderBuilder, Trim};
+use runout_core::{
+    Error, Result,
+    points::{Column, Points, Trace},
+};
+
+/// The column of the traces' ids.
+const TRACE: &str = "trace";
+
+/// The columns of a file besides `trace`.
+#[derive(Debug, Clone, Copy)]
+pub struct Columns<'a> {
+    /// What is the same along a trace, and becomes its [`kind`](Trace::kind).
+    pub kind: &'a str,
+    /// Numbers, one a point; the unit is part of the name.
+    pub numbers: &'a [&'a str],
+}
+
+/// Where the columns stand in the file.
+struct Layout {
+    trace: usize,
+    kind: usize,
+    numbers: Vec<usize>,
+}
+
+impl Columns<'_> {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// When it cannot be read, lacks a column or has another, or a row is not what its columns say.
+    pub fn read(&self, path: &Path) -> Result<Points> {
+        let shown = path.display().to_string();
+        let failure = |problem: &dyn std::fmt::Display| Error::new("read", &shown, problem);
+        let mut file = BufReader::new(File::open(path).map_err(|error| failure(&error))?);
+        let delimiter = delimiter(&mut file).map_err(|error| failure(&error))?;
+        let mut reader = ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(file);
+        let layout = self.layout(reader.byte_headers().map_err(|error| failure(&error))?, &shown)?;
+        let mut values = vec![Vec::new(); self.numbers.len()];
+        let mut traces: Vec<Trace> = Vec::new();
+        let mut record = ByteRecord::new();
+        let mut row = 0;
+        while reader.read_byte_record(&mut record).map_err(|error| failure(&error))? {
+            let cells = Cells { record: &record, file: &shown, decimal_comma: delimiter != b',' };
+            for (column, (place, name)) in values.iter_mut().zip(layout.numbers.iter().zip(self.numbers)) {
+                column.push(cells.number(*place, name)?);
+            }
+            let (id, kind) = (cells.text(layout.trace, TRACE)?, cells.text(layout.kind, self.kind)?);
+            match traces.last_mut() {
+                Some(last) if last.id == id && last.kind == kind => last.points.end = row + 1,
+                _ => {
+                    if let Some(known) = traces.iter().find(|trace| trace.id == id) {
+                        return Err(self.again(known, kind, &cells, &layout));
+                    }
+                    traces.push(Trace { id: id.to_owned(), kind: kind.to_owned(), points: row..row + 1 });
+                }
+            }
+            row += 1;
+        }
+        if traces.is_empty() {
+            return Err(Error::new("read", shown, "it holds no points"));
+        }
+        let columns = self.numbers.iter().zip(values);
+        let columns = columns.map(|(name, values)| Column { name: (*name).to_owned(), values }).collect();
+        Ok(Points { input: path.to_path_buf(), columns, traces })
+    }
+
+    /// Why a trace cannot come back.
+    fn again(&self, known: &Trace, kind: &str, cells: &Cells, layout: &Layout) -> Error {
+        let id = &known.id;
+        if known.kind == kind {
+            let problem = format!("trace {id} has ended above; the points of a trace follow one another");
+            return cells.refuse(layout.trace, TRACE, &problem);
+        }
+        let problem = format!("trace {id} is of {} {} above, not {kind}", self.kind, known.kind);
+        cells.refuse(layout.kind, self.kind, &problem).help("give each trace a name of its own")
+    }
+
+    fn layout(&self, header: &ByteRecord, file: &str) -> Result<Layout> {
+        let names: Vec<String> = header.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+        let wanted = [&[TRACE, self.kind], self.numbers].concat();
+        let refuse = |problem: String| {
+            let help = format!("the columns are {}", wanted.join(", "));
+            Error::new("read", format!("{file}, line 1"), problem).help(help)
+        };
+        for (index, name) in names.iter().enumerate() {
+            if !wanted.contains(&name.as_str()) {
+                return Err(refuse(format!("unknown column `{name}`")));
+            }
+            if names[..index].contains(name) {
+                return Err(refuse(format!("the column `{name}` is there twice")));
+            }
+        }
+        let place = |name: &str| {
+            let found = names.iter().position(|found| found == name);
+            found.ok_or_else(|| refuse(format!("the column `{name}` is missing")))
+        };
+        let numbers = self.numbers.iter().map(|name| place(name)).collect::<Result<_>>()?;
+        Ok(Layout { trace: place(TRACE)?, kind: place(self.kind)?, numbers })
+    }
+}
+
+/// The separator of the header, which then stands for the whole file; skips a byte order mark.
+fn delimiter(file: &mut BufReader<File>) -> std::io::Result<u8> {
+    let mut header = Vec::new();
+    // A header is short; a file without line ends is no reason to read it all twice.
+    file.by_ref().take(4096).read_until(b'\n', &mut header)?;
+    let mark = if header.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
+    file.seek(std::io::SeekFrom::Start(mark))?;
+    Ok(*header.iter().find(|byte| b",;\t".contains(byte)).unwrap_or(&b','))
+}
+
+/// A record, with its place for messages.
+struct Cells<'a> {
+    record: &'a ByteRecord,
+    file: &'a str,
+    decimal_comma: bool,
+}
+
+impl Cells<'_> {
+    fn text(&self, place: usize, name: &str) -> Result<&str> {
+        let bytes = self.record.get(place).unwrap_or_default();
+        match std::str::from_utf8(bytes) {
+            Ok("") => Err(self.refuse(place, name, "it is empty")),
+            Ok(text) => Ok(text),
+            Err(_) => Err(self.refuse(place, name, "it is not UTF-8")),
+        }
+    }
+
+    fn number(&self, place: usize, name: &str) -> Result<f64> {
+        let text = self.text(place, name)?;
+        let parsed = if self.decimal_comma { text.replace(',', ".").parse() } else { text.parse() };
+        match parsed {
+            Ok(number) if f64::is_finite(number) => Ok(number),
+            _ => Err(self.refuse(place, name, &format!("expected a finite number, found `{text}`"))),
+        }
+    }
+
+    fn refuse(&self, place: usize, name: &str, problem: &str) -> Error {
+        let line = self.record.position().map_or(0, csv::Position::line);
+        Error::new("read", format!("{}, line {line}, column {} ({name})", self.file, place + 1), problem)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    const COLUMNS: Columns = Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"] };
+
+    fn from(text: &str) -> Result<Points> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        COLUMNS.read(file.path())
+    }
+
+    #[test]
+    fn traces_with_either_decimal_mark() {
+        let dots = from("trace,kind,z_mm,angle_deg,deviation_um\nA,circle,1.5,0,-2\nA,circle,1.5,90,3\nB,line,2,0,1\n");
+        let commas = from(
+            "\u{feff}kind;trace;deviation_um;z_mm;angle_deg\r\ncircle;A;-2;1,5;0\r\ncircle;A;3;1,5;90\r\nline;B;1;2;0",
+        );
+        let (dots, commas) = (dots.unwrap(), commas.unwrap());
+        assert_eq!(dots.columns, commas.columns);
+        assert_eq!(dots.traces, commas.traces);
+        assert_eq!(dots.column("z_mm").unwrap(), [1.5, 1.5, 2.0]);
+        assert_eq!(dots.traces[0], Trace { id: "A".into(), kind: "circle".into(), points: 0..2 });
+    }
+
+    #[test]
+    fn every_mistake_is_named_with_its_place() {
+        let header = "trace,kind,z_mm,angle_deg,deviation_um\n";
+        let cases = [
+            ("A,circle,1,0,nan\n", "line 2, column 5 (deviation_um): expected a finite number, found `nan`"),
+            ("A,circle,1,0,1\nA,circle,1,x,1\n", "line 3, column 4 (angle_deg): expected a finite number, found `x`"),
+            ("A,circle,1,,1\n", "line 2, column 4 (angle_deg): it is empty"),
+            ("A,circle,1,0,1\nB,circle,1,0,1\nA,circle,1,0,1\n", "line 4, column 1 (trace): trace A has ended above"),
+            ("A,circle,1,0,1\nA,line,1,0,1\n", "line 3, column 2 (kind): trace A is of kind circle above, not line"),
+            ("A,circle,1,0\n", "line: 2"),
+            ("", "it holds no points"),
+        ];
+        for (rows, expected) in cases {
+            let message = from(&format!("{header}{rows}")).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+        let headers = [
+            ("", "the column `z_mm` is missing"),
+            ("trace,kind,z_mm,angle_deg,deviation\n", "unknown column `deviation`"),
+            ("trace,kind,z_mm,z_mm,deviation_um\n", "the column `z_mm` is there twice"),
+            ("trace,kind,z_mm,angle_deg\n", "the column `deviation_um` is missing"),
+        ];
+        for (header, expected) in headers {
+            let message = from(header).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+        assert!(COLUMNS.read(Path::new("/nonexistent/cylinder.csv")).is_err());
+    }
+}
