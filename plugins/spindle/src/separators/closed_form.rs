@@ -104,7 +104,7 @@ impl<M: Method> StageConfig for MethodConfig<M> {
 /// When it is no positive number.
 pub(super) fn checked_gain(gain: Option<f64>) -> std::result::Result<Option<f64>, Fault> {
     match gain {
-        Some(gain) if !(gain > 0.0) => {
+        Some(gain) if gain <= 0.0 || gain.is_nan() => {
             Err(Fault::at("max_noise_gain", format!("expected a factor above 0, found {gain}")))
         }
         gain => Ok(gain),

@@ -37,7 +37,6 @@ impl OneDirection {
         let sensors: Vec<usize> = (0..rig.sensors.len()).collect();
         let [first, rest @ ..] = &rig.sensors[..] else { return Err("needs a sensor".into()) };
         match rest {
-            [] => {}
             [second] if second.section == first.section => {
                 let message = "needs one sensor a section; `{a}` and `{b}` look at the same one";
                 return Err(message.replace("{a}", &first.id).replace("{b}", &second.id));
@@ -54,7 +53,7 @@ impl OneDirection {
             [second] if (second.z_mm - first.z_mm).abs() <= f64::EPSILON => {
                 return Err("needs its sections at different z".into());
             }
-            [_] => {}
+            [] | [_] => {}
             _ => return Err(format!("needs one sensor in each of one or two sections; {} are given", sensors.len())),
         }
         Ok(Self { angle_rad: first.angle_rad, sensors, setups: rig.setups.len() })
