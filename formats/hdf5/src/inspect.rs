@@ -146,7 +146,7 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
 
 fn tables(file: &File, place: &Place) -> Result<Vec<TableReport>> {
     let mut tables = Vec::new();
-    for table in ["form", "motion", "harmonics"] {
+    for table in ["form", "motion", "harmonics", "straightness"] {
         if !file.link_exists(table) {
             continue;
         }

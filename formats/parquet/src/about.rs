@@ -38,20 +38,33 @@ impl Content {
         let lowest = usize::from(!self.level_known);
         let lost_form: BTreeSet<_> = self.lost_form.iter().chain(&summary.lost_orders.form).collect();
         let lost_motion: BTreeSet<_> = self.lost_motion.iter().chain(&summary.lost_orders.motion).collect();
-        let warnings: Vec<String> = summary.all_warnings().collect();
-        let entries = [
-            ("title", summary.title.clone()),
-            ("program", summary.provenance.program.clone()),
-            ("configuration", summary.provenance.configuration.clone()),
-            ("inputs", json!(summary.provenance.inputs).to_string()),
-            ("convention", format!("{CONVENTION} {BANDS}")),
+        let mut entries = common(summary, &format!("{CONVENTION} {BANDS}"));
+        let own = [
             ("lost_orders", json!({ "form": lost_form, "motion": lost_motion }).to_string()),
             ("band_upr", json!([lowest, self.highest_order]).to_string()),
             ("band_over_angle_upr", json!([lowest, self.highest_on_angles]).to_string()),
-            ("warnings", json!(warnings).to_string()),
         ];
-        entries.map(|(key, value)| (format!("runout.{key}"), value)).into()
+        entries.extend(own.map(named));
+        entries
     }
+}
+
+/// What every file says of itself.
+pub fn common(summary: &Summary, convention: &str) -> Vec<(String, String)> {
+    let warnings: Vec<String> = summary.all_warnings().collect();
+    let entries = [
+        ("title", summary.title.clone()),
+        ("program", summary.provenance.program.clone()),
+        ("configuration", summary.provenance.configuration.clone()),
+        ("inputs", json!(summary.provenance.inputs).to_string()),
+        ("convention", convention.to_owned()),
+        ("warnings", json!(warnings).to_string()),
+    ];
+    entries.map(named).into()
+}
+
+fn named((key, value): (&str, String)) -> (String, String) {
+    (format!("runout.{key}"), value)
 }
 
 /// What `band_upr` and `band_over_angle_upr` are.

@@ -26,7 +26,7 @@ fn text(name: &str, nullable: bool, meaning: &str) -> Field {
     column(name, DataType::Utf8, nullable, "", meaning)
 }
 
-fn number(name: &str, unit: &str, meaning: &str) -> Field {
+pub(super) fn number(name: &str, unit: &str, meaning: &str) -> Field {
     column(name, DataType::Float64, false, unit, meaning)
 }
 
@@ -171,6 +171,6 @@ fn angles_deg(angles: usize) -> impl Iterator<Item = f64> {
     (0..angles).map(move |index| 360.0 * index as f64 / angles as f64)
 }
 
-fn numbers(values: impl IntoIterator<Item = f64>) -> ArrayRef {
+pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> ArrayRef {
     Arc::new(Float64Array::from_iter_values(values))
 }

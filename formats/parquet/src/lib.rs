@@ -9,11 +9,13 @@
 //!   Orders run from 1; order 0, the mean level, has a row where the method knows it (its value is not 0).
 //!
 //! Orders that the layout cannot tell are NaN with `observable` false in the harmonics, and left out of the sums in
-//! the other two, whose metadata names them. Every column carries its unit and meaning, every file the configuration,
+//! the other two, whose metadata names them. Where traces along an axis were separated, the folder receives
+//! `straightness.parquet` instead, one row a position. Every column carries its unit and meaning, every file the configuration,
 //! the checksums of the inputs and the warnings.
 
 mod about;
 mod columns;
+mod straightness;
 mod table;
 
 use std::path::PathBuf;
@@ -26,7 +28,8 @@ use runout_core::{
         registry::{Context, Plugin, Registry, StageConfig},
         run::{RunInfo, StationResult, Summary},
     },
-    stage::{Export, Exporter},
+    stage::{Export, Exporter, StraightnessExporter},
+    straightness::{CONVENTION, Straightness},
     surface::Surface,
 };
 use schemars::JsonSchema;
@@ -44,7 +47,7 @@ pub fn register(registry: &mut Registry) {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParquetConfig {
-    /// Folder for form.parquet, motion.parquet and harmonics.parquet; made where it is missing.
+    /// Folder for form.parquet, motion.parquet and harmonics.parquet, or straightness.parquet; made where it is missing.
     pub path: PathBuf,
 }
 
@@ -52,7 +55,7 @@ impl StageConfig for ParquetConfig {
     type Stage = Box<dyn Exporter>;
 
     const NAME: &'static str = "parquet";
-    const ABOUT: &'static str = "tables of form, motion and harmonics";
+    const ABOUT: &'static str = "tables of form, motion and harmonics, or of straightness";
 
     fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         if self.path.as_os_str().is_empty() {
@@ -79,18 +82,32 @@ impl Parquet {
     fn harmonics(&self) -> PathBuf {
         self.folder.join("harmonics.parquet")
     }
-}
 
-impl Exporter for Parquet {
-    fn outputs(&self) -> Vec<PathBuf> {
-        vec![self.form(), self.motion(), self.harmonics()]
+    fn straightness_table(&self) -> PathBuf {
+        self.folder.join("straightness.parquet")
     }
 
-    fn begin(&self, _run: &RunInfo) -> Result<Box<dyn Export>> {
+    /// Refuses a file where the folder should be.
+    fn folder_free(&self) -> Result<()> {
         if self.folder.is_file() {
             let shown = self.folder.display().to_string();
             return Err(Error::new("write to", shown, "there is a file of that name").help("name a folder"));
         }
+        Ok(())
+    }
+}
+
+impl Exporter for Parquet {
+    fn outputs(&self) -> Vec<PathBuf> {
+        vec![self.form(), self.motion(), self.harmonics(), self.straightness_table()]
+    }
+
+    fn straightness(&self) -> Option<&dyn StraightnessExporter> {
+        Some(self)
+    }
+
+    fn begin(&self, _run: &RunInfo) -> Result<Box<dyn Export>> {
+        self.folder_free()?;
         Ok(Box::new(Tables {
             form: Table::create(self.form(), columns::form_schema())?,
             harmonics: Table::create(self.harmonics(), columns::harmonics_schema())?,
@@ -98,6 +115,15 @@ impl Exporter for Parquet {
             motion_path: self.motion(),
             content: Content::default(),
         }))
+    }
+}
+
+impl StraightnessExporter for Parquet {
+    fn write(&self, result: &Straightness, summary: &Summary) -> Result<Vec<PendingFile>> {
+        self.folder_free()?;
+        let mut table = Table::create(self.straightness_table(), straightness::schema())?;
+        table.append(straightness::rows(result))?;
+        Ok(vec![table.close(&about::common(summary, CONVENTION))?])
     }
 }
 

@@ -6,6 +6,7 @@
 //! /motion      station, angle_deg, x_um, y_um, tilt_x_urad, tilt_y_urad, and std_… of each
 //! /harmonics   quantity, section, station, order, re, im, std, observable
 //! /provenance  configuration, inputs/{path, bytes, blake3}
+//! /straightness z_mm, part_um, part_std_um, slide_um, slide_std_um; then there is no form, motion and harmonics
 //! /warnings    [n] texts: the run's, then each station's behind its name
 //! /summary     the run's summary as JSON
 //! ```
@@ -13,9 +14,10 @@
 //! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; texts of the tables are
 //! UTF-8 of fixed length (`.asstr()` in h5py). Each column has the attributes `unit` and `meaning`. What was not solved for, and what the layout cannot tell, is NaN.
 
+mod straightness;
 mod table;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use hdf5_metno::{File, Group, types::VarLenUnicode};
 use runout_core::{
@@ -28,7 +30,7 @@ use runout_core::{
     },
     provenance::Input,
     separation::{CONVENTION, Quantity},
-    stage::{Export, Exporter},
+    stage::{Export, Exporter, StraightnessExporter},
     surface::Surface,
 };
 use schemars::JsonSchema;
@@ -48,7 +50,7 @@ pub struct ResultConfig {
 impl StageConfig for ResultConfig {
     type Stage = Box<dyn Exporter>;
     const NAME: &'static str = "hdf5";
-    const ABOUT: &'static str = "one file with form, motion, harmonics and where they came from";
+    const ABOUT: &'static str = "one file with form, motion, harmonics (or straightness) and where they came from";
 
     fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         if self.path.file_name().is_none() {
@@ -67,14 +69,14 @@ impl Exporter for ResultExporter {
         vec![self.path.clone()]
     }
 
+    fn straightness(&self) -> Option<&dyn StraightnessExporter> {
+        Some(self)
+    }
+
     fn begin(&self, run: &RunInfo) -> Result<Box<dyn Export>> {
         let pending = PendingFile::new(&self.path)?;
         let begin = || -> hdf5_metno::Result<ResultExport> {
-            let file = File::with_options().with_fapl(|access| access.libver_v110()).create(pending.path())?;
-            node::put_text(&file, "format", RESULT_FORMAT)?;
-            node::put(&file, "version", &VERSION)?;
-            node::put_text(&file, "title", &run.title)?;
-            node::put_text(&file, "convention", CONVENTION)?;
+            let file = create(pending.path(), &run.title, CONVENTION)?;
             Ok(ResultExport {
                 form: FormTable::create(&file)?,
                 motion: MotionTable::create(&file)?,
@@ -105,24 +107,35 @@ impl ResultExport {
             None => Error::new("write", "the result", problem),
         }
     }
+}
 
-    fn complete(&self, summary: &Summary) -> hdf5_metno::Result<()> {
-        let provenance = &summary.provenance;
-        node::put_text(&self.file, "program", &provenance.program)?;
-        let json = serde_json::to_string_pretty(summary)
-            .map_err(|error| hdf5_metno::Error::from(format!("the summary: {error}")))?;
-        put_dataset(&self.file, "summary", &json)?;
-        put_texts(&self.file, "warnings", summary.all_warnings())?;
-        let group = self.file.create_group("provenance")?;
-        put_dataset(&group, "configuration", &provenance.configuration)?;
-        let inputs = group.create_group("inputs")?;
-        put_texts(&inputs, "path", provenance.inputs.iter().map(|input| &input.path))?;
-        put_texts(&inputs, "blake3", provenance.inputs.iter().map(|input| &input.blake3))?;
-        let bytes: Vec<u64> = provenance.inputs.iter().map(|Input { bytes, .. }| *bytes).collect();
-        inputs.new_dataset_builder().with_data(&bytes).create("bytes")?;
-        // What the disk refuses comes out here, and not when the file is closed.
-        self.file.flush()
-    }
+/// A result file with its head.
+fn create(path: &Path, title: &str, convention: &str) -> hdf5_metno::Result<File> {
+    let file = File::with_options().with_fapl(|access| access.libver_v110()).create(path)?;
+    node::put_text(&file, "format", RESULT_FORMAT)?;
+    node::put(&file, "version", &VERSION)?;
+    node::put_text(&file, "title", title)?;
+    node::put_text(&file, "convention", convention)?;
+    Ok(file)
+}
+
+/// Adds where the numbers came from, when they are all there.
+fn complete(file: &File, summary: &Summary) -> hdf5_metno::Result<()> {
+    let provenance = &summary.provenance;
+    node::put_text(file, "program", &provenance.program)?;
+    let json = serde_json::to_string_pretty(summary)
+        .map_err(|error| hdf5_metno::Error::from(format!("the summary: {error}")))?;
+    put_dataset(file, "summary", &json)?;
+    put_texts(file, "warnings", summary.all_warnings())?;
+    let group = file.create_group("provenance")?;
+    put_dataset(&group, "configuration", &provenance.configuration)?;
+    let inputs = group.create_group("inputs")?;
+    put_texts(&inputs, "path", provenance.inputs.iter().map(|input| &input.path))?;
+    put_texts(&inputs, "blake3", provenance.inputs.iter().map(|input| &input.blake3))?;
+    let bytes: Vec<u64> = provenance.inputs.iter().map(|Input { bytes, .. }| *bytes).collect();
+    inputs.new_dataset_builder().with_data(&bytes).create("bytes")?;
+    // What the disk refuses comes out here, and not when the file is closed.
+    file.flush()
 }
 
 impl Export for ResultExport {
@@ -154,7 +167,7 @@ impl Export for ResultExport {
     }
 
     fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
-        self.complete(summary).map_err(|error| self.failure(error))?;
+        complete(&self.file, summary).map_err(|error| self.failure(error))?;
         let Self { form, motion, harmonics, file, pending } = *self;
         drop((form, motion, harmonics, file));
         Ok(pending.into_iter().collect())
