@@ -6,6 +6,7 @@
 
 mod interpolate;
 mod load;
+mod positions;
 mod separate;
 mod trace;
 

@@ -14,7 +14,11 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::{interpolate::cubic, trace::AxialTrace};
+use crate::{
+    interpolate::cubic,
+    positions::{coarsest_mm, common_range, positions},
+    trace::AxialTrace,
+};
 
 /// `[separate] plugin = "axial-reversal"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -27,8 +31,8 @@ pub struct AxialReversalConfig {
     #[serde(default = "default_reversed")]
     pub reversed: String,
     /// Distance of the positions that straightness is given at, in mm, counted from where all traces have begun.
-    /// Without it: the traces' own positions where they are the same in all, else the median spacing of the coarsest
-    /// trace.
+    /// Without it: the traces' own positions where they are the same in all, else about the median spacing of the
+    /// coarsest trace, so that both ends of the common range have one.
     #[serde(default)]
     pub step_mm: Option<f64>,
 }
@@ -83,19 +87,15 @@ impl AxialReversalConfig {
 #[derive(Debug, Clone)]
 pub struct AxialReversal(AxialReversalConfig);
 
-/// More positions would be a mistaken step.
-const MOST_POSITIONS: f64 = 1e6;
-/// Two positions have no deviation from a line.
-const FEWEST_POSITIONS: usize = 3;
-/// A gap is wider than this many steps and spacings.
-const GAP: f64 = 3.0;
+/// Positions closer than this share of the coarsest spacing are worth a word.
+const FINER: f64 = 0.75;
 
 impl TraceSeparator for AxialReversal {
     fn separate(&self, points: &Points) -> Result<Straightness> {
         let setups = [traces_of(points, &self.0.initial)?, traces_of(points, &self.0.reversed)?];
         let all: Vec<&AxialTrace> = setups.iter().flatten().collect();
-        let range = common_range(points, &all)?;
-        let z_mm = self.positions(points, &all, range)?;
+        let range = common_range(&points.input, &all)?;
+        let z_mm = positions(self.0.step_mm, &points.input, &all, range)?;
         let aligned = setups.each_ref().map(|traces| -> Vec<Vec<f64>> {
             let on_positions = |trace: &AxialTrace| -> Vec<f64> {
                 z_mm.iter().map(|at| cubic(&trace.z_mm, &trace.reading_um, *at)).collect()
@@ -133,34 +133,6 @@ impl TraceSeparator for AxialReversal {
 }
 
 impl AxialReversal {
-    /// Where straightness is given.
-    fn positions(&self, points: &Points, all: &[&AxialTrace], range: [f64; 2]) -> Result<Vec<f64>> {
-        let [first, last] = range;
-        let z_mm = match (self.0.step_mm, all) {
-            (None, [one, others @ ..]) if others.iter().all(|other| other.z_mm == one.z_mm) => one.z_mm.clone(),
-            (step, _) => {
-                let step = step.unwrap_or_else(|| coarsest_mm(all));
-                // The last position is there although its own rounding may put it beyond.
-                let steps = ((last - first) / step + 1e-6).floor();
-                if steps > MOST_POSITIONS {
-                    let problem = format!("a step of {step} mm makes {steps:.0} positions of {:.3} mm", last - first);
-                    return Err(Error::new("separate", points.input.display().to_string(), problem)
-                        .help("set a larger `step_mm` in [separate]"));
-                }
-                (0..=steps as usize).map(|index| (first + step * index as f64).min(last)).collect()
-            }
-        };
-        if z_mm.len() < FEWEST_POSITIONS {
-            let problem = format!(
-                "all traces share z = {first} to {last} mm: {} positions, and {FEWEST_POSITIONS} are needed",
-                z_mm.len()
-            );
-            return Err(Error::new("separate", points.input.display().to_string(), problem)
-                .help("measure a longer common range, or set a smaller `step_mm` in [separate]"));
-        }
-        Ok(z_mm)
-    }
-
     fn warnings(
         &self,
         points: &Points,
@@ -184,13 +156,14 @@ impl AxialReversal {
             let left_out = beyond.join(", ");
             warnings.push(format!("all traces share z = {first} to {last} mm; points beyond it left out: {left_out}"));
         }
-        let interpolated =
-            all.iter().any(|trace| z_mm.iter().any(|at| trace.z_mm.binary_search_by(|z| z.total_cmp(at)).is_err()));
-        if let (true, [first, second, ..]) = (interpolated, z_mm) {
-            let (step, coarsest) = (second - first, coarsest_mm(all));
-            let finer = if step < 0.999 * coarsest { ", finer than the traces': nothing is added between" } else { "" };
-            warnings.push(format!("readings are interpolated (cubic) on positions {step:.6} mm apart{finer}"));
-            warnings.extend(all.iter().flat_map(|trace| gaps(trace, range, step)));
+        let own = |trace: &&AxialTrace| z_mm.iter().all(|at| trace.z_mm.binary_search_by(|z| z.total_cmp(at)).is_ok());
+        if let (false, [first, second, ..], Some(end)) = (all.iter().all(own), z_mm, z_mm.last()) {
+            let step = second - first;
+            let finer = if step < FINER * coarsest_mm(all) { ", closer than the traces' own" } else { "" };
+            let rest = range[1] - end;
+            let rest = if rest > 1e-6 * step { format!("; the last {rest:.4} mm hold none") } else { String::new() };
+            warnings.push(format!("readings are interpolated (cubic) on positions {step:.4} mm apart{finer}{rest}"));
+            warnings.extend(all.iter().flat_map(|trace| trace.gaps(range, step)));
         }
         warnings.push(match counts {
             [1, 1] => "one trace in each setup: nothing tells the uncertainty; repeat each at least once".into(),
@@ -223,40 +196,6 @@ fn traces_of(points: &Points, setup: &str) -> Result<Vec<AxialTrace>> {
         return Err(Error::new("separate", "part and slide", problem).help(known_names(setup, known)));
     }
     Ok(traces)
-}
-
-/// The range that all traces cover.
-fn common_range(points: &Points, all: &[&AxialTrace]) -> Result<[f64; 2]> {
-    let start = |trace: &&&AxialTrace| trace.range_mm()[0];
-    let end = |trace: &&&AxialTrace| trace.range_mm()[1];
-    let latest = all.iter().max_by(|a, b| start(a).total_cmp(&start(b)));
-    let earliest = all.iter().min_by(|a, b| end(a).total_cmp(&end(b)));
-    match (latest, earliest) {
-        (Some(latest), Some(earliest)) if start(&latest) < end(&earliest) => Ok([start(&latest), end(&earliest)]),
-        (Some(latest), Some(earliest)) => {
-            let (begins, ends) = (start(&latest), end(&earliest));
-            let problem =
-                format!("trace {} begins at {begins} mm, where {} has ended ({ends} mm)", latest.id, earliest.id);
-            Err(Error::new("separate", points.input.display().to_string(), problem)
-                .help("all traces have to share a range of z, in the part's own coordinate"))
-        }
-        _ => Err(Error::new("separate", points.input.display().to_string(), "it holds no traces")),
-    }
-}
-
-/// Largest of the traces' median spacings, in mm.
-fn coarsest_mm(all: &[&AxialTrace]) -> f64 {
-    all.iter().map(|trace| trace.spacing_mm()).fold(0.0, f64::max)
-}
-
-/// Where a trace has no points for long.
-fn gaps(trace: &AxialTrace, [first, last]: [f64; 2], step_mm: f64) -> Vec<String> {
-    let wide = GAP * step_mm.max(trace.spacing_mm());
-    let within = |pair: &&[f64]| pair[1] > first && pair[0] < last && pair[1] - pair[0] > wide;
-    let said = |pair: &[f64]| {
-        format!("trace {} has no points from {} to {} mm: a straight line stands there", trace.id, pair[0], pair[1])
-    };
-    trace.z_mm.windows(2).filter(within).map(said).collect()
 }
 
 fn mean(traces: &[Vec<f64>], positions: usize) -> Vec<f64> {

@@ -10,6 +10,9 @@ use runout_core::{
 /// Below this there is no cubic between readings.
 const FEWEST_POINTS: usize = 4;
 
+/// A gap is wider than this many steps and spacings.
+const GAP: f64 = 3.0;
+
 /// Readings along z, ascending.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxialTrace {
@@ -70,5 +73,15 @@ impl AxialTrace {
     /// Points beyond a range.
     pub fn beyond(&self, [first, last]: [f64; 2]) -> usize {
         self.z_mm.iter().filter(|z| !(first..=last).contains(*z)).count()
+    }
+
+    /// Where it has no points for long, in words.
+    pub fn gaps(&self, [first, last]: [f64; 2], step_mm: f64) -> Vec<String> {
+        let wide = GAP * step_mm.max(self.spacing_mm());
+        let within = |pair: &&[f64]| pair[1] > first && pair[0] < last && pair[1] - pair[0] > wide;
+        let said = |pair: &[f64]| {
+            format!("trace {} has no points from {} to {} mm: a straight line stands there", self.id, pair[0], pair[1])
+        };
+        self.z_mm.windows(2).filter(within).map(said).collect()
     }
 }
