@@ -12,10 +12,10 @@ use super::{
 };
 
 /// Random arrangements tried, and those of them that are refined.
-const DRAWS: usize = 24_000;
-const REFINED: usize = 24;
+const DRAWS: usize = 60_000;
+const REFINED: usize = 60;
 /// Arrangements near one that are tried before the search for a better one ends.
-const NEIGHBOURS: usize = 1500;
+const NEIGHBOURS: usize = 2000;
 /// The same where each is tried at many placements within the tolerance.
 const NEIGHBOURS_WITHIN_TOLERANCE: usize = 300;
 /// Longest step of the refinement: 5°.
@@ -28,7 +28,7 @@ const DIFFERENT_DEG: f64 = 2.0;
 const REPORTED: usize = 5;
 
 /// Draws between two words of progress.
-const DRAWS_A_STEP: usize = 1000;
+const DRAWS_A_STEP: usize = 2000;
 /// How often [`optimise`] tells of its progress.
 pub const PROGRESS_STEPS: usize = DRAWS / DRAWS_A_STEP + REFINED;
 
@@ -63,7 +63,10 @@ pub struct Arrangement {
 pub struct Optimum {
     /// The rig's own.
     pub declared: Arrangement,
-    /// Best first, none a mirror image or a rotation of another.
+    /// Whether the rig's own sensors keep the clearance.
+    pub declared_keeps_clearance: bool,
+    /// Best first, none a mirror image or a rotation of another; only what is better than the rig's own, unless that
+    /// breaks the clearance.
     pub found: Vec<Arrangement>,
 }
 
@@ -77,6 +80,12 @@ pub struct Optimum {
 pub fn optimise(rig: &Rig, search: &Search, progress: &mut dyn FnMut(&str)) -> Result<Optimum, TooTight> {
     let mut random = ChaCha8Rng::seed_from_u64(search.seed);
     let mut bench = Bench::new(rig, search, &mut random)?;
+    let own = rig.sensors.iter().map(|sensor| tidy(sensor.angle_rad.to_degrees())).collect();
+    let declared = bench.arrangement(own);
+    let keeps = bench.keeps_clearance(&declared.angles_deg);
+    if rig.sensors.len() < 2 {
+        return Ok(Optimum { declared, declared_keeps_clearance: keeps, found: Vec::new() });
+    }
     let mut pool: Vec<(Score, Vec<i64>)> = Vec::with_capacity(REFINED + 1);
     for draw in 1..=DRAWS {
         let mut steps = vec![0; rig.sensors.len()];
@@ -108,6 +117,8 @@ pub fn optimise(rig: &Rig, search: &Search, progress: &mut dyn FnMut(&str)) -> R
         found.push(bench.arrangement(bench.degrees(&steps)));
     }
     found.sort_by(|a, b| a.within_tolerance.compare(&b.within_tolerance, search.criterion));
+    let limit = keeps.then_some(declared.within_tolerance);
+    found.retain(|found| limit.is_none_or(|limit| bench.is_better(&found.within_tolerance, &limit)));
     let mut different: Vec<(Arrangement, Vec<f64>)> = Vec::new();
     for arrangement in found {
         let distances = bench.distances(&arrangement.angles_deg);
@@ -116,9 +127,8 @@ pub fn optimise(rig: &Rig, search: &Search, progress: &mut dyn FnMut(&str)) -> R
             different.push((arrangement, distances));
         }
     }
-    let own = rig.sensors.iter().map(|sensor| tidy(sensor.angle_rad.to_degrees())).collect();
     let found = different.into_iter().map(|(arrangement, _)| arrangement).collect();
-    Ok(Optimum { declared: bench.arrangement(own), found })
+    Ok(Optimum { declared, declared_keeps_clearance: keeps, found })
 }
 
 /// What arrangements are tried on. An arrangement is the sensors' angles in hundredths of a degree; the first's is not
@@ -238,14 +248,23 @@ impl<'a> Bench<'a> {
     /// Distances between sensors, those of one section first, each kind ascending: the same after a rotation and in a
     /// mirror.
     fn distances(&self, angles_deg: &[f64]) -> Vec<f64> {
-        let mut distances = Vec::new();
-        for (index, (sensor, angle)) in self.rig.sensors.iter().zip(angles_deg).enumerate() {
-            for (other, other_angle) in self.rig.sensors.iter().zip(angles_deg).take(index) {
-                distances.push((sensor.section != other.section, distance_deg(*angle, *other_angle)));
-            }
-        }
+        let mut distances: Vec<(bool, f64)> = self.pairs(angles_deg).collect();
         distances.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         distances.into_iter().map(|(_, distance)| distance).collect()
+    }
+
+    fn keeps_clearance(&self, angles_deg: &[f64]) -> bool {
+        // 1e-6°: angles went through radians.
+        self.pairs(angles_deg).all(|(apart, distance)| apart || distance >= self.search.clearance_deg - 1e-6)
+    }
+
+    /// Of every two sensors: whether they look at different sections, and their distance in degrees.
+    fn pairs(&self, angles_deg: &[f64]) -> impl Iterator<Item = (bool, f64)> {
+        let placed = move || self.rig.sensors.iter().zip(angles_deg);
+        placed().enumerate().flat_map(move |(index, (sensor, angle))| {
+            let others = placed().take(index);
+            others.map(move |(other, at)| (sensor.section != other.section, distance_deg(*angle, *at)))
+        })
     }
 
     fn words(&self, best: Option<&Score>) -> String {

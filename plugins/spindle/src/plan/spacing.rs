@@ -57,7 +57,7 @@ impl Spacing {
             let sensors = spacing.movable[section].len() + usize::from(section == held);
             if sensors > 1 && spacing.slack(section) < 0 {
                 // With the first sensor between two steps, the last hundredth may be missing.
-                let most_deg = ((TURN / sensors as i64 - 1) as f64 / STEPS_PER_DEG).floor();
+                let most_deg = ((TURN / sensors as i64 - 1) / 10) as f64 / 10.0;
                 return Err(TooTight { section: id.clone(), sensors, most_deg });
             }
         }
@@ -95,9 +95,8 @@ impl Spacing {
             gap.min(TURN - gap) >= self.clearance
         };
         self.movable.iter().enumerate().all(|(section, sensors)| {
-            let from_first = |step: i64| {
-                section != self.held || (step - self.free.0).rem_euclid(TURN) <= self.free.1 - self.free.0
-            };
+            let from_first =
+                |step: i64| section != self.held || (step - self.free.0).rem_euclid(TURN) <= self.free.1 - self.free.0;
             sensors.iter().enumerate().all(|(place, sensor)| {
                 from_first(steps[*sensor]) && sensors[..place].iter().all(|other| apart(steps[*sensor], steps[*other]))
             })

@@ -14,6 +14,8 @@ use super::{
 
 /// Two angles nearer than this are the same, in degrees.
 const SAME_DEG: f64 = 1e-6;
+/// Multiples of these, in degrees, are round angles, the first more so than the last.
+const ROUND_DEG: [usize; 4] = [90, 45, 15, 5];
 
 /// Something that can be added to a rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,12 +57,11 @@ pub fn score(rig: &Rig, orders: &RangeInclusive<usize>) -> Score {
 /// without those that help nothing.
 #[must_use]
 pub fn suggest(rig: &Rig, orders: &RangeInclusive<usize>, clearance_deg: f64) -> Vec<Suggestion> {
-    let step_deg = step_deg(*orders.end());
-    let grid = || (0..(360.0 / step_deg).round() as usize).map(move |step| step as f64 * step_deg);
+    let grid = grid_deg(*orders.end());
     let setups = |sensors_turned| {
-        grid().map(|part_deg| Addition::Setup { part_deg, sensors_turned }).collect::<Vec<Addition>>()
+        grid.iter().map(|part_deg| Addition::Setup { part_deg: *part_deg, sensors_turned }).collect::<Vec<_>>()
     };
-    let sensors = |section| grid().map(|angle_deg| Addition::Sensor { section, angle_deg }).collect();
+    let sensors = |section| grid.iter().map(|angle_deg| Addition::Sensor { section, angle_deg: *angle_deg }).collect();
     let kinds = [setups(false), setups(true)].into_iter().chain((0..rig.sections.len()).map(sensors));
     let before = score(rig, orders);
     let mut found: Vec<Suggestion> =
@@ -69,14 +70,18 @@ pub fn suggest(rig: &Rig, orders: &RangeInclusive<usize>, clearance_deg: f64) ->
     found
 }
 
-/// Grid of the angles: a grid of M places a turn cannot tell anything at orders that are multiples of M, and little
-/// beside them.
-fn step_deg(highest_order: usize) -> f64 {
-    match highest_order {
-        ..=180 => 1.0,
-        ..=360 => 0.5,
-        _ => 0.1,
-    }
+/// Angles to try, round ones first: where several do as well as one another, the first is taken, which is easy to set.
+///
+/// A grid of M places a turn cannot tell anything at orders that are multiples of M, and little beside them.
+fn grid_deg(highest_order: usize) -> Vec<f64> {
+    let per_deg = match highest_order {
+        ..=180 => 1,
+        ..=360 => 2,
+        _ => 10,
+    };
+    let mut steps: Vec<usize> = (0..360 * per_deg).collect();
+    steps.sort_by_key(|step| ROUND_DEG.iter().filter(|round| !step.is_multiple_of(**round * per_deg)).count());
+    steps.into_iter().map(|step| step as f64 / per_deg as f64).collect()
 }
 
 fn best(
