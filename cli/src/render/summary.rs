@@ -1,5 +1,7 @@
 //! What a run found, for people: `run`'s last words.
 
+mod straightness;
+
 use runout_core::pipeline::run::{CaptureSummary, SectionSummary, StationSummary, Summary};
 
 use super::{
@@ -21,14 +23,18 @@ pub fn text(summary: &Summary) -> String {
     let stations = &summary.stations;
     let mut page = Page::default();
     page.line(&summary.title);
-    page.line(count(stations.len(), "station"));
-    turns(&mut page, stations);
-    let form = if stations.len() <= FEW_STATIONS { form_by_station(stations) } else { form_gathered(stations) };
-    page.headed_table(form_heading(stations), &form);
-    residual(&mut page, stations);
-    motion_truth(&mut page, stations);
-    lost_orders(&mut page, summary);
-    surface(&mut page, summary);
+    if let Some(found) = &summary.straightness {
+        straightness::section(&mut page, found);
+    } else {
+        page.line(count(stations.len(), "station"));
+        turns(&mut page, stations);
+        let form = if stations.len() <= FEW_STATIONS { form_by_station(stations) } else { form_gathered(stations) };
+        page.headed_table(form_heading(stations), &form);
+        residual(&mut page, stations);
+        motion_truth(&mut page, stations);
+        lost_orders(&mut page, summary);
+        surface(&mut page, summary);
+    }
     let mut warnings = summary.warnings.clone();
     warnings.extend(stations.iter().flat_map(|station| station.warnings.iter().cloned()));
     page.bullets("Warnings and notes", &warnings);

@@ -6,3 +6,4 @@ mod diagnostics;
 mod folder;
 mod safety;
 mod schemas;
+mod straightness;
