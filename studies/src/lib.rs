@@ -4,4 +4,5 @@ pub mod averaging;
 pub mod campaign;
 pub mod eccentricity;
 pub mod plot;
+pub mod straightness;
 pub mod surface;

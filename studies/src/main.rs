@@ -5,11 +5,13 @@
 use std::{path::Path, process::ExitCode};
 
 use runout_core::{Result, atomic_file};
-use runout_studies::{averaging, eccentricity, surface as unrolled};
+use runout_studies::{averaging, eccentricity, straightness, surface as unrolled};
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
-       runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled";
+       runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
+       runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
+       runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -20,6 +22,8 @@ fn main() -> ExitCode {
             eccentricity::rows(seeds.parse().unwrap_or_default()).map(|rows| println!("{}", eccentricity::table(&rows)))
         }
         ["surface", pipeline, picture] => surface(pipeline, picture),
+        ["straightness-traces", file] => straightness_traces(file),
+        ["straightness", file, picture] => straightness(file, picture),
         ["averaging"] => averaging(None),
         ["averaging", picture] => averaging(Some(picture)),
         _ => {
@@ -50,6 +54,20 @@ fn averaging(picture: Option<&str>) -> Result<()> {
 
 fn surface(pipeline: &str, picture: &str) -> Result<()> {
     let path = atomic_file::write(picture, &unrolled::picture(Path::new(pipeline))?)?;
+    println!("picture: {}", path.display());
+    Ok(())
+}
+
+fn straightness_traces(file: &str) -> Result<()> {
+    let path = atomic_file::write(file, straightness::traces()?.as_bytes())?;
+    println!("traces: {}", path.display());
+    Ok(())
+}
+
+fn straightness(file: &str, picture: &str) -> Result<()> {
+    let result = straightness::separate(Path::new(file))?;
+    println!("{}", straightness::table(&result));
+    let path = atomic_file::write(picture, &straightness::picture(&result)?)?;
     println!("picture: {}", path.display());
     Ok(())
 }

@@ -3,11 +3,13 @@
 use runout_core::{
     pipeline::{
         Pipeline,
+        config::Route,
         document::{Document, Sources},
         run::LostOrders,
     },
     rig::{Rig, Rotation},
     separation::{Assessment, OrderAssessment, Quantity},
+    straightness::LIMIT,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -118,6 +120,9 @@ fn report(sources: &Sources, pipeline: &Pipeline) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
     if let Err(error) = pipeline.loader.open(pipeline.rig.as_ref()) {
         notes.push(format!("the data are not there yet, or cannot be used: {error}"));
+    }
+    if matches!(pipeline.route, Route::Traces { .. }) {
+        notes.push(LIMIT.to_owned());
     }
     if pipeline.exporters.is_empty() {
         notes.push("there is no [[export]]: a run would only print its summary".into());
