@@ -58,6 +58,23 @@ impl Profile {
     }
 }
 
+/// Orders to each side over which [`smooth`] averages: the scatter's spectrum is smooth, its estimate is not.
+pub const SMOOTHING: usize = 2;
+
+/// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over its neighbours. Order 1
+/// stays by itself: what shakes the eccentricity shakes no other order.
+pub fn smooth(covariance: &mut [Complex64], size: usize) {
+    let raw = covariance.to_vec();
+    let max_order = (raw.len() / size.max(1)).saturating_sub(1);
+    for order in 2..=max_order {
+        let window = order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order);
+        let share = 1.0 / (window.end() + 1 - window.start()) as f64;
+        for (entry, target) in covariance[order * size..(order + 1) * size].iter_mut().enumerate() {
+            *target = window.clone().map(|near| raw[near * size + entry]).sum::<Complex64>() * share;
+        }
+    }
+}
+
 /// Every turn of a capture is either used or listed here.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TurnCount {

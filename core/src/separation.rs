@@ -7,6 +7,9 @@ pub const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's a
     Re sum c exp(-i n Phi) over the spindle's angle Phi. Lost orders cannot be told by the layout: NaN in the \
     harmonics, left out of form and motion.";
 
+/// Displacement in µm at a lever of 1 mm per 1 µrad.
+pub const UM_PER_MM_URAD: f64 = 1e-3;
+
 /// Something that a separation solves for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
@@ -58,6 +61,8 @@ pub struct Assessment {
     pub unknowns: Vec<Quantity>,
     /// One entry an order, ascending from 1.
     pub orders: Vec<OrderAssessment>,
+    /// Ids of the rig's sensors and setups that it does not use.
+    pub unused: Vec<String>,
     /// What the user should know: conventions, assumptions, definitions.
     pub notes: Vec<String>,
 }

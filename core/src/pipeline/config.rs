@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use toml::{Spanned, de::DeValue};
 
 use super::{
+    compare::{self, Candidate},
     document::{self, ConfigError, Document, Sources, Table},
     error::{Fault, known_names},
     registry::{Catalogue, Context, Plugin, Registry},
@@ -36,6 +37,10 @@ pub struct Pipeline {
     pub loader: Box<dyn Loader>,
     /// From there to form and motion.
     pub route: Route,
+    /// Name of the separator's plugin.
+    pub separator: String,
+    /// The separators of `[[compare]]`, which `run` leaves alone.
+    pub compare: Vec<Candidate>,
     /// How sections become a surface.
     pub surface: SurfaceConfig,
     /// In the order configured.
@@ -102,7 +107,7 @@ impl Default for Effects {
     }
 }
 
-const KEYS: [&str; 8] = ["title", "rig", "load", "preprocess", "separate", "surface", "diagnose", "export"];
+const KEYS: [&str; 9] = ["title", "rig", "load", "preprocess", "separate", "compare", "surface", "diagnose", "export"];
 
 impl Pipeline {
     /// Checks a configuration against the registry and builds every stage.
@@ -174,6 +179,10 @@ impl Pipeline {
                 }
             }
         };
+        let compare = tables(root, "compare")?
+            .iter()
+            .map(|table| compare::candidate(table, registry, &context))
+            .collect::<Result<_, _>>()?;
         let mut exporters: Vec<Box<dyn Exporter>> = Vec::new();
         let mut outputs: Vec<_> = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
         for table in tables(root, "export")? {
@@ -200,6 +209,8 @@ impl Pipeline {
             rig,
             loader,
             route,
+            separator: compare::plugin_name(&separate_table),
+            compare,
             surface,
             exporters,
             assessment,
@@ -329,6 +340,7 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
             "load": choice(&registry.loaders),
             "preprocess": { "type": "array", "items": choice(&registry.preprocessors) },
             "separate": choice(&registry.separators),
+            "compare": { "type": "array", "items": choice(&registry.separators) },
             "surface": inline::<SurfaceConfig>(),
             "diagnose": inline::<DiagnoseConfig>(),
             "export": { "type": "array", "items": choice(&registry.exporters) },

@@ -11,6 +11,8 @@ pub struct Fault {
     pub(crate) place: Place,
     pub(crate) message: String,
     pub(crate) help: Option<String>,
+    /// Whether a plugin refuses the rig, and the configuration may be all right.
+    pub(crate) unfit: bool,
 }
 
 /// Where a fault stands.
@@ -32,16 +34,21 @@ pub(crate) enum Step {
 impl Fault {
     /// A fault of the value at `key`; `message` says what was expected and what was found.
     pub fn at(key: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { place: Place::Path(vec![Step::Key(key.into())]), message: message.into(), help: None }
+        Self { place: Place::Path(vec![Step::Key(key.into())]), message: message.into(), help: None, unfit: false }
     }
 
     /// A fault of the table as a whole.
     pub fn here(message: impl Into<String>) -> Self {
-        Self { place: Place::Path(Vec::new()), message: message.into(), help: None }
+        Self { place: Place::Path(Vec::new()), message: message.into(), help: None, unfit: false }
+    }
+
+    /// A plugin that cannot take the rig; `message` says what it needs and what the rig has.
+    pub fn unfit(message: impl Into<String>) -> Self {
+        Self { unfit: true, ..Self::at("plugin", message) }
     }
 
     pub(crate) fn span(span: Range<usize>, message: impl Into<String>) -> Self {
-        Self { place: Place::Span(span), message: message.into(), help: None }
+        Self { place: Place::Span(span), message: message.into(), help: None, unfit: false }
     }
 
     /// Adds what the user can do.

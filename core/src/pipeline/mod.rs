@@ -1,8 +1,10 @@
 //! The pipeline: configuration, what is registered, and the run.
 
+pub mod compare;
 pub mod config;
 pub mod document;
 pub mod error;
+mod line;
 pub mod registry;
 pub mod result;
 pub mod run;

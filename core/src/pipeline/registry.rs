@@ -138,4 +138,10 @@ impl<S> Catalogue<S> {
         };
         (plugin.build)(&Spanned::new(table.span(), keys), context).map_err(|fault| document::resolve(fault, table))
     }
+
+    /// Builds the plugin of a name without any keys of its own; `None` where there is none.
+    pub fn build_default(&self, name: &str, context: &Context) -> Option<Result<S, Fault>> {
+        let plugin = self.plugins.iter().find(|plugin| plugin.name == name)?;
+        Some((plugin.build)(&Spanned::new(0..0, DeTable::new()), context))
+    }
 }

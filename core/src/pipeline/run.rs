@@ -1,16 +1,10 @@
 //! The run: load → preprocess → separate → evaluate → export, station by station, threads across stations.
 
-use std::{
-    num::NonZeroUsize,
-    path::PathBuf,
-    sync::{
-        Condvar, Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-    },
-};
+use std::{num::NonZeroUsize, path::PathBuf};
 
 use super::{
     config::{Pipeline, Route},
+    line::{Line, separate},
     result::complete,
     summary::summarise,
     traces,
@@ -25,14 +19,10 @@ pub use super::{
 use crate::{
     Error, Result,
     atomic_file::{PendingFile, commit_all, resolved},
-    inspection::Inspection,
-    measurement::{Recording, StationKey},
     points::Points,
-    profile::Profile,
     provenance::{Input, Provenance, VERSION},
     rig::Rig,
-    separation::Separation,
-    stage::{Averager, Conditioner, Export, PointSeparator, Source, Station, StationSeparator},
+    stage::{Export, PointSeparator, Source, Station},
     surface::{Surface, SurfaceBuilder},
 };
 
@@ -61,7 +51,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
         Source::Turns(recording) => recording.inputs(),
         Source::Points(points) => vec![points.input.clone()],
     };
-    spare_inputs(pipeline, &inputs)?;
+    spare_inputs(&pipeline.outputs(), &inputs)?;
     if let (Source::Points(points), Route::Traces { separator }) = (&source, &pipeline.route) {
         return traces::run(pipeline, points, &**separator);
     }
@@ -72,9 +62,14 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 .rig
                 .as_ref()
                 .ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
-            let line =
-                Line { rig, recording: &**recording, conditioners, averager: &**averager, separator: &**separator };
-            let inputs = line.run(threads, observer, &mut gathering)?;
+            let line = Line { rig, recording: &**recording, conditioners, averager: &**averager };
+            let work = |index, station: Station| {
+                let separation = separate(&**separator, &station)?;
+                let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
+                let truth = recording.truth(index)?;
+                Ok(complete(station.name, station.z_mm, angles, separation, station.profiles, truth))
+            };
+            let inputs = line.run(threads, observer, work, |result| gathering.take(&result, Some(rig)))?;
             (inputs, gathering.build_surface(rig.part_radius_mm)?, recording.remarks())
         }
         (Source::Points(points), Route::Points { separator }) => {
@@ -184,10 +179,10 @@ pub(super) fn conclude(
 }
 
 /// Refuses to write over what the run reads.
-fn spare_inputs(pipeline: &Pipeline, inputs: &[PathBuf]) -> Result<()> {
+pub(super) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<()> {
     let read: Vec<PathBuf> = inputs.iter().map(|input| resolved(input)).collect();
-    for output in pipeline.outputs() {
-        if read.contains(&resolved(&output)) {
+    for output in outputs {
+        if read.contains(&resolved(output)) {
             let problem = "it is what the run reads";
             return Err(Error::new("write", output.display().to_string(), problem).help("export to another path"));
         }
@@ -210,106 +205,6 @@ fn misfit(stations: &[StationSummary]) -> Option<String> {
         stations.len(),
         worst.station,
     ))
-}
-
-/// Refuses what is not a number where the layout could tell one.
-fn finite(station: &str, separation: &Separation) -> Result<()> {
-    let width = separation.unknowns.len().max(1);
-    let told = separation.estimate.iter().zip(&separation.observable);
-    match told.enumerate().find(|(_, (value, told))| **told && !value.is_finite()) {
-        None => Ok(()),
-        Some((index, _)) => {
-            let quantity = separation.unknowns[index % width].id();
-            let problem = format!("{quantity} of order {} comes out as no number", index / width);
-            Err(Error::new("separate", format!("station {station}"), problem)
-                .help("look for absurd readings, and check the rig's radius and positions"))
-        }
-    }
-}
-
-/// Recorded turns on their way to form and motion.
-struct Line<'a> {
-    rig: &'a Rig,
-    recording: &'a dyn Recording,
-    conditioners: &'a [Box<dyn Conditioner>],
-    averager: &'a dyn Averager,
-    separator: &'a dyn StationSeparator,
-}
-
-impl Line<'_> {
-    /// Works on all stations, and on the inputs' checksums meanwhile.
-    ///
-    /// Each worker takes the next station and then waits for its turn to hand the result on: results come in order,
-    /// and no more of them exist at a time than there are workers.
-    fn run(
-        &self,
-        threads: Option<NonZeroUsize>,
-        observer: &dyn Observer,
-        gathering: &mut Gathering,
-    ) -> Result<Vec<Input>> {
-        let stations = self.recording.stations();
-        observer.begin(stations.len());
-        let available = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-        let workers = threads.map_or_else(available, NonZeroUsize::get).clamp(1, stations.len().max(1));
-        let next = AtomicUsize::new(0);
-        let failed = AtomicBool::new(false);
-        let turnstile = Mutex::new((0_usize, Ok(()), gathering));
-        let turned = Condvar::new();
-        let work = || {
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(station) = stations.get(index) else { return };
-                let result = if failed.load(Ordering::Relaxed) { None } else { Some(self.station(index, station)) };
-                let guard = turnstile.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut guard =
-                    turned.wait_while(guard, |(turn, _, _)| *turn != index).unwrap_or_else(PoisonError::into_inner);
-                let (turn, outcome, gathering) = &mut *guard;
-                *turn += 1;
-                if let (Some(result), Ok(())) = (result, &outcome) {
-                    *outcome = result.and_then(|result| gathering.take(&result, Some(self.rig)));
-                    if outcome.is_err() {
-                        failed.store(true, Ordering::Relaxed);
-                    } else {
-                        observer.station(&station.name);
-                    }
-                }
-                drop(guard);
-                turned.notify_all();
-            }
-        };
-        let inputs = std::thread::scope(|scope| {
-            let checksums =
-                scope.spawn(|| self.recording.inputs().iter().map(|path| Input::of(path)).collect::<Result<Vec<_>>>());
-            for _ in 1..workers {
-                scope.spawn(work);
-            }
-            work();
-            checksums.join()
-        });
-        let (_, outcome, _) = turnstile.into_inner().unwrap_or_else(PoisonError::into_inner);
-        outcome?;
-        inputs.unwrap_or_else(|_| Err(Error::new("checksum", "the inputs", "the thread that read them stopped")))
-    }
-
-    fn station(&self, index: usize, key: &StationKey) -> Result<StationResult> {
-        let profiles: Result<Vec<Profile>> =
-            (0..self.rig.setups.len()).map(|setup| self.profile(index, setup)).collect();
-        let station = Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? };
-        let separation = self.separator.separate(&station)?;
-        finite(&key.name, &separation)?;
-        let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
-        let truth = self.recording.truth(index)?;
-        Ok(complete(key.name.clone(), key.z_mm, angles, separation, station.profiles, truth))
-    }
-
-    fn profile(&self, station: usize, setup: usize) -> Result<Profile> {
-        let mut stream: Box<dyn crate::measurement::SampleStream + '_> =
-            Box::new(Inspection::new(self.recording.open(station, setup)?));
-        for conditioner in self.conditioners {
-            stream = conditioner.attach(stream)?;
-        }
-        self.averager.average(stream)
-    }
 }
 
 fn fit_points(

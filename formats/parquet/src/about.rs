@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use runout_core::{
     numerics::fourier,
     pipeline::run::{StationResult, Summary},
+    provenance::Provenance,
     separation::CONVENTION,
 };
 use serde_json::json;
@@ -52,11 +53,16 @@ impl Content {
 /// What every file says of itself.
 pub fn common(summary: &Summary, convention: &str) -> Vec<(String, String)> {
     let warnings: Vec<String> = summary.all_warnings().collect();
+    entries(&summary.title, &summary.provenance, convention, &warnings)
+}
+
+/// The same, of what is no run.
+pub fn entries(title: &str, provenance: &Provenance, convention: &str, warnings: &[String]) -> Vec<(String, String)> {
     let entries = [
-        ("title", summary.title.clone()),
-        ("program", summary.provenance.program.clone()),
-        ("configuration", summary.provenance.configuration.clone()),
-        ("inputs", json!(summary.provenance.inputs).to_string()),
+        ("title", title.to_owned()),
+        ("program", provenance.program.clone()),
+        ("configuration", provenance.configuration.clone()),
+        ("inputs", json!(provenance.inputs).to_string()),
         ("convention", convention.to_owned()),
         ("warnings", json!(warnings).to_string()),
     ];

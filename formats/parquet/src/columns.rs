@@ -17,12 +17,12 @@ const MOTIONS: [(Quantity, &str, &str); 4] = [
     (Quantity::TiltY, "tilt_y_urad", "tilt about y, right-handed"),
 ];
 
-fn column(name: &str, kind: DataType, nullable: bool, unit: &str, meaning: &str) -> Field {
+pub(super) fn column(name: &str, kind: DataType, nullable: bool, unit: &str, meaning: &str) -> Field {
     let about = [("unit", unit), ("meaning", meaning)].map(|(key, value)| (key.to_owned(), value.to_owned()));
     Field::new(name, kind, nullable).with_metadata(HashMap::from(about))
 }
 
-fn text(name: &str, nullable: bool, meaning: &str) -> Field {
+pub(super) fn text(name: &str, nullable: bool, meaning: &str) -> Field {
     column(name, DataType::Utf8, nullable, "", meaning)
 }
 

@@ -15,6 +15,7 @@
 
 mod about;
 mod columns;
+mod comparison;
 mod straightness;
 mod table;
 
@@ -36,6 +37,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use about::Content;
+pub use comparison::ComparisonTable;
 use table::Table;
 
 /// Adds the exporter `parquet`.

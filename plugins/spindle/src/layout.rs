@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+pub use runout_core::separation::UM_PER_MM_URAD;
 use runout_core::{
     Complex64,
     numerics::least_squares::PivotedQr,
@@ -16,8 +17,6 @@ const RANK_TOLERANCE: f64 = 1e-9;
 const NULL_TOLERANCE: f64 = 1e-7;
 /// Sines and cosines below this are those of a sensor that looks along the other axis.
 const ALONG_AXIS: f64 = 1e-9;
-/// µm of displacement per mm of lever and µrad of tilt.
-pub const UM_PER_MM_URAD: f64 = 1e-3;
 
 /// What each reading sees. Readings are ordered setup by setup, sensor by sensor.
 ///
@@ -287,7 +286,7 @@ impl Layout {
     #[must_use]
     pub fn assess(&self, max_order: usize) -> Assessment {
         let orders = (1..=max_order).map(|order| self.assess_order(order)).collect();
-        Assessment { unknowns: self.unknowns.clone(), orders, notes: Vec::new() }
+        Assessment { unknowns: self.unknowns.clone(), orders, unused: Vec::new(), notes: Vec::new() }
     }
 
     fn assess_order(&self, order: usize) -> OrderAssessment {

@@ -3,6 +3,7 @@
 use runout_core::{
     pipeline::error::{Fault, known_names},
     rig::Rig,
+    separation::Assessment,
 };
 
 /// A part of a rig.
@@ -14,8 +15,8 @@ pub struct Selection {
     pub sensors: Vec<usize>,
     /// Index of each chosen setup in the whole rig.
     pub setups: Vec<usize>,
-    /// What is not used, for people.
-    pub left_out: Option<String>,
+    /// Ids of the sensors and setups that are not used.
+    pub unused: Vec<String>,
 }
 
 impl Selection {
@@ -26,12 +27,19 @@ impl Selection {
         chosen.sensors = sensors.iter().map(|index| rig.sensors[*index].clone()).collect();
         chosen.setups = setups.iter().map(|index| rig.setups[*index].clone()).collect();
         let rest = |all: usize, used: &[usize]| (0..all).filter(|index| !used.contains(index)).collect::<Vec<_>>();
-        let unused: Vec<&str> = (rest(rig.sensors.len(), &sensors).into_iter())
-            .map(|index| rig.sensors[index].id.as_str())
-            .chain(rest(rig.setups.len(), &setups).into_iter().map(|index| rig.setups[index].id.as_str()))
+        let unused = (rest(rig.sensors.len(), &sensors).into_iter())
+            .map(|index| rig.sensors[index].id.clone())
+            .chain(rest(rig.setups.len(), &setups).into_iter().map(|index| rig.setups[index].id.clone()))
             .collect();
-        let left_out = (!unused.is_empty()).then(|| unused.join(", "));
-        Self { rig: chosen, sensors, setups, left_out }
+        Self { rig: chosen, sensors, setups, unused }
+    }
+
+    /// Says in an assessment what is not used.
+    pub fn tell(&self, assessment: &mut Assessment) {
+        if !self.unused.is_empty() {
+            assessment.notes.push(format!("not used: {}", self.unused.join(", ")));
+        }
+        assessment.unused.clone_from(&self.unused);
     }
 
     /// The whole rig.

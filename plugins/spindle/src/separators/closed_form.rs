@@ -162,7 +162,7 @@ impl ClosedFormSeparator {
 impl StationSeparator for ClosedFormSeparator {
     fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
         let mut assessment = self.layout.assess(max_order);
-        assessment.notes.extend(self.selection.left_out.iter().map(|unused| format!("not used: {unused}")));
+        self.selection.tell(&mut assessment);
         assessment.notes.extend(self.method.notes());
         Ok(assessment)
     }
@@ -178,7 +178,7 @@ impl StationSeparator for ClosedFormSeparator {
 
 /// A rig that does not fit a method.
 pub(super) fn refusal(method: &str, problem: &str) -> Fault {
-    Fault::at("plugin", format!("{method} {problem}")).help("plugin = \"harmonic-least-squares\" takes any rig")
+    Fault::unfit(format!("{method} {problem}")).help("plugin = \"harmonic-least-squares\" takes any rig")
 }
 
 /// Whether two angles are the same direction.

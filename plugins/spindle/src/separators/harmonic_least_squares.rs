@@ -101,7 +101,7 @@ impl HarmonicLeastSquares {
 impl StationSeparator for HarmonicLeastSquares {
     fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
         let mut assessment = self.layout.assess(max_order);
-        assessment.notes.extend(self.selection.left_out.iter().map(|unused| format!("not used: {unused}")));
+        self.selection.tell(&mut assessment);
         Ok(assessment)
     }
 

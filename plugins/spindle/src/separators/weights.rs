@@ -3,29 +3,19 @@
 use runout_core::{
     Complex64,
     numerics::least_squares::{cholesky, invert_lower},
+    profile::{self, SMOOTHING},
 };
 
 use super::readings::Readings;
 
-/// Orders to each side over which covariances are averaged: the scatter's spectrum is smooth, its estimate is not.
-const SMOOTHING: usize = 2;
 /// With fewer independent samples a channel than this, correlations are shrunk towards none.
 const SAMPLES_A_CHANNEL: f64 = 10.0;
 
-/// Replaces each order's covariance by the mean over its neighbours. Order 1 stays by itself: what shakes the
-/// eccentricity shakes no other order.
+/// Replaces each order's covariance by the mean over its neighbours.
 pub fn smooth(readings: &mut Readings) {
-    let (max_order, sensors) = (readings.max_order, readings.count / readings.turns.len().max(1));
-    let size = sensors * sensors;
+    let sensors = readings.count / readings.turns.len().max(1);
     for matrices in readings.covariance.iter_mut().flatten() {
-        let raw = matrices.clone();
-        for order in 2..=max_order {
-            let window = order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order);
-            let share = 1.0 / (window.end() + 1 - window.start()) as f64;
-            for (entry, target) in matrices[order * size..(order + 1) * size].iter_mut().enumerate() {
-                *target = window.clone().map(|near| raw[near * size + entry]).sum::<Complex64>() * share;
-            }
-        }
+        profile::smooth(matrices, sensors * sensors);
     }
 }
 

@@ -1,0 +1,121 @@
+//! Recorded turns on their way to profiles, station by station, threads across stations.
+
+use std::{
+    num::NonZeroUsize,
+    sync::{
+        Condvar, Mutex, PoisonError,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+};
+
+use super::run::Observer;
+use crate::{
+    Error, Result,
+    inspection::Inspection,
+    measurement::{Recording, SampleStream, StationKey},
+    profile::Profile,
+    provenance::Input,
+    rig::Rig,
+    separation::Separation,
+    stage::{Averager, Conditioner, Station, StationSeparator},
+};
+
+/// From recorded turns to the profiles of one station after the other.
+pub struct Line<'a> {
+    pub rig: &'a Rig,
+    pub recording: &'a dyn Recording,
+    pub conditioners: &'a [Box<dyn Conditioner>],
+    pub averager: &'a dyn Averager,
+}
+
+impl Line<'_> {
+    /// Does `work` on every station (its index and its profiles), and the inputs' checksums meanwhile; `take` gets
+    /// what comes of it.
+    ///
+    /// Each worker takes the next station and then waits for its turn to hand the result on: results come in order,
+    /// and no more of them exist at a time than there are workers.
+    pub fn run<T>(
+        &self,
+        threads: Option<NonZeroUsize>,
+        observer: &dyn Observer,
+        work: impl Fn(usize, Station) -> Result<T> + Sync,
+        take: impl FnMut(T) -> Result<()> + Send,
+    ) -> Result<Vec<Input>> {
+        let stations = self.recording.stations();
+        observer.begin(stations.len());
+        let available = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let workers = threads.map_or_else(available, NonZeroUsize::get).clamp(1, stations.len().max(1));
+        let next = AtomicUsize::new(0);
+        let failed = AtomicBool::new(false);
+        let turnstile = Mutex::new((0_usize, Ok(()), take));
+        let turned = Condvar::new();
+        let worker = || {
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(key) = stations.get(index) else { return };
+                let result = if failed.load(Ordering::Relaxed) {
+                    None
+                } else {
+                    Some(self.station(index, key).and_then(|station| work(index, station)))
+                };
+                let guard = turnstile.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut guard =
+                    turned.wait_while(guard, |(turn, _, _)| *turn != index).unwrap_or_else(PoisonError::into_inner);
+                let (turn, outcome, take) = &mut *guard;
+                *turn += 1;
+                if let (Some(result), Ok(())) = (result, &outcome) {
+                    *outcome = result.and_then(take);
+                    if outcome.is_err() {
+                        failed.store(true, Ordering::Relaxed);
+                    } else {
+                        observer.station(&key.name);
+                    }
+                }
+                drop(guard);
+                turned.notify_all();
+            }
+        };
+        let inputs = std::thread::scope(|scope| {
+            let checksums =
+                scope.spawn(|| self.recording.inputs().iter().map(|path| Input::of(path)).collect::<Result<Vec<_>>>());
+            for _ in 1..workers {
+                scope.spawn(worker);
+            }
+            worker();
+            checksums.join()
+        });
+        let (_, outcome, _) = turnstile.into_inner().unwrap_or_else(PoisonError::into_inner);
+        outcome?;
+        inputs.unwrap_or_else(|_| Err(Error::new("checksum", "the inputs", "the thread that read them stopped")))
+    }
+
+    fn station(&self, index: usize, key: &StationKey) -> Result<Station> {
+        let profiles: Result<Vec<Profile>> =
+            (0..self.rig.setups.len()).map(|setup| self.profile(index, setup)).collect();
+        Ok(Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? })
+    }
+
+    fn profile(&self, station: usize, setup: usize) -> Result<Profile> {
+        let mut stream: Box<dyn SampleStream + '_> = Box::new(Inspection::new(self.recording.open(station, setup)?));
+        for conditioner in self.conditioners {
+            stream = conditioner.attach(stream)?;
+        }
+        self.averager.average(stream)
+    }
+}
+
+/// Separates a station, and refuses what is not a number where the layout could tell one.
+pub fn separate(separator: &dyn StationSeparator, station: &Station) -> Result<Separation> {
+    let separation = separator.separate(station)?;
+    let width = separation.unknowns.len().max(1);
+    let told = separation.estimate.iter().zip(&separation.observable);
+    match told.enumerate().find(|(_, (value, told))| **told && !value.is_finite()) {
+        None => Ok(separation),
+        Some((index, _)) => {
+            let quantity = separation.unknowns[index % width].id();
+            let problem = format!("{quantity} of order {} comes out as no number", index / width);
+            Err(Error::new("separate", format!("station {}", station.name), problem)
+                .help("look for absurd readings, and check the rig's radius and positions"))
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! The table of a comparison of separators.
+
+use std::{iter::repeat_n, path::PathBuf, sync::Arc};
+
+use arrow_array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt32Array};
+use arrow_schema::{DataType, Schema};
+use runout_core::{
+    Result,
+    atomic_file::PendingFile,
+    pipeline::compare::{Comparison, Difference, MethodValue, QuantityComparison, StationComparison},
+    separation::CONVENTION,
+};
+
+use crate::{
+    about,
+    columns::{column, number, numbers, text},
+    table::Table,
+};
+
+/// One row a station, quantity, section, order and method.
+pub struct ComparisonTable(Table);
+
+impl ComparisonTable {
+    /// Begins a file that will appear as `path`.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn create(path: PathBuf) -> Result<Self> {
+        Table::create(path, schema()).map(Self)
+    }
+
+    /// Appends a station's rows.
+    ///
+    /// # Errors
+    /// When the file system refuses them.
+    pub fn append(&mut self, station: &StationComparison) -> Result<()> {
+        self.0.append(rows(station))
+    }
+
+    /// Completes the file; it appears when the result is committed.
+    ///
+    /// # Errors
+    /// When the file system refuses the rest.
+    pub fn close(self, comparison: &Comparison) -> Result<PendingFile> {
+        let stations = comparison.stations.iter().flat_map(|station| station.warnings.iter());
+        let warnings: Vec<String> = comparison.warnings.iter().chain(stations).cloned().collect();
+        let convention = format!("{CONVENTION} Differences are those from the method {}.", comparison.reference);
+        self.0.close(&about::entries(&comparison.title, &comparison.provenance, &convention, &warnings))
+    }
+}
+
+const UNIT: &str = "um; urad for tilt";
+
+fn schema() -> Schema {
+    let optional = |name: &str, unit: &str, meaning: &str| column(name, DataType::Float64, true, unit, meaning);
+    Schema::new(vec![
+        text("station", false, "name of the axial station"),
+        text("quantity", false, "form, x, y, tilt_x or tilt_y"),
+        text("section", true, "id of the section; null for motion"),
+        optional("z_mm", "mm", "place of the section, or of the plane whose displacement x and y are; null for tilt"),
+        column("order", DataType::UInt32, false, "1/rev", "undulations per revolution"),
+        text("method", false, "the separator"),
+        number("re", UNIT, "real part of c; NaN where the method cannot tell the order"),
+        number("im", UNIT, "imaginary part of c; NaN where the method cannot tell the order"),
+        number("std", UNIT, "root of E|error of c|², both parts together, from the scatter; NaN if not known"),
+        column("observable", DataType::Boolean, false, "", "whether the method can tell this order"),
+        optional("difference", UNIT, "|c − c of the reference|; null for the reference, and where one is lost"),
+        optional("difference_std", UNIT, "root of E|error of that difference|², from the joint covariance"),
+        optional("e_n", "", "difference / (2 difference_std); 0 where both are equal to rounding"),
+    ])
+}
+
+/// One method's orders of one quantity.
+struct Block<'a> {
+    quantity: &'a QuantityComparison,
+    value: &'a MethodValue,
+    difference: Option<&'a Difference>,
+}
+
+impl Block<'_> {
+    fn orders(&self) -> usize {
+        self.value.harmonics.re.len()
+    }
+
+    /// A column of the difference by order, with nulls where there is none.
+    fn of_difference<'a>(
+        &'a self,
+        column: impl Fn(&'a Difference) -> &'a Vec<Option<f64>>,
+    ) -> impl Iterator<Item = Option<f64>> + 'a {
+        let held = self.difference.map(column);
+        (0..self.orders()).map(move |index| held.and_then(|held| held.get(index).copied().flatten()))
+    }
+}
+
+fn rows(station: &StationComparison) -> Vec<ArrayRef> {
+    let blocks: Vec<Block> = station
+        .quantities
+        .iter()
+        .flat_map(|quantity| {
+            quantity.values.iter().map(move |value| {
+                let difference = quantity.differences.iter().find(|one| one.method == value.method);
+                Block { quantity, value, difference }
+            })
+        })
+        .collect();
+    let rows: usize = blocks.iter().map(Block::orders).sum();
+    let repeated = |of: fn(&Block) -> Option<String>| -> StringArray {
+        blocks.iter().flat_map(|block| repeat_n(of(block), block.orders())).collect()
+    };
+    let harmonic = |of: fn(&MethodValue) -> &Vec<Option<f64>>| {
+        numbers(blocks.iter().flat_map(|block| of(block.value).iter().map(|value| value.unwrap_or(f64::NAN))))
+    };
+    let difference = |of: fn(&Difference) -> &Vec<Option<f64>>| -> Float64Array {
+        blocks.iter().flat_map(|block| block.of_difference(of)).collect()
+    };
+    let orders = blocks.iter().flat_map(|block| (1..).take(block.orders()));
+    let z_mm = blocks.iter().flat_map(|block| repeat_n(block.value.z_mm, block.orders()));
+    let told = blocks.iter().flat_map(|block| block.value.harmonics.re.iter().map(|value| Some(value.is_some())));
+    vec![
+        Arc::new(StringArray::from_iter_values(repeat_n(station.station.as_str(), rows))),
+        Arc::new(repeated(|block| Some(block.quantity.quantity.clone()))),
+        Arc::new(repeated(|block| block.quantity.section.clone())),
+        Arc::new(z_mm.collect::<Float64Array>()),
+        Arc::new(UInt32Array::from_iter_values(orders)),
+        Arc::new(repeated(|block| Some(block.value.method.clone()))),
+        harmonic(|value| &value.harmonics.re),
+        harmonic(|value| &value.harmonics.im),
+        harmonic(|value| &value.harmonics.std),
+        Arc::new(told.collect::<BooleanArray>()),
+        Arc::new(difference(|one| &one.by_order.difference)),
+        Arc::new(difference(|one| &one.by_order.std)),
+        Arc::new(difference(|one| &one.by_order.e_n)),
+    ]
+}
