@@ -1,8 +1,8 @@
 //! The command line: types only.
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{num::NonZeroUsize, ops::RangeInclusive, path::PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Separates the form of a turning part from the error motion of its spindle.
 ///
@@ -27,6 +27,8 @@ pub enum Command {
     Check(PipelineArgs),
     /// Make a campaign with declared truth and effects, as a measurement file.
     Simulate(SimulateArgs),
+    /// Say what a rig can separate and how well, what to add to it, and better angles for its sensors.
+    Plan(PlanArgs),
     /// List the plugins, or the keys of one.
     Plugins(PluginsArgs),
     /// Print JSON Schemas of configurations and results.
@@ -76,6 +78,82 @@ pub struct SimulateArgs {
     pub overrides: Overrides,
 }
 
+/// `runout plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The rig: what stands under [rig] in a pipeline, in a file of its own.
+    #[arg(value_name = "RIG.toml")]
+    pub rig: PathBuf,
+    /// Orders (undulations per revolution) to plan for, both ends included.
+    #[arg(long, value_name = "FIRST..LAST", default_value = "2..150", value_parser = orders)]
+    pub orders: RangeInclusive<usize>,
+    /// Smallest angle between two sensors of one section.
+    #[arg(long, value_name = "ANGLE", default_value = "15deg", value_parser = degrees, allow_negative_numbers = true)]
+    pub clearance: f64,
+    /// Look for better ones.
+    #[arg(long, visible_alias = "optimize", value_name = "WHAT")]
+    pub optimise: Option<Optimise>,
+    /// How far each sensor may stand from where it should: angles are ranked by the worst placement.
+    #[arg(long, value_name = "ANGLE", default_value = "0deg", value_parser = degrees, allow_negative_numbers = true, requires = "optimise")]
+    pub angle_tolerance: f64,
+    /// The noise gain of form that is to be low: the worst of all orders, or their root mean square.
+    #[arg(long, value_enum, default_value = "worst", requires = "optimise")]
+    pub criterion: Criterion,
+    /// Another seed searches along another way.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "optimise")]
+    pub seed: u64,
+    /// Write noise gain by order and layout, to be plotted as a map: the rig's, those suggested and those found.
+    #[arg(long, value_name = "FILE.csv")]
+    pub map: Option<PathBuf>,
+    #[command(flatten)]
+    pub overrides: Overrides,
+}
+
+/// What can be made better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Optimise {
+    /// The angles of all sensors but the first.
+    Angles,
+}
+
+/// What is to be low.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Criterion {
+    /// The worst noise gain of form.
+    Worst,
+    /// The root mean square of the noise gains of form.
+    Rms,
+}
+
+/// Above it, rounding of e^{inθ} is no longer small beside what tells a lost order.
+const HIGHEST_ORDER: usize = 10_000;
+
+fn orders(text: &str) -> Result<RangeInclusive<usize>, String> {
+    let number = |text: &str| text.trim().parse::<usize>().ok();
+    let pair = |separator| text.split_once(separator).and_then(|(a, b)| Some((number(a)?, number(b)?)));
+    match pair("..").or_else(|| pair("..=")) {
+        Some((0, last)) => Err(format!("orders count from 1; write `1..{last}`")),
+        Some((first, last)) if first > last => Err(format!("there is no order from {first} to {last}")),
+        Some((_, last)) if last > HIGHEST_ORDER => {
+            Err(format!("the highest order that can be planned is {HIGHEST_ORDER}"))
+        }
+        Some((first, last)) => Ok(first..=last),
+        None => Err(match ["-", "–", ":", ","].into_iter().find_map(pair) {
+            Some((first, last)) => format!("did you mean `{first}..{last}`?"),
+            None => "expected two orders, as in `2..80`".into(),
+        }),
+    }
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix("deg").or_else(|| text.strip_suffix('°')).unwrap_or(text).trim();
+    match number.parse::<f64>() {
+        Ok(angle) if (0.0..=180.0).contains(&angle) => Ok(angle),
+        Ok(_) => Err("expected an angle from 0deg to 180deg".into()),
+        Err(_) => Err("expected an angle in degrees, as in `15deg`".into()),
+    }
+}
+
 /// `runout plugins`.
 #[derive(Debug, Args)]
 pub struct PluginsArgs {
@@ -86,7 +164,7 @@ pub struct PluginsArgs {
 /// `runout schema`.
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
-    /// `pipeline`, `scenario`, `rig`, `summary`, `check`, or a plugin's name; all the files' schemas without it.
+    /// `pipeline`, `scenario`, `rig`, `summary`, `check`, `plan`, or a plugin's name; all the files' schemas without it.
     pub name: Option<String>,
     /// Write each file's schema to `NAME.schema.json` in this folder.
     #[arg(long, value_name = "DIR", conflicts_with = "name")]

@@ -15,11 +15,11 @@ use crate::render::{self, diagnostic};
 pub enum Failure {
     /// The command line is wrong: clap's words.
     CommandLine(Box<clap::Error>),
-    /// A name on the command line is unknown.
+    /// A name or a value on the command line cannot be.
     Name {
         /// Which, and of what.
         message: String,
-        /// The known ones.
+        /// The known ones, or what to do.
         help: String,
     },
     /// The configuration is wrong, or cannot be read.

@@ -65,7 +65,7 @@ pub struct Separability {
     pub unknowns: Vec<Unknown>,
     /// Orders that cannot be separated.
     pub lost_orders: LostOrders,
-    /// One entry an order, ascending from 1.
+    /// One entry an order, ascending.
     pub orders: Vec<Order>,
 }
 
@@ -165,7 +165,8 @@ impl From<&Rig> for RigSize {
 }
 
 impl Separability {
-    fn new(assessment: &Assessment, rig: Option<&Rig>) -> Self {
+    /// Of a rig whose layout was assessed.
+    pub(super) fn new(assessment: &Assessment, rig: Option<&Rig>) -> Self {
         let unknown = |quantity: &Quantity| Unknown {
             quantity: quantity.id(),
             section: match quantity {

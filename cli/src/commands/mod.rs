@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod inspect;
+pub mod plan;
 pub mod plugins;
 pub mod run;
 pub mod schema;
@@ -26,6 +27,7 @@ pub fn execute(command: Command, json: bool) -> Result<(), Failure> {
         Command::Run(args) => run::execute(&args, json),
         Command::Check(args) => check::execute(&args, json),
         Command::Simulate(args) => simulate::execute(&args, json),
+        Command::Plan(args) => plan::execute(&args, json),
         Command::Plugins(args) => plugins::execute(&args, json),
         Command::Schema(args) => schema::execute(&args, json),
         Command::Inspect(args) => inspect::execute(&args, json),

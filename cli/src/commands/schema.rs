@@ -14,7 +14,7 @@ use runout_core::{
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
-use super::{check::Report, plugins};
+use super::{check, plan, plugins};
 use crate::{args::SchemaArgs, builtin, failure::Failure, render};
 
 /// Prints schemas, or writes them to a folder.
@@ -45,7 +45,8 @@ fn files(registry: &Registry) -> Vec<(&'static str, Value)> {
         ("scenario", scenario(registry)),
         ("rig", of::<RigConfig>("runout rig", SchemaSettings::default())),
         ("summary", of::<Summary>("runout summary", SchemaSettings::default().for_serialize())),
-        ("check", of::<Report>("runout check", SchemaSettings::default().for_serialize())),
+        ("check", of::<check::Report>("runout check", SchemaSettings::default().for_serialize())),
+        ("plan", of::<plan::Report>("runout plan", SchemaSettings::default().for_serialize())),
     ]
 }
 

@@ -6,7 +6,7 @@ use runout_core::rig::Rotation;
 
 use super::{
     count,
-    number::{ranges, significant, spread},
+    number::{ranges, same, significant, spread},
     page::Page,
     table::Table,
 };
@@ -35,7 +35,7 @@ pub fn text(report: &Report) -> String {
     page.into_text()
 }
 
-fn rig(page: &mut Page, rig: &RigSize) {
+pub(super) fn rig(page: &mut Page, rig: &RigSize) {
     let turning = match rig.rotation {
         Rotation::Ccw => "counter-clockwise about +z",
         Rotation::Cw => "clockwise about +z",
@@ -46,10 +46,11 @@ fn rig(page: &mut Page, rig: &RigSize) {
     page.line(format_args!("  part radius {} mm, turning {turning}", rig.part_radius_mm));
 }
 
-fn orders(page: &mut Page, separability: &Separability) {
+pub(super) fn orders(page: &mut Page, separability: &Separability) {
     let orders = &separability.orders;
     let names: Vec<String> = separability.unknowns.iter().map(Unknown::name).collect();
-    page.heading(format_args!("Per order, 1 to {}", orders.last().map_or(0, |order| order.order)));
+    let [first, last] = [orders.first(), orders.last()].map(|order| order.map_or(0, |order| order.order));
+    page.heading(format_args!("Per order, {first} to {last}"));
     page.line(format_args!("  {}: {}", count(names.len(), "unknown"), names.join(", ")));
     let mut by_dof: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for order in orders {
@@ -59,7 +60,7 @@ fn orders(page: &mut Page, separability: &Separability) {
     page.line(format_args!("  readings left over for a residual: {}", dof.join("; ")));
 }
 
-fn lost_orders(page: &mut Page, separability: &Separability) {
+pub(super) fn lost_orders(page: &mut Page, separability: &Separability) {
     page.heading("Lost orders");
     page.line(format_args!("  form    {}", ranges(&separability.lost_orders.form)));
     page.line(format_args!("  motion  {}", ranges(&separability.lost_orders.motion)));
@@ -79,16 +80,14 @@ fn lost_orders(page: &mut Page, separability: &Separability) {
     }
 }
 
-fn noise_gain(page: &mut Page, separability: &Separability) {
+pub(super) fn noise_gain(page: &mut Page, separability: &Separability) {
     let mut table = Table::new(1, ["unknown", "median", "worst", "at order"]);
     for (index, unknown) in separability.unknowns.iter().enumerate() {
         let gain = |order: &Order| order.noise_gain.get(index).copied().flatten();
         let gains = separability.orders.iter().filter_map(|order| Some((order.order, gain(order)?)));
         let Some([lowest, median, worst]) = spread(gains.clone().map(|(_, gain)| gain)) else { continue };
-        // Equal up to rounding is equal.
-        let same = |gain: f64| worst - gain <= 1e-9 * worst;
-        let at = gains.filter(|(_, gain)| same(*gain)).map(|(order, _)| order.to_string()).next();
-        let at = if same(lowest) { "all".into() } else { at.unwrap_or_default() };
+        let at = gains.filter(|(_, gain)| same(*gain, worst)).map(|(order, _)| order.to_string()).next();
+        let at = if same(lowest, worst) { "all".into() } else { at.unwrap_or_default() };
         let unit = if unknown.unit == "urad" { "µrad" } else { "µm" };
         let name = format!("{} ({unit})", unknown.name());
         table.row([name, significant(median, 3), significant(worst, 3), at]);

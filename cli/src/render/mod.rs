@@ -6,6 +6,7 @@ pub mod file;
 pub mod keys;
 pub mod number;
 pub mod page;
+pub mod plan;
 pub mod summary;
 pub mod table;
 

@@ -56,6 +56,12 @@ pub fn ranges(numbers: &[usize]) -> String {
     if shown.is_empty() { "none".into() } else { shown.join(", ") }
 }
 
+/// Whether two values are equal up to rounding.
+#[must_use]
+pub fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
+}
+
 /// Lowest, middle and highest of the finite values.
 #[must_use]
 pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<[f64; 3]> {

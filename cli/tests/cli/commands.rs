@@ -123,3 +123,63 @@ fn scenario_to_results() {
         assert!(shown.stdout.contains(word), "no {word} in\n{}", shown.stdout);
     }
 }
+
+const THREE_POINT: &str = r#"part_radius_mm = 30
+sensors = [
+  { id = "S1", angle_deg = 0 },
+  { id = "S2", angle_deg = 99.844 },
+  { id = "S3", angle_deg = 202.5 },
+]
+setups = [{ id = "initial" }]
+"#;
+
+#[test]
+fn plan_of_a_three_point_rig() {
+    let folder = Folder::with(&[("rig.toml", THREE_POINT)]);
+    assert_snapshot!(folder.run(&["plan", "rig.toml", "--orders", "2..50"]).shown());
+}
+
+/// Fixed sensors, two setups: every even order is lost, and a setup that tells them is known.
+#[test]
+fn plan_of_a_rig_that_loses_orders() {
+    let folder = Folder::with(&[("rig.toml", &RIG.replace("sensors_deg = 180", "sensors_deg = 0"))]);
+    assert_snapshot!(folder.run(&["plan", "rig.toml", "--orders", "2..21"]).shown());
+    let ran = folder.run(&["plan", "rig.toml", "--orders", "2..80", "--json"]);
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let even: Vec<usize> = (2..=80).step_by(2).collect();
+    assert_eq!(report["lost_orders"], json!({ "form": even, "motion": even }));
+    let gains = report["noise_gain"]["form"].as_array().unwrap();
+    assert_eq!(gains.len(), 79);
+    assert_eq!(gains[0], json!({ "order": 2, "gain": null }));
+    assert_eq!([&gains[78]["order"], &report["residual_dof"][78]["order"]], [80, 80]);
+    assert_eq!(report["residual_dof"][1], json!({ "order": 3, "dof": 2 }));
+    let best = &report["suggestions"][0];
+    assert_eq!([&best["before"]["lost_form_orders"], &best["after"]["lost_form_orders"]], [40, 0]);
+    // What is not worked out yet is not claimed.
+    assert!(report.get("blind_to").is_none() && report.get("confounded").is_none());
+}
+
+/// Better angles and the map, with nothing but the document on stdout and no progress in a pipe.
+#[test]
+fn plan_finds_better_angles_and_writes_the_map() {
+    let folder = Folder::with(&[("rig.toml", THREE_POINT)]);
+    let arguments =
+        "plan rig.toml --orders 2..50 --optimise angles --clearance 20 --angle-tolerance 0.1deg --map map.csv --json";
+    let ran = folder.run(&arguments.split(' ').collect::<Vec<_>>());
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let worst = |arrangement: &Value| arrangement["within_tolerance"]["worst"].as_f64().unwrap();
+    let optimised = &report["optimised"];
+    let found = optimised["found"].as_array().unwrap();
+    assert!(worst(&found[0]) < worst(&optimised["declared"]));
+    for pair in found.windows(2) {
+        assert!(worst(&pair[0]) <= worst(&pair[1]));
+    }
+    let map = std::fs::read_to_string(folder.path().join("map.csv")).unwrap();
+    let mut lines = map.lines();
+    assert_eq!(lines.next(), Some("layout,angles_deg,order,gain,lost"));
+    assert!(lines.next().unwrap().starts_with("\"declared\",0 99.844 202.5,2,1.0"));
+    let layouts = 1 + found.len() + report["suggestions"].as_array().unwrap().len();
+    assert_eq!(map.lines().count(), 1 + 49 * layouts);
+}

@@ -178,3 +178,53 @@ fn unknown_name_of_a_plugin() {
 fn ambiguous_name_of_a_schema() {
     assert_snapshot!(Folder::with(&[]).run(&["schema", "hdf5"]).shown());
 }
+
+/// `runout plan rig.toml` with more arguments.
+fn plan_with(arguments: &[&str]) -> String {
+    Folder::with(&[("rig.toml", RIG)]).run(&[&["plan", "rig.toml"], arguments].concat()).shown()
+}
+
+#[test]
+fn plan_of_a_range_with_a_hyphen() {
+    assert_snapshot!(plan_with(&["--orders", "2-80"]));
+}
+
+#[test]
+fn plan_of_an_empty_range() {
+    assert_snapshot!(plan_with(&["--orders", "80..2"]));
+}
+
+#[test]
+fn plan_with_too_much_clearance() {
+    assert_snapshot!(plan_with(&["--optimise", "angles", "--clearance", "181deg"]));
+    assert_snapshot!(plan_with(&[
+        "--optimise",
+        "angles",
+        "--set",
+        "sensors.2.section=a",
+        "--set",
+        "sensors.2.z_mm=200",
+        "--clearance",
+        "150deg"
+    ]));
+}
+
+#[test]
+fn plan_of_a_clearance_in_radians() {
+    assert_snapshot!(plan_with(&["--clearance", "0.3rad"]));
+}
+
+#[test]
+fn plan_with_a_map_that_is_no_table() {
+    assert_snapshot!(plan_with(&["--map", "map.png"]));
+}
+
+#[test]
+fn plan_of_a_pipeline() {
+    assert_snapshot!(Folder::with(&[("pipeline.toml", &pipeline())]).run(&["plan", "pipeline.toml"]).shown());
+}
+
+#[test]
+fn plan_with_a_fault_in_the_rig() {
+    assert_snapshot!(plan_with(&["--set", "sensors.1.angle=3"]));
+}

@@ -1,0 +1,97 @@
+//! `runout plan`: what a rig can separate and how well, what to add to it, and better angles for its sensors.
+
+mod map;
+mod report;
+
+use std::ops::RangeInclusive;
+
+use runout_core::{
+    pipeline::{
+        document::{self, Document, Sources},
+        error::Fault,
+    },
+    rig::{Rig, RigConfig},
+};
+use runout_spindle::{
+    layout::Layout,
+    plan::{self, Optimum, Search, TooTight, optimise},
+};
+
+use super::{check::Separability, print};
+use crate::{
+    args::{Criterion, Optimise, PlanArgs},
+    failure::Failure,
+    progress::Progress,
+    render,
+};
+pub use report::{Arrangement, Gain, Optimised, Report, Score, Suggested};
+
+/// Plans a rig.
+///
+/// # Errors
+/// When the rig is wrong, the sensors have no room, or the map cannot be written.
+pub fn execute(args: &PlanArgs, json: bool) -> Result<(), Failure> {
+    // A rig file includes no other.
+    let sources = Sources::read(&args.rig, &args.overrides.set, "")?;
+    let rig = rig(&sources)?;
+    map::refuse(args.map.as_deref(), &sources)?;
+    let before = plan::suggest::score(&rig, &args.orders);
+    let optimum = args.optimise.map(|Optimise::Angles| better_angles(&rig, args)).transpose()?;
+    let suggestions = plan::suggest(&rig, &args.orders, args.clearance);
+    let mut report = Report::new(&rig, assess(&rig, &args.orders));
+    report.suggestions = suggestions.iter().map(|found| Suggested::new(found, &rig, before)).collect();
+    report.optimised = optimum.as_ref().map(|optimum| Optimised::new(optimum, &rig, args));
+    if let Some(path) = &args.map {
+        report.map = Some(map::write(path, &rig, &args.orders, &suggestions, optimum.as_ref())?);
+    }
+    print(&report, json, render::plan::text)
+}
+
+fn rig(sources: &Sources) -> Result<Rig, Failure> {
+    let document = Document::parse(sources)?;
+    let root = document.root();
+    if root.get_ref().contains_key("rig") {
+        let fault = Fault::at("rig", "a rig file holds the keys of [rig] at top level");
+        let help = "move what is under [rig] to a file of its own, and write `rig = \"that.toml\"` in the pipeline";
+        return Err(document.diagnose(fault.help(help)).into());
+    }
+    let checked = document::read::<RigConfig>(root).and_then(RigConfig::check);
+    checked.map_err(|fault| document.diagnose(fault).into())
+}
+
+/// What a rig can and cannot separate at these orders.
+fn assess(rig: &Rig, orders: &RangeInclusive<usize>) -> Separability {
+    let mut assessment = Layout::new(rig, false).assess(*orders.end());
+    assessment.orders.retain(|order| orders.contains(&order.order));
+    Separability::new(&assessment, Some(rig))
+}
+
+fn better_angles(rig: &Rig, args: &PlanArgs) -> Result<Optimum, Failure> {
+    if rig.sensors.len() < 2 {
+        return Err(Failure::Name {
+            message: "one sensor has no angle to choose: the first sensor stays where it is".into(),
+            help: "add sensors to the rig, or leave out --optimise to see which one helps most".into(),
+        });
+    }
+    let search = Search {
+        orders: args.orders.clone(),
+        clearance_deg: args.clearance,
+        angle_tolerance_deg: args.angle_tolerance,
+        criterion: match args.criterion {
+            Criterion::Worst => plan::Criterion::Worst,
+            Criterion::Rms => plan::Criterion::Rms,
+        },
+        seed: args.seed,
+    };
+    let progress = Progress::new("steps");
+    progress.expect(optimise::PROGRESS_STEPS);
+    optimise(rig, &search, &mut |best| progress.advance(best)).map_err(|tight| too_tight(&tight, args.clearance))
+}
+
+fn too_tight(tight: &TooTight, clearance_deg: f64) -> Failure {
+    let TooTight { section, sensors, most_deg } = tight;
+    Failure::Name {
+        message: format!("{sensors} sensors of section `{section}` cannot stand {clearance_deg}deg apart"),
+        help: format!("--clearance {most_deg}deg leaves them room"),
+    }
+}

@@ -1,0 +1,69 @@
+//! Noise gain by order and layout, as a table to plot.
+
+use std::{
+    fmt::Write,
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
+
+use runout_core::{
+    Error,
+    atomic_file::{self, resolved},
+    pipeline::document::Sources,
+    rig::Rig,
+};
+use runout_spindle::plan::{Optimum, Suggestion};
+
+use super::{
+    assess,
+    report::{degrees, form_gains, words},
+};
+use crate::failure::Failure;
+
+/// Refuses a file that is no CSV or is read.
+pub(super) fn refuse(path: Option<&Path>, sources: &Sources) -> Result<(), Failure> {
+    let Some(path) = path else { return Ok(()) };
+    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        let message = format!("the map is a CSV file, not {}", path.display());
+        return Err(Failure::Name { message, help: "name it --map FILE.csv".into() });
+    }
+    if sources.files().any(|file| resolved(file) == resolved(path)) {
+        let message = format!("{} is the rig itself", path.display());
+        return Err(Failure::Name { message, help: "name another file by --map".into() });
+    }
+    Ok(())
+}
+
+/// Writes one row a layout and order.
+pub(super) fn write(
+    path: &Path,
+    rig: &Rig,
+    orders: &RangeInclusive<usize>,
+    suggestions: &[Suggestion],
+    optimum: Option<&Optimum>,
+) -> Result<PathBuf, Error> {
+    let mut text = String::from("layout,angles_deg,order,gain,lost\n");
+    add(&mut text, "declared", rig, orders);
+    for (place, found) in (1..).zip(optimum.into_iter().flat_map(|optimum| &optimum.found)) {
+        let mut placed = rig.clone();
+        for (sensor, angle_deg) in placed.sensors.iter_mut().zip(&found.angles_deg) {
+            sensor.angle_rad = angle_deg.to_radians();
+        }
+        add(&mut text, &format!("found {place}"), &placed, orders);
+    }
+    for suggestion in suggestions {
+        add(&mut text, &format!("with {}", words(&suggestion.addition, rig)), &suggestion.rig, orders);
+    }
+    atomic_file::write(path, text.as_bytes())
+}
+
+fn add(text: &mut String, name: &str, rig: &Rig, orders: &RangeInclusive<usize>) {
+    let angles: Vec<String> = rig.sensors.iter().map(|sensor| degrees(sensor.angle_rad).to_string()).collect();
+    // A section's id may hold anything.
+    let (name, angles) = (name.replace('"', "\"\""), angles.join(" "));
+    for entry in form_gains(&assess(rig, orders)) {
+        let shown = entry.gain.map(|gain| format!("{gain:.6}")).unwrap_or_default();
+        // A string takes whatever is written to it.
+        let _ = writeln!(text, "\"{name}\",{angles},{},{shown},{}", entry.order, entry.gain.is_none());
+    }
+}

@@ -1,0 +1,238 @@
+//! What `runout plan` says.
+
+use std::path::PathBuf;
+
+use runout_core::rig::Rig;
+use runout_spindle::plan::{self, Addition, Optimum, Suggestion};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::{
+    args::{Criterion, PlanArgs},
+    commands::check::{Order, RigSize, Separability},
+};
+
+/// What a rig can separate and how well, what to add to it, and better angles for its sensors.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Report {
+    /// The rig in numbers.
+    pub rig: RigSize,
+    /// Unknowns, lost orders, and each order with its rank and the noise gain of every unknown.
+    #[serde(flatten)]
+    pub separability: Separability,
+    /// Noise gain by order.
+    pub noise_gain: NoiseGain,
+    /// Readings (complex) that are left over for a residual, by order.
+    pub residual_dof: Vec<ResidualDof>,
+    /// What to add to the rig, best first: the best setup of each kind, and the best sensor in each section.
+    pub suggestions: Vec<Suggested>,
+    /// Better angles, where they were asked for.
+    pub optimised: Option<Optimised>,
+    /// The map that was written.
+    pub map: Option<PathBuf>,
+}
+
+/// Noise gain by order.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct NoiseGain {
+    /// Of form, each order's worst over the sections.
+    pub form: Vec<Gain>,
+}
+
+/// Noise gain at an order.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Gain {
+    /// Undulations per revolution.
+    pub order: usize,
+    /// Standard deviation for 1 in every reading; null where it is lost.
+    pub gain: Option<f64>,
+}
+
+/// What is left over at an order.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ResidualDof {
+    /// Undulations per revolution.
+    pub order: usize,
+    /// Readings (complex) less the rank.
+    pub dof: usize,
+}
+
+/// Noise gain of form over all the orders.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Score {
+    /// Orders at which some section's form is lost, or its noise gain is above a million.
+    pub lost_form_orders: usize,
+    /// Worst noise gain over the other orders; null where there are none.
+    pub worst: Option<f64>,
+    /// The first order with it.
+    pub worst_order: Option<usize>,
+    /// Root mean square over the other orders.
+    pub rms: Option<f64>,
+}
+
+/// Something to add to the rig.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Suggested {
+    /// "setup" or "sensor".
+    pub add: &'static str,
+    /// In words.
+    pub text: String,
+    /// Of a setup: how the part is clamped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub part_deg: Option<f64>,
+    /// Of a setup: by how much the sensors are moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensors_deg: Option<f64>,
+    /// Of a sensor: the section that it looks at.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub section: Option<String>,
+    /// Of a sensor: where it stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angle_deg: Option<f64>,
+    /// The rig as it is.
+    pub before: Score,
+    /// The rig with this.
+    pub after: Score,
+}
+
+/// Better angles.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Optimised {
+    /// "worst" or "rms".
+    pub criterion: &'static str,
+    /// Smallest angle between two sensors of one section.
+    pub clearance_deg: f64,
+    /// How far each sensor may stand from where it should.
+    pub angle_tolerance_deg: f64,
+    /// Seed of the search.
+    pub seed: u64,
+    /// The sensors' ids, in the order of all `angles_deg`.
+    pub sensors: Vec<String>,
+    /// The rig's own angles.
+    pub declared: Arrangement,
+    /// Whether they keep the clearance.
+    pub declared_keeps_clearance: bool,
+    /// The best and alternatives to it, best first; none a mirror image or a rotation of another. Only what is better
+    /// than the rig's own, unless that breaks the clearance.
+    pub found: Vec<Arrangement>,
+}
+
+/// Angles of the sensors and what they give.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Arrangement {
+    /// By sensor.
+    pub angles_deg: Vec<f64>,
+    /// With every sensor where it should stand.
+    pub nominal: Score,
+    /// The worst of the placements within the angle tolerance.
+    pub within_tolerance: Score,
+}
+
+/// An addition in words.
+pub(super) fn words(addition: &Addition, rig: &Rig) -> String {
+    match addition {
+        Addition::Setup { part_deg, sensors_turned: false } => format!("a setup, part at {part_deg}°, sensors fixed"),
+        Addition::Setup { part_deg, sensors_turned: true } => {
+            format!("a setup, part at {part_deg}°, sensors turned by 180°")
+        }
+        Addition::Sensor { section, angle_deg } => {
+            let section = rig.sections.get(*section).map_or("", String::as_str);
+            format!("a sensor at {angle_deg}° in section {section}")
+        }
+    }
+}
+
+/// Noise gain of form by order, the worst over the sections.
+pub(super) fn form_gains(separability: &Separability) -> Vec<Gain> {
+    let gain = |order: &Order| {
+        let forms =
+            separability.unknowns.iter().zip(&order.noise_gain).filter(|(unknown, _)| unknown.quantity == "form");
+        let gain = forms.map(|(_, gain)| *gain).try_fold(0.0, |worst: f64, gain| Some(worst.max(gain?)));
+        Gain { order: order.order, gain }
+    };
+    separability.orders.iter().map(gain).collect()
+}
+
+impl Report {
+    /// Without suggestions yet.
+    pub(super) fn new(rig: &Rig, separability: Separability) -> Self {
+        let dof = |order: &Order| ResidualDof { order: order.order, dof: order.residual_dof };
+        Self {
+            rig: RigSize::from(rig),
+            noise_gain: NoiseGain { form: form_gains(&separability) },
+            residual_dof: separability.orders.iter().map(dof).collect(),
+            separability,
+            suggestions: Vec::new(),
+            optimised: None,
+            map: None,
+        }
+    }
+}
+
+impl Suggested {
+    pub(super) fn new(found: &Suggestion, rig: &Rig, before: plan::Score) -> Self {
+        let setup = found.rig.setups.last().filter(|_| matches!(found.addition, Addition::Setup { .. }));
+        let (add, part_deg, section, angle_deg) = match found.addition {
+            Addition::Setup { part_deg, .. } => ("setup", Some(part_deg), None, None),
+            Addition::Sensor { section, angle_deg } => {
+                ("sensor", None, rig.sections.get(section).cloned(), Some(angle_deg))
+            }
+        };
+        Self {
+            add,
+            text: words(&found.addition, rig),
+            part_deg,
+            sensors_deg: setup.map(|setup| degrees(setup.sensors_rad)),
+            section,
+            angle_deg,
+            before: before.into(),
+            after: found.after.into(),
+        }
+    }
+}
+
+impl Optimised {
+    pub(super) fn new(optimum: &Optimum, rig: &Rig, args: &PlanArgs) -> Self {
+        Self {
+            criterion: match args.criterion {
+                Criterion::Worst => "worst",
+                Criterion::Rms => "rms",
+            },
+            clearance_deg: args.clearance,
+            angle_tolerance_deg: args.angle_tolerance,
+            seed: args.seed,
+            sensors: rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
+            declared: (&optimum.declared).into(),
+            declared_keeps_clearance: optimum.declared_keeps_clearance,
+            found: optimum.found.iter().map(Arrangement::from).collect(),
+        }
+    }
+}
+
+impl From<&plan::Arrangement> for Arrangement {
+    fn from(arrangement: &plan::Arrangement) -> Self {
+        Self {
+            angles_deg: arrangement.angles_deg.clone(),
+            nominal: arrangement.nominal.into(),
+            within_tolerance: arrangement.within_tolerance.into(),
+        }
+    }
+}
+
+impl From<plan::Score> for Score {
+    fn from(score: plan::Score) -> Self {
+        // Noise gains are above 0: 0 is the worst of none.
+        let told = score.worst > 0.0;
+        Self {
+            lost_form_orders: score.lost,
+            worst: told.then_some(score.worst),
+            worst_order: told.then_some(score.worst_order),
+            rms: told.then_some(score.rms),
+        }
+    }
+}
+
+/// Degrees as they stood in the file, before they became radians.
+pub(super) fn degrees(angle_rad: f64) -> f64 {
+    (angle_rad.to_degrees() * 1e9).round() / 1e9
+}
