@@ -18,8 +18,12 @@ pub struct Profile {
     pub samples_per_rev: usize,
     /// Mean over the turns, µm, `[order][channel]`, orders 0..=`max_order`.
     pub mean: Vec<Complex64>,
-    /// Covariance of that mean across channels, µm², `[order][channel][channel]`, E[δ δᴴ]; `None` below two turns.
+    /// Covariance of that mean across channels, µm², `[order][channel][channel]`, E[δ δᴴ]; `None` below two turns. It
+    /// holds for turns that depend on each other, as those of a spindle do.
     pub covariance: Option<Vec<Complex64>>,
+    /// The covariance of single turns over their number, likewise: what the covariance of the mean would be if turns
+    /// were independent. It is the better known of the two, and serves for weights.
+    pub scatter: Option<Vec<Complex64>>,
     /// How many turns there were, and what became of them.
     pub turns: TurnCount,
     /// Mean speed over the turns used, where the sampling rate is known.

@@ -2,6 +2,7 @@
 
 pub mod averaging;
 pub mod campaign;
+pub mod coverage;
 pub mod eccentricity;
 pub mod plot;
 pub mod straightness;

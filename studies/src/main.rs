@@ -5,10 +5,11 @@
 use std::{path::Path, process::ExitCode};
 
 use runout_core::{Result, atomic_file};
-use runout_studies::{averaging, eccentricity, straightness, surface as unrolled};
+use runout_studies::{averaging, coverage, eccentricity, straightness, surface as unrolled};
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
+       runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth";
@@ -21,6 +22,8 @@ fn main() -> ExitCode {
         ["eccentricity", seeds] if seeds.parse::<u64>().is_ok() => {
             eccentricity::rows(seeds.parse().unwrap_or_default()).map(|rows| println!("{}", eccentricity::table(&rows)))
         }
+        ["coverage"] => coverage(500),
+        ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["straightness-traces", file] => straightness_traces(file),
         ["straightness", file, picture] => straightness(file, picture),
@@ -48,6 +51,14 @@ fn averaging(picture: Option<&str>) -> Result<()> {
     if let Some(path) = picture {
         let path = atomic_file::write(path, &figure.picture("Ra tends to the part's own (simulated)")?)?;
         println!("picture: {}", path.display());
+    }
+    Ok(())
+}
+
+fn coverage(campaigns: u64) -> Result<()> {
+    for setting in coverage::Setting::ALL {
+        println!("{campaigns} campaigns, simulated: {}\n", setting.name());
+        println!("{}", coverage::table(&coverage::rows(&setting.campaigns(0, campaigns))?));
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 pub mod roundness;
 pub mod straightness;
 pub mod texture;
+pub mod uncertainty;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,4 +27,6 @@ pub struct Value {
     pub filter: String,
     /// What the profile was referred to.
     pub reference: String,
+    /// From the covariance of the separation; null where none is known.
+    pub uncertainty: Option<uncertainty::Uncertainty>,
 }

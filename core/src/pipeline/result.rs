@@ -2,7 +2,7 @@
 
 use crate::{
     Complex64,
-    evaluate::{Value, roundness, texture},
+    evaluate::{Value, roundness, texture, uncertainty},
     measurement::StationTruth,
     numerics::fourier::Fourier,
     profile::Profile,
@@ -72,10 +72,18 @@ fn section_values(result: &StationResult, section: usize) -> Vec<Value> {
     let harmonics = result.separation.coefficients(unknown);
     let from_two = harmonics.enumerate().map(|(order, value)| if order < 2 { Complex64::ZERO } else { value });
     let mut fourier = Fourier::new(result.angles);
-    let form_um = fourier.synthesise(from_two);
+    let form_um = fourier.synthesise(from_two).to_vec();
     let highest = result.separation.max_order();
+    let width = result.separation.unknowns.len();
+    let variance: Vec<f64> = result.separation.variance.iter().skip(unknown).step_by(width).copied().collect();
+    let section_id = result.separation.sections.get(section).map_or("", |at| at.id.as_str());
+    let seed = uncertainty::seed(&[&result.station, section_id]);
+    let ront_and_ra = |profile: &[f64]| [roundness::ront_lsci_um(profile), texture::ra_um(profile)];
+    let [ront, ra] = ront_and_ra(&form_um);
+    let uncertainties = uncertainty::monte_carlo(&form_um, &variance, seed, ront_and_ra);
+    let [of_ront, of_ra] = uncertainties.map_or([None, None], |found| found.map(Some));
     let lost: Vec<usize> = result.separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect();
-    let value = |symbol: &str, value, source: &str, reference: &str| Value {
+    let value = |symbol: &str, value, source: &str, reference: &str, uncertainty| Value {
         symbol: symbol.into(),
         unit: "um".into(),
         value,
@@ -84,10 +92,11 @@ fn section_values(result: &StationResult, section: usize) -> Vec<Value> {
         lost_orders: lost.clone(),
         filter: "none".into(),
         reference: reference.into(),
+        uncertainty,
     };
     vec![
-        value("RONt", roundness::ront_lsci_um(form_um), "ISO 12181-1:2011, peak-to-valley roundness deviation", "LSCI"),
-        value("Ra", texture::ra_um(form_um), "Qiao, Xu, Zhao 2024: unfiltered circumferential profile", "mean line"),
+        value("RONt", ront, "ISO 12181-1:2011, peak-to-valley roundness deviation", "LSCI", of_ront),
+        value("Ra", ra, "Qiao, Xu, Zhao 2024: unfiltered circumferential profile", "mean line", of_ra),
     ]
 }
 

@@ -3,13 +3,14 @@
 //! Each turn, from one index mark to the next or through one turn of the encoder, is interpolated on equal angles
 //! ([`kernel`]), fine enough that nothing the recording can hold folds onto a kept order, and transformed. Of its
 //! harmonics, those that `samples_per_rev` equal angles can hold are kept: leaving out the rest is the anti-alias
-//! filter. Their mean and its covariance across channels over the turns are accumulated in one pass ([`mean`]).
+//! filter. Their mean, and its covariance across channels ([`slow`]), are accumulated in one pass ([`mean`]).
 
 mod encoder;
 mod kernel;
 mod mean;
 mod outliers;
 mod resample;
+mod slow;
 mod turns;
 mod window;
 
@@ -226,8 +227,8 @@ impl Averager for SynchronousAverage {
             // What the recording cannot hold is not found to be 0: it is not there.
             let (orders, channels) = (orders_held(turn) + 1, capture.channels());
             outcome.mean.truncate(orders * channels);
-            if let Some(covariance) = &mut outcome.covariance {
-                covariance.truncate(orders * channels * channels);
+            for matrices in [&mut outcome.covariance, &mut outcome.scatter].into_iter().flatten() {
+                matrices.truncate(orders * channels * channels);
             }
         }
         let mean_turn = outcome.used_samples / outcome.used as f64;
@@ -243,6 +244,7 @@ impl Averager for SynchronousAverage {
             samples_per_rev: self.config.samples_per_rev,
             mean: outcome.mean,
             covariance: outcome.covariance,
+            scatter: outcome.scatter,
             turns: count,
             speed_rpm,
             responses: capture.responses,

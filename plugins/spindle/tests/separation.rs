@@ -218,6 +218,7 @@ fn setups_in_another_order_are_suspected() {
         let matrix: Vec<Complex64> =
             (0..16).map(|entry| Complex64::from(if entry % 5 == 0 { 1e-4 } else { 0.0 })).collect();
         profile.covariance = Some(matrix.repeat(orders));
+        profile.scatter.clone_from(&profile.covariance);
         profile.turns.used = 60;
     }
     let separator = HarmonicLeastSquares::new(&rig, false, Weighting::TurnCovariance);

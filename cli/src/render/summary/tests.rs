@@ -34,6 +34,7 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
         lost_orders: vec![],
         filter: "none".into(),
         reference: "LSCI".into(),
+        uncertainty: None,
     };
     SectionSummary {
         section: id.into(),

@@ -2,6 +2,8 @@
 
 use runout_core::Complex64;
 
+use super::slow::Slow;
+
 /// Sums over turns, taken from the first one: what is left is the turns' scatter, so that no digits are lost where the
 /// scatter is far below the signal.
 pub(super) struct Mean {
@@ -10,6 +12,7 @@ pub(super) struct Mean {
     /// The first turn, `[order][channel]`.
     pivot: Vec<Complex64>,
     sum: Vec<Complex64>,
+    slow: Slow,
     /// Σ d dᴴ on and below the diagonal, `[order][row][column ≤ row]`.
     products: Vec<Complex64>,
     /// One order's distance from the pivot.
@@ -17,12 +20,14 @@ pub(super) struct Mean {
 }
 
 impl Mean {
-    pub(super) fn new(orders: usize, channels: usize) -> Self {
+    /// For `planned` turns at most.
+    pub(super) fn new(orders: usize, channels: usize, planned: usize) -> Self {
         Self {
             channels,
             turns: 0,
             pivot: Vec::new(),
             sum: vec![Complex64::ZERO; orders * channels],
+            slow: Slow::new(orders * channels, planned),
             products: vec![Complex64::ZERO; orders * triangle(channels)],
             difference: vec![Complex64::ZERO; channels],
         }
@@ -39,10 +44,12 @@ impl Mean {
     /// Takes one turn's harmonics, `[order][channel]`.
     pub(super) fn add(&mut self, turn: &[Complex64]) {
         self.turns += 1;
+        self.slow.begin_turn(self.turns - 1);
         if self.pivot.is_empty() {
             self.pivot.extend_from_slice(turn);
             return;
         }
+        self.slow.add(turn, &self.pivot);
         // A number of channels that the compiler knows makes straight code of the inner loops.
         match self.channels {
             1 => self.add_known::<1>(turn),
@@ -89,9 +96,14 @@ impl Mean {
         self.pivot.iter().zip(&self.sum).map(|(pivot, sum)| pivot + sum * scale).collect()
     }
 
-    /// Covariance of the mean, 1/(T(T−1)) Σ (cₜ − mean)(cₜ − mean)ᴴ, `[order][channel][channel]`; `None` below two
-    /// turns.
+    /// Covariance of the mean, `[order][channel][channel]`; `None` below two turns. See [`Slow`].
     pub(super) fn covariance(&self) -> Option<Vec<Complex64>> {
+        self.slow.covariance(&self.sum, self.turns, self.channels).or_else(|| self.scatter())
+    }
+
+    /// What the covariance of the mean would be with independent turns, 1/(T(T−1)) Σ (cₜ − mean)(cₜ − mean)ᴴ,
+    /// `[order][channel][channel]`; `None` below two turns.
+    pub(super) fn scatter(&self) -> Option<Vec<Complex64>> {
         if self.turns < 2 {
             return None;
         }

@@ -25,6 +25,7 @@ use super::{
 pub(super) struct Outcome {
     pub mean: Vec<Complex64>,
     pub covariance: Option<Vec<Complex64>>,
+    pub scatter: Option<Vec<Complex64>>,
     pub used: usize,
     /// Length of all turns used together.
     pub used_samples: f64,
@@ -61,6 +62,7 @@ impl<'a> Resampling<'a> {
         let config = &average.config;
         let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
         let length = grid_length(&turns, config.samples_per_rev, capture.encoder);
+        let planned = turns.len();
         Self {
             kernel: &average.kernel,
             capture,
@@ -72,7 +74,7 @@ impl<'a> Resampling<'a> {
             fourier: Fourier::new(length),
             harmonics: vec![Complex64::ZERO; orders],
             turn: vec![Complex64::ZERO; orders * channels],
-            mean: Mean::new(orders, channels),
+            mean: Mean::new(orders, channels, planned),
             outliers: config.outlier_sigma.map(Outliers::new),
             used_samples: 0.0,
             rejected: Vec::new(),
@@ -125,6 +127,7 @@ impl<'a> Resampling<'a> {
         Outcome {
             mean: self.mean.mean(),
             covariance: self.mean.covariance(),
+            scatter: self.mean.scatter(),
             used: self.mean.turns(),
             used_samples: self.used_samples,
             rejected: self.rejected,

@@ -1,4 +1,4 @@
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use std::f64::consts::TAU;
 
@@ -167,7 +167,7 @@ fn blocks_of_any_size_give_the_same() {
 }
 
 #[test]
-fn the_covariance_is_that_of_the_turns() {
+fn the_scatter_is_that_of_the_turns() {
     let (length, turns, channels) = (64, 12, 3);
     for channels in [channels, 5] {
         let mut scatter = scatter(4);
@@ -198,7 +198,7 @@ fn the_covariance_is_that_of_the_turns() {
                     let products =
                         all.iter().map(|turn| (turn[row] - mean(row)) * (turn[column] - mean(column)).conj());
                     let expected = products.sum::<Complex64>() / (turns * (turns - 1)) as f64;
-                    let found = profile.order_covariance(order).unwrap()[row * channels + column];
+                    let found = profile.scatter.as_ref().unwrap()[(order * channels + row) * channels + column];
                     // 1e-13: rounding of the test's own sums beside a level of 100.
                     assert!((found - expected).norm() < 1e-13, "order {order}: {found} {expected}");
                 }
@@ -207,7 +207,38 @@ fn the_covariance_is_that_of_the_turns() {
     }
     let one = stream(&[(0..64).map(f64::from).collect()], marks(0.0, 64.0, 2));
     let profile = average_with(SynchronousAverageConfig { min_turns: 1, ..config(64) }, one).unwrap();
-    assert_eq!((profile.turns.used, profile.covariance), (1, None));
+    assert_eq!((profile.turns.used, profile.covariance, profile.scatter), (1, None, None));
+}
+
+/// Over many captures the mean square of the mean's error is its stated variance: for noise that forgets, and for tones of
+/// any phase, whose turns are anything but independent.
+#[test]
+fn the_covariance_is_that_of_the_mean() {
+    let (length, turns, captures) = (64, 40, 300);
+    let mut uniform = scatter(8);
+    // Tones by their order; none is noise. The scatter over the turns is off by factors of up to ten.
+    for tone in [None, Some(0.037), Some(0.43), Some(3.317), Some(11.52), Some(20.913)] {
+        let (mut errors, mut stated, mut independent) = (0.0, 0.0, 0.0);
+        for _ in 0..captures {
+            let phase = TAU * uniform();
+            let samples = (0..turns * length).map(|frame| match tone {
+                None => 0.1 * uniform(),
+                Some(order) => (TAU * order * frame as f64 / length as f64 + phase).cos(),
+            });
+            let data = [samples.collect::<Vec<f64>>()];
+            let profile = average(length, stream(&data, marks(0.0, length as f64, turns + 1))).unwrap();
+            for order in 2..=12 {
+                errors += profile.order(order)[0].norm_sqr();
+                stated += profile.order_covariance(order).unwrap()[0].re;
+                independent += profile.scatter.as_ref().unwrap()[order].re;
+            }
+        }
+        let [ratio, with_independent_turns] = [errors / stated, errors / independent];
+        println!("tone {tone:?}: error² / stated {ratio:.2}, / that of independent turns {with_independent_turns:.3}");
+        // Neighbours at ±1/T and ±2/T of a tone far away are as strong to (2/(T·distance))², and the estimate itself
+        // scatters: 25 %.
+        assert!((ratio - 1.0).abs() < 0.25, "tone {tone:?}: {ratio}");
+    }
 }
 
 /// Twelve turns with a few marks gone or added.

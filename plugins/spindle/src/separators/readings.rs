@@ -17,6 +17,8 @@ pub struct Readings {
     pub mean: Vec<Complex64>,
     /// Covariance of `mean` in µm², one matrix `[order][channel][channel]` a setup, channels in the rig's order.
     pub covariance: Option<Vec<Vec<Complex64>>>,
+    /// What it would be with independent turns, likewise; for weights.
+    pub scatter: Option<Vec<Vec<Complex64>>>,
     /// Turns averaged in each setup.
     pub turns: Vec<usize>,
     /// Place of each reading among the channels of all profiles of the station.
@@ -61,26 +63,22 @@ impl Readings {
                 mean.extend(channels.iter().map(|channel| coefficients[*channel]));
             }
         }
-        let covariance = ordered
-            .iter()
-            .map(|(profile, channels)| {
-                let width = profile.channels();
-                let mut matrices = Vec::with_capacity((max_order + 1) * sensors * sensors);
-                for order in 0..=max_order {
-                    let matrix = profile.order_covariance(order)?;
-                    for row in channels {
-                        matrices.extend(channels.iter().map(|col| matrix[row * width + col]));
-                    }
-                }
-                Some(matrices)
-            })
-            .collect();
+        let matrices = |of: fn(&Profile) -> Option<&Vec<Complex64>>| -> Option<Vec<Vec<Complex64>>> {
+            let one = |(profile, channels): &(&Profile, Vec<usize>)| {
+                let (all, width) = (of(profile)?, profile.channels());
+                let rows =
+                    (0..=max_order).flat_map(|order| channels.iter().map(move |row| (order * width + row) * width));
+                Some(rows.flat_map(|start| channels.iter().map(move |column| all[start + column])).collect())
+            };
+            ordered.iter().map(one).collect()
+        };
         Ok(Self {
             count: layout.readings.len(),
             max_order,
             samples_per_rev,
             mean,
-            covariance,
+            covariance: matrices(|profile| profile.covariance.as_ref()),
+            scatter: matrices(|profile| profile.scatter.as_ref()),
             turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
             places,
         })

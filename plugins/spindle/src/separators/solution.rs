@@ -166,7 +166,9 @@ impl Solver<'_> {
 
     fn residual(&self, operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Residual {
         let count = readings.count;
-        let (mut squares, mut expected, mut chi2, mut dof) = (0.0, 0.0, 0.0, 0);
+        let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
+        // Weighted as the fit is; set against what the covariance lets expect of it.
+        let (mut weighted, mut weighted_expected) = (0.0, 0.0);
         let mut known = readings.covariance.is_some();
         for order in 1..=readings.max_order {
             let OrderOperator { operator, rank } = &operators.orders[order - 1];
@@ -182,7 +184,9 @@ impl Solver<'_> {
                 Some(covariance) => {
                     expected += variances(&left, &covariance, count).iter().sum::<f64>();
                     if let Some(weights) = operators.weights.as_ref().map(|weights| &weights[order - 1]) {
-                        chi2 += apply(weights, &residual).iter().map(Complex64::norm_sqr).sum::<f64>();
+                        weighted += apply(weights, &residual).iter().map(Complex64::norm_sqr).sum::<f64>();
+                        let left = product(weights, &left, count);
+                        weighted_expected += variances(&left, &covariance, count).iter().sum::<f64>();
                     }
                 }
                 None => known = false,
@@ -195,7 +199,7 @@ impl Solver<'_> {
         let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
         let chi2_per_dof = match &operators.weights {
             _ if !known || expected <= 0.0 => f64::NAN,
-            Some(_) => chi2 / dof as f64,
+            Some(_) => weighted / weighted_expected,
             None => squares / expected,
         };
         Residual {
@@ -284,6 +288,17 @@ impl Solver<'_> {
 /// Matrix (`[row][col]`) times vector.
 pub fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
     matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
+}
+
+/// Product of two square matrices.
+fn product(left: &[Complex64], right: &[Complex64], size: usize) -> Vec<Complex64> {
+    let mut product = vec![Complex64::ZERO; size * size];
+    for (row, target) in left.chunks_exact(size).zip(product.chunks_exact_mut(size)) {
+        for (factor, source) in row.iter().zip(right.chunks_exact(size)) {
+            target.iter_mut().zip(source).for_each(|(to, from)| *to += factor * from);
+        }
+    }
+    product
 }
 
 /// I − A·P, `[reading][reading]`.

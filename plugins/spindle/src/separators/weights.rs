@@ -14,17 +14,18 @@ const SAMPLES_A_CHANNEL: f64 = 10.0;
 /// Replaces each order's covariance by the mean over its neighbours.
 pub fn smooth(readings: &mut Readings) {
     let sensors = readings.count / readings.turns.len().max(1);
-    for matrices in readings.covariance.iter_mut().flatten() {
+    for matrices in [&mut readings.covariance, &mut readings.scatter].into_iter().flatten().flatten() {
         profile::smooth(matrices, sensors * sensors);
     }
 }
 
-/// W with Wᴴ·W = Σ⁻¹ for one order, `[reading][reading]`: it makes errors uncorrelated and of size 1.
+/// W with Wᴴ·W = Σ⁻¹ for one order's scatter Σ, `[reading][reading]`: with independent turns it makes errors uncorrelated
+/// and of size 1.
 ///
 /// `None` where there is no scatter to weigh by (one turn, or turns that are all alike).
 #[must_use]
 pub fn whitening(readings: &Readings, order: usize) -> Option<Vec<Complex64>> {
-    let setups = readings.covariance.as_ref()?;
+    let setups = readings.scatter.as_ref()?;
     let sensors = readings.count / setups.len();
     let size = sensors * sensors;
     let mut weights = vec![Complex64::ZERO; readings.count * readings.count];

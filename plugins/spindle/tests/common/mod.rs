@@ -112,6 +112,7 @@ pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
         samples_per_rev: samples,
         mean,
         covariance: None,
+        scatter: None,
         turns: TurnCount { recorded: 1, used: 1, ..TurnCount::default() },
         speed_rpm: None,
         responses: Vec::new(),
