@@ -46,15 +46,16 @@ impl Score {
     /// `Less` where this is better: fewer lost orders, then the criterion, then the other criterion.
     #[must_use]
     pub fn compare(&self, other: &Self, criterion: Criterion) -> Ordering {
-        let (first, second): (fn(&Self) -> f64, fn(&Self) -> f64) = match criterion {
-            Criterion::Worst => (|score| score.worst, |score| score.rms),
-            Criterion::Rms => (|score| score.rms, |score| score.worst),
+        let key = |score: &Self| {
+            let gains = match criterion {
+                Criterion::Worst => [score.worst, score.rms],
+                Criterion::Rms => [score.rms, score.worst],
+            };
+            gains.map(|gain| (gain / SAME_GAIN).round())
         };
-        let by = |value: fn(&Self) -> f64| {
-            let step = |score| (value(score) / SAME_GAIN).round();
-            step(self).total_cmp(&step(other))
-        };
-        self.lost.cmp(&other.lost).then_with(|| by(first)).then_with(|| by(second))
+        let ([first, second], [others_first, others_second]) = (key(self), key(other));
+        let by_lost = self.lost.cmp(&other.lost);
+        by_lost.then(first.total_cmp(&others_first)).then(second.total_cmp(&others_second))
     }
 
     /// The worse of both in each respect.
@@ -228,7 +229,9 @@ impl FormGain {
             }
             let norm = rest.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
             if norm > RANK_TOLERANCE * (rows as f64).sqrt() {
-                rest.iter_mut().for_each(|entry| *entry /= norm);
+                for entry in &mut rest {
+                    *entry /= norm;
+                }
                 basis.push(rest);
             }
         }

@@ -57,7 +57,7 @@ impl Spacing {
             let sensors = spacing.movable[section].len() + usize::from(section == held);
             if sensors > 1 && spacing.slack(section) < 0 {
                 // With the first sensor between two steps, the last hundredth may be missing.
-                let most_deg = ((TURN / sensors as i64 - 1) / 10) as f64 / 10.0;
+                let most_deg = ((TURN as usize / sensors).saturating_sub(1) / 10) as f64 / 10.0;
                 return Err(TooTight { section: id.clone(), sensors, most_deg });
             }
         }
@@ -66,7 +66,8 @@ impl Spacing {
 
     /// Steps that are left in a section when its sensors stand as near as they may.
     fn slack(&self, section: usize) -> i64 {
-        let sensors = self.movable[section].len() as i64;
+        // More than there are steps do not fit either.
+        let sensors = i64::try_from(self.movable[section].len()).unwrap_or(TURN);
         if section == self.held {
             self.free.1 - self.free.0 - (sensors - 1) * self.clearance
         } else {

@@ -76,7 +76,7 @@ pub fn suggest(rig: &Rig, orders: &RangeInclusive<usize>, clearance_deg: f64) ->
 fn grid_deg(highest_order: usize) -> Vec<f64> {
     let per_deg = match highest_order {
         ..=180 => 1,
-        ..=360 => 2,
+        181..=360 => 2,
         _ => 10,
     };
     let mut steps: Vec<usize> = (0..360 * per_deg).collect();
