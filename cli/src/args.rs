@@ -25,6 +25,8 @@ pub enum Command {
     Run(RunArgs),
     /// Say everything that can be said without the data: configuration, what the rig can and cannot separate.
     Check(PipelineArgs),
+    /// Run several separators on the same data: values side by side, differences with their uncertainty, E_n.
+    Compare(CompareArgs),
     /// Make a campaign with declared truth and effects, as a measurement file.
     Simulate(SimulateArgs),
     /// Say what a rig can separate and how well, what to add to it, and better angles for its sensors.
@@ -60,6 +62,23 @@ pub struct Overrides {
 pub struct RunArgs {
     #[command(flatten)]
     pub pipeline: PipelineArgs,
+    /// Stations worked on at a time; as many as there are processors without it.
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+}
+
+/// `runout compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    pub pipeline: PipelineArgs,
+    /// Separators to compare with the pipeline's own, configured by their [[compare]] tables where there are any.
+    /// Without it, all [[compare]] tables, or else every other separator.
+    #[arg(long, value_name = "A,B,…", value_delimiter = ',')]
+    pub with: Vec<String>,
+    /// Write what came out order by order: a table (FILE.parquet) or the document (FILE.json).
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
     /// Stations worked on at a time; as many as there are processors without it.
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
@@ -164,7 +183,7 @@ pub struct PluginsArgs {
 /// `runout schema`.
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
-    /// `pipeline`, `scenario`, `rig`, `summary`, `check`, `plan`, or a plugin's name; all the files' schemas without it.
+    /// `pipeline`, `scenario`, `rig`, `summary`, `compare`, `check`, `plan`, or a plugin's name; all the files' schemas without it.
     pub name: Option<String>,
     /// Write each file's schema to `NAME.schema.json` in this folder.
     #[arg(long, value_name = "DIR", conflicts_with = "name")]

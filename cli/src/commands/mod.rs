@@ -1,6 +1,7 @@
 //! What each command does.
 
 pub mod check;
+pub mod compare;
 pub mod inspect;
 pub mod plan;
 pub mod plugins;
@@ -26,6 +27,7 @@ pub fn execute(command: Command, json: bool) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::execute(&args, json),
         Command::Check(args) => check::execute(&args, json),
+        Command::Compare(args) => compare::execute(&args, json),
         Command::Simulate(args) => simulate::execute(&args, json),
         Command::Plan(args) => plan::execute(&args, json),
         Command::Plugins(args) => plugins::execute(&args, json),

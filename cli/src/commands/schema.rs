@@ -6,6 +6,7 @@ use runout_core::{
     Error, atomic_file,
     pipeline::{
         Registry,
+        compare::Comparison,
         config::{choice, pipeline_schema},
         run::Summary,
     },
@@ -45,6 +46,7 @@ fn files(registry: &Registry) -> Vec<(&'static str, Value)> {
         ("scenario", scenario(registry)),
         ("rig", of::<RigConfig>("runout rig", SchemaSettings::default())),
         ("summary", of::<Summary>("runout summary", SchemaSettings::default().for_serialize())),
+        ("compare", of::<Comparison>("runout compare", SchemaSettings::default().for_serialize())),
         ("check", of::<check::Report>("runout check", SchemaSettings::default().for_serialize())),
         ("plan", of::<plan::Report>("runout plan", SchemaSettings::default().for_serialize())),
     ]

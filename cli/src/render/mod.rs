@@ -1,6 +1,7 @@
 //! Terminal text.
 
 pub mod check;
+pub mod compare;
 pub mod diagnostic;
 pub mod file;
 pub mod keys;

@@ -140,6 +140,7 @@ impl<S> Catalogue<S> {
     }
 
     /// Builds the plugin of a name without any keys of its own; `None` where there is none.
+    #[must_use]
     pub fn build_default(&self, name: &str, context: &Context) -> Option<Result<S, Fault>> {
         let plugin = self.plugins.iter().find(|plugin| plugin.name == name)?;
         Some((plugin.build)(&Spanned::new(0..0, DeTable::new()), context))

@@ -11,7 +11,10 @@ mod estimates;
 mod methods;
 mod report;
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+};
 
 pub use methods::{Candidate, Method, Refusal};
 pub(super) use methods::{candidate, plugin_name};
@@ -32,6 +35,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    measurement::StationTruth,
     provenance::{Provenance, VERSION},
     rig::Rig,
     stage::{Averager, Conditioner, Source, Station, StationSeparator},
@@ -62,7 +66,7 @@ impl<'a> Comparing<'a> {
         pipeline: &'a mut Pipeline,
         with: &[String],
         registry: &Registry,
-        folder: &std::path::Path,
+        folder: &Path,
     ) -> std::result::Result<Self, Fault> {
         let configured = std::mem::take(&mut pipeline.compare);
         let pipeline = &*pipeline;
@@ -109,7 +113,7 @@ impl<'a> Comparing<'a> {
         spare_inputs(&outputs, &recording.inputs())?;
         let line =
             Line { rig: self.rig, recording: &*recording, conditioners: self.conditioners, averager: self.averager };
-        let work = |index, station: Station| self.station(&station, recording.truth(index)?);
+        let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref());
         let inputs = line.run(threads, observer, work, take)?;
         let own = pipeline.assessment.as_ref();
         let assessments = own.into_iter().chain(self.methods.iter().map(|method| &method.assessment));
@@ -135,7 +139,7 @@ impl<'a> Comparing<'a> {
         })
     }
 
-    fn station(&self, station: &Station, truth: Option<crate::measurement::StationTruth>) -> Result<StationComparison> {
+    fn station(&self, station: &Station, truth: Option<&StationTruth>) -> Result<StationComparison> {
         let scatter = Scatter::of(station);
         let separators = std::iter::once(self.reference).chain(self.methods.iter().map(|method| &*method.separator));
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
@@ -148,7 +152,7 @@ impl<'a> Comparing<'a> {
             warnings.extend(separation.warnings.iter().map(|warning| format!("{name}: {warning}")));
             estimates.push(Estimates::new(&separation, separator.sensitivity(station)?));
             // Profiles are shared; the standards' values need none.
-            results.push(complete(station.name.clone(), station.z_mm, angles, separation, Vec::new(), truth.clone()));
+            results.push(complete(station.name.clone(), station.z_mm, angles, separation, Vec::new(), truth.cloned()));
         }
         Ok(StationComparison {
             station: station.name.clone(),

@@ -1,0 +1,106 @@
+//! `runout compare`: several separators on the same preprocessed data.
+
+use std::path::{Path, PathBuf};
+
+use runout_core::{
+    Error, Result,
+    atomic_file::{self, resolved},
+    pipeline::{
+        Registry,
+        compare::{Comparing, Comparison, StationComparison},
+        document::{Document, Sources},
+        error::known_names,
+    },
+};
+use runout_parquet::ComparisonTable;
+
+use super::{pipeline, print};
+use crate::{args::CompareArgs, builtin, failure::Failure, progress::Progress, render};
+
+/// Compares separators and says how they differ.
+///
+/// # Errors
+/// When the configuration is wrong, nothing can be compared, or the data or a file fails.
+pub fn execute(args: &CompareArgs, json: bool) -> std::result::Result<(), Failure> {
+    let registry = builtin::registry();
+    known(&args.with, &registry)?;
+    let (sources, mut pipeline) = pipeline(&args.pipeline)?;
+    let mut output = Output::named(args.out.as_deref(), &sources)?;
+    let comparing = match Comparing::new(&mut pipeline, &args.with, &registry, sources.folder()) {
+        Ok(comparing) => comparing,
+        Err(fault) => return Err(Document::parse(&sources)?.diagnose(fault).into()),
+    };
+    let progress = Progress::new("stations");
+    let whole = json || matches!(output, Output::Document(_));
+    let mut stations = Vec::new();
+    let take = |station: StationComparison| {
+        output.take(&station)?;
+        stations.push(if whole { station } else { station.without_orders() });
+        Ok(())
+    };
+    let mut comparison = comparing.run(args.threads, &progress, args.out.iter().cloned().collect(), take)?;
+    drop(progress);
+    comparison.stations = stations;
+    output.finish(&comparison)?;
+    print(&comparison, json, render::compare::text)
+}
+
+/// Refuses names that no separator has.
+fn known(names: &[String], registry: &Registry) -> std::result::Result<(), Failure> {
+    let known = || registry.separators.iter().map(|plugin| plugin.name);
+    match names.iter().find(|name| !known().any(|known| known == name.as_str())) {
+        None => Ok(()),
+        Some(name) => {
+            let message = format!("unknown separator `{name}`");
+            Err(Failure::Name { message, help: known_names(name, known()) })
+        }
+    }
+}
+
+/// Where the comparison goes order by order.
+enum Output {
+    Nowhere,
+    /// A table, begun with the first station.
+    Table(PathBuf, Option<Box<ComparisonTable>>),
+    Document(PathBuf),
+}
+
+impl Output {
+    fn named(path: Option<&Path>, sources: &Sources) -> std::result::Result<Self, Failure> {
+        let Some(path) = path else { return Ok(Self::Nowhere) };
+        let refuse = |message: String, help: &str| Failure::Name { message, help: help.to_owned() };
+        let shown = path.display();
+        if sources.files().any(|file| resolved(file) == resolved(path)) {
+            return Err(refuse(format!("{shown} is read as configuration"), "name another file"));
+        }
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("parquet") => Ok(Self::Table(path.to_owned(), None)),
+            Some("json") => Ok(Self::Document(path.to_owned())),
+            _ => Err(refuse(format!("cannot tell what {shown} is to be"), "end it in .parquet or .json")),
+        }
+    }
+
+    fn take(&mut self, station: &StationComparison) -> Result<()> {
+        let Self::Table(path, table) = self else { return Ok(()) };
+        let table = match table {
+            Some(table) => table,
+            None => table.insert(Box::new(ComparisonTable::create(path.clone())?)),
+        };
+        table.append(station)
+    }
+
+    fn finish(self, comparison: &Comparison) -> Result<()> {
+        match self {
+            Self::Nowhere | Self::Table(_, None) => {}
+            Self::Table(_, Some(table)) => {
+                table.close(comparison)?.commit()?;
+            }
+            Self::Document(path) => {
+                let text = serde_json::to_vec_pretty(comparison)
+                    .map_err(|error| Error::new("write", path.display().to_string(), error))?;
+                atomic_file::write(path, &text)?;
+            }
+        }
+        Ok(())
+    }
+}
