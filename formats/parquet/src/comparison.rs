@@ -132,3 +132,44 @@ fn rows(station: &StationComparison) -> Vec<ArrayRef> {
         Arc::new(difference(|one| &one.by_order.e_n)),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
+    use runout_core::pipeline::compare::{DifferenceOrders, Harmonics};
+
+    use super::*;
+
+    #[test]
+    fn a_lost_order_is_no_number() {
+        let value = |method: &str, second: Option<f64>| {
+            let column = vec![Some(0.5), second];
+            let harmonics = Harmonics { re: column.clone(), im: column.clone(), std: column };
+            let (method, z_mm) = (method.to_owned(), Some(200.0));
+            let (ront_um, truth_rms_error_um, lost_orders) = (None, None, Vec::new());
+            MethodValue { method, z_mm, rms: 0.5, std: None, ront_um, truth_rms_error_um, lost_orders, harmonics }
+        };
+        let column = vec![Some(0.1), None];
+        let by_order = DifferenceOrders { difference: column.clone(), std: column.clone(), e_n: column };
+        let quantity = QuantityComparison {
+            quantity: "x".into(),
+            section: None,
+            unit: "um".into(),
+            values: vec![value("a", Some(0.25)), value("b", None)],
+            differences: vec![Difference { method: "b".into(), by_order, ..Difference::default() }],
+        };
+        let station =
+            StationComparison { station: "s001".into(), z_mm: 0.0, quantities: vec![quantity], warnings: Vec::new() };
+        let batch = RecordBatch::try_new(Arc::new(schema()), rows(&station)).unwrap();
+        let numbers = |name: &str| batch.column_by_name(name).unwrap().as_primitive::<Float64Type>().clone();
+        let observable = batch.column_by_name("observable").unwrap().as_boolean().clone();
+        assert_eq!(observable.iter().flatten().collect::<Vec<_>>(), [true, true, true, false]);
+        for name in ["re", "im", "std"] {
+            assert!(numbers(name).value(3).is_nan() && numbers(name).value(1) == 0.25, "{name}");
+        }
+        for name in ["difference", "difference_std", "e_n"] {
+            let held = numbers(name);
+            assert_eq!((0..4).map(|row| held.is_valid(row)).collect::<Vec<_>>(), [false, false, true, false], "{name}");
+        }
+    }
+}
