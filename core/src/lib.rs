@@ -9,6 +9,7 @@ pub mod error;
 pub mod evaluate;
 pub mod inspection;
 pub mod measurement;
+pub mod model;
 pub mod numerics;
 pub mod pipeline;
 pub mod points;

@@ -1,0 +1,372 @@
+//! Find, trace, add, report: until noise is left, or nothing earns its place.
+
+use super::{
+    Effect, Fit, Model, Remainder, Setting,
+    diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Estimated, Level, Moved, Refused, Step, Verdict},
+    evidence::Evidence,
+    fit::{Prior, Refit, dot, norm, refit},
+};
+use crate::Result;
+
+/// Chance of noise doing as much, corrected for the number of candidates, below which an effect is believed.
+const P_LIMIT: f64 = 1e-3;
+/// "Very strong" evidence (Kass, Raftery, J. Am. Stat. Assoc. 90 (1995) 773).
+const BIC_LIMIT: f64 = -10.0;
+/// Candidates whose joint refits differ by less than this, in BIC, cannot be told apart.
+const SAME_BIC: f64 = 10.0;
+/// Candidates of which a joint refit is tried, and the least share of the best linear gain that they must promise.
+const SHORTLIST: (usize, f64) = (6, 0.2);
+/// χ² per degree of freedom up to which noise is all that is left: covariances are estimates themselves.
+const FLOOR_CHI2: f64 = 1.5;
+/// Where something stays unexplained, an effect is believed only if it takes away this share of what was: a stranger lets
+/// the least bad effect take a part.
+const OWN_SHARE: f64 = 0.8;
+/// Held-out data must improve by more than this share, so that rounding is no improvement.
+const HELD_OUT_GAIN: f64 = 1e-3;
+/// An effect of its usual size that would show with less than this many standard deviations is not seen.
+const VISIBLE: f64 = 3.0;
+
+/// How a loop is to be run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Ids of the effects to consider; all without it.
+    pub effects: Option<Vec<String>>,
+    /// Effects that are declared: applied with these values, and not fitted.
+    pub known: Vec<Setting>,
+    /// Most effects that may be added.
+    pub max_added: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { effects: None, known: Vec::new(), max_added: 6 }
+    }
+}
+
+/// A diagnosis, and the model's final fit.
+pub struct Closed<F> {
+    /// What was found.
+    pub diagnosis: Diagnosis,
+    /// The declared model's fit.
+    pub before: F,
+    /// The fit with the effects added.
+    pub after: F,
+}
+
+/// An effect that was believed, with everything that it cannot be told from.
+struct Found {
+    /// The best one first.
+    members: Vec<usize>,
+    /// Values and standard uncertainties as if the best one were all of it.
+    values: Vec<f64>,
+    std: Vec<f64>,
+    evidence: Evidence,
+    before: Remainder,
+    after: Remainder,
+}
+
+/// Runs the loop.
+///
+/// # Errors
+/// When the declared model cannot be fitted.
+pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fit>> {
+    let before = model.fit(&settings.known)?;
+    let mut tracing = Tracing { model, settings, found: Vec::new(), refused: Vec::new() };
+    let mut current = tracing.refit_found()?;
+    while tracing.found.len() < settings.max_added {
+        let Some(found) = tracing.next(&current)? else { break };
+        tracing.found.push(found);
+        current = tracing.refit_found()?;
+        if let Some(last) = tracing.found.last_mut() {
+            last.after = current.fit.remainder().clone();
+        }
+    }
+    let explained = |remainder: &Remainder| !remainder.noise_is_known() || remainder.chi2_per_dof() <= FLOOR_CHI2;
+    if !explained(current.fit.remainder()) && tracing.drop_the_least_bad() {
+        current = tracing.refit_found()?;
+    }
+    let left = explained(current.fit.remainder());
+    let verdict = match (left, tracing.found.is_empty()) {
+        (false, _) => Verdict::Unexplained,
+        (true, true) => Verdict::AtNoiseFloor,
+        (true, false) => Verdict::Explained,
+    };
+    let mut after = current.fit;
+    let members: Vec<usize> = current.settings[settings.known.len()..].iter().map(|setting| setting.effect).collect();
+    let unit = after.remainder().chi2_per_dof();
+    let unit = if after.remainder().noise_is_known() { unit.max(1.0) } else { unit };
+    let covariance: Vec<Vec<f64>> =
+        current.covariance.iter().map(|row| row.iter().map(|entry| entry * unit).collect()).collect();
+    after.widen(&members, &covariance);
+    let diagnosis = Diagnosis {
+        verdict,
+        before: level(before.remainder()),
+        added: tracing.found.iter().map(|found| added(found, model.effects(), &after)).collect(),
+        after: level(after.remainder()),
+        moved: moved(&before, &after),
+        unexplained: if left { Vec::new() } else { after.unexplained() },
+        blind_to: blind(model.effects(), &tracing.considered(), &after),
+        refused: tracing.refused,
+        lost_orders: None,
+        truth: None,
+        warnings: Vec::new(),
+    };
+    Ok(Closed { diagnosis, before, after })
+}
+
+struct Tracing<'a, M> {
+    model: &'a M,
+    settings: &'a Settings,
+    found: Vec<Found>,
+    refused: Vec<Refused>,
+}
+
+impl<M: Model> Tracing<'_, M> {
+    /// Effects that may be added: chosen, not declared.
+    fn considered(&self) -> Vec<usize> {
+        let chosen = |effect: &Effect| self.settings.effects.as_ref().is_none_or(|ids| ids.contains(&effect.id));
+        let declared = |index: usize| self.settings.known.iter().any(|known| known.effect == index);
+        let effects = self.model.effects().iter().enumerate();
+        effects.filter(|(index, effect)| chosen(effect) && !declared(*index)).map(|(index, _)| index).collect()
+    }
+
+    fn active(&self, effect: usize) -> bool {
+        self.found.iter().any(|found| found.members.contains(&effect))
+    }
+
+    /// All effects found, jointly. A confounded set enters as a whole: each member may be all of it, which is the size of
+    /// its prior; what the data cannot decide then shows as a spread.
+    fn refit_found(&self) -> Result<Refit<M::Fit>> {
+        let mut settings = self.settings.known.clone();
+        let mut priors = Vec::new();
+        let mut position = 0;
+        for found in &self.found {
+            let size = |index: usize, parameter: usize| {
+                let tolerance =
+                    self.model.effects()[index].parameters.get(parameter).map_or(1.0, |known| known.tolerance);
+                // Members of other kinds have other units: their size is what has the same effect.
+                let best = &self.model.effects()[found.members[0]].parameters;
+                let own = found.values.get(parameter).map(|value| value.abs());
+                let own = own.zip(best.get(parameter)).map(|(value, best)| value / best.tolerance);
+                own.unwrap_or(1.0).max(1e-6) * tolerance
+            };
+            for (place, member) in found.members.iter().enumerate() {
+                let count = self.model.effects()[*member].parameters.len();
+                let values =
+                    if place == 0 && found.members.len() == 1 { found.values.clone() } else { vec![0.0; count] };
+                if found.members.len() > 1 {
+                    let held = (0..count)
+                        .map(|parameter| Prior { parameter: position + parameter, std: size(*member, parameter) });
+                    priors.extend(held);
+                }
+                position += count;
+                settings.push(Setting { effect: *member, values });
+            }
+        }
+        refit(self.model, settings, self.settings.known.len(), &priors)
+    }
+
+    /// The effect that the data ask for most, if any earns its place.
+    fn next(&mut self, current: &Refit<M::Fit>) -> Result<Option<Found>> {
+        let before = current.fit.remainder().clone();
+        let candidates: Vec<usize> = self.considered().into_iter().filter(|effect| !self.active(*effect)).collect();
+        let fixed = self.settings.known.len();
+        let active: Vec<Vec<f64>> =
+            current.settings[fixed..].iter().flat_map(|setting| current.fit.signature(setting.effect)).collect();
+        let basis = orthonormal(active, &[]);
+        let mut ranked: Vec<(usize, f64)> = candidates
+            .iter()
+            .map(|effect| {
+                let columns = orthonormal(current.fit.signature(*effect), &basis);
+                (*effect, columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum())
+            })
+            .collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
+        let mut trials: Vec<(usize, Refit<M::Fit>, Evidence)> = Vec::new();
+        for (effect, gain) in ranked.into_iter().take(SHORTLIST.0).filter(|(_, gain)| *gain >= promising) {
+            let parameters = self.model.effects()[effect].parameters.len();
+            let evidence = |after: f64| {
+                let dof = before.dof.saturating_sub(parameters);
+                Evidence::new(before.chi2(), after, parameters, dof, candidates.len(), before.noise_is_known())
+            };
+            // What promises nothing to first order is not worth a refit.
+            if evidence(before.chi2() - gain).p_value > 0.05 {
+                continue;
+            }
+            let mut settings = current.settings.clone();
+            settings.push(Setting { effect, values: vec![0.0; parameters] });
+            let Ok(trial) = refit(self.model, settings, fixed, &self.priors_so_far()) else { continue };
+            let evidence = evidence(trial.chi2);
+            trials.push((effect, trial, evidence));
+        }
+        let best = trials.iter().map(|(_, _, evidence)| evidence.delta_bic).fold(f64::INFINITY, f64::min);
+        trials.sort_by(|a, b| a.2.delta_bic.total_cmp(&b.2.delta_bic));
+        let mut trials = trials.into_iter();
+        let Some((effect, trial, evidence)) = trials.next() else { return Ok(None) };
+        let after = trial.fit.remainder().clone();
+        let reason = if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
+            Some(format!("its evidence is weak: p {:.2e}, ΔBIC {:.1}", evidence.p_value, evidence.delta_bic))
+        } else if worse(before.held_out_chi2, after.held_out_chi2) {
+            Some(format!(
+                "it does not lower the error of data left out of the fit: {:.4} → {:.4} {}",
+                before.held_out_rms, after.held_out_rms, before.unit
+            ))
+        } else {
+            None
+        };
+        if let Some(reason) = reason {
+            let named = &self.model.effects()[effect];
+            self.refused.push(Refused {
+                effect: named.id.clone(),
+                targets: named.target.iter().cloned().collect(),
+                reason,
+            });
+            return Ok(None);
+        }
+        let unit = if after.noise_is_known() { after.chi2_per_dof().max(1.0) } else { after.chi2_per_dof() };
+        let count = self.model.effects()[effect].parameters.len();
+        let first = trial.covariance.len() - count;
+        let std = (first..first + count).map(|index| (trial.covariance[index][index] * unit).sqrt()).collect();
+        let values = trial.settings.last().map(|setting| setting.values.clone()).unwrap_or_default();
+        // BIC counts in units of what each trial leaves; the best one's unit is common to all.
+        let alike = trials.filter(|(_, other, evidence)| {
+            let difference = (other.chi2 - trial.chi2) / unit.max(f64::MIN_POSITIVE);
+            difference < SAME_BIC && evidence.delta_bic - best < SAME_BIC.max(0.02 * best.abs())
+        });
+        let members = std::iter::once(effect).chain(alike.map(|(other, ..)| other)).collect();
+        Ok(Some(Found { members, values, std, evidence, before, after }))
+    }
+
+    fn priors_so_far(&self) -> Vec<Prior> {
+        let mut priors = Vec::new();
+        let mut position = 0;
+        for found in &self.found {
+            for member in &found.members {
+                for parameter in &self.model.effects()[*member].parameters {
+                    if found.members.len() > 1 {
+                        priors.push(Prior { parameter: position, std: parameter.tolerance });
+                    }
+                    position += 1;
+                }
+            }
+        }
+        priors
+    }
+
+    /// Takes back the effects that took only a part of what something unknown does. Says whether there were any.
+    fn drop_the_least_bad(&mut self) -> bool {
+        let excess = |remainder: &Remainder| (remainder.chi2_per_dof() - 1.0).max(0.0);
+        let (kept, dropped): (Vec<Found>, Vec<Found>) = std::mem::take(&mut self.found)
+            .into_iter()
+            .partition(|found| excess(&found.after) <= (1.0 - OWN_SHARE) * excess(&found.before));
+        for found in &dropped {
+            let named = &self.model.effects()[found.members[0]];
+            self.refused.push(Refused {
+                effect: named.id.clone(),
+                targets: named.target.iter().cloned().collect(),
+                reason: format!(
+                    "it takes away a part only (χ² per degree of freedom {:.1} → {:.1}) of something that stays unexplained",
+                    found.before.chi2_per_dof(),
+                    found.after.chi2_per_dof()
+                ),
+            });
+        }
+        self.found = kept;
+        !dropped.is_empty()
+    }
+}
+
+fn worse(before: f64, after: f64) -> bool {
+    before.is_finite() && after.is_finite() && after > before * (1.0 - HELD_OUT_GAIN)
+}
+
+/// Columns made orthonormal to a basis and to each other; dependent ones are left out.
+fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut made: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+    for mut column in columns {
+        let whole = norm(&column);
+        for _ in 0..2 {
+            for other in basis.iter().chain(&made) {
+                let share = dot(other, &column);
+                column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= share * other);
+            }
+        }
+        let left = norm(&column);
+        if left > 1e-9 * whole {
+            column.iter_mut().for_each(|entry| *entry /= left);
+            made.push(column);
+        }
+    }
+    made
+}
+
+fn known(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+fn level(remainder: &Remainder) -> Level {
+    Level {
+        residual_rms_um: remainder.rms,
+        noise_floor_um: known(remainder.noise_floor),
+        chi2_per_dof: remainder.noise_is_known().then(|| remainder.chi2_per_dof()),
+        held_out_rms_um: known(remainder.held_out_rms),
+        unit: (remainder.unit != "um").then(|| remainder.unit.clone()),
+    }
+}
+
+fn added(found: &Found, effects: &[Effect], fit: &impl Fit) -> Added {
+    let named = &effects[found.members[0]];
+    let with = |member: &usize| {
+        let other = &effects[*member];
+        other.target.as_ref().map_or_else(|| other.id.clone(), |target| format!("{} {target}", other.id))
+    };
+    let parameters = named.parameters.iter().zip(&found.values).zip(&found.std).map(|((parameter, value), std)| {
+        Estimated { name: parameter.name.clone(), value: *value, std: *std, unit: parameter.unit.clone() }
+    });
+    Added {
+        effect: named.id.clone(),
+        targets: named.target.iter().cloned().collect(),
+        confounded_with: found.members[1..].iter().map(with).collect(),
+        told_apart_by: if found.members.len() > 1 { fit.told_apart_by(&found.members) } else { None },
+        parameters: parameters.collect(),
+        residual_rms_um: Step { before: known(found.before.rms), after: known(found.after.rms) },
+        held_out_rms_um: Step { before: known(found.before.held_out_rms), after: known(found.after.held_out_rms) },
+        delta_bic: found.evidence.delta_bic,
+        p_value: found.evidence.p_value,
+    }
+}
+
+fn moved(before: &impl Fit, after: &impl Fit) -> Vec<Moved> {
+    let values = before.values().into_iter().zip(after.values());
+    let moved = values.map(|(before, after)| Moved {
+        value: after.value,
+        section: after.section,
+        before: before.number,
+        after: after.number,
+        std: known(after.std),
+        unit: after.unit,
+    });
+    moved.collect()
+}
+
+/// Effects of which the usual size would not show.
+fn blind(effects: &[Effect], considered: &[usize], fit: &impl Fit) -> Vec<Blind> {
+    if !fit.remainder().noise_is_known() {
+        return Vec::new();
+    }
+    let unseen = |index: &&usize| {
+        let tolerances = effects[**index].parameters.iter().map(|parameter| parameter.tolerance);
+        let columns = fit.signature(**index);
+        columns.iter().zip(tolerances).all(|(column, tolerance)| norm(column) * tolerance < VISIBLE)
+    };
+    let report = |index: &usize| {
+        let largest = fit.bias(*index).into_iter().max_by(|a, b| a.value.total_cmp(&b.value))?;
+        Some(Blind {
+            effect: effects[*index].id.clone(),
+            targets: effects[*index].target.iter().cloned().collect(),
+            bias_per_unit: BiasPerUnit { value: largest.value, unit: largest.unit, on: largest.on },
+        })
+    };
+    considered.iter().filter(unseen).filter_map(report).collect()
+}

@@ -1,0 +1,1 @@
+//! A model whose declared part and effects are all linear: measured points and terms.

@@ -1,0 +1,158 @@
+//! The closed loop: what a declared model leaves of the data, traced to what it lacks.
+//!
+//! A [`Model`] fits everything that it declares and says what is left; it knows *effects* that it could have besides, each
+//! with parameters and a signature, the derivative of what is left by each parameter. [`closed_loop::diagnose`] finds which
+//! of them the data ask for, adds them, and says what it cannot know. Nothing here knows what is measured.
+
+pub mod closed_loop;
+pub mod diagnosis;
+pub mod evidence;
+pub mod fit;
+pub mod linear_terms;
+
+use self::diagnosis::Unexplained;
+use crate::Result;
+
+/// A declared model of a measurement, and what it could lack.
+pub trait Model {
+    /// A fit of it.
+    type Fit: Fit;
+
+    /// What it could lack, one entry an effect and target.
+    fn effects(&self) -> &[Effect];
+
+    /// Fits everything that is declared, with some effects applied: fully, not only to first order.
+    ///
+    /// # Errors
+    /// When the data do not fit the model, or a parameter is beyond all bounds.
+    fn fit(&self, applied: &[Setting]) -> Result<Self::Fit>;
+}
+
+/// A model fitted to its data.
+pub trait Fit {
+    /// What is left.
+    fn remainder(&self) -> &Remainder;
+
+    /// How what is left changes with each parameter of an effect (an index into [`Model::effects`]), at the values that are
+    /// applied, or at none: `[parameter][residual]`, per unit of the parameter. Everything that the model fits anyway is
+    /// already taken out of it.
+    fn signature(&self, effect: usize) -> Vec<Vec<f64>>;
+
+    /// How the results (form, motion) change with each parameter of an effect: root mean square, per unit of it.
+    fn bias(&self, effect: usize) -> Vec<Bias>;
+
+    /// Values that people look at, with their standard uncertainty where it is known.
+    fn values(&self) -> Vec<Outcome>;
+
+    /// Takes into its results' uncertainty what is not known of the parameters of these effects, one after the other:
+    /// their covariance `[parameter][parameter]`.
+    fn widen(&mut self, _effects: &[usize], _covariance: &[Vec<f64>]) {}
+
+    /// Where something is left that the noise does not explain.
+    fn unexplained(&self) -> Vec<Unexplained> {
+        Vec::new()
+    }
+
+    /// What measurement would tell effects of a confounded set apart.
+    fn told_apart_by(&self, _effects: &[usize]) -> Option<String> {
+        None
+    }
+}
+
+/// Something that a declared model may lack, at one target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Its id, in kebab-case.
+    pub id: String,
+    /// Where it acts: the id of a sensor or a setup; nothing for the whole.
+    pub target: Option<String>,
+    /// What it is described by.
+    pub parameters: Vec<Parameter>,
+}
+
+/// A number that describes an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// What could usually be expected of it, in its unit: the standard deviation of its prior.
+    pub tolerance: f64,
+}
+
+/// An effect with values of its parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// Index into [`Model::effects`].
+    pub effect: usize,
+    /// One value a parameter.
+    pub values: Vec<f64>,
+}
+
+/// What a fit leaves of the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remainder {
+    /// In standard deviations of its noise, projected to where nothing that is fitted can reach; of mean square 1 for each
+    /// degree of freedom where only noise is left.
+    pub residual: Vec<f64>,
+    /// Its degrees of freedom.
+    pub dof: usize,
+    /// Root mean square of what is left, in the data's unit.
+    pub rms: f64,
+    /// What the noise lets expect of it, in the data's unit; NaN where the noise is not known from elsewhere: then
+    /// `residual` is in the data's unit.
+    pub noise_floor: f64,
+    /// Root mean square of what the fit leaves of data that it has not seen, in the data's unit.
+    pub held_out_rms: f64,
+    /// Weighted sum of squares of the same.
+    pub held_out_chi2: f64,
+    /// Unit of the data.
+    pub unit: String,
+}
+
+impl Remainder {
+    /// Sum of squares of the residual.
+    #[must_use]
+    pub fn chi2(&self) -> f64 {
+        self.residual.iter().map(|value| value * value).sum()
+    }
+
+    /// χ² per degree of freedom.
+    #[must_use]
+    pub fn chi2_per_dof(&self) -> f64 {
+        self.chi2() / self.dof.max(1) as f64
+    }
+
+    /// Whether the noise is known from elsewhere than from the fit.
+    #[must_use]
+    pub fn noise_is_known(&self) -> bool {
+        self.noise_floor.is_finite()
+    }
+}
+
+/// What one unit of a parameter does to a result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bias {
+    /// Which result: "form", "motion".
+    pub on: String,
+    /// Root mean square.
+    pub value: f64,
+    /// Of the result per that of the parameter: "um/mm".
+    pub unit: String,
+}
+
+/// A value that people look at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Its symbol or name.
+    pub value: String,
+    /// The section, where it has one.
+    pub section: Option<String>,
+    /// The number.
+    pub number: f64,
+    /// Its standard uncertainty; NaN where not known.
+    pub std: f64,
+    /// Its unit.
+    pub unit: String,
+}
