@@ -2,7 +2,10 @@
 
 mod straightness;
 
-use runout_core::pipeline::run::{CaptureSummary, SectionSummary, StationSummary, Summary};
+use runout_core::{
+    evaluate::Value,
+    pipeline::run::{CaptureSummary, SectionSummary, StationSummary, Summary},
+};
 
 use super::{
     count,
@@ -30,6 +33,9 @@ pub fn text(summary: &Summary) -> String {
         turns(&mut page, stations);
         let form = if stations.len() <= FEW_STATIONS { form_by_station(stations) } else { form_gathered(stations) };
         page.headed_table(form_heading(stations), &form);
+        if sections(stations).any(|(_, section)| section.form_std_um.is_some()) {
+            page.line("  ± is the standard uncertainty: beside rms that of the form at any one angle");
+        }
         residual(&mut page, stations);
         motion_truth(&mut page, stations);
         lost_orders(&mut page, summary);
@@ -130,14 +136,18 @@ fn sections(stations: &[StationSummary]) -> impl Iterator<Item = (&StationSummar
     stations.iter().flat_map(|station| station.sections.iter().map(move |section| (station, section)))
 }
 
-fn value_of(section: &SectionSummary, symbol: &str) -> Option<f64> {
-    section.values.iter().find(|value| value.symbol == symbol).map(|value| value.value)
+fn value_of<'a>(section: &'a SectionSummary, symbol: &str) -> Option<&'a Value> {
+    section.values.iter().find(|value| value.symbol == symbol)
+}
+
+fn std_of(value: &Value) -> Option<f64> {
+    value.uncertainty.as_ref().map(|uncertainty| uncertainty.std)
 }
 
 fn form_heading(stations: &[StationSummary]) -> String {
     let band = sections(stations).find_map(|(_, section)| section.values.first()).map(|value| value.band_upr);
     let band = band.map(|[low, high]| format!(", {low} to {high} undulations per revolution")).unwrap_or_default();
-    format!("Form{band} (± is the standard uncertainty at any one angle)")
+    format!("Form{band}")
 }
 
 fn form_by_station(stations: &[StationSummary]) -> Table {
@@ -155,7 +165,10 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
             significant(section.z_mm, 5),
             with_std(section.form_rms_um, section.form_std_um),
         ];
-        row.extend(symbols.iter().map(|(symbol, _)| known(value_of(section, symbol), 4)));
+        row.extend(symbols.iter().map(|(symbol, _)| match value_of(section, symbol) {
+            Some(value) if std_of(value).is_some() => with_std(value.value, std_of(value)),
+            value => known(value.map(|value| value.value), 4),
+        }));
         row.push(known(section.truth_form_rms_error_um, 2));
         table.row(row);
     }
@@ -183,9 +196,10 @@ fn form_gathered(stations: &[StationSummary]) -> Table {
         };
         gather("z mm".into(), 5, &|section| Some(section.z_mm));
         gather("rms µm".into(), 4, &|section| Some(section.form_rms_um));
-        gather("± µm".into(), 2, &|section| section.form_std_um);
+        gather("rms ± µm".into(), 2, &|section| section.form_std_um);
         for (symbol, unit) in symbols(stations) {
-            gather(format!("{symbol} {unit}"), 4, &|section| value_of(section, &symbol));
+            gather(format!("{symbol} {unit}"), 4, &|section| Some(value_of(section, &symbol)?.value));
+            gather(format!("{symbol} ± {unit}"), 2, &|section| std_of(value_of(section, &symbol)?));
         }
         gather("true error µm".into(), 2, &|section| section.truth_form_rms_error_um);
     }

@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod diagnostics;
 mod folder;
+mod other_rigs;
 mod safety;
 mod schemas;
 mod straightness;

@@ -200,6 +200,11 @@ impl<'a> Document<'a> {
                 let span = part.start..part.start + part.text().len();
                 let refuse = |message: String| sources.locate_span(Fault::span(span.clone(), message));
                 let value = table.get_mut().remove("value").ok_or_else(|| refuse("expected key=value".into()))?;
+                let names_included = |part: &Part| part.role == Role::Include(path.clone());
+                if value.get_ref().as_str().is_some() && sources.parts.iter().any(names_included) {
+                    // What the file holds stands there already.
+                    continue;
+                }
                 let steps: Vec<&str> = path.split('.').map(str::trim).collect();
                 assign(root.get_mut(), &steps, value).map_err(refuse)?;
             }

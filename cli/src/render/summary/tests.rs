@@ -1,6 +1,6 @@
 use insta::assert_snapshot;
 use runout_core::{
-    evaluate::Value,
+    evaluate::{Value, uncertainty::Uncertainty},
     pipeline::run::{
         CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
         SurfaceSummary,
@@ -25,7 +25,7 @@ fn capture(setup: &str, rejected: usize) -> CaptureSummary {
 }
 
 fn section(id: &str, z_mm: f64) -> SectionSummary {
-    let value = |symbol: &str, value| Value {
+    let value = |symbol: &str, value, std: Option<f64>| Value {
         symbol: symbol.into(),
         unit: "um".into(),
         value,
@@ -34,14 +34,18 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
         lost_orders: vec![],
         filter: "none".into(),
         reference: "LSCI".into(),
-        uncertainty: None,
+        uncertainty: std.map(|std| Uncertainty {
+            std,
+            interval_95: [value - 2.0 * std, value + 2.0 * std],
+            draws: 400,
+        }),
     };
     SectionSummary {
         section: id.into(),
         z_mm,
         form_rms_um: 4.012_34 + z_mm / 1000.0,
         form_std_um: Some(0.0034),
-        values: vec![value("RONt", 21.6412), value("Ra", 3.2)],
+        values: vec![value("RONt", 21.6412, Some(0.0312)), value("Ra", 3.2, None)],
         truth_form_rms_error_um: Some(0.0051),
     }
 }
