@@ -22,6 +22,7 @@ mod random;
 mod recording;
 mod series;
 mod spin;
+mod strangers;
 mod world;
 
 #[cfg(test)]
@@ -44,9 +45,9 @@ pub use config::{
     TiltHarmonic,
 };
 pub use effects::{
-    AsynchronousLine, AxialMotion, Effect, EvenOrderMotion, FilterAttenuation, PartEccentricity, ReversalAngle,
-    SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity, SetupMotionChange,
-    SpeedRipple, ThermalDrift,
+    AsynchronousLine, AxialMotion, Backlash, Dent, Effect, EvenOrderMotion, FilterAttenuation, PartEccentricity,
+    ReversalAngle, SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity,
+    SetupMotionChange, SlippedProbe, SpeedRipple, Step, ThermalDrift,
 };
 pub use recording::SpindleRecording;
 

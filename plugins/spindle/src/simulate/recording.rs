@@ -16,6 +16,7 @@ use super::{
     random::{Place, Purpose, stream},
     series::{self, LANES, Phasor, Series},
     spin::Spin,
+    strangers::{Acting, Slip},
     world::{UM_PER_MM_URAD, World},
 };
 
@@ -75,10 +76,7 @@ struct SimulatedStream<'a> {
 
 /// A sensor in one capture.
 struct Looking<'a> {
-    /// e^{iθ′}, the direction of its line.
-    line: Complex64,
-    /// e^{i(θ′ − β)}.
-    toward: Complex64,
+    stance: Stance,
     z_mm: f64,
     /// The part's axis in the part's own coordinates, in µm.
     clamped: Complex64,
@@ -86,7 +84,17 @@ struct Looking<'a> {
     harmonics: Vec<Complex64>,
     /// The same where axial motion has moved the part, instant by instant.
     moved: Vec<Phasor<LANES>>,
+    strangers: Vec<Acting>,
     channel: Channel<'a>,
+}
+
+/// Where a sensor looks from.
+#[derive(Debug, Clone, Copy)]
+struct Stance {
+    /// e^{iθ′}, the direction of its line.
+    line: Complex64,
+    /// e^{i(θ′ − β)}.
+    toward: Complex64,
 }
 
 /// The spindle at some instants.
@@ -95,6 +103,8 @@ struct Instants {
     turned: Phasor<LANES>,
     displacement: Displacement<LANES>,
     axial_um: Option<[f64; LANES]>,
+    /// Its angle in turns: whole ones and the rest.
+    turns: [(f64, f64); LANES],
 }
 
 impl<'a> SimulatedStream<'a> {
@@ -108,12 +118,12 @@ impl<'a> SimulatedStream<'a> {
             let z_mm = sensor.z_mm + key.z_mm;
             let random = stream(world.seed, Purpose::Noise, Place { setup, station, item });
             Looking {
-                line: Complex64::cis(angle),
-                toward: Complex64::cis(angle - clamped_in.part_rad),
+                stance: Stance { line: Complex64::cis(angle), toward: Complex64::cis(angle - clamped_in.part_rad) },
                 z_mm,
                 clamped: world.clamped_at(clamped_in, sensor, z_mm),
                 harmonics: world.form.at(z_mm),
                 moved: Vec::new(),
+                strangers: Acting::all(&sensor.strangers, setup),
                 channel: Channel::new(&sensor.chain, random),
             }
         });
@@ -164,15 +174,40 @@ impl<'a> SimulatedStream<'a> {
         let axial = &self.world.axial_um;
         let axial_um = (!axial.is_empty()).then(|| axial.as_slice().sum(&turn.conj()));
         let turned = if self.world.rig.rotation.direction() > 0.0 { turn } else { turn.conj() };
-        Instants { turned, displacement, axial_um }
+        Instants { turned, displacement, axial_um, turns }
     }
 }
 
 impl Looking<'_> {
-    /// What the sensor sees before its own electronics, in µm.
-    fn see(&mut self, world: &World, instants: &Instants) -> [f64; LANES] {
+    /// What arrives at the sensor's own electronics from the first `count` instants, in µm.
+    fn look(&mut self, world: &World, instants: &Instants, count: usize) -> [f64; LANES] {
+        let mut seen = self.see(world, instants, self.stance);
+        if self.strangers.is_empty() {
+            return seen;
+        }
+        let slips: Vec<Slip> = self.strangers.iter().filter_map(Acting::slip).collect();
+        let mut stance = self.stance;
+        for slip in slips.iter().filter(|slip| slip.turned != Complex64::ONE) {
+            stance = Stance { line: stance.line * slip.turned, toward: stance.toward * slip.turned };
+            let elsewhere = self.see(world, instants, stance);
+            for lane in (0..count).filter(|lane| slip.has_happened(instants.turns[*lane])) {
+                seen[lane] = elsewhere[lane];
+            }
+        }
+        let toward = instants.turned.conj().times(self.stance.toward);
+        for lane in 0..count {
+            let toward = Complex64::new(toward.re[lane], toward.im[lane]);
+            for stranger in &mut self.strangers {
+                seen[lane] = stranger.act(seen[lane], instants.turns[lane], toward);
+            }
+        }
+        seen
+    }
+
+    /// How far the surface stands out along the sensor's line, in µm.
+    fn see(&mut self, world: &World, instants: &Instants, stance: Stance) -> [f64; LANES] {
         // α₀ = θ′ − direction·Φ − β.
-        let toward = instants.turned.conj().times(self.toward);
+        let toward = instants.turned.conj().times(stance.toward);
         let lever = UM_PER_MM_URAD * self.z_mm;
         let (mut along, mut across) = ([0.0; LANES], [0.0; LANES]);
         let [x, y, tilt_x, tilt_y] = &instants.displacement;
@@ -180,7 +215,7 @@ impl Looking<'_> {
             let axis = Complex64::new(x[lane] + lever * tilt_y[lane], y[lane] - lever * tilt_x[lane]);
             // The part's own x axis stands at angle −α₀ in the sensor's frame.
             let clamped = self.clamped * Complex64::new(toward.re[lane], -toward.im[lane]);
-            let centre = axis * self.line.conj() + clamped;
+            let centre = axis * stance.line.conj() + clamped;
             (along[lane], across[lane]) = (centre.re, centre.im);
         }
         let sight = Sight { toward, along, across };
@@ -220,9 +255,10 @@ impl SampleStream for SimulatedStream<'_> {
         let world = self.world;
         for (batch, rows) in block.samples.chunks_mut(LANES * channels).enumerate() {
             let start = self.position + (batch * LANES) as u64;
-            let instants = self.instants(start, rows.len() / channels, &mut block.angle_rev);
+            let count = rows.len() / channels;
+            let instants = self.instants(start, count, &mut block.angle_rev);
             for (index, sensor) in self.sensors.iter_mut().enumerate() {
-                let seen = sensor.see(world, &instants);
+                let seen = sensor.look(world, &instants, count);
                 for (lane, (row, displacement_um)) in rows.chunks_mut(channels).zip(seen).enumerate() {
                     let turns = (start + lane as u64) as f64 / world.samples_per_rev as f64;
                     row[index] = sensor.channel.record(displacement_um, turns);

@@ -18,6 +18,7 @@ use super::{
     random::{Place, Purpose, phase, stream},
     series,
     spin::Course,
+    strangers::Stranger,
 };
 
 /// Everything that a capture is computed from.
@@ -52,6 +53,7 @@ pub(super) struct TrueSensor {
     pub z_mm: f64,
     pub section: usize,
     pub chain: Chain,
+    pub strangers: Vec<Stranger>,
 }
 
 /// A setup as it really is.
@@ -111,6 +113,7 @@ impl World {
             z_mm: sensor.z_mm,
             section: sensor.section,
             chain: Chain::new(config.noise.rms_um, sensor.sign, converter),
+            strangers: Vec::new(),
         };
         let setups = rig.setups.iter().enumerate().map(|(index, setup)| {
             let mut random = stream(config.seed, Purpose::Eccentricity, Place { setup: index, ..Place::default() });

@@ -1,8 +1,11 @@
 //! What happens besides: each effect changes the simulated world where it would change the real one.
+//!
+//! Strangers are effects that no model knows.
 
 mod sensors;
 mod setups;
 mod spindle;
+mod strangers;
 
 use runout_core::pipeline::error::{Fault, known_names};
 use schemars::JsonSchema;
@@ -11,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub use sensors::{FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity, ThermalDrift};
 pub use setups::{PartEccentricity, ReversalAngle, SetupMotionChange};
 pub use spindle::{AsynchronousLine, AxialMotion, EvenOrderMotion, SecondOrderGeometry, SpeedRipple};
+pub use strangers::{Backlash, Dent, SlippedProbe, Step};
 
 use super::world::World;
 
@@ -46,6 +50,14 @@ pub enum Effect {
     AxialMotion(AxialMotion),
     /// A low-pass in one channel.
     FilterAttenuation(FilterAttenuation),
+    /// A stranger, which the closed loop does not know: a local dent that not every sensor sees, or not in every setup.
+    Dent(Dent),
+    /// A stranger: play in one channel.
+    Backlash(Backlash),
+    /// A stranger: a reading steps over part of the turn.
+    Step(Step),
+    /// A stranger: from some turn on a probe sits elsewhere.
+    SlippedProbe(SlippedProbe),
 }
 
 /// What every effect can do.
@@ -85,21 +97,31 @@ impl Effect {
             Self::SpeedRipple(effect) => effect,
             Self::AxialMotion(effect) => effect,
             Self::FilterAttenuation(effect) => effect,
+            Self::Dent(effect) => effect,
+            Self::Backlash(effect) => effect,
+            Self::Step(effect) => effect,
+            Self::SlippedProbe(effect) => effect,
         }
     }
 }
 
-/// Indices of the targets among the known ids.
-fn places(targets: &[String], known: &[&str], noun: &str) -> Result<Vec<usize>, Fault> {
-    if targets.is_empty() {
-        return Err(
-            Fault::at("targets", format!("name at least one {noun}")).help(known_names("", known.iter().copied()))
-        );
+fn sensor_ids(world: &World) -> Vec<&str> {
+    world.rig.sensors.iter().map(|sensor| sensor.id.as_str()).collect()
+}
+
+fn setup_ids(world: &World) -> Vec<&str> {
+    world.rig.setups.iter().map(|setup| setup.id.as_str()).collect()
+}
+
+/// Indices of the ids under a key among the known ones.
+fn places(key: &str, ids: &[String], known: &[&str], noun: &str) -> Result<Vec<usize>, Fault> {
+    if ids.is_empty() {
+        return Err(Fault::at(key, format!("name at least one {noun}")).help(known_names("", known.iter().copied())));
     }
-    let place = |id: &String| {
-        known.iter().position(|other| other == id).ok_or_else(|| {
-            Fault::at("targets", format!("the rig has no {noun} `{id}`")).help(known_names(id, known.iter().copied()))
-        })
-    };
-    targets.iter().map(place).collect()
+    let place = |id: &String| known.iter().position(|other| other == id).ok_or_else(|| unknown(key, noun, id, known));
+    ids.iter().map(place).collect()
+}
+
+fn unknown(key: &str, noun: &str, id: &str, known: &[&str]) -> Fault {
+    Fault::at(key, format!("the rig has no {noun} `{id}`")).help(known_names(id, known.iter().copied()))
 }

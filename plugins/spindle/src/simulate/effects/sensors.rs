@@ -4,7 +4,7 @@ use runout_core::pipeline::error::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, places};
+use super::{Acts, places, sensor_ids};
 use crate::simulate::{
     chain::{Drift, LowPass},
     check,
@@ -174,9 +174,8 @@ impl Acts for FilterAttenuation {
     }
 }
 
-fn on_sensors(world: &mut World, targets: &[String], change: impl Fn(&mut TrueSensor)) -> Result<(), Fault> {
-    let known: Vec<&str> = world.rig.sensors.iter().map(|sensor| sensor.id.as_str()).collect();
-    for index in places(targets, &known, "sensor")? {
+pub(super) fn on_sensors(world: &mut World, targets: &[String], change: impl Fn(&mut TrueSensor)) -> Result<(), Fault> {
+    for index in places("targets", targets, &sensor_ids(world), "sensor")? {
         change(&mut world.sensors[index]);
     }
     Ok(())

@@ -7,7 +7,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, places};
+use super::{Acts, places, setup_ids};
 use crate::simulate::{
     check,
     world::{Clamping, TrueSetup, World},
@@ -122,8 +122,7 @@ impl Acts for PartEccentricity {
 }
 
 fn on_setups(world: &mut World, targets: &[String], change: impl Fn(&mut TrueSetup)) -> Result<(), Fault> {
-    let known: Vec<&str> = world.rig.setups.iter().map(|setup| setup.id.as_str()).collect();
-    for index in places(targets, &known, "setup")? {
+    for index in places("targets", targets, &setup_ids(world), "setup")? {
         change(&mut world.setups[index]);
     }
     Ok(())

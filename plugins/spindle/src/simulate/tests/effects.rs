@@ -2,12 +2,12 @@
 
 use super::*;
 
-const INITIAL: usize = 0;
-const TURNED: usize = 1;
+pub(super) const INITIAL: usize = 0;
+pub(super) const TURNED: usize = 1;
 
 /// Form cos(3α) + ½ cos(7α + 40°) with a twist, and motion of known harmonics: x 1.2 cos 2Φ, y 0.7 cos(3Φ − 50°),
 /// tilt about x 4 cos 5Φ, about y 6 cos 4Φ µrad.
-fn scene() -> SpindleConfig {
+pub(super) fn scene() -> SpindleConfig {
     let mut config = plain();
     config.form.harmonics = vec![
         FormHarmonic { order: 3, amplitude_um: 1.0, ..FormHarmonic::default() },
@@ -20,26 +20,30 @@ fn scene() -> SpindleConfig {
     config
 }
 
-fn form(alpha: f64, z_mm: f64) -> f64 {
+pub(super) fn form(alpha: f64, z_mm: f64) -> f64 {
     (3.0 * alpha).cos() + 0.5 * (7.0 * alpha + (40.0 + 2.0 * z_mm).to_radians()).cos()
 }
 
-fn motion(theta: f64, z_mm: f64, phi: f64) -> f64 {
+pub(super) fn motion(theta: f64, z_mm: f64, phi: f64) -> f64 {
     let x = 1.2 * (2.0 * phi).cos() + 1e-3 * z_mm * 6.0 * (4.0 * phi).cos();
     let y = 0.7 * (3.0 * phi - 50.0_f64.to_radians()).cos() - 1e-3 * z_mm * 4.0 * (5.0 * phi).cos();
     theta.cos() * x + theta.sin() * y
 }
 
 /// Angle and z of the sensors of [`rig`].
-fn place(channel: usize) -> (f64, f64) {
+pub(super) fn place(channel: usize) -> (f64, f64) {
     ([0.0, TAU / 4.0][channel % 2], [200.0, 230.0][channel / 2])
 }
 
-const PART: [f64; 2] = [0.0, 99.844];
+pub(super) const PART: [f64; 2] = [0.0, 99.844];
 
 /// Checks that `effect` leaves all channels of all setups as they are but `changed`, which become `expected`, a function
 /// of channel, setup and spindle angle. 1e-11 µm: rounding of angles on these orders.
-fn check(effect: Effect, changed: impl Fn(usize, usize) -> bool, expected: impl Fn(usize, usize, f64) -> f64) {
+pub(super) fn check(
+    effect: Effect,
+    changed: impl Fn(usize, usize) -> bool,
+    expected: impl Fn(usize, usize, f64) -> f64,
+) {
     check_in(&scene(), effect, changed, expected, 1e-11);
 }
 
@@ -66,12 +70,12 @@ fn check_in(
     }
 }
 
-fn reading(channel: usize, setup: usize, phi: f64) -> f64 {
+pub(super) fn reading(channel: usize, setup: usize, phi: f64) -> f64 {
     let (theta, z_mm) = place(channel);
     form(theta - phi - PART[setup].to_radians(), z_mm) + motion(theta, z_mm, phi)
 }
 
-fn ids(names: &[&str]) -> Vec<String> {
+pub(super) fn ids(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_owned()).collect()
 }
 

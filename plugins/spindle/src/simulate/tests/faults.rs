@@ -50,6 +50,13 @@ fn the_place_of_a_mistake_is_told() {
         ("[[effect]]\nplugin = \"sensor-gian\"", "sensor-gian", "`sensor-gain`", 7),
         ("[[effect]]\nplugin = \"sensor-gain\"\ntargets = [\"S1\"]\ngain = 1", "gain", "", 6),
         ("[[effect]]\nplugin = \"sensor-gain\"\ntargets = [\"S3\"]\nrelative_gain = 1", "no sensor `S3`", "`S1`", 8),
+        ("[[effect]]\nplugin = \"dent\"\ndepth_um = 1\npart_angle_deg = 0\nwidth_deg = 2", "is form", "`setups`", 7),
+        (
+            "[[effect]]\nplugin = \"step\"\ntargets = [\"S1\"]\nsetups = [\"x\"]\nstep_um = 1\nfrom_deg = 0\nto_deg = 9",
+            "no setup `x`",
+            "`initial`",
+            9,
+        ),
         ("[[effect]]\nplugin = \"speed-ripple\"\norder = 2\namplitude_deg = 90", "backwards", "", 9),
     ] {
         let (found, advice, at) = fault(rest);

@@ -3,6 +3,7 @@
 mod campaign;
 mod effects;
 mod faults;
+mod strangers;
 
 use std::f64::consts::TAU;
 
