@@ -74,18 +74,17 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     let mut tracing = Tracing { model, settings, found: Vec::new(), refused: Vec::new() };
     let mut current = tracing.refit_found()?;
     while tracing.found.len() < settings.max_added {
-        let Some(found) = tracing.next(&current)? else { break };
+        let Some(found) = tracing.next(&current) else { break };
         tracing.found.push(found);
         current = tracing.refit_found()?;
         if let Some(last) = tracing.found.last_mut() {
             last.after = current.fit.remainder().clone();
         }
     }
-    let explained = |remainder: &Remainder| !remainder.noise_is_known() || remainder.chi2_per_dof() <= FLOOR_CHI2;
-    if !explained(current.fit.remainder()) && tracing.drop_the_least_bad() {
+    if !at_the_floor(current.fit.remainder()) && tracing.drop_the_least_bad() {
         current = tracing.refit_found()?;
     }
-    let left = explained(current.fit.remainder());
+    let left = at_the_floor(current.fit.remainder());
     let verdict = match (left, tracing.found.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::AtNoiseFloor,
@@ -166,10 +165,25 @@ impl<M: Model> Tracing<'_, M> {
         refit(self.model, settings, self.settings.known.len(), &priors)
     }
 
-    /// The effect that the data ask for most, if any earns its place.
-    fn next(&mut self, current: &Refit<M::Fit>) -> Result<Option<Found>> {
-        let before = current.fit.remainder().clone();
+    /// The effect of the lowest rank that earns its place, if any does.
+    fn next(&mut self, current: &Refit<M::Fit>) -> Option<Found> {
         let candidates: Vec<usize> = self.considered().into_iter().filter(|effect| !self.active(*effect)).collect();
+        let mut ranks: Vec<usize> = candidates.iter().map(|effect| self.model.rank(*effect)).collect();
+        ranks.sort_unstable();
+        ranks.dedup();
+        for rank in ranks {
+            let of_rank: Vec<usize> =
+                candidates.iter().copied().filter(|effect| self.model.rank(*effect) == rank).collect();
+            if let Some(found) = self.best(current, &of_rank, candidates.len()) {
+                return Some(found);
+            }
+        }
+        None
+    }
+
+    /// The effect that the data ask for most, if it earns its place among `count` that were looked at.
+    fn best(&mut self, current: &Refit<M::Fit>, candidates: &[usize], count: usize) -> Option<Found> {
+        let before = current.fit.remainder().clone();
         let fixed = self.settings.known.len();
         let active: Vec<Vec<f64>> =
             current.settings[fixed..].iter().flat_map(|setting| current.fit.signature(setting.effect)).collect();
@@ -188,7 +202,7 @@ impl<M: Model> Tracing<'_, M> {
             let parameters = self.model.effects()[effect].parameters.len();
             let evidence = |after: f64| {
                 let dof = before.dof.saturating_sub(parameters);
-                Evidence::new(before.chi2(), after, parameters, dof, candidates.len(), before.noise_is_known())
+                Evidence::new(before.chi2(), after, parameters, dof, count, before.noise_is_known())
             };
             // What promises nothing to first order is not worth a refit.
             if evidence(before.chi2() - gain).p_value > 0.05 {
@@ -203,7 +217,7 @@ impl<M: Model> Tracing<'_, M> {
         let best = trials.iter().map(|(_, _, evidence)| evidence.delta_bic).fold(f64::INFINITY, f64::min);
         trials.sort_by(|a, b| a.2.delta_bic.total_cmp(&b.2.delta_bic));
         let mut trials = trials.into_iter();
-        let Some((effect, trial, evidence)) = trials.next() else { return Ok(None) };
+        let (effect, trial, evidence) = trials.next()?;
         let after = trial.fit.remainder().clone();
         let reason = if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
             Some(format!("its evidence is weak: p {:.2e}, ΔBIC {:.1}", evidence.p_value, evidence.delta_bic))
@@ -216,14 +230,11 @@ impl<M: Model> Tracing<'_, M> {
             None
         };
         if let Some(reason) = reason {
-            let named = &self.model.effects()[effect];
-            self.refused.push(Refused {
-                effect: named.id.clone(),
-                targets: named.target.iter().cloned().collect(),
-                reason,
-            });
-            return Ok(None);
+            self.refuse(effect, reason);
+            return None;
         }
+        let named = &self.model.effects()[effect];
+        self.refused.retain(|refused| !is(refused, named));
         let unit = if after.noise_is_known() { after.chi2_per_dof().max(1.0) } else { after.chi2_per_dof() };
         let count = self.model.effects()[effect].parameters.len();
         let first = trial.covariance.len() - count;
@@ -235,7 +246,15 @@ impl<M: Model> Tracing<'_, M> {
             difference < SAME_BIC && evidence.delta_bic - best < SAME_BIC.max(0.02 * best.abs())
         });
         let members = std::iter::once(effect).chain(alike.map(|(other, ..)| other)).collect();
-        Ok(Some(Found { members, values, std, evidence, before, after }))
+        Some(Found { members, values, std, evidence, before, after })
+    }
+
+    /// Keeps the last reason for which an effect was refused.
+    fn refuse(&mut self, effect: usize, reason: String) {
+        let named = &self.model.effects()[effect];
+        self.refused.retain(|refused| !is(refused, named));
+        let targets = named.target.iter().cloned().collect();
+        self.refused.push(Refused { effect: named.id.clone(), targets, reason });
     }
 
     fn priors_so_far(&self) -> Vec<Prior> {
@@ -261,20 +280,26 @@ impl<M: Model> Tracing<'_, M> {
             .into_iter()
             .partition(|found| excess(&found.after) <= (1.0 - OWN_SHARE) * excess(&found.before));
         for found in &dropped {
-            let named = &self.model.effects()[found.members[0]];
-            self.refused.push(Refused {
-                effect: named.id.clone(),
-                targets: named.target.iter().cloned().collect(),
-                reason: format!(
-                    "it takes away a part only (χ² per degree of freedom {:.1} → {:.1}) of something that stays unexplained",
-                    found.before.chi2_per_dof(),
-                    found.after.chi2_per_dof()
-                ),
-            });
+            let reason = format!(
+                "it takes away a part only (χ² per degree of freedom {:.1} → {:.1}) of something that stays unexplained",
+                found.before.chi2_per_dof(),
+                found.after.chi2_per_dof()
+            );
+            self.refuse(found.members[0], reason);
         }
         self.found = kept;
         !dropped.is_empty()
     }
+}
+
+fn is(refused: &Refused, effect: &Effect) -> bool {
+    refused.effect == effect.id && refused.targets.iter().eq(&effect.target)
+}
+
+/// Whether noise may be all that is left: χ² per degree of freedom has the variance 2/dof.
+fn at_the_floor(remainder: &Remainder) -> bool {
+    let chance = 1.0 + 3.0 * (2.0 / remainder.dof.max(1) as f64).sqrt();
+    !remainder.noise_is_known() || remainder.chi2_per_dof() <= FLOOR_CHI2.max(chance)
 }
 
 fn worse(before: f64, after: f64) -> bool {
@@ -294,7 +319,9 @@ fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
         }
         let left = norm(&column);
         if left > 1e-9 * whole {
-            column.iter_mut().for_each(|entry| *entry /= left);
+            for entry in &mut column {
+                *entry /= left;
+            }
             made.push(column);
         }
     }

@@ -1,1 +1,326 @@
 //! A model whose declared part and effects are all linear: measured points and terms.
+
+mod basis;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use self::basis::Basis;
+use super::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, fit::dot};
+use crate::{Error, Result};
+
+/// What was measured.
+#[derive(Debug, Clone, Default)]
+pub struct Observations {
+    /// One value a point.
+    pub values: Vec<f64>,
+    /// Their unit.
+    pub unit: String,
+    /// Standard uncertainty of each, where it is known from elsewhere.
+    pub std: Option<f64>,
+    /// The group of each point (an index into `groups`): groups are left out of the fit one after the other and predicted.
+    pub group: Vec<usize>,
+    /// The groups' names.
+    pub groups: Vec<String>,
+}
+
+/// A declared parameter, which is always fitted.
+#[derive(Debug, Clone)]
+pub struct Declared {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// What one unit of it adds to each observation.
+    pub column: Vec<f64>,
+}
+
+/// An effect that may be missing.
+#[derive(Debug, Clone)]
+pub struct Term {
+    /// What it is.
+    pub effect: Effect,
+    /// What one unit of each parameter adds to each observation, `[parameter][point]`.
+    pub columns: Vec<Vec<f64>>,
+    /// Terms of a lower rank are asked first ([`Model::rank`]).
+    pub rank: usize,
+}
+
+/// Points that are never fitted, only predicted at the end.
+#[derive(Debug, Clone)]
+pub struct Unseen {
+    /// What they are.
+    pub name: String,
+    /// One value a point.
+    pub values: Vec<f64>,
+    /// As in [`Declared`], `[parameter][point]`.
+    pub declared: Vec<Vec<f64>>,
+    /// As in [`Term`], `[term][parameter][point]`.
+    pub terms: Vec<Vec<Vec<f64>>>,
+}
+
+/// Measured points y = B·b + Σ T·t + noise: declared parameters b, and terms of which each may be missing.
+///
+/// The fit is by orthogonal columns. A term's signature is its column outside the span of the declared ones.
+#[derive(Debug, Clone)]
+pub struct LinearTerms(Arc<Data>);
+
+#[derive(Debug, Clone)]
+struct Data {
+    observations: Observations,
+    declared: Vec<Declared>,
+    basis: Basis,
+    effects: Vec<Effect>,
+    terms: Vec<Term>,
+    /// Points of each group.
+    members: Vec<Vec<usize>>,
+    unseen: Vec<Unseen>,
+    /// Effects that are declared with their values: never refitted.
+    known: Vec<usize>,
+}
+
+impl LinearTerms {
+    /// A model of `observations`.
+    ///
+    /// # Errors
+    /// When columns and observations are not of one length, a number is not finite, or the points cannot tell the declared
+    /// parameters apart.
+    pub fn new(observations: Observations, declared: Vec<Declared>, terms: Vec<Term>) -> Result<Self> {
+        let refuse = |problem: String| Error::new("fit", "the points", problem);
+        let count = observations.values.len();
+        let columns = || declared.iter().map(|known| &known.column).chain(terms.iter().flat_map(|term| &term.columns));
+        if observations.group.len() != count || columns().any(|column| column.len() != count) {
+            return Err(refuse(format!("its {count} points have columns of another length")));
+        }
+        if columns().chain([&observations.values]).flatten().any(|value| !value.is_finite()) {
+            return Err(refuse("a value is no finite number".into()));
+        }
+        let mut members = vec![Vec::new(); observations.groups.len()];
+        for (point, group) in observations.group.iter().enumerate() {
+            let group = members.get_mut(*group).ok_or_else(|| refuse(format!("there is no group {group}")))?;
+            group.push(point);
+        }
+        let basis = Basis::of(declared.iter().map(|known| known.column.clone()).collect());
+        if basis.dependent() {
+            let names: Vec<&str> = declared.iter().map(|known| known.name.as_str()).collect();
+            return Err(refuse(format!("{count} points cannot tell {} apart", names.join(", "))));
+        }
+        let effects = terms.iter().map(|term| term.effect.clone()).collect();
+        let (unseen, known) = (Vec::new(), Vec::new());
+        Ok(Self(Arc::new(Data { observations, declared, basis, effects, terms, members, unseen, known })))
+    }
+
+    /// Adds points that are only predicted; each set gives a value "rms of …".
+    #[must_use]
+    pub fn predicting(mut self, unseen: Vec<Unseen>) -> Self {
+        Arc::make_mut(&mut self.0).unseen = unseen;
+        self
+    }
+
+    /// Says which effects are declared with their values: they are no free parameters, also not of held-out predictions.
+    #[must_use]
+    pub fn with_known(mut self, known: &[Setting]) -> Self {
+        Arc::make_mut(&mut self.0).known = known.iter().map(|setting| setting.effect).collect();
+        self
+    }
+}
+
+impl Model for LinearTerms {
+    type Fit = LinearFit;
+
+    fn effects(&self) -> &[Effect] {
+        &self.0.effects
+    }
+
+    fn rank(&self, effect: usize) -> usize {
+        self.0.terms.get(effect).map_or(0, |term| term.rank)
+    }
+
+    fn fit(&self, applied: &[Setting]) -> Result<LinearFit> {
+        let data = &self.0;
+        let Observations { values, std, unit, .. } = &data.observations;
+        let scale = std.unwrap_or(1.0);
+        let left = data.less(applied);
+        let mut residual = left.clone();
+        data.basis.remove_from(&mut residual);
+        let free = applied.iter().filter(|setting| !data.known.contains(&setting.effect));
+        let free = free.filter_map(|setting| data.terms.get(setting.effect)).flat_map(|term| term.columns.clone());
+        let joint = data.basis.extended(free.collect());
+        let known: Vec<Setting> =
+            applied.iter().filter(|setting| data.known.contains(&setting.effect)).cloned().collect();
+        let held_out = joint.left_out(&data.less(&known), &data.members);
+        let mean_square = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
+        let dof = values.len().saturating_sub(joint.rank());
+        let remainder = Remainder {
+            rms: mean_square(&residual).sqrt(),
+            noise_floor: std.map_or(f64::NAN, |std| std * (dof as f64 / values.len() as f64).sqrt()),
+            held_out_rms: mean_square(&held_out).sqrt(),
+            held_out_chi2: dot(&held_out, &held_out) / (scale * scale),
+            residual: residual.iter().map(|value| value / scale).collect(),
+            dof,
+            unit: unit.clone(),
+        };
+        let coefficients = data.basis.coefficients(&left);
+        let doubt = vec![0.0; coefficients.len()];
+        Ok(LinearFit {
+            data: Arc::clone(data),
+            applied: applied.to_vec(),
+            coefficients,
+            doubt,
+            remainder,
+            variance: vec![],
+        })
+    }
+}
+
+impl Data {
+    /// The observations less what applied effects add to them.
+    fn less(&self, applied: &[Setting]) -> Vec<f64> {
+        let mut left = self.observations.values.clone();
+        for setting in applied {
+            let columns = self.terms.get(setting.effect).map_or(&[][..], |term| &term.columns);
+            subtract(&mut left, columns, &setting.values);
+        }
+        left
+    }
+
+    /// How the declared parameters change with each parameter of an effect, `[parameter][declared]`.
+    fn leverage(&self, effect: usize) -> Vec<Vec<f64>> {
+        let columns = self.terms.get(effect).map_or(&[][..], |term| &term.columns);
+        let of = |column: &Vec<f64>| self.basis.coefficients(column).iter().map(|value| -value).collect();
+        columns.iter().map(of).collect()
+    }
+}
+
+fn subtract(from: &mut [f64], columns: &[Vec<f64>], values: &[f64]) {
+    for (column, value) in columns.iter().zip(values) {
+        from.iter_mut().zip(column).for_each(|(entry, column)| *entry -= value * column);
+    }
+}
+
+/// A fit of [`LinearTerms`].
+#[derive(Debug, Clone)]
+pub struct LinearFit {
+    data: Arc<Data>,
+    applied: Vec<Setting>,
+    coefficients: Vec<f64>,
+    /// Variance of each declared parameter that comes from not knowing the effects.
+    doubt: Vec<f64>,
+    remainder: Remainder,
+    /// Variances of the applied effects' parameters.
+    variance: Vec<(usize, Vec<f64>)>,
+}
+
+impl LinearFit {
+    /// Declared parameters, in their order.
+    #[must_use]
+    pub fn declared(&self) -> &[f64] {
+        &self.coefficients
+    }
+
+    /// Applied effects, each with its values and their variances (NaN before [`Fit::widen`]).
+    pub fn effects(&self) -> impl Iterator<Item = (&Effect, &[f64], Vec<f64>)> + '_ {
+        self.applied.iter().filter_map(|setting| {
+            let known = self.variance.iter().find(|(effect, _)| *effect == setting.effect);
+            let variance = known.map_or_else(|| vec![f64::NAN; setting.values.len()], |(_, variance)| variance.clone());
+            Some((self.data.effects.get(setting.effect)?, setting.values.as_slice(), variance))
+        })
+    }
+
+    /// Root mean square of points never fitted less what the fit predicts of them.
+    fn unseen_rms(&self, unseen: &Unseen) -> f64 {
+        let mut left = unseen.values.clone();
+        subtract(&mut left, &unseen.declared, &self.coefficients);
+        for setting in &self.applied {
+            subtract(&mut left, unseen.terms.get(setting.effect).map_or(&[], Vec::as_slice), &setting.values);
+        }
+        (dot(&left, &left) / left.len() as f64).sqrt()
+    }
+}
+
+impl Fit for LinearFit {
+    fn remainder(&self) -> &Remainder {
+        &self.remainder
+    }
+
+    fn signature(&self, effect: usize) -> Vec<Vec<f64>> {
+        let scale = -self.data.observations.std.unwrap_or(1.0).recip();
+        let mut columns = self.data.terms.get(effect).map_or_else(Vec::new, |term| term.columns.clone());
+        for column in &mut columns {
+            self.data.basis.remove_from(column);
+            for entry in column {
+                *entry *= scale;
+            }
+        }
+        columns
+    }
+
+    fn bias(&self, effect: usize) -> Vec<Bias> {
+        let parameters = self.data.effects.get(effect).map_or(&[][..], |effect| &effect.parameters);
+        let leverage = self.data.leverage(effect).into_iter().zip(parameters);
+        let biases = leverage.flat_map(|(changes, parameter)| {
+            self.data.declared.iter().zip(changes).map(|(declared, change)| Bias {
+                on: declared.name.clone(),
+                value: change.abs(),
+                unit: format!("{}/{}", declared.unit, parameter.unit),
+            })
+        });
+        biases.collect()
+    }
+
+    fn values(&self) -> Vec<Outcome> {
+        let std = self.data.observations.std;
+        let level = self.remainder.chi2_per_dof();
+        let noise = std.map_or(level, |std| std * std * level.max(1.0));
+        let unit_variance = self.data.basis.unit_variance();
+        let declared = self.data.declared.iter().zip(&self.coefficients).zip(unit_variance.iter().zip(&self.doubt));
+        let declared = declared.map(|((declared, number), (variance, doubt))| Outcome {
+            value: declared.name.clone(),
+            section: None,
+            number: *number,
+            std: (noise * variance + doubt).sqrt(),
+            unit: declared.unit.clone(),
+        });
+        let unseen = self.data.unseen.iter().map(|unseen| Outcome {
+            value: format!("rms of {}, never fitted", unseen.name),
+            section: None,
+            number: self.unseen_rms(unseen),
+            std: f64::NAN,
+            unit: self.remainder.unit.clone(),
+        });
+        declared.chain(unseen).collect()
+    }
+
+    fn widen(&mut self, effects: &[usize], covariance: &[Vec<f64>]) {
+        let changes: Vec<Vec<f64>> = effects.iter().flat_map(|effect| self.data.leverage(*effect)).collect();
+        for (index, doubt) in self.doubt.iter_mut().enumerate() {
+            let row =
+                |row: &Vec<f64>| -> f64 { row.iter().zip(&changes).map(|(entry, change)| entry * change[index]).sum() };
+            *doubt = covariance.iter().zip(&changes).map(|(entries, change)| change[index] * row(entries)).sum();
+        }
+        let mut diagonal = covariance.iter().enumerate().filter_map(|(index, row)| row.get(index).copied());
+        for effect in effects {
+            let count = self.data.effects.get(*effect).map_or(0, |effect| effect.parameters.len());
+            self.variance.push((*effect, diagonal.by_ref().take(count).collect()));
+        }
+    }
+
+    fn unexplained(&self) -> Vec<Unexplained> {
+        let groups = self.data.members.iter().zip(&self.data.observations.groups);
+        let of = |points: &Vec<usize>| -> f64 {
+            points.iter().filter_map(|point| self.remainder.residual.get(*point)).map(|value| value * value).sum()
+        };
+        let share = |sum: f64| 100.0 * sum / self.remainder.chi2();
+        let worst = groups.map(|(points, name)| (of(points), name)).max_by(|a, b| a.0.total_cmp(&b.0));
+        let excess = self.remainder.rms.powi(2) - self.remainder.noise_floor.powi(2);
+        let report = |(sum, name): (f64, &String)| Unexplained {
+            sensor: None,
+            setup: None,
+            orders: [0, 0],
+            rms_um: excess.max(0.0).sqrt(),
+            place: format!("most of it at {name} ({:.0} % of the squares)", share(sum)),
+        };
+        worst.map(report).into_iter().collect()
+    }
+}

@@ -26,6 +26,12 @@ pub trait Model {
     /// # Errors
     /// When the data do not fit the model, or a parameter is beyond all bounds.
     fn fit(&self, applied: &[Setting]) -> Result<Self::Fit>;
+
+    /// When an effect's turn comes: those of a higher rank are asked only where none of a lower one earns its place. A part's
+    /// place comes before its size, and its size before its form, which counts from them.
+    fn rank(&self, _effect: usize) -> usize {
+        0
+    }
 }
 
 /// A model fitted to its data.
