@@ -24,6 +24,8 @@ pub struct Profile {
     /// The covariance of single turns over their number, likewise: what the covariance of the mean would be if turns
     /// were independent. It is the better known of the two, and serves for weights.
     pub scatter: Option<Vec<Complex64>>,
+    /// The same turns in parts, where asked for.
+    pub split: Option<Split>,
     /// How many turns there were, and what became of them.
     pub turns: TurnCount,
     /// Mean speed over the turns used, where the sampling rate is known.
@@ -32,6 +34,47 @@ pub struct Profile {
     pub responses: Vec<Response>,
     /// What the user should know of this capture.
     pub warnings: Vec<String>,
+}
+
+/// The turns of a capture in parts: what a model is fitted to, and what it has not seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Split {
+    /// The first turns.
+    pub fit: Part,
+    /// The last ones.
+    pub held_out: Part,
+    /// Means of consecutive, about equal groups of all turns, `[group]`, each `[order][channel]`.
+    pub groups: Vec<Vec<Complex64>>,
+    /// Mean level of each turn, µm, `[turn][channel]`.
+    pub levels: Vec<f64>,
+}
+
+/// Consecutive turns, averaged: fields as in [`Profile`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Mean over the turns.
+    pub mean: Vec<Complex64>,
+    /// Covariance of that mean.
+    pub covariance: Option<Vec<Complex64>>,
+    /// The same with independent turns.
+    pub scatter: Option<Vec<Complex64>>,
+    /// First turn and number of turns, among those used.
+    pub turns: std::ops::Range<usize>,
+}
+
+impl Split {
+    /// A profile of one part only.
+    #[must_use]
+    pub fn profile(&self, whole: &Profile, part: &Part) -> Profile {
+        Profile {
+            mean: part.mean.clone(),
+            covariance: part.covariance.clone(),
+            scatter: part.scatter.clone(),
+            split: None,
+            turns: TurnCount { used: part.turns.len(), ..whole.turns.clone() },
+            ..whole.clone()
+        }
+    }
 }
 
 impl Profile {

@@ -70,20 +70,23 @@ struct Found {
 /// # Errors
 /// When the declared model cannot be fitted.
 pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fit>> {
-    let before = model.fit(&settings.known)?;
+    let declared = model.fit(&settings.known)?;
+    let before = model.whole().fit(&settings.known)?;
     let mut tracing = Tracing { model, settings, found: Vec::new(), refused: Vec::new() };
-    let mut current = tracing.refit_found()?;
+    let mut current = tracing.refit_found(model)?;
     while tracing.found.len() < settings.max_added {
         let Some(found) = tracing.next(&current) else { break };
         tracing.found.push(found);
-        current = tracing.refit_found()?;
+        current = tracing.refit_found(model)?;
         if let Some(last) = tracing.found.last_mut() {
             last.after = current.fit.remainder().clone();
         }
     }
     if !at_the_floor(current.fit.remainder()) && tracing.drop_the_least_bad() {
-        current = tracing.refit_found()?;
+        current = tracing.refit_found(model)?;
     }
+    let held_out = [declared.remainder().held_out_rms, current.fit.remainder().held_out_rms];
+    let current = tracing.refit_found(model.whole())?;
     let left = at_the_floor(current.fit.remainder());
     let verdict = match (left, tracing.found.is_empty()) {
         (false, _) => Verdict::Unexplained,
@@ -99,9 +102,9 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     after.widen(&members, &covariance);
     let diagnosis = Diagnosis {
         verdict,
-        before: level(before.remainder()),
-        added: tracing.found.iter().map(|found| added(found, model.effects(), &after)).collect(),
-        after: level(after.remainder()),
+        before: level(before.remainder(), held_out[0]),
+        added: tracing.found.iter().map(|found| added(found, model, &after)).collect(),
+        after: level(after.remainder(), held_out[1]),
         moved: moved(&before, &after),
         unexplained: if left { Vec::new() } else { after.unexplained() },
         blind_to: blind(model.effects(), &tracing.considered(), &after),
@@ -135,7 +138,7 @@ impl<M: Model> Tracing<'_, M> {
 
     /// All effects found, jointly. A confounded set enters as a whole: each member may be all of it, which is the size of
     /// its prior; what the data cannot decide then shows as a spread.
-    fn refit_found(&self) -> Result<Refit<M::Fit>> {
+    fn refit_found(&self, model: &M) -> Result<Refit<M::Fit>> {
         let mut settings = self.settings.known.clone();
         let mut priors = Vec::new();
         let mut position = 0;
@@ -162,7 +165,7 @@ impl<M: Model> Tracing<'_, M> {
                 settings.push(Setting { effect: *member, values });
             }
         }
-        refit(self.model, settings, self.settings.known.len(), &priors)
+        refit(model, settings, self.settings.known.len(), &priors)
     }
 
     /// The effect of the lowest rank that earns its place, if any does.
@@ -191,6 +194,9 @@ impl<M: Model> Tracing<'_, M> {
         let mut ranked: Vec<(usize, f64)> = candidates
             .iter()
             .map(|effect| {
+                if self.model.effects()[*effect].parameters.is_empty() {
+                    return (*effect, before.chi2() - self.with(current, *effect));
+                }
                 let columns = orthonormal(current.fit.signature(*effect), &basis);
                 (*effect, columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum())
             })
@@ -255,6 +261,13 @@ impl<M: Model> Tracing<'_, M> {
         self.refused.retain(|refused| !is(refused, named));
         let targets = named.target.iter().cloned().collect();
         self.refused.push(Refused { effect: named.id.clone(), targets, reason });
+    }
+
+    /// χ² with an effect that has no parameters; infinite where it cannot be applied.
+    fn with(&self, current: &Refit<M::Fit>, effect: usize) -> f64 {
+        let mut settings = current.settings.clone();
+        settings.push(Setting { effect, values: Vec::new() });
+        self.model.fit(&settings).map_or(f64::INFINITY, |fit| fit.remainder().chi2())
     }
 
     fn priors_so_far(&self) -> Vec<Prior> {
@@ -332,17 +345,18 @@ fn known(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-fn level(remainder: &Remainder) -> Level {
+fn level(remainder: &Remainder, held_out_rms: f64) -> Level {
     Level {
         residual_rms_um: remainder.rms,
         noise_floor_um: known(remainder.noise_floor),
         chi2_per_dof: remainder.noise_is_known().then(|| remainder.chi2_per_dof()),
-        held_out_rms_um: known(remainder.held_out_rms),
+        held_out_rms_um: known(held_out_rms),
         unit: (remainder.unit != "um").then(|| remainder.unit.clone()),
     }
 }
 
-fn added(found: &Found, effects: &[Effect], fit: &impl Fit) -> Added {
+fn added<M: Model>(found: &Found, model: &M, fit: &M::Fit) -> Added {
+    let effects = model.effects();
     let named = &effects[found.members[0]];
     let with = |member: &usize| {
         let other = &effects[*member];
@@ -356,7 +370,7 @@ fn added(found: &Found, effects: &[Effect], fit: &impl Fit) -> Added {
         targets: named.target.iter().cloned().collect(),
         confounded_with: found.members[1..].iter().map(with).collect(),
         told_apart_by: if found.members.len() > 1 { fit.told_apart_by(&found.members) } else { None },
-        parameters: parameters.collect(),
+        parameters: model.present(found.members[0], parameters.collect()),
         residual_rms_um: Step { before: known(found.before.rms), after: known(found.after.rms) },
         held_out_rms_um: Step { before: known(found.before.held_out_rms), after: known(found.after.held_out_rms) },
         delta_bic: found.evidence.delta_bic,

@@ -10,7 +10,7 @@ pub mod evidence;
 pub mod fit;
 pub mod linear_terms;
 
-use self::diagnosis::Unexplained;
+use self::diagnosis::{Estimated, Unexplained};
 use crate::Result;
 
 /// A declared model of a measurement, and what it could lack.
@@ -31,6 +31,16 @@ pub trait Model {
     /// place comes before its size, and its size before its form, which counts from them.
     fn rank(&self, _effect: usize) -> usize {
         0
+    }
+
+    /// The same model on all data, for the final results: what the loop holds out is part of them.
+    fn whole(&self) -> &Self {
+        self
+    }
+
+    /// An effect's parameters as people say them.
+    fn present(&self, _effect: usize, estimated: Vec<Estimated>) -> Vec<Estimated> {
+        estimated
     }
 }
 

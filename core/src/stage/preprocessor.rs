@@ -28,11 +28,20 @@ pub trait Averager: Send + Sync {
     /// Highest order that its profiles hold.
     fn max_order(&self) -> usize;
 
+    /// Reads a stream to its end. With a share to hold out, the last turns of that share (0 to 1) are averaged by themselves
+    /// besides: [`Profile::split`].
+    ///
+    /// # Errors
+    /// When the source fails or too little of it can be used.
+    fn average_holding_out(&self, input: Box<dyn SampleStream + '_>, share: Option<f64>) -> Result<Profile>;
+
     /// Reads a stream to its end.
     ///
     /// # Errors
     /// When the source fails or too little of it can be used.
-    fn average(&self, input: Box<dyn SampleStream + '_>) -> Result<Profile>;
+    fn average(&self, input: Box<dyn SampleStream + '_>) -> Result<Profile> {
+        self.average_holding_out(input, None)
+    }
 }
 
 /// The sampling rate of a capture, or a clear answer.

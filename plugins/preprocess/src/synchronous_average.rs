@@ -11,6 +11,7 @@ mod mean;
 mod outliers;
 mod resample;
 mod slow;
+mod split;
 mod turns;
 mod window;
 
@@ -192,7 +193,7 @@ impl Averager for SynchronousAverage {
         fourier::max_order(self.config.samples_per_rev)
     }
 
-    fn average(&self, mut input: Box<dyn SampleStream + '_>) -> Result<Profile> {
+    fn average_holding_out(&self, mut input: Box<dyn SampleStream + '_>, share: Option<f64>) -> Result<Profile> {
         let mut capture = input.capture().clone();
         Self::are_turns(&capture)?;
         let first_turn = capture.first_turn();
@@ -212,7 +213,7 @@ impl Averager for SynchronousAverage {
         // Before anything is read: with too few marks a single turn could be larger than memory.
         self.enough(&capture, &count, usable.len())?;
 
-        let mut resampling = Resampling::new(self, &capture, usable);
+        let mut resampling = Resampling::new(self, &capture, usable, share);
         let mut block = Block::default();
         while input.next_block(&mut block)? {
             resampling.take(&mut block);
@@ -230,6 +231,9 @@ impl Averager for SynchronousAverage {
             for matrices in [&mut outcome.covariance, &mut outcome.scatter].into_iter().flatten() {
                 matrices.truncate(orders * channels * channels);
             }
+            if let Some(split) = &mut outcome.split {
+                split::truncate(split, orders, channels);
+            }
         }
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
@@ -245,6 +249,7 @@ impl Averager for SynchronousAverage {
             mean: outcome.mean,
             covariance: outcome.covariance,
             scatter: outcome.scatter,
+            split: outcome.split,
             turns: count,
             speed_rpm,
             responses: capture.responses,

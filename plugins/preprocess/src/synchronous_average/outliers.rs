@@ -2,7 +2,7 @@
 
 use runout_core::{Complex64, profile::Rejection};
 
-use super::{mean::Mean, turns::Turn};
+use super::{split::Means, turns::Turn};
 
 /// Turns that are looked at together, at least: enough for a median, few enough to drift little and to be kept.
 const TOGETHER: usize = 16;
@@ -30,17 +30,17 @@ impl Outliers {
     }
 
     /// Takes a turn; `judged` gets those that can now be told.
-    pub(super) fn add(&mut self, turn: Turn, harmonics: &[Complex64], mean: &mut Mean, judged: &mut Vec<Verdict>) {
+    pub(super) fn add(&mut self, turn: Turn, harmonics: &[Complex64], means: &mut Means, judged: &mut Vec<Verdict>) {
         self.held.push((turn, harmonics.to_vec()));
         if self.held.len() >= 2 * TOGETHER {
-            self.judge(TOGETHER, mean, judged);
+            self.judge(TOGETHER, means, judged);
         }
     }
 
     /// Judges the first `count` turns held, or all that there are.
-    pub(super) fn judge(&mut self, count: usize, mean: &mut Mean, judged: &mut Vec<Verdict>) {
+    pub(super) fn judge(&mut self, count: usize, means: &mut Means, judged: &mut Vec<Verdict>) {
         let together: Vec<_> = self.held.drain(..count.min(self.held.len())).collect();
-        let channels = mean.channels();
+        let channels = means.whole.channels();
         let distances = distances_um(&together, channels);
         let usual: Vec<f64> = (0..channels)
             .map(|channel| median(&mut distances.iter().map(|turn| turn[channel]).collect::<Vec<_>>()))
@@ -50,15 +50,15 @@ impl Outliers {
             let outlier =
                 farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
             if outlier.is_none() {
-                mean.add(&harmonics);
+                means.add(&harmonics);
             }
             judged.push(Verdict { turn, outlier: outlier.map(|(channel, _)| (channel, distances[channel])) });
         }
     }
 
     /// All turns that are still held.
-    pub(super) fn judge_rest(&mut self, mean: &mut Mean, judged: &mut Vec<Verdict>) {
-        self.judge(usize::MAX, mean, judged);
+    pub(super) fn judge_rest(&mut self, means: &mut Means, judged: &mut Vec<Verdict>) {
+        self.judge(usize::MAX, means, judged);
     }
 }
 

@@ -9,13 +9,13 @@ use runout_core::{
         fourier::{Fourier, max_order},
         lanes::in_lanes,
     },
-    profile::{RejectedTurn, Rejection},
+    profile::{RejectedTurn, Rejection, Split},
 };
 
 use super::{
     SynchronousAverage, encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
-    mean::Mean,
+    split::Means,
     outliers::{Outliers, Verdict},
     turns::{ROUNDING, Turn},
     window::{CONTINUED, Window},
@@ -26,6 +26,7 @@ pub(super) struct Outcome {
     pub mean: Vec<Complex64>,
     pub covariance: Option<Vec<Complex64>>,
     pub scatter: Option<Vec<Complex64>>,
+    pub split: Option<Split>,
     pub used: usize,
     /// Length of all turns used together.
     pub used_samples: f64,
@@ -49,7 +50,7 @@ pub(super) struct Resampling<'a> {
     harmonics: Vec<Complex64>,
     /// One turn's harmonics, `[order][channel]`.
     turn: Vec<Complex64>,
-    mean: Mean,
+    means: Means,
     outliers: Option<Outliers>,
     used_samples: f64,
     rejected: Vec<RejectedTurn>,
@@ -58,7 +59,7 @@ pub(super) struct Resampling<'a> {
 
 impl<'a> Resampling<'a> {
     /// `turns` are those that the marks allow, in order.
-    pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>) -> Self {
+    pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>, held_out: Option<f64>) -> Self {
         let config = &average.config;
         let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
         let length = grid_length(&turns, config.samples_per_rev, capture.encoder);
@@ -74,7 +75,7 @@ impl<'a> Resampling<'a> {
             fourier: Fourier::new(length),
             harmonics: vec![Complex64::ZERO; orders],
             turn: vec![Complex64::ZERO; orders * channels],
-            mean: Mean::new(orders, channels, planned),
+            means: Means::new(orders, channels, planned, held_out),
             outliers: config.outlier_sigma.map(Outliers::new),
             used_samples: 0.0,
             rejected: Vec::new(),
@@ -121,14 +122,15 @@ impl<'a> Resampling<'a> {
         }
         if let Some(mut outliers) = self.outliers.take() {
             let mut judged = Vec::new();
-            outliers.judge_rest(&mut self.mean, &mut judged);
+            outliers.judge_rest(&mut self.means, &mut judged);
             self.sort(judged);
         }
         Outcome {
-            mean: self.mean.mean(),
-            covariance: self.mean.covariance(),
-            scatter: self.mean.scatter(),
-            used: self.mean.turns(),
+            mean: self.means.whole.mean(),
+            covariance: self.means.whole.covariance(),
+            scatter: self.means.whole.scatter(),
+            used: self.means.whole.turns(),
+            split: self.means.split(),
             used_samples: self.used_samples,
             rejected: self.rejected,
             exact: self.exact,
@@ -173,12 +175,12 @@ impl<'a> Resampling<'a> {
         self.transform();
         match &mut self.outliers {
             None => {
-                self.mean.add(&self.turn);
+                self.means.add(&self.turn);
                 self.used_samples += turn.samples();
             }
             Some(outliers) => {
                 let mut judged = Vec::new();
-                outliers.add(turn, &self.turn, &mut self.mean, &mut judged);
+                outliers.add(turn, &self.turn, &mut self.means, &mut judged);
                 self.sort(judged);
             }
         }
