@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod diagnostics;
 mod folder;
+mod lost_orders;
 mod other_rigs;
 mod safety;
 mod schemas;
