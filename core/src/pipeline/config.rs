@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema};
-use serde::Deserialize;
 use serde_json::{Value, json};
 use toml::{Spanned, de::DeValue};
 
 use super::{
     compare::{self, Candidate},
+    diagnose::config::DiagnoseConfig,
     document::{self, ConfigError, Document, Sources, Table},
     error::{Fault, known_names},
     registry::{Catalogue, Context, Plugin, Registry},
@@ -18,8 +18,8 @@ use crate::{
     rig::{Rig, RigConfig},
     separation::Assessment,
     stage::{
-        Averager, Conditioner, Exporter, Loader, PointSeparator, Preprocessor, Separator, SourceKind, StationSeparator,
-        TraceSeparator,
+        Averager, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Separator, SourceKind,
+        StationSeparator, TraceSeparator,
     },
     surface::SurfaceConfig,
 };
@@ -41,6 +41,8 @@ pub struct Pipeline {
     pub separator: String,
     /// The separators of `[[compare]]`, which `run` leaves alone.
     pub compare: Vec<Candidate>,
+    /// What the closed loop may consider.
+    pub diagnose: DiagnoseConfig,
     /// How sections become a surface.
     pub surface: SurfaceConfig,
     /// In the order configured.
@@ -67,44 +69,16 @@ pub enum Route {
         /// Points to form.
         separator: Box<dyn PointSeparator>,
     },
+    /// Measured points with a model for the closed loop, and no form.
+    Model {
+        /// Points to terms.
+        model: Box<dyn PointModel>,
+    },
     /// Measured traces along an axis, all at once.
     Traces {
         /// Traces to straightness.
         separator: Box<dyn TraceSeparator>,
     },
-}
-
-/// `[diagnose]`: which effects the closed loop may consider. `run` leaves it alone.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DiagnoseConfig {
-    /// "all", or a list of effect ids.
-    #[serde(default)]
-    pub effects: Effects,
-}
-
-/// A choice of effects.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Effects {
-    /// "all".
-    Word(AllEffects),
-    /// Ids.
-    Some(Vec<String>),
-}
-
-/// The word "all".
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum AllEffects {
-    /// Every effect that the toolkit knows.
-    All,
-}
-
-impl Default for Effects {
-    fn default() -> Self {
-        Self::Word(AllEffects::All)
-    }
 }
 
 const KEYS: [&str; 9] = ["title", "rig", "load", "preprocess", "separate", "compare", "surface", "diagnose", "export"];
@@ -136,9 +110,12 @@ impl Pipeline {
         };
         let rig = table(root, "rig")?.map(|table| checked::<RigConfig, _>(&table, RigConfig::check)).transpose()?;
         let context = Context { folder: sources.folder(), rig: rig.as_ref() };
-        if let Some(table) = table(root, "diagnose")? {
-            document::read::<DiagnoseConfig>(&table)?;
-        }
+        let diagnose_table = table(root, "diagnose")?;
+        let diagnose = diagnose_table
+            .as_ref()
+            .map(|table| checked::<DiagnoseConfig, _>(table, |config| config.check(sources.folder())))
+            .transpose()?
+            .unwrap_or_default();
         let surface = table(root, "surface")?
             .map(|table| checked::<SurfaceConfig, _>(&table, SurfaceConfig::check))
             .transpose()?
@@ -160,50 +137,22 @@ impl Pipeline {
                 turns(preprocessors, separator, &separate_table, root)?
             }
             SourceKind::Points => {
+                if let (Some(table), Some(_)) = (&diagnose_table, diagnose.hold_out) {
+                    let fault = Fault::at("hold_out", "measured points are left out group by group, not by a share");
+                    return Err(document::resolve(fault.help("leave `hold_out` out"), table));
+                }
                 if let Some((_, table)) = preprocessors.first() {
                     let fault = Fault::here("measured points take no preprocessor").help("leave [[preprocess]] out");
                     return Err(document::resolve(fault, table));
                 }
-                match registry.separators.build(&separate_table, &context)? {
-                    Separator::Points(separator) => (Route::Points { separator }, None),
-                    Separator::Traces(separator) => {
-                        if let Some(table) = table(root, "surface")? {
-                            return Err(Fault::span(table.span(), "straightness along one line makes no surface"));
-                        }
-                        (Route::Traces { separator }, None)
-                    }
-                    Separator::Stations(_) => {
-                        let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
-                        return Err(document::resolve(fault, &separate_table));
-                    }
-                }
+                (points(registry.separators.build(&separate_table, &context)?, &separate_table, root)?, None)
             }
         };
         let compare = tables(root, "compare")?
             .iter()
             .map(|table| compare::candidate(table, registry, &context))
             .collect::<Result<_, _>>()?;
-        let mut exporters: Vec<Box<dyn Exporter>> = Vec::new();
-        let mut outputs: Vec<_> = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
-        for table in tables(root, "export")? {
-            let exporter = registry.exporters.build(&table, &context)?;
-            if matches!(route, Route::Traces { .. }) && exporter.straightness().is_none() {
-                let fault = Fault::at("plugin", "this exporter takes form; [separate] gives straightness along a line");
-                return Err(document::resolve(fault.help("take one that writes tables"), &table));
-            }
-            for output in exporter.outputs() {
-                let place = resolved(&output);
-                if let Some((_, use_of_it)) = outputs.iter().find(|(other, _)| *other == place) {
-                    let message = format!("{} is already {use_of_it}", output.display());
-                    return Err(document::resolve(Fault::at("path", message), &table));
-                }
-                if outputs.iter().all(|(_, use_of_it)| *use_of_it != SUMMARY_USE) {
-                    outputs.push((resolved(&beside(&output)), SUMMARY_USE));
-                }
-                outputs.push((place, "written by an exporter"));
-            }
-            exporters.push(exporter);
-        }
+        let exporters = exporters(root, sources, registry, &context, &route, diagnose.path.as_deref())?;
         Ok(Self {
             title,
             rig,
@@ -211,6 +160,7 @@ impl Pipeline {
             route,
             separator: compare::plugin_name(&separate_table),
             compare,
+            diagnose,
             surface,
             exporters,
             assessment,
@@ -230,14 +180,87 @@ impl Pipeline {
     /// Where the summary goes: beside the first export.
     #[must_use]
     pub fn summary_path(&self) -> Option<PathBuf> {
-        self.exporters.iter().find_map(|exporter| exporter.outputs().first().map(|path| beside(path)))
+        self.beside_the_first(SUMMARY)
+    }
+
+    /// Where the diagnosis goes: where `[diagnose]` says, or beside the first export.
+    #[must_use]
+    pub fn diagnosis_path(&self) -> Option<PathBuf> {
+        self.diagnose.path.clone().or_else(|| self.beside_the_first(DIAGNOSIS))
+    }
+
+    fn beside_the_first(&self, name: &str) -> Option<PathBuf> {
+        self.exporters.iter().find_map(|exporter| exporter.outputs().first().map(|path| beside(path, name)))
     }
 }
 
+const SUMMARY: &str = "summary.json";
 const SUMMARY_USE: &str = "where the run's summary goes";
+const DIAGNOSIS: &str = "diagnosis.json";
+const DIAGNOSIS_USE: &str = "where the diagnosis goes";
 
-fn beside(output: &Path) -> PathBuf {
-    output.with_file_name("summary.json")
+fn beside(output: &Path, name: &str) -> PathBuf {
+    output.with_file_name(name)
+}
+
+/// The route of measured points.
+fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<Route, Fault> {
+    match separator {
+        Separator::Points(separator) => Ok(Route::Points { separator }),
+        Separator::Model(model) => Ok(Route::Model { model }),
+        Separator::Traces(separator) => match table(root, "surface")? {
+            Some(table) => Err(Fault::span(table.span(), "straightness along one line makes no surface")),
+            None => Ok(Route::Traces { separator }),
+        },
+        Separator::Stations(_) => {
+            let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
+            Err(document::resolve(fault, separate_table))
+        }
+    }
+}
+
+/// The exporters, none of which writes over what is read or what another file is for.
+fn exporters(
+    root: &Table,
+    sources: &Sources,
+    registry: &Registry,
+    context: &Context,
+    route: &Route,
+    diagnosis_path: Option<&Path>,
+) -> Result<Vec<Box<dyn Exporter>>, Fault> {
+    let mut exporters: Vec<Box<dyn Exporter>> = Vec::new();
+    let mut outputs: Vec<_> = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
+    outputs.extend(diagnosis_path.map(|path| (resolved(path), DIAGNOSIS_USE)));
+    for table in tables(root, "export")? {
+        let exporter = registry.exporters.build(&table, context)?;
+        match route {
+            Route::Traces { .. } if exporter.straightness().is_none() => {
+                let fault = Fault::at("plugin", "this exporter takes form; [separate] gives straightness along a line");
+                return Err(document::resolve(fault.help("take one that writes tables"), &table));
+            }
+            Route::Model { .. } => {
+                let fault = Fault::at("plugin", "this exporter takes form; [separate] is a model for `diagnose` only");
+                return Err(document::resolve(fault.help("name a file by `path` in [diagnose]"), &table));
+            }
+            _ => {}
+        }
+        for output in exporter.outputs() {
+            let place = resolved(&output);
+            if let Some((_, use_of_it)) = outputs.iter().find(|(other, _)| *other == place) {
+                let message = format!("{} is already {use_of_it}", output.display());
+                return Err(document::resolve(Fault::at("path", message), &table));
+            }
+            if outputs.iter().all(|(_, use_of_it)| *use_of_it != SUMMARY_USE) {
+                outputs.push((resolved(&beside(&output, SUMMARY)), SUMMARY_USE));
+                if diagnosis_path.is_none() {
+                    outputs.push((resolved(&beside(&output, DIAGNOSIS)), DIAGNOSIS_USE));
+                }
+            }
+            outputs.push((place, "written by an exporter"));
+        }
+        exporters.push(exporter);
+    }
+    Ok(exporters)
 }
 
 fn turns(
@@ -268,7 +291,7 @@ fn turns(
                 separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
             Ok((Route::Turns { conditioners, averager, separator }, Some(assessment)))
         }
-        Separator::Points(_) | Separator::Traces(_) => {
+        Separator::Points(_) | Separator::Model(_) | Separator::Traces(_) => {
             let fault = Fault::at("plugin", "this separator takes measured points; [load] gives recorded turns");
             Err(document::resolve(fault, separate_table))
         }

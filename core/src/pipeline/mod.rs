@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod config;
+pub mod diagnose;
 pub mod document;
 pub mod error;
 mod line;

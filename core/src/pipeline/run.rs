@@ -19,10 +19,10 @@ pub use super::{
 use crate::{
     Error, Result,
     atomic_file::{PendingFile, commit_all, resolved},
-    points::Points,
     provenance::{Input, Provenance, VERSION},
     rig::Rig,
-    stage::{Export, PointSeparator, Source, Station},
+    separation::Separation,
+    stage::{Export, Source, Station},
     surface::{Surface, SurfaceBuilder},
 };
 
@@ -55,6 +55,12 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     if let (Source::Points(points), Route::Traces { separator }) = (&source, &pipeline.route) {
         return traces::run(pipeline, points, &**separator);
     }
+    if matches!(pipeline.route, Route::Model { .. }) {
+        let problem = format!("`{}` is a model for the closed loop and separates no form", pipeline.separator);
+        return Err(
+            Error::new("run", &pipeline.title, problem).help("runout diagnose finds what the declared model lacks")
+        );
+    }
     let mut gathering = Gathering::begin(pipeline, &info)?;
     let (inputs, surface, remarks) = match (&source, &pipeline.route) {
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator }) => {
@@ -73,23 +79,21 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
             (inputs, gathering.build_surface(rig.part_radius_mm)?, recording.remarks())
         }
         (Source::Points(points), Route::Points { separator }) => {
-            fit_points(points, &**separator, pipeline.surface.angles, observer, &mut gathering)?;
+            take_sections(separator.separate(points)?, pipeline.surface.angles, observer, &mut gathering)?;
             let surface = gathering.build_surface(separator.reference_radius_mm(points)?)?;
             let remarks = separator.remarks(points, surface.as_ref())?;
             (vec![Input::of(&points.input)?], surface, remarks)
         }
         _ => return Err(Error::new("run", &pipeline.title, "the loader gave what it did not declare")),
     };
-    gathering.summary.provenance.inputs = inputs;
-    gathering.summary.warnings.extend(remarks);
-    gathering.finish(surface.as_ref())
+    gathering.conclude(inputs, remarks, surface.as_ref(), None)
 }
 
 /// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.
 const MISFIT_CHI2: f64 = 4.0;
 
 /// Results on their way to the exporters.
-struct Gathering {
+pub(super) struct Gathering {
     exports: Vec<Box<dyn Export>>,
     surface: Option<SurfaceBuilder>,
     summary: Summary,
@@ -97,7 +101,7 @@ struct Gathering {
 }
 
 impl Gathering {
-    fn begin(pipeline: &Pipeline, info: &RunInfo) -> Result<Self> {
+    pub(super) fn begin(pipeline: &Pipeline, info: &RunInfo) -> Result<Self> {
         let exports: Result<Vec<_>> = pipeline.exporters.iter().map(|exporter| exporter.begin(info)).collect();
         let tested = matches!(&pipeline.route, Route::Points { separator } if separator.needs_surface());
         let wanted = tested || pipeline.exporters.iter().any(|exporter| exporter.needs_surface());
@@ -120,7 +124,7 @@ impl Gathering {
         Ok(())
     }
 
-    fn build_surface(&mut self, radius_mm: f64) -> Result<Option<Surface>> {
+    pub(super) fn build_surface(&mut self, radius_mm: f64) -> Result<Option<Surface>> {
         let surface = self.surface.take().map(|builder| builder.build(radius_mm)).transpose()?;
         self.summary.surface = surface.as_ref().map(|surface| SurfaceSummary {
             angles: surface.angles,
@@ -132,12 +136,22 @@ impl Gathering {
         Ok(surface)
     }
 
-    fn finish(mut self, surface: Option<&Surface>) -> Result<Summary> {
+    /// Completes the exports and gives all files their names, one more among them where there is one.
+    pub(super) fn conclude(
+        mut self,
+        inputs: Vec<Input>,
+        remarks: Vec<String>,
+        surface: Option<&Surface>,
+        besides: Option<PendingFile>,
+    ) -> Result<Summary> {
+        self.summary.provenance.inputs = inputs;
+        self.summary.warnings.extend(remarks);
         self.summary.warnings.extend(misfit(&self.summary.stations));
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&self.summary, surface)?);
         }
+        complete.extend(besides);
         conclude(self.summary, complete, self.summary_path)
     }
 }
@@ -207,16 +221,15 @@ fn misfit(stations: &[StationSummary]) -> Option<String> {
     ))
 }
 
-fn fit_points(
-    points: &Points,
-    separator: &dyn PointSeparator,
+/// Completes sections of measured points.
+pub(super) fn take_sections(
+    sections: Vec<Separation>,
     angles: usize,
     observer: &dyn Observer,
     gathering: &mut Gathering,
 ) -> Result<()> {
-    let separations = separator.separate(points)?;
-    observer.begin(separations.len());
-    for separation in separations {
+    observer.begin(sections.len());
+    for separation in sections {
         let (name, z_mm) =
             separation.sections.first().map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));
         let result = complete(name, z_mm, angles, separation, Vec::new(), None);

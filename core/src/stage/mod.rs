@@ -9,5 +9,7 @@ pub mod simulator;
 pub use exporter::{Export, Exporter, StraightnessExporter};
 pub use loader::{Loader, Source, SourceKind};
 pub use preprocessor::{Averager, Conditioner, Preprocessor};
-pub use separator::{PointSeparator, Separator, Station, StationSeparator, TraceSeparator};
+pub use separator::{
+    Conclusion, PointModel, PointSeparator, Separator, Shape, Station, StationSeparator, TraceSeparator,
+};
 pub use simulator::Simulator;

@@ -2,6 +2,7 @@
 
 use crate::{
     Result,
+    model::linear_terms::{LinearFit, LinearTerms},
     pipeline::error::Fault,
     points::Points,
     profile::Profile,
@@ -17,6 +18,8 @@ pub enum Separator {
     Stations(Box<dyn StationSeparator>),
     /// All points at once.
     Points(Box<dyn PointSeparator>),
+    /// All points at once, and only for the closed loop: there is no form to separate.
+    Model(Box<dyn PointModel>),
     /// All traces along an axis at once.
     Traces(Box<dyn TraceSeparator>),
 }
@@ -80,6 +83,44 @@ pub trait PointSeparator: Send + Sync {
     fn remarks(&self, _points: &Points, _surface: Option<&Surface>) -> Result<Vec<String>> {
         Ok(Vec::new())
     }
+
+    /// Its model for the closed loop, where it has one.
+    fn model(&self) -> Option<&dyn PointModel> {
+        None
+    }
+}
+
+/// A model of measured points for the closed loop.
+pub trait PointModel: Send + Sync {
+    /// What is declared of these points, and the effects that this may lack.
+    ///
+    /// # Errors
+    /// When the points do not hold what the model needs.
+    fn terms(&self, points: &Points) -> Result<LinearTerms>;
+
+    /// What the final fit says.
+    ///
+    /// # Errors
+    /// When the points do not hold what it needs.
+    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion>;
+}
+
+/// What a model's final fit says.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Conclusion {
+    /// The form by the effects that were found, where there is one.
+    pub shape: Option<Shape>,
+    /// What the user should know.
+    pub remarks: Vec<String>,
+}
+
+/// Form that a model's fit describes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// One separation a section, in the order of z.
+    pub sections: Vec<Separation>,
+    /// Radius of the cylinder that it counts from, in mm.
+    pub radius_mm: f64,
 }
 
 /// Separates traces along an axis into the straightness of the part and of the slide.
