@@ -28,6 +28,75 @@ pub struct Columns<'a> {
     pub numbers: &'a [&'a str],
 }
 
+/// The columns of a file of points that belong to no trace: numbers, one a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Numbers<'a> {
+    /// Read.
+    pub read: &'a [&'a str],
+    /// Known, and left alone.
+    pub ignored: &'a [&'a str],
+}
+
+impl Numbers<'_> {
+    /// Reads a file into one trace named `trace`.
+    ///
+    /// # Errors
+    /// When it cannot be read, lacks a column or has another, or a cell is no number.
+    pub fn read(&self, path: &Path, trace: &str) -> Result<Points> {
+        let shown = path.display().to_string();
+        let failure = |problem: &dyn std::fmt::Display| Error::new("read", &shown, problem);
+        let (mut reader, decimal_comma) = open(path)?;
+        let header = reader.byte_headers().map_err(|error| failure(&error))?;
+        let places = places(header, self.read, self.ignored, &shown)?;
+        let mut values = vec![Vec::new(); self.read.len()];
+        let mut record = ByteRecord::new();
+        while reader.read_byte_record(&mut record).map_err(|error| failure(&error))? {
+            let cells = Cells { record: &record, file: &shown, decimal_comma };
+            for (column, (place, name)) in values.iter_mut().zip(places.iter().zip(self.read)) {
+                column.push(cells.number(*place, name)?);
+            }
+        }
+        let points = 0..values.first().map_or(0, Vec::len);
+        if points.is_empty() {
+            return Err(Error::new("read", shown, "it holds no points"));
+        }
+        let columns = self.read.iter().zip(values);
+        let columns = columns.map(|(name, values)| Column { name: (*name).to_owned(), values }).collect();
+        let traces = vec![Trace { id: trace.to_owned(), kind: trace.to_owned(), points }];
+        Ok(Points { input: path.to_path_buf(), columns, traces })
+    }
+}
+
+/// A reader behind the header's separator, and whether it allows a decimal comma.
+fn open(path: &Path) -> Result<(csv::Reader<BufReader<File>>, bool)> {
+    let failure = |error: std::io::Error| Error::new("read", path.display().to_string(), error);
+    let mut file = BufReader::new(File::open(path).map_err(failure)?);
+    let delimiter = delimiter(&mut file).map_err(failure)?;
+    Ok((ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(file), delimiter != b','))
+}
+
+/// Where the wanted columns stand; refuses those that are neither wanted nor ignored.
+fn places(header: &ByteRecord, wanted: &[&str], ignored: &[&str], file: &str) -> Result<Vec<usize>> {
+    let names: Vec<String> = header.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+    let refuse = |problem: String| {
+        let help = format!("the columns are {}", wanted.join(", "));
+        Error::new("read", format!("{file}, line 1"), problem).help(help)
+    };
+    for (index, name) in names.iter().enumerate() {
+        if !wanted.contains(&name.as_str()) && !ignored.contains(&name.as_str()) {
+            return Err(refuse(format!("unknown column `{name}`")));
+        }
+        if names[..index].contains(name) {
+            return Err(refuse(format!("the column `{name}` is there twice")));
+        }
+    }
+    let place = |name: &&str| {
+        let found = names.iter().position(|found| found == name);
+        found.ok_or_else(|| refuse(format!("the column `{name}` is missing")))
+    };
+    wanted.iter().map(place).collect()
+}
+
 /// Where the columns stand in the file.
 struct Layout {
     trace: usize,
@@ -43,16 +112,14 @@ impl Columns<'_> {
     pub fn read(&self, path: &Path) -> Result<Points> {
         let shown = path.display().to_string();
         let failure = |problem: &dyn std::fmt::Display| Error::new("read", &shown, problem);
-        let mut file = BufReader::new(File::open(path).map_err(|error| failure(&error))?);
-        let delimiter = delimiter(&mut file).map_err(|error| failure(&error))?;
-        let mut reader = ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(file);
+        let (mut reader, decimal_comma) = open(path)?;
         let layout = self.layout(reader.byte_headers().map_err(|error| failure(&error))?, &shown)?;
         let mut values = vec![Vec::new(); self.numbers.len()];
         let mut traces: Vec<Trace> = Vec::new();
         let mut record = ByteRecord::new();
         let mut row = 0;
         while reader.read_byte_record(&mut record).map_err(|error| failure(&error))? {
-            let cells = Cells { record: &record, file: &shown, decimal_comma: delimiter != b',' };
+            let cells = Cells { record: &record, file: &shown, decimal_comma };
             for (column, (place, name)) in values.iter_mut().zip(layout.numbers.iter().zip(self.numbers)) {
                 column.push(cells.number(*place, name)?);
             }
@@ -88,26 +155,10 @@ impl Columns<'_> {
     }
 
     fn layout(&self, header: &ByteRecord, file: &str) -> Result<Layout> {
-        let names: Vec<String> = header.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
         let wanted = [&[TRACE, self.kind], self.numbers].concat();
-        let refuse = |problem: String| {
-            let help = format!("the columns are {}", wanted.join(", "));
-            Error::new("read", format!("{file}, line 1"), problem).help(help)
-        };
-        for (index, name) in names.iter().enumerate() {
-            if !wanted.contains(&name.as_str()) {
-                return Err(refuse(format!("unknown column `{name}`")));
-            }
-            if names[..index].contains(name) {
-                return Err(refuse(format!("the column `{name}` is there twice")));
-            }
-        }
-        let place = |name: &str| {
-            let found = names.iter().position(|found| found == name);
-            found.ok_or_else(|| refuse(format!("the column `{name}` is missing")))
-        };
-        let numbers = self.numbers.iter().map(|name| place(name)).collect::<Result<_>>()?;
-        Ok(Layout { trace: place(TRACE)?, kind: place(self.kind)?, numbers })
+        let mut places = places(header, &wanted, &[], file)?;
+        let numbers = places.split_off(2);
+        Ok(Layout { trace: places[0], kind: places[1], numbers })
     }
 }
 
@@ -178,6 +229,23 @@ mod tests {
         assert_eq!(dots.traces, commas.traces);
         assert_eq!(dots.column("z_mm").unwrap(), [1.5, 1.5, 2.0]);
         assert_eq!(dots.traces[0], Trace { id: "A".into(), kind: "circle".into(), points: 0..2 });
+    }
+
+    #[test]
+    fn points_without_traces() {
+        let numbers = Numbers { read: &["phase_deg", "radius_counts"], ignored: &["note"] };
+        let read = |text: &str| {
+            let mut file = tempfile::NamedTempFile::new().unwrap();
+            file.write_all(text.as_bytes()).unwrap();
+            numbers.read(file.path(), "signal")
+        };
+        let points = read("note;radius_counts;phase_deg\nhum;500,5;0\n;501;90,25\n").unwrap();
+        assert_eq!(points.column("phase_deg").unwrap(), [0.0, 90.25]);
+        assert_eq!(points.column("radius_counts").unwrap(), [500.5, 501.0]);
+        assert_eq!(points.traces, [Trace { id: "signal".into(), kind: "signal".into(), points: 0..2 }]);
+        assert!(read("phase_deg\n1\n").unwrap_err().to_string().contains("`radius_counts` is missing"));
+        assert!(read("phase_deg,radius_counts\n").unwrap_err().to_string().contains("no points"));
+        assert!(read("phase_deg,radius_counts\n1,x\n").unwrap_err().to_string().contains("line 2, column 2"));
     }
 
     #[test]
