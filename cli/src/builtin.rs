@@ -13,6 +13,8 @@ pub fn registry() -> Registry {
         runout_spindle::register,
         runout_cylinder::register,
         runout_straightness::register,
+        runout_quadrature::register,
+        runout_rotary_axis::register,
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,

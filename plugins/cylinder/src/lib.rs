@@ -7,6 +7,7 @@
 mod circle;
 mod least_squares;
 mod load;
+mod model;
 mod predict;
 mod robust;
 mod scan;

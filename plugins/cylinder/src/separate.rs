@@ -8,7 +8,7 @@ use runout_core::{
     },
     points::{Points, Trace},
     separation::{Quantity, Residual, SectionAt, Separation},
-    stage::{PointSeparator, Separator},
+    stage::{PointModel, PointSeparator, Separator},
     surface::Surface,
 };
 use schemars::JsonSchema;
@@ -106,11 +106,11 @@ impl LeastSquaresCylinderConfig {
 pub struct LeastSquaresCylinder(LeastSquaresCylinderConfig);
 
 /// A circle without its outliers.
-struct Circle<'a> {
-    trace: &'a Trace,
-    measured: usize,
-    scan: Scan,
-    warnings: Vec<String>,
+pub(crate) struct Circle<'a> {
+    pub trace: &'a Trace,
+    pub measured: usize,
+    pub scan: Scan,
+    pub warnings: Vec<String>,
 }
 
 impl PointSeparator for LeastSquaresCylinder {
@@ -146,6 +146,10 @@ impl PointSeparator for LeastSquaresCylinder {
         }
         Ok(remarks)
     }
+
+    fn model(&self) -> Option<&dyn PointModel> {
+        Some(self)
+    }
 }
 
 impl LeastSquaresCylinder {
@@ -162,13 +166,6 @@ impl LeastSquaresCylinder {
     /// # Errors
     /// When the points lack a column.
     pub fn predictions(&self, points: &Points, cylinder: &Cylinder, surface: &Surface) -> Result<Vec<Prediction>> {
-        let mut kinds: Vec<(&str, Vec<&Trace>)> = Vec::new();
-        for trace in points.traces.iter().filter(|trace| !self.uses(trace)) {
-            match kinds.iter_mut().find(|(kind, _)| *kind == trace.kind) {
-                Some((_, traces)) => traces.push(trace),
-                None => kinds.push((&trace.kind, vec![trace])),
-            }
-        }
         let compare = |(kind, traces): (&str, Vec<&Trace>)| {
             let scans: Vec<Scan> = traces.iter().map(|trace| Scan::of(points, trace)).collect::<Result<_>>()?;
             let sample = |angle, z| surface.sample(angle, z);
@@ -176,7 +173,27 @@ impl LeastSquaresCylinder {
             let traces = traces.iter().map(|trace| trace.id.clone()).collect();
             Ok(Prediction { kind: kind.to_owned(), traces, ..prediction })
         };
-        kinds.into_iter().map(compare).collect()
+        self.unused(points).into_iter().map(compare).collect()
+    }
+
+    /// The traces that are not used, one entry a kind.
+    pub(crate) fn unused<'a>(&self, points: &'a Points) -> Vec<(&'a str, Vec<&'a Trace>)> {
+        let mut kinds: Vec<(&str, Vec<&Trace>)> = Vec::new();
+        for trace in points.traces.iter().filter(|trace| !self.uses(trace)) {
+            match kinds.iter_mut().find(|(kind, _)| *kind == trace.kind) {
+                Some((_, traces)) => traces.push(trace),
+                None => kinds.push((&trace.kind, vec![trace])),
+            }
+        }
+        kinds
+    }
+
+    pub(crate) fn outlier_mad(&self) -> f64 {
+        self.0.outlier_mad
+    }
+
+    pub(crate) fn nominal_mm(&self) -> f64 {
+        self.0.radius_mm
     }
 
     fn uses(&self, trace: &Trace) -> bool {
@@ -185,7 +202,7 @@ impl LeastSquaresCylinder {
     }
 
     /// The traces used, each without its outliers.
-    fn circles<'a>(&self, points: &'a Points) -> Result<Vec<Circle<'a>>> {
+    pub(crate) fn circles<'a>(&self, points: &'a Points) -> Result<Vec<Circle<'a>>> {
         let known: Vec<&str> =
             points.traces.iter().flat_map(|trace| [trace.kind.as_str(), trace.id.as_str()]).collect();
         for name in self.0.used.iter().chain(&self.0.hold_out) {

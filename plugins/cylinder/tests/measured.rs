@@ -6,8 +6,10 @@ use std::{f64::consts::TAU, path::PathBuf};
 
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
+    model::{closed_loop, diagnosis::Diagnosis},
     pipeline::{
         Pipeline, Registry,
+        diagnose::diagnose,
         document::Sources,
         registry::{Context, StageConfig},
         run::{Silent, StationResult, Summary, run},
@@ -290,4 +292,74 @@ fn points_that_cannot_tell_a_cylinder_are_refused() {
     };
     let lines = config.separator().unwrap().separate(&two).unwrap_err();
     assert!(lines.to_string().contains("trace G0 of made.csv: its points cannot tell orders 0 to 10"), "{lines}");
+}
+
+fn diagnosed(text: &str) -> Diagnosis {
+    let mut registry = Registry::default();
+    runout_cylinder::register(&mut registry);
+    let sources = Sources::from_text("test.toml", text, PathBuf::new(), &[], "rig").unwrap();
+    diagnose(&Pipeline::from_sources(&sources, &registry).unwrap(), &Silent).unwrap()
+}
+
+#[test]
+fn the_loop_finds_what_a_radius_lacks() {
+    let Some(path) = measured() else { return };
+    let found = diagnosed(&format!(
+        "load = {{ plugin = 'cylinder-traces', path = '{}' }}\n\
+         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056 }}",
+        path.display()
+    ));
+    for added in &found.added {
+        println!("{} {:?} {:.0} {:?}", added.effect, added.held_out_rms_um, added.delta_bic, added.parameters);
+        assert!(added.confounded_with.is_empty(), "{added:?}");
+    }
+    println!("{:?}\n{:?}\n{:?}", found.refused, found.moved, found.warnings);
+    let effects: Vec<&str> = found.added.iter().map(|added| added.effect.as_str()).collect();
+    assert_eq!(effects[..3], ["part-eccentricity", "axis-tilt", "taper"]);
+    assert!(effects.len() > 3 && effects[3..].iter().all(|effect| effect.starts_with("lobes-")), "{effects:?}");
+    // Independent least squares: circles left out 5.96 → 1.46 → 1.20 → 1.16 → 1.00 µm with lobes 2 to 5 in one step. Its
+    // outliers are those of each model, not of each circle: 0.05 µm.
+    let left: Vec<f64> = found.added.iter().map(|added| added.held_out_rms_um.after.unwrap()).collect();
+    let before = found.before.held_out_rms_um.unwrap();
+    for (found, reference) in [before, left[0], left[1], left[2]].iter().zip([5.96, 1.46, 1.20, 1.16]) {
+        assert!((found - reference).abs() < 0.06, "{found} where {reference} was expected");
+    }
+    let after = found.after.held_out_rms_um.unwrap();
+    assert!(after <= 1.0, "{after}");
+    // Generatrices, never fitted, every point of them: 5.80 → 1.46 µm.
+    let lines = found.moved.iter().find(|moved| moved.value.contains("generatrix")).unwrap();
+    println!("circles left out {before:.3} → {after:.3} µm, generatrices {:.3} → {:.3} µm", lines.before, lines.after);
+    assert!((lines.before - 5.80).abs() < 0.02 && lines.after <= 1.5, "{lines:?}");
+    // It stops, and says of what the circles left out refuse.
+    assert!(
+        found.refused.iter().any(|refused| refused.reason.contains("does not lower the error")),
+        "{:?}",
+        found.refused
+    );
+}
+
+#[test]
+fn the_final_model_is_exported_with_its_form() {
+    // The three lobes of made() grow along z, which the model does not know: it finds their mean.
+    let points = made(&[2.0, 7.0, 12.0, 17.0]);
+    let separator = separator(15, &[]);
+    let model = separator.model().unwrap();
+    let terms = model.terms(&points).unwrap();
+    let closed = closed_loop::diagnose(&terms, &closed_loop::Settings::default()).unwrap();
+    let added: Vec<&str> = closed.diagnosis.added.iter().map(|added| added.effect.as_str()).collect();
+    assert_eq!(added, ["part-eccentricity", "axis-tilt", "lobes-3"]);
+    let shape = model.conclude(&points, &closed.after).unwrap().shape.unwrap();
+    let order: Vec<f64> = shape.sections.iter().map(|section| section.sections[0].z_mm).collect();
+    assert_eq!(order, [2.0, 7.0, 12.0, 17.0]);
+    for section in &shape.sections {
+        let lobes = section.coefficients(0).nth(3).unwrap();
+        // 1 + 0.1·z over the mean of z, 9.5 mm; the ripple of 0.007 µm rms over 1600 points stays below 0.002 µm.
+        assert!((lobes.re - 1.95).abs() < 2e-3 && lobes.im.abs() < 2e-3, "{lobes}");
+        assert!(section.coefficients(0).enumerate().all(|(order, value)| order == 3 || value.norm() < 1e-12));
+    }
+    // 3 µm above the nominal radius.
+    assert!((shape.radius_mm - 15.059).abs() < 1e-5, "{}", shape.radius_mm);
+    let tilt = &closed.diagnosis.added[1].parameters;
+    // The tilt of made(): slopes of 0.2 and −0.1 µm/mm.
+    assert!((tilt[0].value - 100.0).abs() < 0.5 && (tilt[1].value - 200.0).abs() < 0.5, "{tilt:?}");
 }

@@ -1,0 +1,57 @@
+//! The loader `r-test-points`.
+
+use std::path::PathBuf;
+
+use runout_core::{
+    Result,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
+    rig::Rig,
+    stage::{Loader, Source, SourceKind},
+};
+use runout_traces::Numbers;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// `[load] plugin = "r-test-points"`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RTestPointsConfig {
+    /// CSV file with the columns a_deg, c_deg, dx_mm, dy_mm, dz_mm, in any order: commands of the rotary axes and the measured
+    /// deviation of the ball. A column point is left alone. Separated by comma, semicolon or tab; the last two allow a
+    /// decimal comma.
+    pub path: PathBuf,
+}
+
+impl StageConfig for RTestPointsConfig {
+    type Stage = Box<dyn Loader>;
+
+    const NAME: &'static str = "r-test-points";
+    const ABOUT: &'static str = "deviations of the ball in an R-test, from CSV";
+
+    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        if self.path.as_os_str().is_empty() {
+            return Err(Fault::at("path", "expected the name of a file"));
+        }
+        Ok(Box::new(RTestPoints { path: context.path(&self.path) }))
+    }
+}
+
+const NUMBERS: Numbers = Numbers { read: &["a_deg", "c_deg", "dx_mm", "dy_mm", "dz_mm"], ignored: &["point"] };
+
+/// The loader `r-test-points`.
+struct RTestPoints {
+    path: PathBuf,
+}
+
+impl Loader for RTestPoints {
+    fn kind(&self) -> SourceKind {
+        SourceKind::Points
+    }
+
+    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
+        NUMBERS.read(&self.path, "r-test").map(Source::Points)
+    }
+}

@@ -1,0 +1,172 @@
+//! The separator `r-test`: a model of an R-test on the C axis for the closed loop.
+//!
+//! How the axis stands (two offsets, two errors of perpendicularity) and how the ball stands on the table move the ball by a
+//! level and one harmonic of C in each coordinate (ISO 230-1:2012, 3.5; ISO 230-7 names them E_X0C … E_B0C):
+//!
+//! d_j(C) = d_j0 + a_j cos C + b_j sin C,  j = x, y, z.
+//!
+//! Higher harmonics are error motions of the axis.
+
+use runout_core::{
+    Error, Result,
+    model::{
+        Effect, Fit, Parameter, Remainder,
+        linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
+    },
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
+    points::Points,
+    stage::{Conclusion, PointModel, Separator},
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// `[separate] plugin = "r-test"`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RTestConfig {
+    /// Standard uncertainty of one coordinate of one point, in µm.
+    pub std_um: f64,
+    /// Only points at this command of the A axis are used: the A axis stands otherwise at another.
+    pub a_deg: f64,
+    /// Highest harmonic of C that may be in the error motion.
+    #[serde(default = "default_max_order")]
+    pub max_order: usize,
+}
+
+fn default_max_order() -> usize {
+    3
+}
+
+const HIGHEST_ORDER: usize = 50;
+/// Commands closer than this are the same, in degrees: half the last digit of most controls.
+const SAME_COMMAND_DEG: f64 = 5e-4;
+/// Fewer points a coordinate are few: two for each parameter of three harmonics.
+const FEW_POINTS: usize = 14;
+
+impl StageConfig for RTestConfig {
+    type Stage = Separator;
+
+    const NAME: &'static str = "r-test";
+    const ABOUT: &'static str = "installation and harmonics of a C axis by an R-test, for `diagnose`";
+
+    fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        Ok(Separator::Model(Box::new(self.model()?)))
+    }
+}
+
+impl RTestConfig {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// The first that cannot be, with its key.
+    pub fn model(self) -> std::result::Result<RTest, Fault> {
+        if !(self.std_um.is_finite() && self.std_um > 0.0) {
+            return Err(Fault::at("std_um", format!("the uncertainty must be above 0 µm, found {}", self.std_um)));
+        }
+        if !self.a_deg.is_finite() {
+            return Err(Fault::at("a_deg", format!("expected an angle, found {}", self.a_deg)));
+        }
+        if !(2..=HIGHEST_ORDER).contains(&self.max_order) {
+            let message = format!("expected an order from 2 to {HIGHEST_ORDER}, found {}", self.max_order);
+            return Err(Fault::at("max_order", message));
+        }
+        Ok(RTest(self))
+    }
+}
+
+/// The installation of the C axis, and what may be missing.
+#[derive(Debug, Clone)]
+pub struct RTest(RTestConfig);
+
+const COORDINATES: [(&str, &str); 3] = [("x", "dx_mm"), ("y", "dy_mm"), ("z", "dz_mm")];
+
+impl RTest {
+    /// C commands of the points used, with their places in the file.
+    fn used(&self, points: &Points) -> Result<Vec<(usize, f64)>> {
+        let at = |a: &f64| (a - self.0.a_deg).abs() < SAME_COMMAND_DEG;
+        let both = points.column("a_deg")?.iter().zip(points.column("c_deg")?).enumerate();
+        let used: Vec<_> = both.filter(|(_, (a, _))| at(a)).map(|(index, (_, c))| (index, *c)).collect();
+        if used.is_empty() {
+            let problem = format!("no point is at A = {}°", self.0.a_deg);
+            let help = "`a_deg` names the command of the A axis whose points are used";
+            return Err(Error::new("fit", points.input.display().to_string(), problem).help(help));
+        }
+        Ok(used)
+    }
+}
+
+impl PointModel for RTest {
+    fn terms(&self, points: &Points) -> Result<LinearTerms> {
+        let used = self.used(points)?;
+        let count = used.len();
+        let mut values = Vec::with_capacity(3 * count);
+        for (_, name) in COORDINATES {
+            let column = points.column(name)?;
+            values.extend(used.iter().filter_map(|(index, _)| column.get(*index)).map(|millimetres| 1e3 * millimetres));
+        }
+        // Coordinate by coordinate: a wave of C in one of them.
+        let wave = |coordinate: usize, order: usize, function: fn(f64) -> f64| -> Vec<f64> {
+            let mut column = vec![0.0; 3 * count];
+            let places = column.iter_mut().skip(coordinate * count);
+            places.zip(&used).for_each(|(entry, (_, c))| *entry = function(order as f64 * c.to_radians()));
+            column
+        };
+        let declared = COORDINATES.iter().enumerate().flat_map(|(coordinate, (name, _))| {
+            let one = |what: &str, order, function| {
+                let column = wave(coordinate, order, function);
+                Declared { name: format!("{name} {what}"), unit: "um".into(), column }
+            };
+            [one("level", 0, f64::cos), one("cos C", 1, f64::cos), one("sin C", 1, f64::sin)]
+        });
+        let terms = (2..=self.0.max_order).map(|order| {
+            let names = COORDINATES.iter().flat_map(|(name, _)| [format!("{name}_cosine"), format!("{name}_sine")]);
+            let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
+            let columns =
+                (0..3).flat_map(|coordinate| [wave(coordinate, order, f64::cos), wave(coordinate, order, f64::sin)]);
+            Term {
+                effect: Effect { id: format!("harmonic-{order}"), target: None, parameters },
+                columns: columns.collect(),
+                rank: 0,
+            }
+        });
+        let observations = Observations {
+            values,
+            unit: "um".into(),
+            std: Some(self.0.std_um),
+            group: (0..3).flat_map(|_| 0..count).collect(),
+            groups: used.iter().map(|(_, c)| format!("C = {c}°")).collect(),
+        };
+        let object = points.input.display();
+        LinearTerms::new(observations, declared.collect(), terms.collect())
+            .map_err(|error| Error::new("fit the installation to", object.to_string(), error))
+    }
+
+    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion> {
+        let used = self.used(points)?;
+        let Remainder { rms, dof, held_out_rms, .. } = fit.remainder();
+        let all = points.column("a_deg")?.len();
+        let mut remarks = vec![format!("{} of {all} points are used, those at A = {}°", used.len(), self.0.a_deg)];
+        let [low, high] =
+            used.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, c)| [low.min(*c), high.max(*c)]);
+        if used.len() < FEW_POINTS {
+            remarks.push(format!(
+                "{} points a coordinate (C = {low}° to {high}°) are few: {dof} degrees of freedom are left in all, so that \
+                 {rms:.2} µm rms left, where {} µm is stated, confirms little",
+                used.len(),
+                self.0.std_um
+            ));
+        }
+        if *held_out_rms > 2.0 * self.0.std_um {
+            remarks.push(format!(
+                "a point left out is predicted to {held_out_rms:.1} µm rms only, {:.1} times the stated uncertainty: with \
+                 the others alone its place is mostly extrapolated, so leaving out compares models here but does not \
+                 confirm one",
+                held_out_rms / self.0.std_um
+            ));
+        }
+        Ok(Conclusion { shape: None, remarks })
+    }
+}
