@@ -25,6 +25,8 @@ pub enum Command {
     Run(RunArgs),
     /// Say everything that can be said without the data: configuration, what the rig can and cannot separate.
     Check(PipelineArgs),
+    /// Find what the declared model lacks, name it or say that it cannot be named, add it: error before and after.
+    Diagnose(PipelineArgs),
     /// Run several separators on the same data: values side by side, differences with their uncertainty, E_n.
     Compare(CompareArgs),
     /// Make a campaign with declared truth and effects, as a measurement file.
@@ -183,7 +185,7 @@ pub struct PluginsArgs {
 /// `runout schema`.
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
-    /// `pipeline`, `scenario`, `rig`, `summary`, `compare`, `check`, `plan`, or a plugin's name; all the files' schemas without it.
+    /// `pipeline`, `scenario`, `rig`, `summary`, `diagnosis`, `compare`, `check`, `plan`, or a plugin's name; all the files' schemas without it.
     pub name: Option<String>,
     /// Write each file's schema to `NAME.schema.json` in this folder.
     #[arg(long, value_name = "DIR", conflicts_with = "name")]

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod compare;
+pub mod diagnose;
 pub mod inspect;
 pub mod plan;
 pub mod plugins;
@@ -27,6 +28,7 @@ pub fn execute(command: Command, json: bool) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::execute(&args, json),
         Command::Check(args) => check::execute(&args, json),
+        Command::Diagnose(args) => diagnose::execute(&args, json),
         Command::Compare(args) => compare::execute(&args, json),
         Command::Simulate(args) => simulate::execute(&args, json),
         Command::Plan(args) => plan::execute(&args, json),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use runout_core::{
     Error, atomic_file,
+    model::diagnosis::Diagnosis,
     pipeline::{
         Registry,
         compare::Comparison,
@@ -46,6 +47,7 @@ fn files(registry: &Registry) -> Vec<(&'static str, Value)> {
         ("scenario", scenario(registry)),
         ("rig", of::<RigConfig>("runout rig", SchemaSettings::default())),
         ("summary", of::<Summary>("runout summary", SchemaSettings::default().for_serialize())),
+        ("diagnosis", of::<Diagnosis>("runout diagnosis", SchemaSettings::default().for_serialize())),
         ("compare", of::<Comparison>("runout compare", SchemaSettings::default().for_serialize())),
         ("check", of::<check::Report>("runout check", SchemaSettings::default().for_serialize())),
         ("plan", of::<plan::Report>("runout plan", SchemaSettings::default().for_serialize())),

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod compare;
+pub mod diagnosis;
 pub mod diagnostic;
 pub mod file;
 pub mod keys;

@@ -1,0 +1,18 @@
+//! `runout diagnose`.
+
+use runout_core::pipeline::diagnose;
+
+use super::{pipeline, print};
+use crate::{args::PipelineArgs, failure::Failure, progress::Progress, render};
+
+/// Runs the closed loop on a pipeline and says what the declared model lacks.
+///
+/// # Errors
+/// When the configuration is wrong, or the data or a file fails. Whatever the verdict, a diagnosis is no failure.
+pub fn execute(args: &PipelineArgs, json: bool) -> Result<(), Failure> {
+    let (_, pipeline) = pipeline(args)?;
+    let progress = Progress::new("stations");
+    let diagnosis = diagnose::diagnose(&pipeline, &progress)?;
+    drop(progress);
+    print(&diagnosis, json, render::diagnosis::text)
+}
