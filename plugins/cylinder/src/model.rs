@@ -165,10 +165,9 @@ impl PointModel for LeastSquaresCylinder {
                 basis.circles.iter().map(|circle| circle.measured - circle.scan.len()).sum::<usize>(),
                 basis.circles.iter().map(|circle| circle.measured).sum::<usize>()
             ),
-            format!(
-                "the noise is not known from elsewhere, and neighbouring points are alike (one in {raised:.0} counts): \
-                 evidence and standard uncertainties of the effects flatter, and the circles left out decide"
-            ),
+            "the noise is not known from elsewhere, and points of one circle are no independent witnesses: evidence and \
+             standard uncertainties of the effects flatter, and the circles left out decide"
+                .into(),
             "form of the exports is that of the effects found (taper, barrel, lobes), not of each circle on its own"
                 .into(),
         ];

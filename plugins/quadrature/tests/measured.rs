@@ -114,3 +114,18 @@ fn the_diagnosis_is_written_and_a_run_says_what_it_cannot() {
     let known = format!("{text}\ndiagnose.known = [{{ effect = 'quadrature-offset', values = {{ cosine = 3.0 }} }}]");
     assert!(diagnose(&pipeline(&known), &Silent).unwrap().added.is_empty());
 }
+
+#[test]
+fn what_a_model_cannot_take_is_refused_before_it_runs() {
+    let mut registry = Registry::default();
+    runout_quadrature::register(&mut registry);
+    let refused = |more: &str| {
+        let text = format!("{}{more}", text(std::path::Path::new("signal.csv")));
+        let sources = Sources::from_text("test.toml", &text, PathBuf::new(), &[], "rig").unwrap();
+        Pipeline::from_sources(&sources, &registry).err().unwrap().to_string()
+    };
+    assert!(refused("diagnose.hold_out = 0.2").contains("group by group"));
+    assert!(refused("diagnose.hold_out = 2").contains("between 0 and 1"));
+    assert!(refused("separate.blocks = 1").contains("blocks"));
+    assert!(refused("diagnose.known = [{ effect = 'quadrature-offset', values = { sine = nan } }]").contains("finite"));
+}

@@ -1,7 +1,7 @@
 //! The separator `r-test`: a model of an R-test on the C axis for the closed loop.
 //!
-//! How the axis stands (two offsets, two errors of perpendicularity) and how the ball stands on the table move the ball by a
-//! level and one harmonic of C in each coordinate (ISO 230-1:2012, 3.5; ISO 230-7 names them E_X0C … E_B0C):
+//! How the axis stands (two offsets and two errors of perpendicularity, E_X0C, E_Y0C, E_A0C and E_B0C of ISO 230-7) and how the
+//! ball stands on the table move the ball by a level and one harmonic of C in each coordinate:
 //!
 //! d_j(C) = d_j0 + a_j cos C + b_j sin C,  j = x, y, z.
 //!
