@@ -124,7 +124,9 @@ fn report(sources: &Sources, pipeline: &Pipeline) -> Result<Report, Failure> {
     if matches!(pipeline.route, Route::Traces { .. }) {
         notes.push(LIMIT.to_owned());
     }
-    if pipeline.exporters.is_empty() {
+    if matches!(pipeline.route, Route::Model { .. }) {
+        notes.push("there is no form to separate: `runout diagnose` finds what the declared model lacks".into());
+    } else if pipeline.exporters.is_empty() {
         notes.push("there is no [[export]]: a run would only print its summary".into());
     }
     Ok(Report {

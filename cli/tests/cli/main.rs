@@ -6,6 +6,7 @@ mod compare;
 mod diagnostics;
 mod folder;
 mod lost_orders;
+mod measured;
 mod other_rigs;
 mod safety;
 mod schemas;

@@ -1,0 +1,40 @@
+//! `examples/12-measured-r-test` as it stands: a model of points that has no form to separate.
+
+use serde_json::Value;
+
+use crate::folder::Folder;
+
+const PIPELINE: &str = include_str!("../../../examples/12-measured-r-test/pipeline.toml");
+const POINTS: &str = include_str!("../../../examples/12-measured-r-test/r-test.csv");
+const DIAGNOSIS: &str = include_str!("../../../examples/12-measured-r-test/diagnosis.json");
+
+fn example() -> Folder {
+    Folder::with(&[("pipeline.toml", PIPELINE), ("r-test.csv", POINTS)])
+}
+
+#[test]
+fn the_diagnosis_is_the_one_shown() {
+    let ran = example().run(&["diagnose", "pipeline.toml", "--json"]);
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let [found, shown]: [Value; 2] = [&ran.stdout, DIAGNOSIS].map(|text| serde_json::from_str(text).unwrap());
+    assert_eq!((&found["verdict"], &found["warnings"]), (&shown["verdict"], &shown["warnings"]));
+    assert_eq!(found["added"][0]["effect"], "harmonic-2");
+    for level in ["before", "after"] {
+        let [found, shown] = [&found, &shown].map(|text| text[level]["residual_rms_um"].as_f64().unwrap());
+        // 1e-9 µm: another processor rounds otherwise.
+        assert!((found - shown).abs() < 1e-9, "{level}: {found} instead of {shown}");
+    }
+}
+
+#[test]
+fn what_it_cannot_do_is_said() {
+    let folder = example();
+    let ran = folder.run(&["check", "pipeline.toml"]);
+    assert!(ran.stdout.contains("there is no form to separate"), "{}", ran.stdout);
+    let ran = folder.run(&["run", "pipeline.toml"]);
+    assert!(ran.status == 1 && ran.stderr.contains("separates no form"), "{}", ran.stderr);
+    let ran = folder.run(&["diagnose", "pipeline.toml", "--set", "diagnose.path=r-test.csv"]);
+    assert!(ran.status == 1 && ran.stderr.contains("it is what the run reads"), "{}", ran.stderr);
+    let ran = folder.run(&["diagnose", "pipeline.toml", "--set", "diagnose.effects=[\"harmonics-2\"]"]);
+    assert!(ran.status == 1 && ran.stderr.contains("did you mean `harmonic-2`"), "{}", ran.stderr);
+}
