@@ -57,6 +57,10 @@ pub struct Closed<F> {
 struct Found {
     /// The best one first.
     members: Vec<usize>,
+    /// Values of each member as if it were all of it.
+    alone: Vec<Vec<f64>>,
+    /// What else was applied, at its best values beside it.
+    others: Vec<Setting>,
     /// Values and standard uncertainties as if the best one were all of it.
     values: Vec<f64>,
     std: Vec<f64>,
@@ -73,26 +77,28 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     let declared = model.fit(&settings.known)?;
     let before = model.whole().fit(&settings.known)?;
     let mut tracing = Tracing { model, settings, found: Vec::new(), refused: Vec::new() };
-    let mut current = tracing.refit_found(model)?;
+    let mut current = tracing.refit_found(model, &[])?;
     while tracing.found.len() < settings.max_added {
         let Some(found) = tracing.next(&current) else { break };
+        let start = found.others.clone();
         tracing.found.push(found);
-        current = tracing.refit_found(model)?;
+        current = tracing.refit_found(model, &start)?;
         if let Some(last) = tracing.found.last_mut() {
             last.after = current.fit.remainder().clone();
         }
     }
     if !at_the_floor(current.fit.remainder()) && tracing.drop_the_least_bad() {
-        current = tracing.refit_found(model)?;
+        current = tracing.refit_found(model, &current.settings)?;
     }
     let held_out = [declared.remainder().held_out_rms, current.fit.remainder().held_out_rms];
-    let current = tracing.refit_found(model.whole())?;
+    let current = tracing.refit_found(model.whole(), &current.settings)?;
     let left = at_the_floor(current.fit.remainder());
     let verdict = match (left, tracing.found.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::AtNoiseFloor,
         (true, false) => Verdict::Explained,
     };
+    tracing.settle(&current);
     let mut after = current.fit;
     let members: Vec<usize> = current.settings[settings.known.len()..].iter().map(|setting| setting.effect).collect();
     let unit = after.remainder().chi2_per_dof();
@@ -138,34 +144,19 @@ impl<M: Model> Tracing<'_, M> {
 
     /// All effects found, jointly. A confounded set enters as a whole: each member may be all of it, which is the size of
     /// its prior; what the data cannot decide then shows as a spread.
-    fn refit_found(&self, model: &M) -> Result<Refit<M::Fit>> {
+    fn refit_found(&self, model: &M, start: &[Setting]) -> Result<Refit<M::Fit>> {
         let mut settings = self.settings.known.clone();
-        let mut priors = Vec::new();
-        let mut position = 0;
         for found in &self.found {
-            let size = |index: usize, parameter: usize| {
-                let tolerance =
-                    self.model.effects()[index].parameters.get(parameter).map_or(1.0, |known| known.tolerance);
-                // Members of other kinds have other units: their size is what has the same effect.
-                let best = &self.model.effects()[found.members[0]].parameters;
-                let own = found.values.get(parameter).map(|value| value.abs());
-                let own = own.zip(best.get(parameter)).map(|(value, best)| value / best.tolerance);
-                own.unwrap_or(1.0).max(1e-6) * tolerance
-            };
-            for (place, member) in found.members.iter().enumerate() {
-                let count = self.model.effects()[*member].parameters.len();
+            for (member, alone) in found.members.iter().zip(&found.alone) {
+                // Any mixture explains the data; the even one is in the middle of what they cannot decide.
+                let share = 1.0 / found.members.len() as f64;
+                let known = start.iter().find(|setting| setting.effect == *member);
                 let values =
-                    if place == 0 && found.members.len() == 1 { found.values.clone() } else { vec![0.0; count] };
-                if found.members.len() > 1 {
-                    let held = (0..count)
-                        .map(|parameter| Prior { parameter: position + parameter, std: size(*member, parameter) });
-                    priors.extend(held);
-                }
-                position += count;
+                    known.map_or_else(|| alone.iter().map(|value| value * share).collect(), |at| at.values.clone());
                 settings.push(Setting { effect: *member, values });
             }
         }
-        refit(model, settings, self.settings.known.len(), &priors)
+        refit(model, settings, self.settings.known.len(), &self.priors_so_far())
     }
 
     /// The effect of the lowest rank that earns its place, if any does.
@@ -197,7 +188,7 @@ impl<M: Model> Tracing<'_, M> {
                 if self.model.effects()[*effect].parameters.is_empty() {
                     return (*effect, before.chi2() - self.with(current, *effect));
                 }
-                let columns = orthonormal(current.fit.signature(*effect), &basis);
+                let columns = independent(current.fit.signature(*effect), &basis);
                 (*effect, columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum())
             })
             .collect();
@@ -251,8 +242,15 @@ impl<M: Model> Tracing<'_, M> {
             let difference = (other.chi2 - trial.chi2) / unit.max(f64::MIN_POSITIVE);
             difference < SAME_BIC && evidence.delta_bic - best < SAME_BIC.max(0.02 * best.abs())
         });
-        let members = std::iter::once(effect).chain(alike.map(|(other, ..)| other)).collect();
-        Some(Found { members, values, std, evidence, before, after })
+        let mut members = vec![effect];
+        let mut alone = vec![values.clone()];
+        for (other, refit, _) in alike {
+            members.push(other);
+            alone.push(refit.settings.last().map(|setting| setting.values.clone()).unwrap_or_default());
+        }
+        let mut others = trial.settings;
+        others.pop();
+        Some(Found { members, alone, others, values, std, evidence, before, after })
     }
 
     /// Keeps the last reason for which an effect was refused.
@@ -270,14 +268,34 @@ impl<M: Model> Tracing<'_, M> {
         self.model.fit(&settings).map_or(f64::INFINITY, |fit| fit.remainder().chi2())
     }
 
+    /// Takes values and uncertainties of effects that stand for themselves from the final fit.
+    fn settle(&mut self, last: &Refit<M::Fit>) {
+        let remainder = last.fit.remainder();
+        let unit = remainder.chi2_per_dof();
+        let unit = if remainder.noise_is_known() { unit.max(1.0) } else { unit };
+        let mut settings = last.settings[self.settings.known.len()..].iter();
+        let mut position = 0;
+        for found in &mut self.found {
+            let alone = found.members.len() == 1;
+            for setting in settings.by_ref().take(found.members.len()) {
+                if alone {
+                    found.values.clone_from(&setting.values);
+                    let places = position..position + setting.values.len();
+                    found.std = places.map(|place| (last.covariance[place][place] * unit).sqrt()).collect();
+                }
+                position += setting.values.len();
+            }
+        }
+    }
+
     fn priors_so_far(&self) -> Vec<Prior> {
         let mut priors = Vec::new();
         let mut position = 0;
         for found in &self.found {
-            for member in &found.members {
-                for parameter in &self.model.effects()[*member].parameters {
+            for (member, alone) in found.members.iter().zip(&found.alone) {
+                for (value, known) in alone.iter().zip(&self.model.effects()[*member].parameters) {
                     if found.members.len() > 1 {
-                        priors.push(Prior { parameter: position, std: parameter.tolerance });
+                        priors.push(Prior { parameter: position, std: value.abs().max(1e-3 * known.tolerance) });
                     }
                     position += 1;
                 }
@@ -317,6 +335,20 @@ fn at_the_floor(remainder: &Remainder) -> bool {
 
 fn worse(before: f64, after: f64) -> bool {
     before.is_finite() && after.is_finite() && after > before * (1.0 - HELD_OUT_GAIN)
+}
+
+/// A candidate that differs by less than this from what is applied already, relative, is another description of it.
+const DIFFERENT: f64 = 0.02;
+
+/// The columns of a candidate beside those applied; none where it is another description of them.
+fn independent(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let whole: f64 = columns.iter().map(|column| dot(column, column)).sum();
+    let outside =
+        |column: &Vec<f64>| dot(column, column) - basis.iter().map(|base| dot(base, column).powi(2)).sum::<f64>();
+    if columns.iter().map(outside).sum::<f64>() < DIFFERENT * DIFFERENT * whole {
+        return Vec::new();
+    }
+    orthonormal(columns, basis)
 }
 
 /// Columns made orthonormal to a basis and to each other; dependent ones are left out.
@@ -409,5 +441,14 @@ fn blind(effects: &[Effect], considered: &[usize], fit: &impl Fit) -> Vec<Blind>
             bias_per_unit: BiasPerUnit { value: largest.value, unit: largest.unit, on: largest.on },
         })
     };
-    considered.iter().filter(unseen).filter_map(report).collect()
+    let mut found: Vec<Blind> = Vec::new();
+    for blind in considered.iter().filter(unseen).filter_map(report) {
+        // The same effect at several orders is one.
+        match found.iter_mut().find(|known| known.effect == blind.effect && known.targets == blind.targets) {
+            Some(known) if known.bias_per_unit.value >= blind.bias_per_unit.value => {}
+            Some(known) => *known = blind,
+            None => found.push(blind),
+        }
+    }
+    found
 }

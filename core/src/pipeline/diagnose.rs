@@ -4,16 +4,21 @@ pub mod config;
 
 use super::{
     config::{Pipeline, Route},
-    result::RunInfo,
+    line::Line,
+    result::{RunInfo, complete, true_error},
     run::{Gathering, Observer, spare_inputs, take_sections},
 };
 use crate::{
     Error, Result,
     atomic_file::{PendingFile, commit_all},
-    model::{Model, closed_loop, diagnosis::Diagnosis},
+    model::{
+        Model, closed_loop,
+        diagnosis::{Diagnosis, Step, Truth},
+    },
     points::Points,
     provenance::Input,
-    stage::{Conclusion, PointModel, Source},
+    separation::Quantity,
+    stage::{Conclusion, PointModel, Source, Station, StationSeparator},
 };
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form.
@@ -31,9 +36,76 @@ pub fn diagnose(pipeline: &Pipeline, observer: &dyn Observer) -> Result<Diagnosi
             diagnose_points(pipeline, points, model, observer)
         }
         (Source::Points(points), Route::Model { model }) => diagnose_points(pipeline, points, &**model, observer),
-        // Recorded turns.
+        (Source::Turns(recording), Route::Turns { conditioners, averager, separator }) => {
+            let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
+            let hold_out = Some(pipeline.diagnose.hold_out.unwrap_or(HOLD_OUT));
+            let line = Line { rig, recording: &**recording, conditioners, averager: &**averager, hold_out };
+            diagnose_turns(pipeline, &line, &**separator, observer)
+        }
         _ => Err(no_model(&pipeline.separator)),
     }
+}
+
+/// Share of the turns that is held out where the pipeline says nothing.
+const HOLD_OUT: f64 = 0.2;
+
+fn diagnose_turns(
+    pipeline: &Pipeline,
+    line: &Line,
+    separator: &dyn StationSeparator,
+    observer: &dyn Observer,
+) -> Result<Diagnosis> {
+    let recording = line.recording;
+    let outputs: Vec<_> = pipeline.outputs().into_iter().chain(pipeline.diagnosis_path()).collect();
+    spare_inputs(&outputs, &recording.inputs())?;
+    let mut stations: Vec<Station> = Vec::new();
+    let inputs = line.run(
+        None,
+        observer,
+        |_, station| Ok(station),
+        |station| {
+            stations.push(station);
+            Ok(())
+        },
+    )?;
+    let found = separator.diagnose(&stations, &|effects| pipeline.diagnose.settings(effects)).ok_or_else(|| {
+        let problem = format!("`{}` has no model of effects for the closed loop", pipeline.separator);
+        Error::new("diagnose", &pipeline.title, problem)
+    })??;
+    let mut diagnosis = found.diagnosis;
+    let info =
+        RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
+    let mut gathering = Gathering::begin(pipeline, &info)?;
+    let mut errors = [Vec::new(), Vec::new()];
+    for (index, (station, (before, after))) in
+        stations.into_iter().zip(found.before.into_iter().zip(found.after)).enumerate()
+    {
+        let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
+        let truth = recording.truth(index)?;
+        let complete = |separation, profiles| {
+            complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone())
+        };
+        let declared = complete(before, Vec::new());
+        let result = complete(after, station.profiles);
+        for (errors, result) in errors.iter_mut().zip([&declared, &result]) {
+            let forms = (0..result.separation.sections.len()).map(Quantity::Form);
+            errors.extend(forms.filter_map(|form| true_error(result, form)));
+        }
+        gathering.take(&result, pipeline.rig.as_ref())?;
+    }
+    let rms = |errors: &Vec<f64>| {
+        let squares: f64 = errors.iter().map(|error| error * error).sum();
+        (!errors.is_empty()).then(|| (squares / errors.len() as f64).sqrt())
+    };
+    if !errors[0].is_empty() {
+        diagnosis.truth = Some(Truth { form_rms_error_um: Step { before: rms(&errors[0]), after: rms(&errors[1]) } });
+    }
+    let written = pipeline.diagnosis_path().map(|path| pending(path, &diagnosis)).transpose()?;
+    let surface = gathering.build_surface(line.rig.part_radius_mm)?;
+    let mut remarks = recording.remarks();
+    remarks.extend(diagnosis.warnings.iter().cloned());
+    gathering.conclude(inputs, remarks, surface.as_ref(), written)?;
+    Ok(diagnosis)
 }
 
 /// More than any model of points has effects that earn their place.

@@ -26,6 +26,8 @@ pub struct Line<'a> {
     pub recording: &'a dyn Recording,
     pub conditioners: &'a [Box<dyn Conditioner>],
     pub averager: &'a dyn Averager,
+    /// Share of the turns that are averaged by themselves besides.
+    pub hold_out: Option<f64>,
 }
 
 impl Line<'_> {
@@ -100,7 +102,7 @@ impl Line<'_> {
         for conditioner in self.conditioners {
             stream = conditioner.attach(stream)?;
         }
-        self.averager.average(stream)
+        self.averager.average_holding_out(stream, self.hold_out)
     }
 }
 

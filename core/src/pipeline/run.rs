@@ -68,7 +68,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 .rig
                 .as_ref()
                 .ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
-            let line = Line { rig, recording: &**recording, conditioners, averager: &**averager };
+            let line = Line { rig, recording: &**recording, conditioners, averager: &**averager, hold_out: None };
             let work = |index, station: Station| {
                 let separation = separate(&**separator, &station)?;
                 let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
@@ -113,7 +113,7 @@ impl Gathering {
         })
     }
 
-    fn take(&mut self, result: &StationResult, rig: Option<&Rig>) -> Result<()> {
+    pub(super) fn take(&mut self, result: &StationResult, rig: Option<&Rig>) -> Result<()> {
         for export in &mut self.exports {
             export.station(result)?;
         }

@@ -3,6 +3,7 @@
 use crate::{
     Result,
     model::linear_terms::{LinearFit, LinearTerms},
+    model::{Effect, closed_loop::Settings, diagnosis::Diagnosis},
     pipeline::error::Fault,
     points::Points,
     profile::Profile,
@@ -43,6 +44,30 @@ pub trait StationSeparator: Send + Sync {
     /// # Errors
     /// When the profiles do not fit the rig.
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity>;
+
+    /// Runs the closed loop on all stations at once; `None` where the method has no model of effects. `settings` says how,
+    /// for a model with these effects.
+    ///
+    /// # Errors
+    /// When the profiles do not fit the rig.
+    fn diagnose(
+        &self,
+        _stations: &[Station],
+        _settings: &dyn Fn(&[Effect]) -> Result<Settings>,
+    ) -> Option<Result<StationDiagnosis>> {
+        None
+    }
+}
+
+/// What the closed loop found, with form and motion before and after.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StationDiagnosis {
+    /// What was found.
+    pub diagnosis: Diagnosis,
+    /// Form and motion of the declared model, one entry a station.
+    pub before: Vec<Separation>,
+    /// Of the final one.
+    pub after: Vec<Separation>,
 }
 
 /// One axial station, measured in every setup of the rig.

@@ -10,6 +10,8 @@ use runout_core::{
     separation::{Assessment, OrderAssessment, Quantity},
 };
 
+use crate::effects::Alterations;
+
 /// A column adds to the rank when more than this of it (relative) lies outside the others' span. Rounding of
 /// e^{inθ} at order 10 000 is 1e-12; a sensor misplaced by a nanometre on 30 mm gives 3e-8.
 const RANK_TOLERANCE: f64 = 1e-9;
@@ -56,6 +58,8 @@ pub struct Reading {
     pub part_angle_rad: f64,
     /// z minus the sensors' mean z, in mm.
     pub lever_mm: f64,
+    /// Synchronous motion in this setup over that in the first.
+    pub motion_ratio: f64,
 }
 
 /// The unknowns at order 1, where each clamping has an eccentricity of its own in each section.
@@ -92,6 +96,7 @@ impl Layout {
                     angle_rad,
                     part_angle_rad: angle_rad - clamping.part_rad,
                     lever_mm: sensor.z_mm - mean_z_mm,
+                    motion_ratio: 1.0,
                 });
             }
         }
@@ -129,6 +134,27 @@ impl Layout {
         Self { max_noise_gain, ..self }
     }
 
+    /// Whether motion is taken to have odd orders only.
+    #[must_use]
+    pub fn assumes_odd_motion(&self) -> bool {
+        self.odd_motion
+    }
+
+    /// The layout as effects change it: where sensors and part truly are, how much the spindle moves.
+    #[must_use]
+    pub fn altered(&self, alterations: &Alterations) -> Self {
+        let mut layout = self.clone();
+        layout.odd_motion &= !alterations.even_order_motion;
+        for reading in &mut layout.readings {
+            let (sensor, setup) = (&alterations.sensors[reading.sensor], &alterations.setups[reading.setup]);
+            reading.angle_rad += sensor.angle_rad;
+            reading.part_angle_rad += sensor.angle_rad - setup.part_rad;
+            reading.lever_mm += sensor.z_mm;
+            reading.motion_ratio *= 1.0 + setup.motion;
+        }
+        layout
+    }
+
     /// +1, or −1 where motion of this order is assumed to change sign in this setup.
     #[must_use]
     pub fn motion_sign(&self, setup: usize, order: usize) -> f64 {
@@ -151,7 +177,7 @@ impl Layout {
             Quantity::TiltX => -lever * sine,
             Quantity::TiltY => lever * cosine,
         };
-        Complex64::from(self.motion_sign(reading.setup, order) * motion)
+        Complex64::from(self.motion_sign(reading.setup, order) * reading.motion_ratio * motion)
     }
 
     /// e^{±in(θ'−β)}, + where the part turns counter-clockwise.
@@ -192,7 +218,7 @@ impl Layout {
     pub fn first_order_matrix(&self) -> Vec<Complex64> {
         let unknowns = self.first_order_unknowns();
         let row = |reading: &Reading| {
-            let against = Complex64::from_polar(1.0, -self.direction * reading.angle_rad);
+            let against = Complex64::from_polar(reading.motion_ratio, -self.direction * reading.angle_rad);
             unknowns
                 .iter()
                 .map(|unknown| match unknown {

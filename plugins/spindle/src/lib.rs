@@ -1,5 +1,7 @@
 //! Spindles: separators of the part's form from the axis's error motion, and a simulator of both.
 
+pub mod diagnose;
+pub mod effects;
 pub mod layout;
 pub mod plan;
 pub mod selection;

@@ -111,8 +111,13 @@ impl<'a> Comparing<'a> {
             return Err(Error::new("compare", &pipeline.title, "the loader gave what it did not declare"));
         };
         spare_inputs(&outputs, &recording.inputs())?;
-        let line =
-            Line { rig: self.rig, recording: &*recording, conditioners: self.conditioners, averager: self.averager };
+        let line = Line {
+            rig: self.rig,
+            recording: &*recording,
+            conditioners: self.conditioners,
+            averager: self.averager,
+            hold_out: None,
+        };
         let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref());
         let inputs = line.run(threads, observer, work, take)?;
         let own = pipeline.assessment.as_ref();

@@ -127,7 +127,9 @@ impl DiagnoseConfig {
             let names = || parameters.iter().map(|parameter| parameter.name.as_str());
             if let Some(name) = known.values.keys().find(|name| names().all(|known| known != *name)) {
                 let problem = format!("it has no parameter `{name}`");
-                return Err(Error::new("apply", format!("`{}`", known.effect), problem).help(known_names(name, names())));
+                return Err(
+                    Error::new("apply", format!("`{}`", known.effect), problem).help(known_names(name, names()))
+                );
             }
             let values = names().map(|name| known.values.get(name).copied().unwrap_or(0.0)).collect();
             Ok(Setting { effect: index, values })

@@ -4,13 +4,14 @@ use std::{f64::consts::TAU, marker::PhantomData};
 
 use runout_core::{
     Complex64, Result,
+    model::{Effect, closed_loop::Settings},
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
     rig::Rig,
     separation::{Assessment, Quantity, Sensitivity, Separation},
-    stage::{Separator, Station, StationSeparator, separator::require_rig},
+    stage::{Separator, Station, StationDiagnosis, StationSeparator, separator::require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -21,6 +22,7 @@ use super::{
     solution::{Operators, OrderOperator, Solver},
 };
 use crate::{
+    diagnose,
     layout::{Layout, UM_PER_MM_URAD},
     selection::Selection,
 };
@@ -173,6 +175,15 @@ impl StationSeparator for ClosedFormSeparator {
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| self.operators(readings))
+    }
+
+    fn diagnose(
+        &self,
+        stations: &[Station],
+        settings: &dyn Fn(&[Effect]) -> Result<Settings>,
+    ) -> Option<Result<StationDiagnosis>> {
+        let (selection, layout) = (self.selection.clone(), self.layout.clone());
+        Some(diagnose::diagnose(selection, layout, self.second_order, stations, settings))
     }
 }
 

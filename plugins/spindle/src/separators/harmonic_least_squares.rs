@@ -2,13 +2,14 @@
 
 use runout_core::{
     Complex64, Result,
+    model::{Effect, closed_loop::Settings},
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},
-    stage::{Separator, Station, StationSeparator, separator::require_rig},
+    stage::{Separator, Station, StationDiagnosis, StationSeparator, separator::require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -19,7 +20,7 @@ use super::{
     solution::{Operators, OrderOperator, Solver},
     weights,
 };
-use crate::{layout::Layout, selection::Selection};
+use crate::{diagnose, layout::Layout, selection::Selection};
 
 /// How readings are weighed against each other where there are more than unknowns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -112,25 +113,44 @@ impl StationSeparator for HarmonicLeastSquares {
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting))
     }
+
+    fn diagnose(
+        &self,
+        stations: &[Station],
+        settings: &dyn Fn(&[Effect]) -> Result<Settings>,
+    ) -> Option<Result<StationDiagnosis>> {
+        let (selection, layout) = (self.selection.clone(), self.layout.clone());
+        Some(diagnose::diagnose(selection, layout, self.second_order, stations, settings))
+    }
 }
 
 /// Least-squares operators of all orders.
 #[must_use]
 pub fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> Operators {
-    let count = layout.readings.len();
     let weights: Option<Vec<_>> = match weighting {
         Weighting::TurnCovariance => {
             (1..=readings.max_order).map(|order| weights::whitening(readings, order)).collect()
         }
         Weighting::None => None,
     };
+    Operators {
+        orders: order_operators(layout, readings.max_order, weights.as_deref()),
+        observable: (1..=readings.max_order).map(|order| layout.observable(order)).collect(),
+        weights,
+    }
+}
+
+/// Least-squares operators of orders from 1, with W of each order where readings are weighted.
+#[must_use]
+pub fn order_operators(layout: &Layout, max_order: usize, weights: Option<&[Vec<Complex64>]>) -> Vec<OrderOperator> {
+    let count = layout.readings.len();
     let solve = |order: usize| {
         let (columns, matrix) = if order == 1 {
             (layout.first_order_unknowns().len(), layout.first_order_matrix())
         } else {
             (layout.unknowns.len(), layout.matrix(order))
         };
-        let Some(weights) = weights.as_ref().map(|weights| &weights[order - 1]) else {
+        let Some(weights) = weights.map(|weights| &weights[order - 1]) else {
             let qr = layout.factor_matrix(columns, &matrix);
             return OrderOperator { operator: qr.operator(None), rank: qr.rank() };
         };
@@ -144,9 +164,5 @@ pub fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> 
         let qr = layout.factor_matrix(columns, &weighted);
         OrderOperator { operator: qr.operator(Some(weights)), rank: qr.rank() }
     };
-    Operators {
-        orders: (1..=readings.max_order).map(solve).collect(),
-        observable: (1..=readings.max_order).map(|order| layout.observable(order)).collect(),
-        weights,
-    }
+    (1..=max_order).map(solve).collect()
 }

@@ -12,3 +12,8 @@ mod solution;
 mod swapped_setups;
 pub mod three_point;
 mod weights;
+
+pub(crate) use readings::Readings;
+pub(crate) use second_order::{OVERSAMPLING, interpolate};
+pub(crate) use solution::{Estimate, Operators, Solver, apply, leftover, product, variances};
+pub(crate) use weights::{smooth, whitening};

@@ -84,6 +84,19 @@ impl Readings {
         })
     }
 
+    /// Leaves out the orders above `max_order`.
+    pub fn truncate(&mut self, max_order: usize) {
+        if max_order >= self.max_order {
+            return;
+        }
+        let sensors = self.count / self.turns.len().max(1);
+        self.max_order = max_order;
+        self.mean.truncate((max_order + 1) * self.count);
+        for matrices in [&mut self.covariance, &mut self.scatter].into_iter().flatten().flatten() {
+            matrices.truncate((max_order + 1) * sensors * sensors);
+        }
+    }
+
     /// The readings of one order.
     #[must_use]
     pub fn order(&self, order: usize) -> &[Complex64] {

@@ -12,7 +12,7 @@ use super::solution::Estimate;
 use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
 
 /// Finer grid on which form is tabulated, per angle of the profile.
-const OVERSAMPLING: usize = 4;
+pub(crate) const OVERSAMPLING: usize = 4;
 /// Points of the Lagrange interpolation: at fourfold oversampling, orders up to a quarter of the samples a turn are
 /// interpolated to 1e-6 of their amplitude.
 const POINTS: usize = 8;
@@ -64,7 +64,7 @@ impl<'a> SecondOrder<'a> {
                 // The eccentricity Re C e^{iα} is along the sensor's line; a quarter turn on, it is across.
                 let ahead = eccentricity * Complex64::from_polar(1.0, part_angle);
                 let across_motion = cosine * (y[step] - lever * tilt_x[step]) - sine * (x[step] + lever * tilt_y[step]);
-                let across = across_motion - ahead.im;
+                let across = reading.motion_ratio * across_motion - ahead.im;
                 let here = interpolate(table, part_angle);
                 let mut there = here;
                 for _ in 0..ROUNDS {
@@ -129,7 +129,7 @@ impl Estimate {
 }
 
 /// Lagrange interpolation in a periodic table.
-fn interpolate(table: &[f64], angle_rad: f64) -> f64 {
+pub(crate) fn interpolate(table: &[f64], angle_rad: f64) -> f64 {
     let position = (angle_rad / TAU).rem_euclid(1.0) * table.len() as f64;
     let base = position.floor();
     let offset = position - base;

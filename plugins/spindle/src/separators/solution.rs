@@ -41,7 +41,7 @@ pub struct Operators {
 /// The unknowns at all orders, motion at the sensors' mean z.
 #[derive(Debug, Clone)]
 pub struct Estimate {
-    width: usize,
+    pub width: usize,
     /// First-order unknowns, as [`Layout::first_order_unknowns`] lists them.
     pub first: Vec<Complex64>,
     /// `[order][unknown]` from order 0; order 1 holds the motion that turns against the spindle.
@@ -74,32 +74,50 @@ impl Solver<'_> {
         let mut readings = Readings::gather(self.selection, self.layout, station)?;
         weights::smooth(&mut readings);
         let operators = method(&readings);
-        let mut estimate = self.estimate(&operators, &readings.mean, readings.max_order);
-        let mut linear = readings.mean.clone();
-        if self.second_order {
-            let mut geometry =
-                SecondOrder::new(self.layout, self.selection.rig.part_radius_mm, readings.samples_per_rev);
-            let mut excess = vec![Complex64::ZERO; readings.mean.len()];
-            for _ in 0..MAX_PASSES {
-                geometry.excess(&estimate, &mut excess);
-                let mut moved = 0.0;
-                for ((linear, reading), excess) in linear.iter_mut().zip(&readings.mean).zip(&excess) {
-                    let corrected = reading - excess;
-                    moved += (corrected - *linear).norm_sqr();
-                    *linear = corrected;
-                }
-                estimate = self.estimate(&operators, &linear, readings.max_order);
-                if (0.5 * moved / readings.count as f64).sqrt() < SETTLED_UM {
-                    break;
-                }
-            }
-        }
+        let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
         let mut warnings = Vec::new();
         let residual = self.residual(&operators, &readings, &linear);
         if residual.chi2_per_dof > swapped_setups::SUSPICIOUS_CHI2 {
             warnings.extend(swapped_setups::suspect(&self.selection.rig, self.layout, &operators, &readings));
         }
         Ok(self.report(station, &operators, &readings, &estimate, residual, warnings))
+    }
+
+    /// Solves, adds what exact geometry and `beyond` add to linear readings at that solution, and solves again until it
+    /// settles. Gives the solution and the linear readings, `[order][reading]`.
+    pub fn iterate(
+        &self,
+        readings: &Readings,
+        operators: &Operators,
+        mut beyond: impl FnMut(&Estimate, &mut [Complex64]),
+    ) -> (Estimate, Vec<Complex64>) {
+        let mut estimate = self.estimate(operators, &readings.mean, readings.max_order);
+        let mut linear = readings.mean.clone();
+        let mut geometry = self
+            .second_order
+            .then(|| SecondOrder::new(self.layout, self.selection.rig.part_radius_mm, readings.samples_per_rev));
+        let mut excess = vec![Complex64::ZERO; readings.mean.len()];
+        for _ in 0..MAX_PASSES {
+            match &mut geometry {
+                Some(geometry) => geometry.excess(&estimate, &mut excess),
+                None => excess.fill(Complex64::ZERO),
+            }
+            beyond(&estimate, &mut excess);
+            let mut moved = 0.0;
+            for ((linear, reading), excess) in linear.iter_mut().zip(&readings.mean).zip(&excess) {
+                let corrected = reading - excess;
+                moved += (corrected - *linear).norm_sqr();
+                *linear = corrected;
+            }
+            if moved == 0.0 {
+                break;
+            }
+            estimate = self.estimate(operators, &linear, readings.max_order);
+            if (0.5 * moved / readings.count as f64).sqrt() < SETTLED_UM {
+                break;
+            }
+        }
+        (estimate, linear)
     }
 
     /// How the estimates follow from all readings of a station, also those that the selection leaves out.
@@ -164,7 +182,7 @@ impl Solver<'_> {
         self.layout.unknowns.iter().map(value).collect()
     }
 
-    fn residual(&self, operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Residual {
+    pub fn residual(&self, operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Residual {
         let count = readings.count;
         let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
         // Weighted as the fit is; set against what the covariance lets expect of it.
@@ -210,7 +228,7 @@ impl Solver<'_> {
         }
     }
 
-    fn report(
+    pub fn report(
         &self,
         station: &Station,
         operators: &Operators,
@@ -267,7 +285,7 @@ impl Solver<'_> {
     }
 
     /// The operator of an order, with the unknowns of orders from 2 as rows.
-    fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
+    pub fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
         let operator = &operators.orders[order - 1].operator;
         if order == 1 { self.first_order_operator(operator, count) } else { operator.clone() }
     }
@@ -291,7 +309,7 @@ pub fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
 }
 
 /// Product of two square matrices.
-fn product(left: &[Complex64], right: &[Complex64], size: usize) -> Vec<Complex64> {
+pub fn product(left: &[Complex64], right: &[Complex64], size: usize) -> Vec<Complex64> {
     let mut product = vec![Complex64::ZERO; size * size];
     for (row, target) in left.chunks_exact(size).zip(product.chunks_exact_mut(size)) {
         for (factor, source) in row.iter().zip(right.chunks_exact(size)) {
@@ -318,7 +336,7 @@ pub fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usize) -> V
 }
 
 /// Diagonal of M·Σ·Mᴴ for M (`[row][reading]`).
-fn variances(matrix: &[Complex64], covariance: &[Complex64], count: usize) -> Vec<f64> {
+pub fn variances(matrix: &[Complex64], covariance: &[Complex64], count: usize) -> Vec<f64> {
     matrix
         .chunks_exact(count)
         .map(|row| {

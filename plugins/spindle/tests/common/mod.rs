@@ -113,6 +113,7 @@ pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
         mean,
         covariance: None,
         scatter: None,
+        split: None,
         turns: TurnCount { recorded: 1, used: 1, ..TurnCount::default() },
         speed_rpm: None,
         responses: Vec::new(),

@@ -1,0 +1,391 @@
+//! A spindle model fitted with effects applied.
+
+use std::sync::Arc;
+
+use runout_core::{
+    Complex64, Error, Result,
+    evaluate::{roundness::ront_lsci_um, uncertainty},
+    model::{Bias, Fit, Outcome, Remainder, Setting, diagnosis::Unexplained},
+    numerics::fourier::Fourier,
+    separation::{Quantity, Separation},
+    stage::Station,
+};
+
+use super::{
+    data::{Shared, StationData, project},
+    strangers,
+};
+use crate::{
+    effects::{ActsOn, Alterations, Predicted},
+    layout::Layout,
+    separators::{
+        Estimate, Operators, Readings, Solver, apply, harmonic_least_squares::order_operators, leftover, product,
+    },
+};
+
+/// A fit, and what its partials need.
+pub struct SpindleFit {
+    shared: Arc<Shared>,
+    alterations: Alterations,
+    layout: Layout,
+    stations: Vec<Solved>,
+    remainder: Remainder,
+}
+
+/// One station's solution.
+pub(super) struct Solved {
+    pub operators: Operators,
+    pub estimate: Estimate,
+    /// Readings taken back to displacements.
+    pub corrected: Readings,
+    /// The same without what exact geometry adds.
+    pub linear: Vec<Complex64>,
+    /// W (I − A P) of each order from 1, over the noise of a real degree of freedom.
+    pub whitened: Vec<Vec<Complex64>>,
+    /// What is not known of effects, `[order][unknown]`, added to the variances.
+    widened: Vec<f64>,
+}
+
+impl SpindleFit {
+    pub(super) fn new(shared: Arc<Shared>, applied: &[Setting]) -> Result<Self> {
+        let mut alterations = Alterations::none(&shared.layout);
+        for setting in applied {
+            let place = shared.places.get(setting.effect).ok_or_else(|| {
+                Error::new("apply", format!("effect {}", setting.effect), "there is no such effect in this rig")
+            })?;
+            shared.kind(setting.effect).alter(place.index, &setting.values, &mut alterations);
+        }
+        if !alterations.are_possible() {
+            return Err(Error::new("apply", "effects", "their values are beyond all bounds"));
+        }
+        let layout = shared.layout.altered(&alterations);
+        let stations: Vec<Solved> =
+            shared.data.iter().map(|data| Solved::new(&shared, data, &layout, &alterations)).collect();
+        let remainder = remainder(&shared, &stations, &layout, &alterations);
+        Ok(Self { shared, alterations, layout, stations, remainder })
+    }
+
+    /// The layout with the effects applied.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Highest order fitted.
+    #[must_use]
+    pub fn max_order(&self) -> usize {
+        self.stations.iter().map(|station| station.corrected.max_order).max().unwrap_or(0)
+    }
+
+    fn predicted(&self, station: usize) -> Predicted<'_> {
+        let solved = &self.stations[station];
+        let readings = &solved.corrected;
+        Predicted::new(&self.layout, &self.alterations, readings.samples_per_rev, &solved.estimate, &readings.mean)
+    }
+
+    fn partials(&self, effect: usize, station: usize) -> Vec<Vec<Complex64>> {
+        let place = &self.shared.places[effect];
+        self.shared.kind(effect).partials(place.index, &self.predicted(station))
+    }
+
+    /// Form and motion, one entry a station.
+    #[must_use]
+    pub fn separations(&self, stations: &[Station]) -> Vec<Separation> {
+        let solver = self.shared.solver(&self.layout, &self.alterations);
+        let each = self.stations.iter().zip(stations).map(|(solved, station)| {
+            let residual = solver.residual(&solved.operators, &solved.corrected, &solved.linear);
+            let mut separation =
+                solver.report(station, &solved.operators, &solved.corrected, &solved.estimate, residual, Vec::new());
+            separation.variance.iter_mut().zip(&solved.widened).for_each(|(variance, more)| *variance += more);
+            separation
+        });
+        each.collect()
+    }
+}
+
+impl Shared {
+    pub(super) fn solver<'a>(&'a self, layout: &'a Layout, alterations: &Alterations) -> Solver<'a> {
+        Solver { selection: &self.selection, layout, second_order: self.second_order || alterations.exact_geometry }
+    }
+}
+
+impl Solved {
+    fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
+        let mut corrected = data.readings.clone();
+        alterations.correct(layout, &mut corrected.mean, corrected.samples_per_rev);
+        let max_order = corrected.max_order;
+        // Displacements are weighed by the noise of the readings that they were.
+        let weights: Vec<Vec<Complex64>> =
+            (1..=max_order).map(|order| data.weights_of(order, layout, alterations)).collect();
+        let operators = Operators {
+            orders: order_operators(layout, max_order, Some(&weights)),
+            observable: (1..=max_order).map(|order| layout.observable(order)).collect(),
+            weights: data.weights.is_some().then(|| weights.clone()),
+        };
+        let solver = shared.solver(layout, alterations);
+        let (estimate, linear) = solver.iterate(&corrected, &operators, |estimate, excess| {
+            axial(layout, alterations, &corrected, estimate, excess);
+        });
+        let count = corrected.count;
+        let whitened = (1..=max_order)
+            .map(|order| {
+                let matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
+                let left = leftover(&matrix, &operators.orders[order - 1].operator, count);
+                let mut left = product(&weights[order - 1], &left, count);
+                // A real degree of freedom has half of a complex one's square.
+                let scale = std::f64::consts::SQRT_2 / data.floor_std(order);
+                left.iter_mut().for_each(|entry| *entry *= scale);
+                left
+            })
+            .collect();
+        let widened = vec![0.0; (max_order + 1) * layout.unknowns.len()];
+        Self { operators, estimate, corrected, linear, whitened, widened }
+    }
+}
+
+/// Adds what places along z other than the declared ones do to the readings.
+fn axial(
+    layout: &Layout,
+    alterations: &Alterations,
+    readings: &Readings,
+    estimate: &Estimate,
+    excess: &mut [Complex64],
+) {
+    let moved = alterations.sensors.iter().any(|sensor| sensor.circle_mm != 0.0);
+    if alterations.axial_um.is_empty() && !moved {
+        return;
+    }
+    let predicted = Predicted::new(layout, alterations, readings.samples_per_rev, estimate, &readings.mean);
+    if !alterations.axial_um.is_empty() {
+        let along = predicted.curves(
+            &predicted.along_z,
+            |_| true,
+            |angle, slope| -1e-3 * slope * alterations.axial_um.iter().map(|harmonic| harmonic.at(angle)).sum::<f64>(),
+        );
+        excess.iter_mut().zip(along).for_each(|(excess, along)| *excess += along);
+    }
+    for (index, slope) in predicted.along_z.iter().enumerate() {
+        let reading = &layout.readings[index % readings.count];
+        excess[index] += slope * alterations.sensors[reading.sensor].circle_mm;
+    }
+}
+
+fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations: &Alterations) -> Remainder {
+    let mut residual = Vec::new();
+    let (mut dof, mut squares, mut expected, mut readings) = (0, 0.0, 0.0, 0);
+    let (mut held_squares, mut held_chi2, mut held_readings) = (0.0, 0.0, 0);
+    let solver = shared.solver(layout, alterations);
+    for (solved, data) in stations.iter().zip(&shared.data) {
+        let count = solved.corrected.count;
+        project(&solved.whitened, &solved.linear, count, |_, values| {
+            residual.extend(values.iter().flat_map(|value| [value.re, value.im]));
+        });
+        for (sensor, creep, std) in &data.creeps {
+            residual.push((creep - alterations.sensors[*sensor].creep_um) / std);
+            dof += 1;
+        }
+        let level = solver.residual(&solved.operators, &solved.corrected, &solved.linear);
+        if level.dof > 0 {
+            dof += level.dof;
+            squares += level.rms_um.powi(2) * count as f64;
+            expected += level.expected_rms_um.powi(2) * count as f64;
+        }
+        readings += count;
+        if let Some((chi2, sum)) = held_out(data, solved, layout, alterations) {
+            held_chi2 += chi2;
+            held_squares += sum;
+            held_readings += count;
+        }
+    }
+    let known = shared.data.iter().all(|data| data.weights.is_some());
+    let share = |sum: f64, count: usize| if count > 0 { (sum / count as f64).sqrt() } else { f64::NAN };
+    Remainder {
+        residual,
+        dof,
+        rms: share(squares, readings),
+        noise_floor: if known { share(expected, readings) } else { f64::NAN },
+        held_out_rms: share(0.5 * held_squares, held_readings),
+        held_out_chi2: if held_readings > 0 { held_chi2 } else { f64::NAN },
+        unit: "um".into(),
+    }
+}
+
+/// χ² and sum of squares (µm²) of what the fit leaves of the turns held out.
+fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &Alterations) -> Option<(f64, f64)> {
+    let mut held = data.held_out.clone()?;
+    let mut later = alterations.clone();
+    for (sensor, creeping) in later.sensors.iter_mut().zip(&data.creeping) {
+        sensor.creep_share = creeping.map_or(1.0, |creeping| creeping.held_out_share());
+    }
+    later.correct(layout, &mut held.mean, held.samples_per_rev);
+    let count = held.count;
+    let (mut chi2, mut squares) = (0.0, 0.0);
+    for order in 1..=held.max_order.min(solved.corrected.max_order) {
+        let at = order * count..(order + 1) * count;
+        let operator = &solved.operators.orders[order - 1].operator;
+        let matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
+        let solution = apply(operator, &solved.linear[at.clone()]);
+        let predicted = apply(&matrix, &solution);
+        let beyond = solved.corrected.mean[at.clone()].iter().zip(&solved.linear[at.clone()]).map(|(a, b)| a - b);
+        let left: Vec<Complex64> = held.mean[at]
+            .iter()
+            .zip(beyond)
+            .zip(predicted)
+            .map(|((held, beyond), predicted)| held - beyond - predicted)
+            .collect();
+        // Readings were recorded, not displacements.
+        let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order).norm_sqr();
+        squares += left.iter().enumerate().map(|(index, value)| value.norm_sqr() * response(index)).sum::<f64>();
+        let weighted = apply(&data.weights_of(order, layout, alterations), &left);
+        chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / data.floor_std(order).powi(2);
+    }
+    Some((chi2, squares))
+}
+
+impl Fit for SpindleFit {
+    fn remainder(&self) -> &Remainder {
+        &self.remainder
+    }
+
+    fn signature(&self, effect: usize) -> Vec<Vec<f64>> {
+        let count = self.shared.places[effect].effect.parameters.len();
+        let mut signature = vec![Vec::with_capacity(self.remainder.residual.len()); count];
+        let place = &self.shared.places[effect];
+        let drifts = place.effect.id == "thermal-drift";
+        for (index, solved) in self.stations.iter().enumerate() {
+            for (partial, column) in self.partials(effect, index).iter().zip(&mut signature) {
+                // What the model predicts more of, the residual has less of.
+                project(&solved.whitened, partial, solved.corrected.count, |_, values| {
+                    column.extend(values.iter().flat_map(|value| [-value.re, -value.im]));
+                });
+                let creeps = self.shared.data[index].creeps.iter();
+                column.extend(creeps.map(
+                    |(sensor, _, std)| {
+                        if drifts && *sensor == place.index { -std.recip() } else { 0.0 }
+                    },
+                ));
+            }
+        }
+        signature
+    }
+
+    fn bias(&self, effect: usize) -> Vec<Bias> {
+        let place = &self.shared.places[effect];
+        let mut biases = Vec::new();
+        let Some(solved) = self.stations.first() else { return biases };
+        for (partial, parameter) in self.partials(effect, 0).iter().zip(&place.effect.parameters) {
+            let (mut form, mut shift, mut forms, mut shifts) = (0.0, 0.0, 0, 0);
+            for (unknown, quantity) in self.layout.unknowns.iter().enumerate() {
+                let squares: f64 = solved.moved_by(partial, unknown).map(|(_, value)| value.norm_sqr()).sum();
+                match quantity {
+                    Quantity::Form(_) => (form, forms) = (form + squares, forms + 1),
+                    Quantity::X | Quantity::Y => (shift, shifts) = (shift + squares, shifts + 1),
+                    _ => {}
+                }
+            }
+            for (on, squares, count) in [("form", form, forms), ("motion", shift, shifts)] {
+                if count > 0 {
+                    let value = (0.5 * squares / f64::from(count)).sqrt();
+                    let unit = if parameter.unit == "1" { "um".into() } else { format!("um/({})", parameter.unit) };
+                    biases.push(Bias { on: on.into(), value, unit });
+                }
+            }
+        }
+        biases
+    }
+
+    fn values(&self) -> Vec<Outcome> {
+        let mut values = Vec::new();
+        let stations: Vec<Station> = self.shared.data.iter().map(StationData::key).collect();
+        let several = stations.len() > 1;
+        for (separation, station) in self.separations(&stations).iter().zip(&stations) {
+            for (unknown, quantity) in separation.unknowns.iter().enumerate() {
+                let Quantity::Form(section) = quantity else { continue };
+                let Some(at) = separation.sections.get(*section) else { continue };
+                let place = if several { format!("{}@{}", at.id, station.name) } else { at.id.clone() };
+                values.extend(form_values(separation, unknown, &place));
+            }
+        }
+        values
+    }
+
+    fn widen(&mut self, effects: &[usize], covariance: &[Vec<f64>]) {
+        let width = self.layout.unknowns.len();
+        for station in 0..self.stations.len() {
+            let partials: Vec<Vec<Complex64>> =
+                effects.iter().flat_map(|effect| self.partials(*effect, station)).collect();
+            let solved = &mut self.stations[station];
+            for unknown in 0..width {
+                let moved: Vec<Vec<(usize, Complex64)>> =
+                    partials.iter().map(|partial| solved.moved_by(partial, unknown).collect()).collect();
+                for (i, of_i) in moved.iter().enumerate() {
+                    for (j, of_j) in moved.iter().enumerate() {
+                        for ((order, a), (_, b)) in of_i.iter().zip(of_j) {
+                            solved.widened[order * width + unknown] += (a * b.conj()).re * covariance[i][j];
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn unexplained(&self) -> Vec<Unexplained> {
+        let rig = &self.shared.selection.rig;
+        let each = self.stations.iter().filter_map(|solved| strangers::where_from(solved, &self.layout, rig));
+        let mut found: Vec<Unexplained> = each.collect();
+        found.sort_by(|a, b| b.rms_um.total_cmp(&a.rms_um));
+        found
+    }
+
+    fn told_apart_by(&self, effects: &[usize]) -> Option<String> {
+        let on = |effect: &usize| self.shared.kind(*effect).about().acts_on;
+        if effects.iter().all(|effect| on(effect) == ActsOn::Sensor) {
+            Some(
+                "a third sensor in the section, or a setup with the part at another angle and the sensors moved".into(),
+            )
+        } else {
+            Some("another setup with the part at an angle that no other setup has".into())
+        }
+    }
+}
+
+impl Solved {
+    /// How an unknown moves with a parameter, by order from 2: its operator on the readings' partials.
+    fn moved_by<'a>(
+        &'a self,
+        partial: &'a [Complex64],
+        unknown: usize,
+    ) -> impl Iterator<Item = (usize, Complex64)> + 'a {
+        let count = self.corrected.count;
+        (2..=self.corrected.max_order).filter(move |order| self.operators.observable[order - 1][unknown]).map(
+            move |order| {
+                let row = &self.operators.orders[order - 1].operator[unknown * count..(unknown + 1) * count];
+                let readings = &partial[order * count..(order + 1) * count];
+                (order, row.iter().zip(readings).map(|(a, b)| a * b).sum())
+            },
+        )
+    }
+}
+
+/// RONt and root mean square of a form.
+fn form_values(separation: &Separation, unknown: usize, place: &str) -> [Outcome; 2] {
+    let width = separation.unknowns.len();
+    let from_two = |(order, value)| if order < 2 { Complex64::ZERO } else { value };
+    let harmonics = separation.coefficients(unknown).enumerate().map(from_two);
+    let angles = (2 * separation.max_order() + 2).next_power_of_two();
+    let form_um = Fourier::new(angles).synthesise(harmonics).to_vec();
+    let rms = |profile: &[f64]| (profile.iter().map(|value| value * value).sum::<f64>() / angles as f64).sqrt();
+    let variance: Vec<f64> = separation.variance.iter().skip(unknown).step_by(width).copied().collect();
+    let values = |profile: &[f64]| [ront_lsci_um(profile), rms(profile)];
+    let stds = uncertainty::monte_carlo(&form_um, &variance, uncertainty::seed(&[place]), values)
+        .map_or([f64::NAN; 2], |found| found.map(|each| each.std));
+    let [ront, form_rms] = values(&form_um);
+    let outcome = |value: &str, number: f64, std: f64| Outcome {
+        value: value.into(),
+        section: Some(place.into()),
+        number,
+        std,
+        unit: "um".into(),
+    };
+    [outcome("RONt", ront, stds[0]), outcome("form rms", form_rms, stds[1])]
+}

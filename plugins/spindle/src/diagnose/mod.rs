@@ -1,0 +1,160 @@
+//! The closed loop on spindle measurements.
+
+mod data;
+mod drift;
+mod fit;
+mod strangers;
+
+use std::sync::Arc;
+
+use runout_core::{
+    Result,
+    model::{
+        Effect, Model, Setting,
+        closed_loop::{self, Settings},
+        diagnosis::{Estimated, LostOrders},
+    },
+    stage::{Station, StationDiagnosis},
+};
+
+use crate::{
+    effects::{self, ActsOn, SpindleEffect},
+    layout::Layout,
+    selection::Selection,
+};
+use data::{Shared, StationData};
+pub use fit::SpindleFit;
+
+/// Orders that take part in tracing: form lives in the low ones, and time grows with their number.
+const TRACED_ORDERS: usize = 255;
+
+/// A spindle measurement as a model that the loop can run on.
+pub struct SpindleModel {
+    /// The turns that are fitted, and those held out.
+    traced: Arc<Shared>,
+    /// All turns, all orders.
+    whole: Option<Box<SpindleModel>>,
+}
+
+impl SpindleModel {
+    /// From averaged stations; profiles with a [`split`](runout_core::profile::Profile::split) hold turns out.
+    ///
+    /// # Errors
+    /// When the profiles do not fit the rig.
+    pub fn new(
+        selection: Selection,
+        layout: Layout,
+        second_order: bool,
+        effects: Vec<Box<dyn SpindleEffect>>,
+        stations: &[Station],
+    ) -> Result<Self> {
+        let effects: Arc<[Box<dyn SpindleEffect>]> = effects.into();
+        let places = places(&effects, &selection, &layout, second_order);
+        let whole = Shared {
+            effects: places.iter().map(|place| place.effect.clone()).collect(),
+            data: stations
+                .iter()
+                .map(|station| StationData::whole(&selection, &layout, station))
+                .collect::<Result<_>>()?,
+            selection: selection.clone(),
+            layout: layout.clone(),
+            second_order,
+            places,
+            kinds: Arc::clone(&effects),
+        };
+        let traced = Shared {
+            data: stations
+                .iter()
+                .map(|station| StationData::split(&selection, &layout, station))
+                .collect::<Result<_>>()?,
+            places: whole.places.clone(),
+            effects: whole.effects.clone(),
+            selection,
+            layout,
+            second_order,
+            kinds: effects,
+        };
+        let whole = Self { traced: Arc::new(whole), whole: None };
+        Ok(Self { traced: Arc::new(traced), whole: Some(Box::new(whole)) })
+    }
+}
+
+/// Each effect at each of its targets. The first setup is what the others are counted from.
+fn places(
+    kinds: &[Box<dyn SpindleEffect>],
+    selection: &Selection,
+    layout: &Layout,
+    second_order: bool,
+) -> Vec<data::Place> {
+    let rig = &selection.rig;
+    let mut places = Vec::new();
+    for (kind, effect) in kinds.iter().enumerate() {
+        let about = effect.about();
+        // Nothing can lack what it has.
+        let has = (about.id == "even-order-motion" && !layout.assumes_odd_motion())
+            || (about.id == "second-order-geometry" && second_order);
+        if has {
+            continue;
+        }
+        let targets: Vec<(usize, Option<String>)> = match about.acts_on {
+            ActsOn::Sensor => rig.sensors.iter().map(|sensor| Some(sensor.id.clone())).enumerate().collect(),
+            ActsOn::LaterSetup => rig.setups.iter().map(|setup| Some(setup.id.clone())).enumerate().skip(1).collect(),
+            ActsOn::Rig => vec![(0, None)],
+        };
+        places.extend(targets.into_iter().map(|(index, target)| data::Place {
+            kind,
+            index,
+            effect: Effect { id: about.id.into(), target, parameters: about.parameters.clone() },
+        }));
+    }
+    places
+}
+
+impl Model for SpindleModel {
+    type Fit = SpindleFit;
+
+    fn effects(&self) -> &[Effect] {
+        &self.traced.effects
+    }
+
+    fn fit(&self, applied: &[Setting]) -> Result<SpindleFit> {
+        SpindleFit::new(Arc::clone(&self.traced), applied)
+    }
+
+    fn present(&self, effect: usize, estimated: Vec<Estimated>) -> Vec<Estimated> {
+        self.traced.kind(effect).present(estimated)
+    }
+
+    fn whole(&self) -> &Self {
+        self.whole.as_deref().unwrap_or(self)
+    }
+}
+
+/// Runs the loop on averaged stations with all effects that there are.
+///
+/// # Errors
+/// When the profiles do not fit the rig.
+pub fn diagnose(
+    selection: Selection,
+    layout: Layout,
+    second_order: bool,
+    stations: &[Station],
+    settings: &dyn Fn(&[Effect]) -> Result<Settings>,
+) -> Result<StationDiagnosis> {
+    let model = SpindleModel::new(selection, layout, second_order, effects::all(), stations)?;
+    let closed = closed_loop::diagnose(&model, &settings(model.effects())?)?;
+    let mut diagnosis = closed.diagnosis;
+    drift::say_rates(&mut diagnosis, &model.traced);
+    diagnosis.lost_orders = Some(lost_orders(&closed.after));
+    diagnosis.warnings.extend(model.traced.warnings());
+    Ok(StationDiagnosis {
+        diagnosis,
+        before: closed.before.separations(stations),
+        after: closed.after.separations(stations),
+    })
+}
+
+fn lost_orders(fit: &SpindleFit) -> LostOrders {
+    let assessment = fit.layout().assess(TRACED_ORDERS.min(fit.max_order()));
+    LostOrders { form: assessment.lost_form_orders(), motion: assessment.lost_motion_orders() }
+}

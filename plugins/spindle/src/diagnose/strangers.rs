@@ -1,0 +1,103 @@
+//! Where something is that no effect explains: in which sensor and setup, at which orders, over which angles.
+
+use runout_core::{Complex64, model::diagnosis::Unexplained, numerics::fourier::Fourier, rig::Rig};
+
+use super::{data::project, fit::Solved};
+use crate::layout::Layout;
+
+/// A reading is where it comes from when letting that reading be anything takes away this share of the residual.
+const SHARE: f64 = 0.5;
+/// Orders at which less than this share of its square lies are left out, at both ends.
+const TAIL: f64 = 0.05;
+/// It has a place within the turn where half of its square lies within this share of the turn.
+const NARROW: f64 = 0.2;
+
+/// What a station's residual says of a stranger.
+pub fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexplained> {
+    let count = solved.corrected.count;
+    let mut total = 0.0;
+    // What each reading would have to hold to explain the residual, and how much it would.
+    let mut disturbance = vec![vec![Complex64::ZERO; solved.corrected.max_order + 1]; count];
+    let mut explained = vec![0.0; count];
+    project(&solved.whitened, &solved.linear, count, |order, residual| {
+        total += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let matrix = &solved.whitened[order - 1];
+        for reading in 0..count {
+            let column = || matrix.iter().skip(reading).step_by(count);
+            let square: f64 = column().map(Complex64::norm_sqr).sum();
+            if square > 0.0 {
+                let dot: Complex64 = column().zip(residual).map(|(entry, value)| entry.conj() * value).sum();
+                explained[reading] += dot.norm_sqr() / square;
+                disturbance[reading][order] = dot / square;
+            }
+        }
+    });
+    let best = (0..count).max_by(|a, b| explained[*a].total_cmp(&explained[*b]))?;
+    let by_sensor = |sensor: usize| -> f64 {
+        (0..count).filter(|index| layout.readings[*index].sensor == sensor).map(|index| explained[index]).sum()
+    };
+    let by_setup = |setup: usize| -> f64 {
+        (0..count).filter(|index| layout.readings[*index].setup == setup).map(|index| explained[index]).sum()
+    };
+    let reading = &layout.readings[best];
+    let all: f64 = explained.iter().sum();
+    let (sensor, setup) = if explained[best] > SHARE * total {
+        (Some(reading.sensor), Some(reading.setup))
+    } else if by_sensor(reading.sensor) > SHARE * all {
+        (Some(reading.sensor), None)
+    } else if by_setup(reading.setup) > SHARE * all {
+        (None, Some(reading.setup))
+    } else {
+        (None, None)
+    };
+    let harmonics = &disturbance[best];
+    let squares: Vec<f64> = harmonics.iter().map(Complex64::norm_sqr).collect();
+    let sum: f64 = squares.iter().sum();
+    let lowest = beyond(squares.iter().copied().enumerate(), TAIL * sum);
+    let highest = beyond(squares.iter().copied().enumerate().rev(), TAIL * sum);
+    Some(Unexplained {
+        sensor: sensor.map(|index| rig.sensors[index].id.clone()),
+        setup: setup.map(|index| rig.setups[index].id.clone()),
+        orders: [lowest.min(highest), highest],
+        rms_um: (0.5 * sum).sqrt(),
+        place: place(harmonics),
+    })
+}
+
+/// The order at which a sum from one end passes a limit.
+fn beyond(squares: impl Iterator<Item = (usize, f64)>, limit: f64) -> usize {
+    let mut passed = 0.0;
+    for (order, square) in squares {
+        passed += square;
+        if passed > limit {
+            return order;
+        }
+    }
+    1
+}
+
+/// Where in the turn a curve of these harmonics has most of its square.
+fn place(harmonics: &[Complex64]) -> String {
+    let samples = (2 * harmonics.len() + 2).next_power_of_two();
+    let curve = Fourier::new(samples).synthesise(harmonics.iter().map(|value| value.conj())).to_vec();
+    let squares: Vec<f64> = curve.iter().map(|value| value * value).collect();
+    let half = 0.5 * squares.iter().sum::<f64>();
+    // The shortest arc that holds half of the square, by two pointers around the turn.
+    let (mut end, mut sum, mut shortest) = (0, 0.0, (samples, 0));
+    for start in 0..samples {
+        while sum < half && end < start + samples {
+            sum += squares[end % samples];
+            end += 1;
+        }
+        if end - start < shortest.0 {
+            shortest = (end - start, start);
+        }
+        sum -= squares[start];
+    }
+    let (length, start) = shortest;
+    if length as f64 > NARROW * samples as f64 {
+        return "over the whole turn".into();
+    }
+    let degrees = |sample: usize| (360.0 * (sample % samples) as f64 / samples as f64).round();
+    format!("spindle angle {}…{}°", degrees(start), degrees(start + length))
+}

@@ -1,0 +1,228 @@
+//! What effects change: where sensors and part truly are, how readings follow from displacements.
+
+use runout_core::{Complex64, numerics::fourier::Fourier};
+
+use crate::{
+    layout::Layout,
+    separators::{OVERSAMPLING, interpolate},
+};
+
+/// Everything that effects change, at its declared value until one does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alterations {
+    /// One entry a sensor.
+    pub sensors: Vec<SensorAlteration>,
+    /// One entry a setup.
+    pub setups: Vec<SetupAlteration>,
+    /// Uneven speed within the turn.
+    pub ripples: Vec<Harmonic>,
+    /// Motion along the axis, in µm.
+    pub axial_um: Vec<Harmonic>,
+    /// Whether motion keeps the sign of even orders, where the separator assumes otherwise.
+    pub even_order_motion: bool,
+    /// Whether geometry is exact, where the separator leaves it linear.
+    pub exact_geometry: bool,
+}
+
+/// One sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorAlteration {
+    /// Relative gain less 1.
+    pub gain: f64,
+    /// True less declared angle, in rad.
+    pub angle_rad: f64,
+    /// True less declared axial position, in mm.
+    pub z_mm: f64,
+    /// The same, as far as the sensor sees another circle of the part there, in mm.
+    pub circle_mm: f64,
+    /// Reading = u + quadratic·u² + cubic·u³, in 1/µm.
+    pub quadratic_per_um: f64,
+    /// In 1/µm².
+    pub cubic_per_um2: f64,
+    /// Creep over the averaged turn, in µm.
+    pub creep_um: f64,
+    /// Creep over the turns at hand, over that of the turns which `creep_um` is meant for.
+    pub creep_share: f64,
+    /// Reciprocal of the order at which a first-order low-pass is −3 dB.
+    pub inverse_cutoff: f64,
+}
+
+/// One setup.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SetupAlteration {
+    /// True less declared angle of the part, in rad.
+    pub part_rad: f64,
+    /// Motion over that of the first setup, less 1.
+    pub motion: f64,
+}
+
+/// cosine·cos(order·Φ) + sine·sin(order·Φ).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Harmonic {
+    /// Per turn.
+    pub order: usize,
+    /// Amplitude of the cosine.
+    pub cosine: f64,
+    /// Amplitude of the sine.
+    pub sine: f64,
+}
+
+impl Harmonic {
+    /// Its value.
+    #[must_use]
+    pub fn at(&self, angle_rad: f64) -> f64 {
+        let (sine, cosine) = (self.order as f64 * angle_rad).sin_cos();
+        self.cosine * cosine + self.sine * sine
+    }
+}
+
+impl Alterations {
+    /// Everything as declared.
+    #[must_use]
+    pub fn none(layout: &Layout) -> Self {
+        let count =
+            |of: fn(&crate::layout::Reading) -> usize| layout.readings.iter().map(of).max().map_or(0, |m| m + 1);
+        Self {
+            sensors: vec![SensorAlteration::NONE; count(|reading| reading.sensor)],
+            setups: vec![SetupAlteration::default(); count(|reading| reading.setup)],
+            ripples: Vec::new(),
+            axial_um: Vec::new(),
+            even_order_motion: false,
+            exact_geometry: false,
+        }
+    }
+
+    /// Whether all values are such that readings can be taken back to displacements.
+    #[must_use]
+    pub fn are_possible(&self) -> bool {
+        let sensor = |sensor: &SensorAlteration| {
+            sensor.gain.abs() < 0.9 && sensor.angle_rad.abs() < 0.5 && sensor.inverse_cutoff > -0.1
+        };
+        let setup = |setup: &SetupAlteration| setup.part_rad.abs() < 0.5 && setup.motion > -0.95;
+        let ripple: f64 =
+            self.ripples.iter().map(|ripple| ripple.order as f64 * ripple.cosine.hypot(ripple.sine)).sum();
+        let numbers = self.sensors.iter().flat_map(|s| [s.quadratic_per_um, s.cubic_per_um2, s.creep_um, s.z_mm]);
+        self.sensors.iter().all(sensor)
+            && self.setups.iter().all(setup)
+            && ripple < 0.5
+            && numbers.into_iter().all(f64::is_finite)
+    }
+
+    /// Takes averaged readings (`[order][reading]`, orders from 0) back to displacements: creep, gain and
+    /// low-pass, characteristic, angle.
+    pub fn correct(&self, layout: &Layout, mean: &mut [Complex64], samples_per_rev: usize) {
+        let count = layout.readings.len();
+        let mut curve = Curve::new(samples_per_rev);
+        for (index, reading) in layout.readings.iter().enumerate() {
+            let sensor = &self.sensors[reading.sensor];
+            for (order, row) in mean.chunks_exact_mut(count).enumerate() {
+                let value = &mut row[index];
+                *value -= sensor.creep_um * sensor.creep_share * creep(order);
+                *value /= sensor.response(order);
+            }
+            let curved = sensor.quadratic_per_um != 0.0 || sensor.cubic_per_um2 != 0.0;
+            if curved || !self.ripples.is_empty() {
+                let harmonics = mean.iter().skip(index).step_by(count).copied();
+                let harmonics: Vec<Complex64> = if self.ripples.is_empty() {
+                    curve.mapped(harmonics, |_, value| sensor.straightened(value))
+                } else {
+                    let straight = curve.mapped(harmonics, |_, value| sensor.straightened(value));
+                    curve.at_angles(&straight, |angle| self.recorded_at(angle))
+                };
+                mean.iter_mut().skip(index).step_by(count).zip(harmonics).for_each(|(to, from)| *to = from);
+            }
+        }
+    }
+
+    /// The angle at which the recording believes to be when the spindle is at this one: φ + ε(φ) = Φ, with ε 0 at the marks.
+    fn recorded_at(&self, angle_rad: f64) -> f64 {
+        let early = |angle: f64| self.ripples.iter().map(|ripple| ripple.at(angle) - ripple.cosine).sum::<f64>();
+        let mut recorded = angle_rad;
+        // A contraction by order·amplitude a round: 0.01 or so.
+        for _ in 0..6 {
+            recorded = angle_rad - early(recorded);
+        }
+        recorded
+    }
+}
+
+impl SensorAlteration {
+    /// A sensor as declared.
+    pub const NONE: Self = Self {
+        gain: 0.0,
+        angle_rad: 0.0,
+        z_mm: 0.0,
+        circle_mm: 0.0,
+        quadratic_per_um: 0.0,
+        cubic_per_um2: 0.0,
+        creep_um: 0.0,
+        creep_share: 1.0,
+        inverse_cutoff: 0.0,
+    };
+
+    /// Reading over displacement at an order: gain and low-pass.
+    #[must_use]
+    pub fn response(&self, order: usize) -> Complex64 {
+        (1.0 + self.gain) / Complex64::new(1.0, -(order as f64) * self.inverse_cutoff)
+    }
+
+    /// u from u + quadratic·u² + cubic·u³, by Newton's method.
+    fn straightened(&self, reading_um: f64) -> f64 {
+        let (a, b) = (self.quadratic_per_um, self.cubic_per_um2);
+        let mut u = reading_um;
+        for _ in 0..4 {
+            let slope = 1.0 + u * (2.0 * a + 3.0 * b * u);
+            if slope.abs() < 0.1 {
+                return u;
+            }
+            u -= (u * (1.0 + u * (a + b * u)) - reading_um) / slope;
+        }
+        u
+    }
+}
+
+/// Harmonic of Φ/2π − ½ over a turn, of Re Σ c e^{−inΦ}: −(1/π) Σ sin(nΦ)/n.
+#[must_use]
+pub fn creep(order: usize) -> Complex64 {
+    if order == 0 { Complex64::ZERO } else { Complex64::new(0.0, -1.0 / (std::f64::consts::PI * order as f64)) }
+}
+
+/// One reading over the turn, for what is not linear in its harmonics.
+pub struct Curve {
+    turn: Fourier,
+    fine: Fourier,
+}
+
+impl Curve {
+    /// On as many angles as the readings have, or four times as many.
+    #[must_use]
+    pub fn new(samples_per_rev: usize) -> Self {
+        Self { turn: Fourier::new(samples_per_rev), fine: Fourier::new(samples_per_rev * OVERSAMPLING) }
+    }
+
+    /// Harmonics of a function of angle and value; products of two orders do not fold, since the grid is fine.
+    pub fn mapped(
+        &mut self,
+        harmonics: impl ExactSizeIterator<Item = Complex64>,
+        map: impl Fn(f64, f64) -> f64,
+    ) -> Vec<Complex64> {
+        let mut found = vec![Complex64::ZERO; harmonics.len()];
+        let values = self.fine.synthesise(harmonics.map(|value| value.conj())).to_vec();
+        let step = std::f64::consts::TAU / values.len() as f64;
+        let mapped = values.iter().enumerate().map(|(index, value)| map(index as f64 * step, *value));
+        self.fine.analyse(mapped, &mut found);
+        found.iter_mut().for_each(|value| *value = value.conj());
+        found
+    }
+
+    /// Harmonics of the same curve at other angles.
+    fn at_angles(&mut self, harmonics: &[Complex64], angle: impl Fn(f64) -> f64) -> Vec<Complex64> {
+        let table = self.fine.synthesise(harmonics.iter().map(|value| value.conj())).to_vec();
+        let samples = self.turn.length();
+        let mut found = vec![Complex64::ZERO; harmonics.len()];
+        let step = std::f64::consts::TAU / samples as f64;
+        self.turn.analyse((0..samples).map(|index| interpolate(&table, angle(index as f64 * step))), &mut found);
+        found.iter_mut().for_each(|value| *value = value.conj());
+        found
+    }
+}

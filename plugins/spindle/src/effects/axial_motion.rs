@@ -1,0 +1,36 @@
+//! `axial-motion`: the part moves along z by w(Φ), so that sensors see it elsewhere; with its slope from one section to the
+//! next, the reading changes by −w·∂h/∂z. For w = a cos nΦ + b sin nΦ: ∂/∂a = −cos nΦ ∂h/∂z, ∂/∂b = −sin nΦ ∂h/∂z.
+
+use runout_core::{Complex64, model::diagnosis::Estimated};
+
+use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_amplitude, parameter};
+
+/// Axial error motion of one order.
+pub struct AxialMotion {
+    /// Per turn.
+    pub order: usize,
+}
+
+impl SpindleEffect for AxialMotion {
+    fn about(&self) -> About {
+        let parameters = vec![parameter("cosine", "um", 1.0), parameter("sine", "um", 1.0)];
+        About { id: "axial-motion", acts_on: ActsOn::Rig, parameters }
+    }
+
+    fn alter(&self, _target: usize, values: &[f64], alterations: &mut Alterations) {
+        alterations.axial_um.push(Harmonic { order: self.order, cosine: values[0], sine: values[1] });
+    }
+
+    fn partials(&self, _target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        let order = self.order as f64;
+        // µm of motion along z are 1e-3 mm.
+        vec![
+            predicted.curves(&predicted.along_z, |_| true, |angle, slope| -1e-3 * slope * (order * angle).cos()),
+            predicted.curves(&predicted.along_z, |_| true, |angle, slope| -1e-3 * slope * (order * angle).sin()),
+        ]
+    }
+
+    fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {
+        as_amplitude(self.order, &estimated)
+    }
+}

@@ -1,0 +1,120 @@
+//! What a spindle measurement may have that its rig does not declare: one file an effect.
+//!
+//! An effect says what it is described by, how it changes the model when applied ([`Alterations`]), and how it changes the
+//! readings per unit of each parameter. Readings are u = form + motion along the sensor (`physics.md` section 1). Partials are
+//! those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied.
+//!
+//! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own that hands it to
+//! [`crate::diagnose::SpindleModel`]. The tests of `tests/effects.rs` check every effect's partials against finite
+//! differences.
+
+mod alterations;
+mod axial_motion;
+mod even_order_motion;
+mod filter_attenuation;
+mod predicted;
+mod reversal_angle;
+mod second_order_geometry;
+mod sensor_angle;
+mod sensor_axial_position;
+mod sensor_gain;
+mod sensor_nonlinearity;
+mod setup_motion_change;
+mod speed_ripple;
+mod thermal_drift;
+
+use runout_core::{
+    Complex64,
+    model::{Parameter, diagnosis::Estimated},
+};
+
+pub use alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, creep};
+pub use predicted::Predicted;
+
+/// An effect on a spindle measurement.
+pub trait SpindleEffect: Send + Sync {
+    /// What it is.
+    fn about(&self) -> About;
+
+    /// Puts it into the model: `target` is the index of a sensor or a setup, `values` has one entry a parameter.
+    fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations);
+
+    /// ∂(reading)/∂(parameter) of all readings, `[parameter][order][reading]`.
+    fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>>;
+
+    /// Its parameters as people say them.
+    fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {
+        estimated
+    }
+}
+
+/// What an effect is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct About {
+    /// Its id.
+    pub id: &'static str,
+    /// Where it acts.
+    pub acts_on: ActsOn,
+    /// What it is described by; nothing where it only can be there or not.
+    pub parameters: Vec<Parameter>,
+}
+
+/// Where an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ActsOn {
+    /// Any one sensor.
+    Sensor,
+    /// Any setup but the first, which the others are counted from.
+    LaterSetup,
+    /// The rig as a whole.
+    Rig,
+}
+
+/// A parameter with its unit and usual size.
+fn parameter(name: &str, unit: &str, tolerance: f64) -> Parameter {
+    Parameter { name: name.into(), unit: unit.into(), tolerance }
+}
+
+/// Orders of uneven speed and of axial motion that are looked for.
+const LOW_ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
+
+/// Every effect that there is.
+#[must_use]
+pub fn all() -> Vec<Box<dyn SpindleEffect>> {
+    let mut all: Vec<Box<dyn SpindleEffect>> = vec![
+        Box::new(sensor_gain::SensorGain),
+        Box::new(sensor_angle::SensorAngle),
+        Box::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: false }),
+        Box::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: true }),
+        Box::new(sensor_nonlinearity::SensorNonlinearity),
+        Box::new(reversal_angle::ReversalAngle),
+        Box::new(setup_motion_change::SetupMotionChange),
+        Box::new(thermal_drift::ThermalDrift),
+        Box::new(filter_attenuation::FilterAttenuation),
+        Box::new(even_order_motion::EvenOrderMotion),
+        Box::new(second_order_geometry::SecondOrderGeometry),
+    ];
+    for order in LOW_ORDERS {
+        all.push(Box::new(speed_ripple::SpeedRipple { order }));
+        all.push(Box::new(axial_motion::AxialMotion { order }));
+    }
+    all
+}
+
+/// Amplitude, phase and order of cosine·cos(nΦ) + sine·sin(nΦ) = amplitude·cos(nΦ − phase), from the estimates of cosine
+/// and sine.
+fn as_amplitude(order: usize, estimated: &[Estimated]) -> Vec<Estimated> {
+    let [cosine, sine] = estimated else { return estimated.to_vec() };
+    let amplitude = cosine.value.hypot(sine.value);
+    let share = |part: f64| if amplitude > 0.0 { part / amplitude } else { 1.0 };
+    let [along, across] = [share(cosine.value), share(sine.value)];
+    let std = (along * cosine.std).hypot(across * sine.std);
+    let turned = (across * cosine.std).hypot(along * sine.std) / amplitude.max(f64::MIN_POSITIVE);
+    let exact =
+        |name: &str, value: f64, unit: &str, std: f64| Estimated { name: name.into(), value, std, unit: unit.into() };
+    vec![
+        exact("amplitude", amplitude, &cosine.unit, std),
+        exact("order", order as f64, "1/rev", 0.0),
+        exact("phase", sine.value.atan2(cosine.value), "rad", turned),
+    ]
+}

@@ -1,0 +1,143 @@
+//! What the fitted model predicts of each reading, part by part, for the effects' partials.
+
+use runout_core::{Complex64, separation::Quantity};
+
+use super::alterations::{Alterations, Curve};
+use crate::{
+    layout::{FirstOrder, Layout, UM_PER_MM_URAD},
+    separators::Estimate,
+};
+
+/// Harmonics of Re Σ c e^{−inΦ}, `[order][reading]` from order 0, of what each reading is made of.
+pub struct Predicted<'a> {
+    /// The layout as effects change it.
+    pub layout: &'a Layout,
+    /// What effects change.
+    pub alterations: &'a Alterations,
+    /// Equal angles a turn.
+    pub samples_per_rev: usize,
+    /// Form and eccentricity, in µm.
+    pub part: Vec<Complex64>,
+    /// Motion along the sensor, in µm.
+    pub along: Vec<Complex64>,
+    /// Motion across the sensor, a quarter turn ahead of its direction, in µm.
+    pub across: Vec<Complex64>,
+    /// Tilt that moves the part along the sensor with z, in µrad.
+    pub tilt: Vec<Complex64>,
+    /// Displacements as the readings have them, with their level, in µm.
+    pub readings: Vec<Complex64>,
+    /// How the part changes along z, in µm/mm; 0 where only one section is seen.
+    pub along_z: Vec<Complex64>,
+}
+
+impl<'a> Predicted<'a> {
+    /// From a solution; `readings` are displacements.
+    #[must_use]
+    pub(crate) fn new(
+        layout: &'a Layout,
+        alterations: &'a Alterations,
+        samples_per_rev: usize,
+        estimate: &Estimate,
+        readings: &[Complex64],
+    ) -> Self {
+        let count = layout.readings.len();
+        let mut predicted = Self {
+            layout,
+            alterations,
+            samples_per_rev,
+            part: vec![Complex64::ZERO; readings.len()],
+            along: vec![Complex64::ZERO; readings.len()],
+            across: vec![Complex64::ZERO; readings.len()],
+            tilt: vec![Complex64::ZERO; readings.len()],
+            readings: readings.to_vec(),
+            along_z: vec![Complex64::ZERO; readings.len()],
+        };
+        let position = |wanted: Quantity| layout.unknowns.iter().position(|known| *known == wanted);
+        let [x, y, tilt_x, tilt_y] = [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY].map(position);
+        let first = layout.first_order_unknowns();
+        let eccentricity = |setup: usize, section: usize| {
+            let wanted = FirstOrder::Eccentricity { setup, section };
+            let found = first.iter().position(|known| *known == wanted);
+            found.and_then(|index| estimate.first.get(index)).copied().unwrap_or_default()
+        };
+        for order in 1..readings.len() / count {
+            let of = |unknown: Option<usize>| unknown.map_or(Complex64::ZERO, |unknown| estimate.told(order, unknown));
+            let form = |setup: usize, section: usize| {
+                if order == 1 { eccentricity(setup, section) } else { of(position(Quantity::Form(section))) }
+            };
+            for (index, reading) in layout.readings.iter().enumerate() {
+                let at = order * count + index;
+                let phase = layout.part_phase(reading, order);
+                predicted.part[at] = form(reading.setup, reading.section) * phase;
+                let (sine, cosine) = reading.angle_rad.sin_cos();
+                let lever = reading.lever_mm * UM_PER_MM_URAD;
+                let moves = layout.motion_sign(reading.setup, order) * reading.motion_ratio;
+                let (shift_x, shift_y) = (of(x) + of(tilt_y) * lever, of(y) - of(tilt_x) * lever);
+                predicted.along[at] = (shift_x * cosine + shift_y * sine) * moves;
+                predicted.across[at] = (shift_y * cosine - shift_x * sine) * moves;
+                predicted.tilt[at] = (of(tilt_y) * cosine - of(tilt_x) * sine) * moves;
+                if let Some((other, distance_mm)) = predicted.neighbour(reading.section) {
+                    let change = form(reading.setup, other) - form(reading.setup, reading.section);
+                    predicted.along_z[at] = change * phase / distance_mm;
+                }
+            }
+        }
+        predicted
+    }
+
+    /// Another section and how far along z it is.
+    fn neighbour(&self, section: usize) -> Option<(usize, f64)> {
+        let z_mm = |wanted: usize| {
+            self.layout.readings.iter().find(|reading| reading.section == wanted).map(|reading| reading.lever_mm)
+        };
+        let here = z_mm(section)?;
+        let others = self.layout.readings.iter().filter(|reading| reading.section != section);
+        others
+            .map(|reading| (reading.section, reading.lever_mm - here))
+            .filter(|(_, distance)| distance.abs() > 1e-3)
+            .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
+    /// Nothing, for readings that an effect leaves alone.
+    #[must_use]
+    pub fn nothing(&self) -> Vec<Complex64> {
+        vec![Complex64::ZERO; self.readings.len()]
+    }
+
+    /// A partial from each harmonic of some readings: `value` gets the order and the place in the arrays.
+    #[must_use]
+    pub fn each(
+        &self,
+        on: impl Fn(&crate::layout::Reading) -> bool,
+        value: impl Fn(usize, usize) -> Complex64,
+    ) -> Vec<Complex64> {
+        let count = self.layout.readings.len();
+        let mut partial = self.nothing();
+        for (index, reading) in self.layout.readings.iter().enumerate().filter(|(_, reading)| on(reading)) {
+            let _ = reading;
+            for order in 1..partial.len() / count {
+                partial[order * count + index] = value(order, order * count + index);
+            }
+        }
+        partial
+    }
+
+    /// A partial from the curve of some readings over the spindle's angle: `map` gets angle and value of `source`.
+    #[must_use]
+    pub fn curves(
+        &self,
+        source: &[Complex64],
+        on: impl Fn(&crate::layout::Reading) -> bool,
+        map: impl Fn(f64, f64) -> f64,
+    ) -> Vec<Complex64> {
+        let count = self.layout.readings.len();
+        let mut partial = self.nothing();
+        let mut curve = Curve::new(self.samples_per_rev);
+        for (index, _) in self.layout.readings.iter().enumerate().filter(|(_, reading)| on(reading)) {
+            let harmonics: Vec<Complex64> = source.iter().skip(index).step_by(count).copied().collect();
+            let mapped = curve.mapped(harmonics.into_iter(), &map);
+            partial.iter_mut().skip(index).step_by(count).zip(mapped).for_each(|(to, from)| *to = from);
+        }
+        partial
+    }
+}

@@ -1,0 +1,24 @@
+//! `reversal-angle`: in a setup the part was clamped at β + δ. ∂/∂δ = −h'(α).
+
+use runout_core::Complex64;
+
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
+
+/// The part's angle in a setup.
+pub struct ReversalAngle;
+
+impl SpindleEffect for ReversalAngle {
+    fn about(&self) -> About {
+        let parameters = vec![parameter("angle", "rad", 0.005)];
+        About { id: "reversal-angle", acts_on: ActsOn::LaterSetup, parameters }
+    }
+
+    fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
+        alterations.setups[target].part_rad += values[0];
+    }
+
+    fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        let turned = |order: usize| -Complex64::I * predicted.layout.direction * order as f64;
+        vec![predicted.each(|reading| reading.setup == target, |order, at| turned(order) * predicted.part[at])]
+    }
+}

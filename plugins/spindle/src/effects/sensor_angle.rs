@@ -1,0 +1,26 @@
+//! `sensor-angle`: a sensor stands at θ + δ and sees part and motion from there.
+//! ∂/∂δ = h'(α) + motion across the sensor, y cos θ' − x sin θ'.
+
+use runout_core::Complex64;
+
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
+
+/// A sensor's angle.
+pub struct SensorAngle;
+
+impl SpindleEffect for SensorAngle {
+    fn about(&self) -> About {
+        // A degree: sensors are set up by eye and scale.
+        About { id: "sensor-angle", acts_on: ActsOn::Sensor, parameters: vec![parameter("angle", "rad", 0.0175)] }
+    }
+
+    fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
+        alterations.sensors[target].angle_rad += values[0];
+    }
+
+    fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        let turned = |order: usize| Complex64::I * predicted.layout.direction * order as f64;
+        let on = |reading: &crate::layout::Reading| reading.sensor == target;
+        vec![predicted.each(on, |order, at| turned(order) * predicted.part[at] + predicted.across[at])]
+    }
+}

@@ -1,0 +1,35 @@
+//! `sensor-axial-position`: a sensor sits at z + ζ, with another lever arm on tilt, ∂/∂ζ = ε_y cos θ' − ε_x sin θ'. It sees
+//! another circle of the part there: + ∂h/∂z, as the form changes from one section to the next. Both are tried: sections may
+//! be too far apart to tell the change between them.
+
+use runout_core::Complex64;
+
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
+use crate::layout::UM_PER_MM_URAD;
+
+/// A sensor's axial position.
+pub struct SensorAxialPosition {
+    /// Whether the form there is taken to be another one.
+    pub sees_another_circle: bool,
+}
+
+impl SpindleEffect for SensorAxialPosition {
+    fn about(&self) -> About {
+        let parameters = vec![parameter("shift", "mm", 1.0)];
+        About { id: "sensor-axial-position", acts_on: ActsOn::Sensor, parameters }
+    }
+
+    fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
+        let sensor = &mut alterations.sensors[target];
+        sensor.z_mm += values[0];
+        if self.sees_another_circle {
+            sensor.circle_mm += values[0];
+        }
+    }
+
+    fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        let circle = if self.sees_another_circle { 1.0 } else { 0.0 };
+        let change = |_, at: usize| predicted.tilt[at] * UM_PER_MM_URAD + predicted.along_z[at] * circle;
+        vec![predicted.each(|reading| reading.sensor == target, change)]
+    }
+}

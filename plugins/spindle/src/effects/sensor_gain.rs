@@ -1,0 +1,23 @@
+//! `sensor-gain`: a reading is too large by a factor, (1 + g)·u. ∂/∂g = u.
+
+use runout_core::Complex64;
+
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
+
+/// A sensor's relative gain.
+pub struct SensorGain;
+
+impl SpindleEffect for SensorGain {
+    fn about(&self) -> About {
+        About { id: "sensor-gain", acts_on: ActsOn::Sensor, parameters: vec![parameter("gain", "1", 0.01)] }
+    }
+
+    fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
+        alterations.sensors[target].gain += values[0];
+    }
+
+    fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        let gain = 1.0 + predicted.alterations.sensors[target].gain;
+        vec![predicted.each(|reading| reading.sensor == target, |_, at| predicted.readings[at] / gain)]
+    }
+}
