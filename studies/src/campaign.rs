@@ -86,13 +86,27 @@ pub fn station(
     samples_per_rev: usize,
     turns: usize,
 ) -> Result<(Station, StationTruth)> {
+    station_holding_out(simulator, rig, samples_per_rev, turns, None)
+}
+
+/// The same, a share of the turns averaged by themselves besides.
+///
+/// # Errors
+/// When a stage fails.
+pub fn station_holding_out(
+    simulator: &SpindleSimulator,
+    rig: &Rig,
+    samples_per_rev: usize,
+    turns: usize,
+    share: Option<f64>,
+) -> Result<(Station, StationTruth)> {
     let recording = simulator.spindle_recording();
     let averager = averager(samples_per_rev)?;
     let profile = |setup: usize| -> Result<Profile> {
         let stream = recording.open(0, setup)?;
         let recorded = stream.capture().marks.len().saturating_sub(1);
         let trim = trim(recorded.saturating_sub(turns))?;
-        averager.average(trim.attach(Box::new(Inspection::new(stream)))?)
+        averager.average_holding_out(trim.attach(Box::new(Inspection::new(stream)))?, share)
     };
     let profiles: Result<Vec<Profile>> = (0..rig.setups.len()).map(profile).collect();
     let truth = recording.truth(0)?.unwrap_or_default();

@@ -5,11 +5,13 @@
 use std::{path::Path, process::ExitCode};
 
 use runout_core::{Result, atomic_file};
-use runout_studies::{averaging, coverage, eccentricity, straightness, surface as unrolled};
+use runout_studies::{averaging, blind, coverage, eccentricity, straightness, surface as unrolled};
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
+       runout-studies blind [CAMPAIGNS [SEED [FILE]]]   what the closed loop says of campaigns that it knows nothing of
+       runout-studies blind-campaign INDEX [SEED]   one of them in full
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth";
@@ -24,6 +26,12 @@ fn main() -> ExitCode {
         }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
+        ["blind", ref rest @ ..] if rest.len() <= 3 && numbers(rest).is_some() => {
+            let [campaigns, seed] = numbers(rest).unwrap_or_default();
+            blind(campaigns, seed, rest.get(2).copied())
+        }
+        ["blind-campaign", index] if index.parse::<u64>().is_ok() => blind_campaign(index, "1"),
+        ["blind-campaign", index, seed] if index.parse::<u64>().is_ok() => blind_campaign(index, seed),
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["straightness-traces", file] => straightness_traces(file),
         ["straightness", file, picture] => straightness(file, picture),
@@ -60,6 +68,33 @@ fn coverage(campaigns: u64) -> Result<()> {
         println!("{campaigns} campaigns, simulated: {}\n", setting.name());
         println!("{}", coverage::table(&coverage::rows(&setting.campaigns(0, campaigns))?));
     }
+    Ok(())
+}
+
+/// Campaigns and seed, as far as they are given.
+fn numbers(words: &[&str]) -> Option<[u64; 2]> {
+    let number = |place: usize, default| words.get(place).map_or(Some(default), |word| word.parse().ok());
+    Some([number(0, 240)?, number(1, 1)?])
+}
+
+fn blind(campaigns: u64, seed: u64, file: Option<&str>) -> Result<()> {
+    let start = std::time::Instant::now();
+    let judged = blind::campaigns(campaigns, seed)?;
+    let text = blind::report::report(&judged);
+    println!("{campaigns} campaigns of seed {seed}, simulated\n\n{text}");
+    if let Some(path) = file {
+        let path = atomic_file::write(path, text.as_bytes())?;
+        println!("written: {}", path.display());
+    }
+    eprintln!("in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn blind_campaign(index: &str, seed: &str) -> Result<()> {
+    let [index, seed] = [index, seed].map(|word| word.parse().unwrap_or_default());
+    let judged = blind::judge::judge(blind::draw::campaign(seed, index))?;
+    println!("{:?}: {}\n{:#?}", judged.campaign.rig, judged.planted(), judged.diagnosis);
+    println!("{:#?}\n{:?}\n{:?}\n{}", judged.effects, judged.form, judged.failures(), judged.said());
     Ok(())
 }
 

@@ -1,5 +1,7 @@
 //! The scenario as it stands in a file.
 
+use std::path::PathBuf;
+
 use runout_core::rig::RigConfig;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -179,11 +181,23 @@ pub struct FormConfig {
     /// Harmonics in addition.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub harmonics: Vec<FormHarmonic>,
+    /// A measured profile in addition, the same at every z: a CSV file with columns `angle_deg` and `form_um`, relative to
+    /// the scenario. Its orders 2 to `max_order` are taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured: Option<PathBuf>,
 }
 
 impl Default for FormConfig {
     fn default() -> Self {
-        Self { rms_um: 0.0, max_order: 60, slope: 1.0, own_share: 0.3, wavelength_mm: 200.0, harmonics: Vec::new() }
+        Self {
+            rms_um: 0.0,
+            max_order: 60,
+            slope: 1.0,
+            own_share: 0.3,
+            wavelength_mm: 200.0,
+            harmonics: Vec::new(),
+            measured: None,
+        }
     }
 }
 

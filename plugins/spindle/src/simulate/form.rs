@@ -38,6 +38,9 @@ impl Form {
         if !(0.0..=1.0).contains(&config.own_share) {
             return Err(Fault::at("own_share", format!("expected 0 to 1, found {}", config.own_share)));
         }
+        if config.measured.is_some() {
+            return Err(Fault::at("measured", "a file is read where a scenario is checked, not here"));
+        }
         let mut form = Self { bands: Vec::new() };
         if config.rms_um > 0.0 {
             check::order("max_order", config.max_order, 2, orders)?;

@@ -17,6 +17,7 @@ mod config;
 mod effects;
 mod form;
 mod geometry;
+mod measured;
 mod motion;
 mod random;
 mod recording;
@@ -108,7 +109,13 @@ impl StageConfig for SpindleConfig {
     const ABOUT: &'static str =
         "a turned part on a spindle: form, error motion, and what goes wrong while measuring them";
 
-    fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
+    fn check(mut self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        // As harmonics: the recording then tells the whole truth without the file.
+        if let Some(path) = self.form.measured.take() {
+            let harmonics = measured::harmonics(&context.path(&path), self.form.max_order)
+                .map_err(|problem| Fault::at("measured", problem).under("form"))?;
+            self.form.harmonics.extend(harmonics);
+        }
         Ok(Box::new(simulator(&self)?))
     }
 }

@@ -40,6 +40,7 @@ fn the_place_of_a_mistake_is_told() {
         ("[recording]\nspeed_wobble_percent = 40", "backwards", "", 7),
         ("[recording]\nstations = { count = 0 }", "stations", "", 7),
         ("[form]\nrms_um = 4\nmax_order = 300", "order", "samples_per_rev", 8),
+        ("[form]\nmeasured = \"no-such.csv\"", "cannot read no-such.csv", "", 7),
         ("[form]\nrmsum = 4", "unknown key `rmsum`", "`rms_um`", 7),
         ("[form]\nharmonics = [{ order = 1, amplitude_um = 1 }]", "order from 2", "", 7),
         ("[motion]\nx = [{ order = 0, amplitude_um = 1 }]", "order from 1", "", 7),

@@ -1,0 +1,259 @@
+//! What the loop says of a campaign, beside what was planted.
+
+use runout_core::{
+    Complex64, Error, Result,
+    measurement::StationTruth,
+    model::{
+        closed_loop::Settings,
+        diagnosis::{Added, Diagnosis, Verdict},
+    },
+    numerics::fourier::Fourier,
+    separation::{Quantity, Separation},
+    stage::StationDiagnosis,
+};
+use runout_spindle::{
+    diagnose::diagnose,
+    layout,
+    selection::Selection,
+    simulate::{Effect, SpindleConfig, simulator},
+};
+
+use super::draw::{Campaign, Kind, Layout, Planted};
+use crate::campaign;
+
+/// χ² per degree of freedom of the declared model from which something is there to be found.
+pub const VISIBLE_CHI2: f64 = 1.5;
+/// Share of the turns, at the end, that no fit sees.
+const HOLD_OUT: f64 = 0.25;
+/// Orders over which forms are compared.
+const BAND: std::ops::RangeInclusive<usize> = 2..=80;
+
+/// A campaign with its diagnosis.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// The campaign.
+    pub campaign: Campaign,
+    /// What the loop says.
+    pub diagnosis: Diagnosis,
+    /// Of each effect planted, in their order.
+    pub effects: Vec<Traced>,
+    /// What was named and is not there.
+    pub false_alarms: Vec<String>,
+    /// Errors of the form.
+    pub form: FormErrors,
+}
+
+/// What became of a planted effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Traced {
+    /// Whether it raises the residual of the declared model by itself.
+    pub visible: bool,
+    /// Whether it was named: itself, or a set that holds it.
+    pub named: bool,
+    /// Whether it was named alone.
+    pub alone: bool,
+    /// Parameters within two standard uncertainties, and all that were compared: of effects named alone.
+    pub parameters: [usize; 2],
+}
+
+/// Root mean square errors of form over orders 2 to 80, as far as they can be told, in µm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FormErrors {
+    /// Of the same campaign with nothing wrong.
+    pub sound: f64,
+    /// Of the declared model.
+    pub before: f64,
+    /// Of the final one.
+    pub after: f64,
+    /// What the final one states.
+    pub stated: f64,
+}
+
+/// The loop on a simulated campaign: the one place that knows how it is called.
+fn run(config: &SpindleConfig, campaign: &Campaign, effects: Option<Vec<String>>) -> Result<Run> {
+    let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
+    let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let recording = &config.recording;
+    let (station, truth) = campaign::station_holding_out(
+        &simulator,
+        &rig,
+        recording.samples_per_rev,
+        recording.revolutions,
+        Some(HOLD_OUT),
+    )?;
+    let layout = layout::Layout::new(&rig, campaign.rig == Layout::Paper);
+    let settings = Settings { effects, ..Settings::default() };
+    let said = diagnose(Selection::whole(&rig), layout, campaign.second_order, &[station], &|_| Ok(settings.clone()))?;
+    Ok(Run { said, truth })
+}
+
+struct Run {
+    said: StationDiagnosis,
+    truth: StationTruth,
+}
+
+/// Diagnoses a campaign and compares.
+///
+/// # Errors
+/// When the simulation or the loop fails.
+pub fn judge(campaign: Campaign) -> Result<Judged> {
+    let Run { said, truth } = run(&campaign.config, &campaign, None)?;
+    let sound = match campaign.kind {
+        Kind::Clean => None,
+        _ => Some(run(&campaign.sound, &campaign, Some(Vec::new()))?),
+    };
+    let alone = |planted: usize| -> Result<bool> {
+        let effect = campaign.config.effect.get(planted).cloned();
+        let config = SpindleConfig { effect: effect.into_iter().collect(), ..campaign.config.clone() };
+        Ok(visible(&run(&config, &campaign, Some(Vec::new()))?.said.diagnosis))
+    };
+    let mut effects = Vec::new();
+    for (index, planted) in campaign.planted.iter().enumerate() {
+        let shows = match (campaign.kind, campaign.config.effect.get(index)) {
+            // A line is not in the averaged turns: it shows where it stands out of other asynchronous motion.
+            (_, Some(Effect::AsynchronousLine(line))) => {
+                line.amplitude_um > campaign.config.asynchronous.rms_um.unwrap_or_default()
+            }
+            (Kind::Pair, _) => alone(index)?,
+            _ => visible(&said.diagnosis),
+        };
+        let found = said.diagnosis.added.iter().find(|added| holds(added, planted));
+        let alone = found.filter(|added| added.confounded_with.is_empty());
+        effects.push(Traced {
+            visible: shows,
+            named: found.is_some(),
+            alone: alone.is_some(),
+            parameters: alone.map_or([0; 2], |added| within(added, planted)),
+        });
+    }
+    let there = |added: &&Added| !campaign.planted.iter().any(|planted| holds(added, planted));
+    let false_alarms = said.diagnosis.added.iter().filter(there).map(name).collect();
+    let form = form_errors(&said, &sound.as_ref().map_or(&said, |run| &run.said).after, &truth);
+    Ok(Judged { campaign, diagnosis: said.diagnosis, effects, false_alarms, form })
+}
+
+/// Whether the declared model leaves more than noise; without a measure of noise, whatever is planted should show.
+fn visible(diagnosis: &Diagnosis) -> bool {
+    diagnosis.before.chi2_per_dof.is_none_or(|chi2| chi2 > VISIBLE_CHI2)
+}
+
+/// Effect and target as in `confounded_with`.
+fn name(added: &Added) -> String {
+    std::iter::once(&added.effect).chain(&added.targets).cloned().collect::<Vec<_>>().join(" ")
+}
+
+/// Whether what was named is, or could as well be, what was planted.
+fn holds(added: &Added, planted: &Planted) -> bool {
+    let wanted = match &planted.target {
+        Some(target) => format!("{} {target}", planted.id),
+        None => planted.id.to_owned(),
+    };
+    let told = added.parameters.iter().find(|one| one.name == "order").map(|one| one.value);
+    let true_order = planted.parameters.iter().find(|(name, _)| *name == "order").map(|(_, order)| *order);
+    // Of effects with an order, another order is another effect.
+    let same_order = told.zip(true_order).is_none_or(|(told, order)| (told - order).abs() < 0.1);
+    (name(added) == wanted && same_order) || added.confounded_with.contains(&wanted)
+}
+
+/// Parameters within two standard uncertainties of the truth, of those that can be compared.
+fn within(added: &Added, planted: &Planted) -> [usize; 2] {
+    let mut counts = [0; 2];
+    if added.effect != planted.id {
+        return counts;
+    }
+    for (name, truth) in &planted.parameters {
+        let Some(found) = added.parameters.iter().find(|one| one.name == *name && one.std > 0.0) else { continue };
+        counts[0] += usize::from((found.value - truth).abs() <= 2.0 * found.std);
+        counts[1] += 1;
+    }
+    counts
+}
+
+fn form_errors(said: &StationDiagnosis, sound: &[Separation], truth: &StationTruth) -> FormErrors {
+    let all = [sound, &said.before, &said.after].map(|separations| separations.first());
+    let [Some(sound), Some(before), Some(after)] = all else {
+        return FormErrors { sound: f64::NAN, before: f64::NAN, after: f64::NAN, stated: f64::NAN };
+    };
+    let mut squares = [0.0; 4];
+    for (section, curve) in truth.form_um.iter().enumerate() {
+        let mut fourier = Fourier::new(curve.len());
+        let mut harmonics = vec![Complex64::ZERO; fourier.max_order() + 1];
+        fourier.analyse(curve.iter().copied(), &mut harmonics);
+        for order in BAND {
+            let index = |one: &Separation| {
+                let unknown = one.position(Quantity::Form(section))?;
+                let index = order * one.unknowns.len() + unknown;
+                one.observable.get(index).is_some_and(|told| *told).then_some(index)
+            };
+            // Orders that one of them cannot tell are no errors.
+            let (Some(a), Some(b), Some(c)) = (index(sound), index(before), index(after)) else { continue };
+            let found = [sound.estimate[a], before.estimate[b], after.estimate[c]];
+            let errors = found.map(|value| (value - harmonics.get(order).copied().unwrap_or_default()).norm_sqr());
+            let variance = after.variance[c];
+            for (sum, square) in squares.iter_mut().zip(errors.into_iter().chain([variance])) {
+                *sum += 0.5 * square / truth.form_um.len() as f64;
+            }
+        }
+    }
+    let [sound, before, after, stated] = squares.map(f64::sqrt);
+    FormErrors { sound, before, after, stated }
+}
+
+impl Judged {
+    /// What is not as it should be, in words; nothing where all is well.
+    #[must_use]
+    pub fn failures(&self) -> Vec<String> {
+        let mut failures = Vec::new();
+        for (planted, traced) in self.campaign.planted.iter().zip(&self.effects) {
+            if self.campaign.kind != Kind::Stranger && traced.visible && !traced.named {
+                failures.push(format!("{} missed", planted.id));
+            }
+        }
+        let alarm = if self.campaign.kind == Kind::Stranger { "blamed" } else { "false alarm" };
+        failures.extend(self.false_alarms.iter().map(|name| format!("{alarm}: {name}")));
+        let left = self.diagnosis.verdict == Verdict::Unexplained;
+        if self.diagnosis.before.chi2_per_dof.is_none() {
+            failures.push("the noise is not known".into());
+        }
+        match self.campaign.kind {
+            Kind::Stranger if !left && self.effects.iter().any(|traced| traced.visible) => {
+                failures.push("not said to be unexplained".into());
+            }
+            Kind::Stranger => {}
+            _ if left => failures.push("something said to be left".into()),
+            _ => {}
+        }
+        failures
+    }
+
+    /// What was planted, in words.
+    #[must_use]
+    pub fn planted(&self) -> String {
+        let words = self.campaign.planted.iter().map(|planted| {
+            let target = planted.target.as_ref().map(|target| format!(" {target}")).unwrap_or_default();
+            format!("{}{target} {}", planted.id, planted.size)
+        });
+        words.collect::<Vec<_>>().join(" and ")
+    }
+
+    /// What was said, in words.
+    #[must_use]
+    pub fn said(&self) -> String {
+        let added = self.diagnosis.added.iter().map(|added| {
+            let values: Vec<String> = added
+                .parameters
+                .iter()
+                .map(|one| format!("{} {:.3e} ± {:.1e}", one.name, one.value, one.std))
+                .collect();
+            let set = match added.confounded_with.len() {
+                0 => String::new(),
+                others => format!(" or {others} others"),
+            };
+            format!("{}{set} ({})", name(added), values.join(", "))
+        });
+        let mut words: Vec<String> = added.collect();
+        let refused = self.diagnosis.refused.iter();
+        words.extend(refused.map(|one| format!("refused {} {}: {}", one.effect, one.targets.join(" "), one.reason)));
+        if words.is_empty() { "nothing added".into() } else { words.join("; ") }
+    }
+}
