@@ -240,7 +240,9 @@ impl<M: Model> Tracing<'_, M> {
         // BIC counts in units of what each trial leaves; the best one's unit is common to all.
         let alike = trials.filter(|(_, other, evidence)| {
             let difference = (other.chi2 - trial.chi2) / unit.max(f64::MIN_POSITIVE);
-            difference < SAME_BIC && evidence.delta_bic - best < SAME_BIC.max(0.02 * best.abs())
+            difference < SAME_BIC
+                && evidence.delta_bic - best < SAME_BIC.max(0.02 * best.abs())
+                && overlap(&before.residual, [&after.residual, &other.fit.remainder().residual]) > OVERLAP
         });
         let mut members = vec![effect];
         let mut alone = vec![values.clone()];
@@ -336,6 +338,16 @@ fn at_the_floor(remainder: &Remainder) -> bool {
 fn worse(before: f64, after: f64) -> bool {
     before.is_finite() && after.is_finite() && after > before * (1.0 - HELD_OUT_GAIN)
 }
+
+/// Cosine of the angle between what two models take away from a residual.
+fn overlap(before: &[f64], after: [&Vec<f64>; 2]) -> f64 {
+    let taken = after.map(|after| before.iter().zip(after).map(|(before, after)| before - after).collect::<Vec<f64>>());
+    let [one, other] = &taken;
+    dot(one, other) / (norm(one) * norm(other)).max(f64::MIN_POSITIVE)
+}
+
+/// Two effects that explain as much of the same thing take away vectors that point one way at least so far.
+const OVERLAP: f64 = 0.7;
 
 /// A candidate that differs by less than this from what is applied already, relative, is another description of it.
 const DIFFERENT: f64 = 0.02;

@@ -102,8 +102,11 @@ impl System {
         let mut scale = Vec::with_capacity(count);
         for column in &mut columns {
             let norm = norm(column);
-            scale.push(if norm > 0.0 { norm.recip() } else { 0.0 });
-            column.iter_mut().for_each(|entry| *entry *= scale[scale.len() - 1]);
+            let factor = if norm > 0.0 { norm.recip() } else { 0.0 };
+            for entry in column.iter_mut() {
+                *entry *= factor;
+            }
+            scale.push(factor);
         }
         let mut upper = vec![vec![0.0; count]; count];
         for index in 0..count {
@@ -120,7 +123,9 @@ impl System {
             let left = norm(column);
             if left > INDEPENDENT {
                 upper[index][index] = left;
-                column.iter_mut().for_each(|entry| *entry /= left);
+                for entry in column.iter_mut() {
+                    *entry /= left;
+                }
             } else {
                 column.fill(0.0);
             }

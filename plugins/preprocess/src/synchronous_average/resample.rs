@@ -15,8 +15,8 @@ use runout_core::{
 use super::{
     SynchronousAverage, encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
-    split::Means,
     outliers::{Outliers, Verdict},
+    split::Means,
     turns::{ROUNDING, Turn},
     window::{CONTINUED, Window},
 };
@@ -59,7 +59,12 @@ pub(super) struct Resampling<'a> {
 
 impl<'a> Resampling<'a> {
     /// `turns` are those that the marks allow, in order.
-    pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>, held_out: Option<f64>) -> Self {
+    pub(super) fn new(
+        average: &'a SynchronousAverage,
+        capture: &'a Capture,
+        turns: Vec<Turn>,
+        held_out: Option<f64>,
+    ) -> Self {
         let config = &average.config;
         let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
         let length = grid_length(&turns, config.samples_per_rev, capture.encoder);

@@ -138,20 +138,16 @@ impl StationData {
     pub fn weights_of(&self, order: usize, layout: &Layout, alterations: &Alterations) -> Vec<Complex64> {
         let count = self.readings.count;
         let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order);
-        match &self.weights {
-            Some(weights) => {
-                let mut scaled = weights[order - 1].clone();
-                for row in scaled.chunks_exact_mut(count) {
-                    row.iter_mut().enumerate().for_each(|(index, entry)| *entry *= response(index));
-                }
-                scaled
-            }
-            None => {
-                let mut identity = vec![Complex64::ZERO; count * count];
-                (0..count).for_each(|index| identity[index * count + index] = response(index));
-                identity
-            }
+        let Some(weights) = &self.weights else {
+            let mut identity = vec![Complex64::ZERO; count * count];
+            (0..count).for_each(|index| identity[index * count + index] = response(index));
+            return identity;
+        };
+        let mut scaled = weights[order - 1].clone();
+        for row in scaled.chunks_exact_mut(count) {
+            row.iter_mut().enumerate().for_each(|(index, entry)| *entry *= response(index));
         }
+        scaled
     }
 
     /// Noise of the residual's degrees of freedom at an order from 1, as a standard deviation of weighted residuals.

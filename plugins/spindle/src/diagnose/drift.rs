@@ -29,6 +29,8 @@ pub struct Creeping {
     turns: usize,
 }
 
+/// Levels wander with asynchronous motion: neighbours depend on each other, over some turns.
+const TURNS_ALIKE: f64 = 4.0;
 /// A drift is certain above this many standard uncertainties of its rate.
 const CERTAIN: f64 = 6.0;
 
@@ -121,8 +123,6 @@ fn of_sensor(sensor: usize, station: &Station) -> Option<Creeping> {
     }
     let tau = 0.5 * (low + high);
     let (left, rate, _) = fit(tau);
-    // Levels wander with asynchronous motion: neighbours depend on each other, over some turns.
-    const TURNS_ALIKE: f64 = 4.0;
     let noise = left * TURNS_ALIKE / (turns as f64 - 3.0);
     let step = 1e-3 * tau;
     let (above, below) = (shape(tau + step), shape(tau - step));

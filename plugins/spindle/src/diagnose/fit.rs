@@ -134,7 +134,9 @@ impl Solved {
                 let mut left = product(&weights[order - 1], &left, count);
                 // A real degree of freedom has half of a complex one's square.
                 let scale = std::f64::consts::SQRT_2 / data.floor_std(order);
-                left.iter_mut().for_each(|entry| *entry *= scale);
+                for entry in &mut left {
+                    *entry *= scale;
+                }
                 left
             })
             .collect();

@@ -79,7 +79,7 @@ fn beyond(squares: impl Iterator<Item = (usize, f64)>, limit: f64) -> usize {
 /// Where in the turn a curve of these harmonics has most of its square.
 fn place(harmonics: &[Complex64]) -> String {
     let samples = (2 * harmonics.len() + 2).next_power_of_two();
-    let curve = Fourier::new(samples).synthesise(harmonics.iter().map(|value| value.conj())).to_vec();
+    let curve = Fourier::new(samples).synthesise(harmonics.iter().map(Complex64::conj)).to_vec();
     let squares: Vec<f64> = curve.iter().map(|value| value * value).collect();
     let half = 0.5 * squares.iter().sum::<f64>();
     // The shortest arc that holds half of the square, by two pointers around the turn.

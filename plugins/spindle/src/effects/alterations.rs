@@ -211,18 +211,16 @@ impl Curve {
         let step = std::f64::consts::TAU / values.len() as f64;
         let mapped = values.iter().enumerate().map(|(index, value)| map(index as f64 * step, *value));
         self.fine.analyse(mapped, &mut found);
-        found.iter_mut().for_each(|value| *value = value.conj());
-        found
+        found.into_iter().map(|value| value.conj()).collect()
     }
 
     /// Harmonics of the same curve at other angles.
     fn at_angles(&mut self, harmonics: &[Complex64], angle: impl Fn(f64) -> f64) -> Vec<Complex64> {
-        let table = self.fine.synthesise(harmonics.iter().map(|value| value.conj())).to_vec();
+        let table = self.fine.synthesise(harmonics.iter().map(Complex64::conj)).to_vec();
         let samples = self.turn.length();
         let mut found = vec![Complex64::ZERO; harmonics.len()];
         let step = std::f64::consts::TAU / samples as f64;
         self.turn.analyse((0..samples).map(|index| interpolate(&table, angle(index as f64 * step))), &mut found);
-        found.iter_mut().for_each(|value| *value = value.conj());
-        found
+        found.into_iter().map(|value| value.conj()).collect()
     }
 }
