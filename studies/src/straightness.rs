@@ -114,8 +114,11 @@ pub fn picture(result: &Straightness) -> Result<Vec<u8>> {
     plot::curves(&axes, &curves).map_err(|problem| Error::new("draw", "the straightness", problem))
 }
 
-/// Name, what was found, its uncertainty, and the truth about the least-squares line on the same positions.
-fn quantities(result: &Straightness) -> [(&'static str, &[f64], &[f64], Vec<f64>); 2] {
+/// Name, what was found, its uncertainty, truth.
+type Compared<'a> = (&'static str, &'a [f64], &'a [f64], Vec<f64>);
+
+/// What was found beside the truth about the least-squares line on the same positions.
+fn quantities(result: &Straightness) -> [Compared<'_>; 2] {
     let truth = |of: fn(f64) -> f64| {
         let profile: Vec<f64> = result.z_mm.iter().map(|z| of(*z)).collect();
         about_lsli_um(&result.z_mm, &profile)

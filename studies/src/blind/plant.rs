@@ -85,21 +85,21 @@ impl Draw {
 
     /// Effects of a setup.
     fn of_setup(&mut self, id: &str, large: bool, config: &SpindleConfig) -> (Effect, Planted) {
-        match id {
-            "reversal-angle" => {
-                let (target, angle_deg) = (self.later_setup(config), self.signed(0.003, 1.0, large));
-                let parameters = vec![("angle", angle_deg.to_radians())];
-                let planted = planted("reversal-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
-                (Effect::ReversalAngle(ReversalAngle { targets: vec![target], angle_deg, declared: false }), planted)
-            }
-            _ => {
-                let (target, ratio) = (self.later_setup(config), 1.0 + self.signed(0.003, 0.3, large));
-                let size = format!("{ratio:.3}");
-                let planted = planted("setup-motion-change", Some(&target), vec![("ratio", ratio)], size);
-                let effect = SetupMotionChange { targets: vec![target], ratio, declared: false };
-                (Effect::SetupMotionChange(effect), planted)
-            }
+        let target = self.later_setup(config);
+        if id == "reversal-angle" {
+            let angle_deg = self.signed(0.003, 1.0, large);
+            let parameters = vec![("angle", angle_deg.to_radians())];
+            let planted = planted("reversal-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
+            return (
+                Effect::ReversalAngle(ReversalAngle { targets: vec![target], angle_deg, declared: false }),
+                planted,
+            );
         }
+        let ratio = 1.0 + self.signed(0.003, 0.3, large);
+        let size = format!("{ratio:.3}");
+        let planted = planted("setup-motion-change", Some(&target), vec![("ratio", ratio)], size);
+        let effect = SetupMotionChange { targets: vec![target], ratio, declared: false };
+        (Effect::SetupMotionChange(effect), planted)
     }
 
     fn speed_ripple(&mut self, large: bool) -> (Effect, Planted) {
