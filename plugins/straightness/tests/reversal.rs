@@ -1,5 +1,7 @@
 //! Part and slide told apart on made-up traces.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
 use std::f64::consts::TAU;
 
 use rand::SeedableRng;
@@ -22,7 +24,10 @@ fn separator(step_mm: Option<f64>) -> AxialReversal {
 
 /// A file of traces: name, setup, (z, reading).
 #[derive(Clone)]
-struct File(Vec<(String, &'static str, Vec<(f64, f64)>)>);
+struct File(Vec<Measured>);
+
+/// Name, setup, position and reading.
+type Measured = (String, &'static str, Vec<(f64, f64)>);
 
 impl File {
     fn points(&self) -> Points {
@@ -239,7 +244,9 @@ fn taper_and_parallelism_cannot_be_told() {
     let mut tapered = straight.clone();
     for (_, setup, rows) in &mut tapered.0 {
         let angle = if *setup == "initial" { 0.02 } else { -0.02 };
-        rows.iter_mut().for_each(|row| row.1 += (0.05 + angle) * row.0);
+        for row in rows.iter_mut() {
+            row.1 += (0.05 + angle) * row.0;
+        }
     }
     let (straight, tapered) = (straight.separate(None), tapered.separate(None));
     let differ = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
