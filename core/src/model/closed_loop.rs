@@ -199,7 +199,7 @@ impl<M: Model> Tracing<'_, M> {
             let parameters = self.model.effects()[effect].parameters.len();
             let evidence = |after: f64| {
                 let dof = before.dof.saturating_sub(parameters);
-                Evidence::new(before.chi2(), after, parameters, dof, count, before.noise_is_known())
+                Evidence::new(before.chi2(), after, parameters.max(1), dof, count, before.noise_is_known())
             };
             // What promises nothing to first order is not worth a refit.
             if evidence(before.chi2() - gain).p_value > 0.05 {

@@ -265,7 +265,7 @@ mod tests {
             assert!(message.contains(expected), "{message}");
         }
         let headers = [
-            ("", "the column `z_mm` is missing"),
+            ("", "the column `trace` is missing"),
             ("trace,kind,z_mm,angle_deg,deviation\n", "unknown column `deviation`"),
             ("trace,kind,z_mm,z_mm,deviation_um\n", "the column `z_mm` is there twice"),
             ("trace,kind,z_mm,angle_deg\n", "the column `deviation_um` is missing"),

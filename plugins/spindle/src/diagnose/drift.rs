@@ -1,6 +1,7 @@
 //! Drift from the levels of the turns: what a sensor creeps over a capture, in all setups alike.
 
 use runout_core::{
+    Complex64,
     model::diagnosis::{Diagnosis, Estimated},
     stage::Station,
 };
@@ -31,6 +32,26 @@ pub struct Creeping {
 
 /// Levels wander with asynchronous motion: neighbours depend on each other, over some turns.
 const TURNS_ALIKE: f64 = 4.0;
+/// Share of a variance that stays whatever is taken out of it.
+const LEAST_LEFT: f64 = 0.05;
+/// Correlations stay below this where a variance was made smaller.
+const MOST_ALIKE: f64 = 0.9;
+
+/// Limits a sensor's correlations with the others, so that the covariance stays one.
+fn keep_definite(matrix: &mut [Complex64], sensors: usize, sensor: usize) {
+    for other in (0..sensors).filter(|other| *other != sensor) {
+        let limit = MOST_ALIKE
+            * (matrix[sensor * sensors + sensor].re * matrix[other * sensors + other].re).max(0.0).sqrt()
+            / (sensors - 1) as f64;
+        for at in [sensor * sensors + other, other * sensors + sensor] {
+            let size = matrix[at].norm();
+            if size > limit {
+                matrix[at] *= limit / size;
+            }
+        }
+    }
+}
+
 /// A drift is certain above this many standard uncertainties of its rate.
 const CERTAIN: f64 = 6.0;
 
@@ -63,9 +84,11 @@ impl Creeping {
         for (matrices, square) in [(&mut readings.covariance, mean * mean), (&mut readings.scatter, spread)] {
             for matrices in matrices.iter_mut().flatten() {
                 for order in 2..matrices.len() / (sensors * sensors) {
-                    let entry = &mut matrices[(order * sensors + sensor) * sensors + sensor];
+                    let matrix = &mut matrices[order * sensors * sensors..(order + 1) * sensors * sensors];
                     let leak = square / (std::f64::consts::PI * order as f64).powi(2);
-                    entry.re = (entry.re - leak).max(0.05 * entry.re);
+                    let entry = &mut matrix[sensor * sensors + sensor];
+                    entry.re = (entry.re - leak).max(LEAST_LEFT * entry.re);
+                    keep_definite(matrix, sensors, sensor);
                 }
             }
         }
