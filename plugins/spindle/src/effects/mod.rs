@@ -5,7 +5,7 @@
 //! those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied.
 //!
 //! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own that hands it to
-//! [`crate::diagnose::SpindleModel`]. The tests of `tests/effects.rs` check every effect's partials against finite
+//! [`crate::diagnose::SpindleModel`]. `tests/diagnose.rs` checks every effect's partials against finite
 //! differences.
 
 mod alterations;
