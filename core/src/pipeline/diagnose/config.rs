@@ -117,11 +117,13 @@ impl DiagnoseConfig {
                     .filter(|effect| effect.id == known.effect)
                     .map(|effect| effect.target.as_deref().unwrap_or("none"))
                     .collect();
-                let help = match targets[..] {
-                    [] => known_names(&known.effect, ids()),
-                    _ => format!("its targets: {}", targets.join(", ")),
-                };
-                unknown(&known.effect).help(help)
+                if targets.is_empty() {
+                    return unknown(&known.effect).help(known_names(&known.effect, ids()));
+                }
+                let target = known.target.as_deref().unwrap_or("none");
+                let problem = format!("it cannot act on `{target}`");
+                Error::new("apply", format!("`{}`", known.effect), problem)
+                    .help(format!("its targets: {}", targets.join(", ")))
             })?;
             let parameters = &effects[index].parameters;
             let names = || parameters.iter().map(|parameter| parameter.name.as_str());
