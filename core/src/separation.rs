@@ -155,7 +155,7 @@ pub struct SectionAt {
 pub struct Residual {
     /// Root mean square over all readings and angles, in µm; NaN where nothing is redundant.
     pub rms_um: f64,
-    /// What the scatter over the turns lets expect of it, in µm; NaN without a covariance.
+    /// What the covariance of the averages lets expect of it, in µm; NaN without a covariance.
     pub expected_rms_um: f64,
     /// Weighted sum of squares per degree of freedom; NaN where not known.
     pub chi2_per_dof: f64,
@@ -192,7 +192,7 @@ impl Separation {
         seen.filter(|(order, seen)| *order > 0 && !**seen).map(|(order, _)| order).collect()
     }
 
-    /// Standard uncertainty of one unknown at any one angle, from the scatter over the turns.
+    /// Standard uncertainty of one unknown at any one angle, from the covariance of the averages.
     ///
     /// With errors that do not favour a phase and do not couple orders, Var Re Σ δₙ e^{inα} = ½ Σ E|δₙ|², the same at
     /// every angle. NaN where no variance is known.

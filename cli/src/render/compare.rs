@@ -26,7 +26,7 @@ pub fn text(comparison: &Comparison) -> String {
     let differences = differences(comparison);
     if !differences.is_empty() {
         page.headed_table(format_args!("Differences from {}{several}", comparison.reference), &differences);
-        page.line("  expected: from the scatter over the turns, with what both methods have in common");
+        page.line("  expected: from the noise measured over the turns, with what both methods have in common");
         page.line("  E_n = |difference| / (2 × its standard uncertainty), order by order: scatter alone keeps it");
         page.line("  at or below 1 at 98.2 % of the orders");
     }

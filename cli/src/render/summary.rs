@@ -232,7 +232,7 @@ fn residual(page: &mut Page, stations: &[StationSummary]) {
     let table = gathered(
         &[
             ("left by the fit, rms µm", &|station| station.residual_rms_um),
-            ("expected from the turns' scatter, rms µm", &|station| station.expected_residual_rms_um),
+            ("expected from the noise measured, rms µm", &|station| station.expected_residual_rms_um),
             ("chi squared per degree of freedom", &|station| station.chi2_per_dof),
         ],
         stations,

@@ -204,7 +204,7 @@ pub(super) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<()
     Ok(())
 }
 
-/// What a rig that is not as declared looks like: a residual far above what the turns' scatter lets expect.
+/// What a rig that is not as declared looks like: a residual far above what the noise lets expect.
 fn misfit(stations: &[StationSummary]) -> Option<String> {
     let beyond = stations.iter().filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > MISFIT_CHI2));
     let count = beyond.clone().count();
@@ -214,8 +214,8 @@ fn misfit(stations: &[StationSummary]) -> Option<String> {
     let expected = worst.expected_residual_rms_um.unwrap_or(f64::NAN);
     Some(format!(
         "at {count} of {} stations the readings contradict each other: the fit leaves up to {left:.4} µm rms ({}), where \
-         the turns' scatter lets expect {expected:.4}; something is not as the rig declares it, and the stated \
-         uncertainties, which come from that scatter alone, do not cover it",
+         the noise measured over the turns lets expect {expected:.4}; something is not as the rig declares it, and the stated \
+         uncertainties, which come from that noise alone, do not cover it",
         stations.len(),
         worst.station,
     ))

@@ -75,7 +75,7 @@ pub struct StationSummary {
     pub sections: Vec<SectionSummary>,
     /// Root mean square that the fit leaves of the readings, in µm; absent where nothing is redundant.
     pub residual_rms_um: Option<f64>,
-    /// What the scatter over the turns lets expect of it, in µm.
+    /// What the covariance of the averages lets expect of it, in µm.
     pub expected_residual_rms_um: Option<f64>,
     /// Weighted residual per degree of freedom.
     pub chi2_per_dof: Option<f64>,
@@ -124,7 +124,7 @@ pub struct SectionSummary {
     pub z_mm: f64,
     /// Root mean square of the form, in µm.
     pub form_rms_um: f64,
-    /// Standard uncertainty of the form at any one angle, from the scatter over the turns, in µm.
+    /// Standard uncertainty of the form at any one angle, from the covariance of the averages, in µm.
     pub form_std_um: Option<f64>,
     /// The standards' values.
     pub values: Vec<Value>,

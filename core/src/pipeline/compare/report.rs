@@ -95,7 +95,7 @@ pub struct MethodValue {
     pub z_mm: Option<f64>,
     /// Root mean square over the angles, of the orders that are told.
     pub rms: f64,
-    /// Standard uncertainty at any one angle, from the scatter over the turns; null without one.
+    /// Standard uncertainty at any one angle, from the covariance of the averages; null without one.
     pub std: Option<f64>,
     /// Peak-to-valley roundness deviation about the least-squares circle, of a form, in µm.
     pub ront_um: Option<f64>,
@@ -131,7 +131,7 @@ pub struct Difference {
     pub orders_compared: usize,
     /// Root mean square of the difference over the angles, of the orders that both tell.
     pub rms: Option<f64>,
-    /// What the scatter over the turns lets expect of it, from the joint covariance; null without one.
+    /// What the covariance of the averages lets expect of it, from the joint covariance; null without one.
     pub expected_rms: Option<f64>,
     /// Share of the orders compared with E_n ≤ 1: 0.982 is what scatter alone gives. Null without a covariance.
     pub share_within: Option<f64>,
