@@ -43,10 +43,43 @@ pub struct Split {
     pub fit: Part,
     /// The last ones.
     pub held_out: Part,
-    /// Means of consecutive, about equal groups of all turns, `[group]`, each `[order][channel]`.
-    pub groups: Vec<Vec<Complex64>>,
-    /// Mean level of each turn, µm, `[turn][channel]`.
-    pub levels: Vec<f64>,
+    /// Each turn by itself.
+    pub turns: Turns,
+}
+
+/// Orders, from 0, that are kept of every turn: enough to see what changes from turn to turn.
+pub const TURN_ORDERS: usize = 41;
+
+/// The low harmonics of each turn used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Turns {
+    /// Each turn's number in the capture: those left out are missing.
+    pub numbers: Vec<usize>,
+    /// Orders of each turn, from 0: [`TURN_ORDERS`] or what the average holds.
+    pub orders: usize,
+    /// Channels.
+    pub channels: usize,
+    /// Coefficients of Re Σ cₙ e^{−inΦ} in µm, `[turn][order][channel]`.
+    pub harmonics: Vec<Complex64>,
+}
+
+impl Turns {
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.numbers.len()
+    }
+
+    /// The coefficient of a turn (by position), order and channel.
+    #[must_use]
+    pub fn at(&self, turn: usize, order: usize, channel: usize) -> Complex64 {
+        self.harmonics[(turn * self.orders + order) * self.channels + channel]
+    }
+
+    /// Mean level of a channel in each turn, in µm.
+    pub fn levels(&self, channel: usize) -> impl Iterator<Item = f64> + '_ {
+        (0..self.count()).map(move |turn| self.at(turn, 0, channel).re)
+    }
 }
 
 /// Consecutive turns, averaged: fields as in [`Profile`].

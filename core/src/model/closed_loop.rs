@@ -1,7 +1,7 @@
 //! Find, trace, add, report: until noise is left, or nothing earns its place.
 
 use super::{
-    Effect, Fit, Model, Remainder, Setting,
+    Effect, Fit, Model, Parameter, Remainder, Setting,
     diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Estimated, Level, Moved, Refused, Step, Verdict},
     evidence::Evidence,
     fit::{Prior, Refit, dot, norm, refit},
@@ -23,6 +23,10 @@ const FLOOR_CHI2: f64 = 1.5;
 const OWN_SHARE: f64 = 0.8;
 /// Held-out data must improve by more than this share, so that rounding is no improvement.
 const HELD_OUT_GAIN: f64 = 1e-3;
+/// No effect is this many times larger than its tolerance.
+const MOST: f64 = 100.0;
+/// Where results hold a confounded set, its members' own sizes hold it this many times more softly.
+const SOFT: f64 = 5.0;
 /// An effect of its usual size that would show with less than this many standard deviations is not seen.
 const VISIBLE: f64 = 3.0;
 
@@ -59,6 +63,8 @@ struct Found {
     members: Vec<usize>,
     /// Values of each member as if it were all of it.
     alone: Vec<Vec<f64>>,
+    /// What holds the members where the data do not decide.
+    priors: Vec<Prior>,
     /// What else was applied, at its best values beside it.
     others: Vec<Setting>,
     /// Values and standard uncertainties as if the best one were all of it.
@@ -143,14 +149,14 @@ impl<M: Model> Tracing<'_, M> {
     }
 
     /// All effects found, jointly. A confounded set enters as a whole: each member may be all of it, which is the size of
-    /// its prior; what the data cannot decide then shows as a spread.
+    /// its prior; what the data cannot decide then shows as a spread. The refit starts where the best member is all of it,
+    /// which explains the data; from there the priors lead along what the data cannot decide.
     fn refit_found(&self, model: &M, start: &[Setting]) -> Result<Refit<M::Fit>> {
         let mut settings = self.settings.known.clone();
         for found in &self.found {
-            for (member, alone) in found.members.iter().zip(&found.alone) {
-                // Any mixture explains the data; the even one is in the middle of what they cannot decide.
-                let share = 1.0 / found.members.len() as f64;
+            for (place, (member, alone)) in found.members.iter().zip(&found.alone).enumerate() {
                 let known = start.iter().find(|setting| setting.effect == *member);
+                let share = if place == 0 { 1.0 } else { 0.0 };
                 let values =
                     known.map_or_else(|| alone.iter().map(|value| value * share).collect(), |at| at.values.clone());
                 settings.push(Setting { effect: *member, values });
@@ -219,10 +225,14 @@ impl<M: Model> Tracing<'_, M> {
         let reason = if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
             Some(format!("its evidence is weak: p {:.2e}, ΔBIC {:.1}", evidence.p_value, evidence.delta_bic))
         } else if worse(before.held_out_chi2, after.held_out_chi2) {
-            Some(format!(
-                "it does not lower the error of data left out of the fit: {:.4} → {:.4} {}",
-                before.held_out_rms, after.held_out_rms, before.unit
-            ))
+            let [from, to] = if before.noise_is_known() {
+                [before.held_out_chi2, after.held_out_chi2].map(|chi2| format!("χ² {chi2:.1}"))
+            } else {
+                [before.held_out_rms, after.held_out_rms].map(|rms| format!("{rms:.4} {}", before.unit))
+            };
+            Some(format!("it does not lower the error of data left out of the fit: {from} → {to}"))
+        } else if let Some((parameter, value)) = self.beyond_belief(effect, &trial) {
+            Some(format!("it would have to be larger than can be: {} = {value:.3e} {}", parameter.name, parameter.unit))
         } else {
             None
         };
@@ -252,7 +262,48 @@ impl<M: Model> Tracing<'_, M> {
         }
         let mut others = trial.settings;
         others.pop();
-        Some(Found { members, alone, others, values, std, evidence, before, after })
+        let priors = if members.len() > 1 { self.priors(&current.fit, &members, &alone) } else { Vec::new() };
+        Some(Found { members, alone, priors, others, values, std, evidence, before, after })
+    }
+
+    /// A parameter of the last effect of a trial that is far larger than expected.
+    fn beyond_belief(&self, effect: usize, trial: &Refit<M::Fit>) -> Option<(&Parameter, f64)> {
+        let values = trial.settings.last().map(|setting| &setting.values)?;
+        let mut parameters = self.model.effects()[effect].parameters.iter().zip(values);
+        let (parameter, value) = parameters.find(|(known, value)| value.abs() > MOST * known.tolerance)?;
+        Some((parameter, *value))
+    }
+
+    /// Holds a confounded set where the results move least. Form without it, the truth, and everything that the data
+    /// allow between: the nearest of these to form without it is never farther from the truth than that is (Pythagoras).
+    /// The members' own sizes decide where results do not move, and softly where they do.
+    fn priors(&self, fit: &M::Fit, members: &[usize], alone: &[Vec<f64>]) -> Vec<Prior> {
+        let moves: Vec<Vec<f64>> = members.iter().flat_map(|member| fit.moves(*member)).collect();
+        let values: Vec<f64> = alone.iter().flatten().copied().collect();
+        let mut places = 0..;
+        let size = alone.iter().map(|alone| {
+            let columns = alone.iter().zip(&mut places).filter_map(|(value, place)| Some((value, moves.get(place)?)));
+            let mut moved = vec![0.0; moves.first().map_or(0, Vec::len)];
+            for (value, column) in columns {
+                moved.iter_mut().zip(column).for_each(|(moved, entry)| *moved += value * entry);
+            }
+            norm(&moved)
+        });
+        let size = size.fold(0.0, f64::max);
+        let parameters = members.iter().flat_map(|member| &self.model.effects()[*member].parameters);
+        let soft = if size > 0.0 { SOFT } else { 1.0 };
+        let own = values.iter().zip(parameters).enumerate().map(|(place, (value, known))| {
+            let std = soft * value.abs().max(1e-3 * known.tolerance);
+            Prior { weights: vec![(place, std.recip())] }
+        });
+        let mut priors: Vec<Prior> = own.collect();
+        if size > 0.0 {
+            priors.extend(triangle(moves).into_iter().map(|row| {
+                let weights = row.into_iter().enumerate().map(|(place, entry)| (place, entry / size));
+                Prior { weights: weights.collect() }
+            }));
+        }
+        priors
     }
 
     /// Keeps the last reason for which an effect was refused.
@@ -292,16 +343,13 @@ impl<M: Model> Tracing<'_, M> {
 
     fn priors_so_far(&self) -> Vec<Prior> {
         let mut priors = Vec::new();
-        let mut position = 0;
+        let mut first = 0;
         for found in &self.found {
-            for (member, alone) in found.members.iter().zip(&found.alone) {
-                for (value, known) in alone.iter().zip(&self.model.effects()[*member].parameters) {
-                    if found.members.len() > 1 {
-                        priors.push(Prior { parameter: position, std: value.abs().max(1e-3 * known.tolerance) });
-                    }
-                    position += 1;
-                }
+            for prior in &found.priors {
+                let weights = prior.weights.iter().map(|(place, weight)| (first + place, *weight));
+                priors.push(Prior { weights: weights.collect() });
             }
+            first += found.alone.iter().map(Vec::len).sum::<usize>();
         }
         priors
     }
@@ -361,6 +409,24 @@ fn independent(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
         return Vec::new();
     }
     orthonormal(columns, basis)
+}
+
+/// R of columns Q·R, `[row][column]`: as long as they are in every combination.
+fn triangle(mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let count = columns.len();
+    let mut upper = vec![vec![0.0; count]; count];
+    for row in 0..count {
+        let left = norm(&columns[row]);
+        if left <= 0.0 {
+            continue;
+        }
+        let base: Vec<f64> = columns[row].iter().map(|entry| entry / left).collect();
+        for (column, entry) in columns.iter_mut().zip(&mut upper[row]).skip(row) {
+            *entry = dot(&base, column);
+            column.iter_mut().zip(&base).for_each(|(value, base)| *value -= *entry * base);
+        }
+    }
+    upper
 }
 
 /// Columns made orthonormal to a basis and to each other; dependent ones are left out.

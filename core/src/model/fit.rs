@@ -12,13 +12,18 @@ const SETTLED: f64 = 1e-3;
 /// A parameter whose column adds less than this, relative, to those before it cannot be told from them.
 const INDEPENDENT: f64 = 1e-9;
 
-/// A parameter that is held near 0 by a prior: index into all parameters of the settings, and its standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A combination of parameters that is held near 0: Σ weight·value has the standard deviation 1.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    /// Position among the settings' parameters, one after the other.
-    pub parameter: usize,
-    /// Standard deviation about 0, in the parameter's unit.
-    pub std: f64,
+    /// Positions among the settings' parameters, one after the other, and their weights.
+    pub weights: Vec<(usize, f64)>,
+}
+
+impl Prior {
+    /// The combination at these values.
+    fn at(&self, values: &[f64]) -> f64 {
+        self.weights.iter().map(|(place, weight)| weight * values.get(*place).copied().unwrap_or(0.0)).sum()
+    }
 }
 
 /// Effects applied at their best values.
@@ -74,7 +79,7 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize, priors: &[P
 
 fn cost_of(fit: &impl Fit, free: &[Setting], priors: &[Prior]) -> f64 {
     let values: Vec<f64> = free.iter().flat_map(|setting| setting.values.iter().copied()).collect();
-    let held: f64 = priors.iter().filter_map(|prior| Some((values.get(prior.parameter)? / prior.std).powi(2))).sum();
+    let held: f64 = priors.iter().map(|prior| prior.at(&values).powi(2)).sum();
     fit.remainder().chi2() + held
 }
 
@@ -93,10 +98,13 @@ impl System {
         let mut right = fit.remainder().residual.clone();
         let values: Vec<f64> = free.iter().flat_map(|setting| setting.values.iter().copied()).collect();
         for prior in priors {
-            for (index, column) in columns.iter_mut().enumerate() {
-                column.push(if index == prior.parameter { prior.std.recip() } else { 0.0 });
+            columns.iter_mut().for_each(|column| column.push(0.0));
+            for (place, weight) in &prior.weights {
+                if let Some(entry) = columns.get_mut(*place).and_then(|column| column.last_mut()) {
+                    *entry += weight;
+                }
             }
-            right.push(values.get(prior.parameter).copied().unwrap_or(0.0) / prior.std);
+            right.push(prior.at(&values));
         }
         let count = columns.len();
         let mut scale = Vec::with_capacity(count);

@@ -57,6 +57,12 @@ pub trait Fit {
     /// How the results (form, motion) change with each parameter of an effect: root mean square, per unit of it.
     fn bias(&self, effect: usize) -> Vec<Bias>;
 
+    /// How the result that counts most (form) changes with each parameter of an effect: `[parameter][entry]`, in one unit;
+    /// nothing where there is no such result. What the data cannot decide is left where this moves least.
+    fn moves(&self, _effect: usize) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
     /// Values that people look at, with their standard uncertainty where it is known.
     fn values(&self) -> Vec<Outcome>;
 

@@ -221,6 +221,47 @@ fn a_stranger_stays_unexplained() {
     assert!(after <= 1.001 * before);
 }
 
+/// A probe that slips in the middle of a setup is no sensor's gain: the turns tell, and nothing is blamed.
+#[test]
+fn a_probe_that_slips_within_a_setup_is_said_to_have() {
+    let effect = r#"[{"plugin":"slipped-probe","targets":["S2"],"setup":"b","after_turns":31.4,"shift_um":0.7,
+        "angle_deg":0.2,"relative_gain":0.02}]"#;
+    for seed in 1..=3 {
+        let (found, [before, after]) = diagnosed(&campaign(seed, effect));
+        let diagnosis = &found.diagnosis;
+        println!(
+            "simulated, a slipped probe: {:?} {:?}, form error {before:.4} → {after:.4} µm",
+            diagnosis.verdict, diagnosis.unexplained
+        );
+        assert_eq!(diagnosis.verdict, Verdict::Unexplained);
+        assert!(diagnosis.added.is_empty(), "{:?}", diagnosis.added);
+        let change = &diagnosis.unexplained[0];
+        assert_eq!((change.sensor.as_deref(), change.setup.as_deref()), (Some("S2"), Some("b")));
+        // The turn in which it slips is a mixture of both.
+        assert!(change.place == "from turn 31 on" || change.place == "from turn 32 on", "{}", change.place);
+        assert!(after <= 1.001 * before, "{before} → {after}");
+    }
+}
+
+#[test]
+fn an_asynchronous_line_is_found_in_the_turns() {
+    let effect = r#"[{"plugin":"asynchronous-line","order":2.43,"amplitude_um":0.3,"direction_deg":30}]"#;
+    for seed in 1..=3 {
+        let (found, [before, after]) = diagnosed(&campaign(seed, effect));
+        let added = &found.diagnosis.added;
+        println!("simulated, a line: {added:?}, form error {before:.4} → {after:.4} µm");
+        assert_eq!(found.diagnosis.verdict, Verdict::Explained);
+        assert_eq!(added.len(), 1);
+        assert_eq!(added[0].effect, "asynchronous-line");
+        for (name, truth) in [("order", 2.43), ("amplitude", 0.3), ("direction", 30.0_f64.to_radians())] {
+            let found = added[0].parameters.iter().find(|known| known.name == name).unwrap();
+            // Five standard uncertainties, as for the other effects.
+            assert!((found.value - truth).abs() < 5.0 * found.std, "{name}: {found:?} for {truth}");
+        }
+        assert!(after < CLEAN_UM, "{after}");
+    }
+}
+
 /// Every effect's partials are what the residual does when the effect is applied a little more and a little less.
 #[test]
 fn partials_are_finite_differences() {

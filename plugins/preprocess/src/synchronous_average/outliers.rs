@@ -50,7 +50,7 @@ impl Outliers {
             let outlier =
                 farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
             if outlier.is_none() {
-                means.add(&harmonics);
+                means.add(turn.number, &harmonics);
             }
             judged.push(Verdict { turn, outlier: outlier.map(|(channel, _)| (channel, distances[channel])) });
         }

@@ -180,7 +180,7 @@ impl<'a> Resampling<'a> {
         self.transform();
         match &mut self.outliers {
             None => {
-                self.means.add(&self.turn);
+                self.means.add(turn.number, &self.turn);
                 self.used_samples += turn.samples();
             }
             Some(outliers) => {

@@ -2,13 +2,10 @@
 
 use runout_core::{
     Complex64,
-    profile::{Part, Split},
+    profile::{Part, Split, TURN_ORDERS, Turns},
 };
 
 use super::mean::Mean;
-
-/// Groups of consecutive turns: enough to see when something changed.
-const GROUPS: usize = 5;
 
 /// The mean of all turns, and of parts of them.
 pub(super) struct Means {
@@ -17,13 +14,11 @@ pub(super) struct Means {
 }
 
 struct Parts {
-    /// Turns that can be expected, and how many of them are fitted.
-    planned: usize,
+    /// How many turns are fitted.
     fitted: usize,
     fit: Mean,
     held_out: Mean,
-    groups: Vec<Mean>,
-    levels: Vec<f64>,
+    turns: Turns,
 }
 
 impl Means {
@@ -32,29 +27,29 @@ impl Means {
         let parts = held_out.filter(|_| planned >= 4).map(|share| {
             let last = ((share * planned as f64).round() as usize).clamp(2, planned - 2);
             let fitted = planned - last;
-            let groups = GROUPS.min(planned);
-            let size = planned.div_ceil(groups);
+            let kept = orders.min(TURN_ORDERS);
             Parts {
-                planned,
                 fitted,
                 fit: Mean::new(orders, channels, fitted),
                 held_out: Mean::new(orders, channels, last),
-                groups: (0..groups).map(|_| Mean::new(orders, channels, size)).collect(),
-                levels: Vec::with_capacity(planned * channels),
+                turns: Turns {
+                    numbers: Vec::with_capacity(planned),
+                    orders: kept,
+                    channels,
+                    harmonics: Vec::with_capacity(planned * kept * channels),
+                },
             }
         });
         Self { whole: Mean::new(orders, channels, planned), parts }
     }
 
-    /// Takes one turn's harmonics, `[order][channel]`.
-    pub fn add(&mut self, turn: &[Complex64]) {
-        if let Some(parts) = &mut self.parts {
-            let number = self.whole.turns();
-            let part = if number < parts.fitted { &mut parts.fit } else { &mut parts.held_out };
+    /// Takes the harmonics, `[order][channel]`, of the turn of this number.
+    pub fn add(&mut self, number: usize, turn: &[Complex64]) {
+        if let Some(Parts { fitted, fit, held_out, turns }) = &mut self.parts {
+            let part = if self.whole.turns() < *fitted { fit } else { held_out };
             part.add(turn);
-            let groups = parts.groups.len();
-            parts.groups[(number * groups / parts.planned).min(groups - 1)].add(turn);
-            parts.levels.extend(turn[..self.whole.channels()].iter().map(|level| level.re));
+            turns.numbers.push(number);
+            turns.harmonics.extend(&turn[..turns.orders * turns.channels]);
         }
         self.whole.add(turn);
     }
@@ -72,8 +67,7 @@ impl Means {
         Some(Split {
             fit: part(&parts.fit, 0..fitted),
             held_out: part(&parts.held_out, fitted..fitted + parts.held_out.turns()),
-            groups: parts.groups.iter().filter(|group| group.turns() > 0).map(Mean::mean).collect(),
-            levels: parts.levels.clone(),
+            turns: parts.turns.clone(),
         })
     }
 }
@@ -86,5 +80,10 @@ pub(super) fn truncate(split: &mut Split, orders: usize, channels: usize) {
             matrices.truncate(orders * channels * channels);
         }
     }
-    split.groups.iter_mut().for_each(|group| group.truncate(orders * channels));
+    let turns = &mut split.turns;
+    if orders < turns.orders {
+        let kept = turns.harmonics.chunks(turns.orders * channels).flat_map(|turn| &turn[..orders * channels]);
+        turns.harmonics = kept.copied().collect();
+        turns.orders = orders;
+    }
 }

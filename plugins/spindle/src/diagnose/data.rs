@@ -4,7 +4,12 @@ use std::sync::Arc;
 
 use runout_core::{Complex64, Result, model::Effect, stage::Station};
 
-use super::{TRACED_ORDERS, drift::Creeping};
+use super::{
+    TRACED_ORDERS,
+    changes::{self, Change},
+    drift::{self, Creeping},
+    lines::{self, Line},
+};
 use crate::{
     effects::{Alterations, SpindleEffect},
     layout::Layout,
@@ -69,21 +74,45 @@ pub struct StationData {
     pub weights: Option<Vec<Vec<Complex64>>>,
     /// Mean square of a weighted residual's degree of freedom, by order from 1: 1 for independent turns.
     pub floor: Vec<f64>,
-    /// What the levels of the turns say of each sensor's creep.
-    pub creeping: Vec<Option<Creeping>>,
+    /// What the single turns show.
+    pub seen: Arc<Seen>,
+    /// Leak of each line into the readings.
+    pub leaks: Vec<Vec<Complex64>>,
     /// Sensor, mean creep a turn and its standard uncertainty, where the levels tell a drift for certain: one observation
     /// more, since a creep of one sensor can look like a motion in the averaged turn.
     pub creeps: Vec<(usize, f64, f64)>,
 }
 
+/// What the single turns of a station show, and their average does not.
+pub struct Seen {
+    /// What their levels say of each sensor's creep.
+    pub creeping: Vec<Option<Creeping>>,
+    /// Changes within a setup.
+    pub changes: Vec<Change>,
+    /// Asynchronous lines.
+    pub lines: Vec<Line>,
+}
+
+impl Seen {
+    pub fn new(selection: &Selection, layout: &Layout, station: &Station) -> Self {
+        let creeping = drift::creeping(selection, station);
+        let max_order = station.profiles.iter().map(runout_core::profile::Profile::max_order).min().unwrap_or(0);
+        Self {
+            changes: changes::changes(selection, station, &creeping),
+            lines: lines::lines(selection, layout, station, max_order),
+            creeping,
+        }
+    }
+}
+
 impl StationData {
     /// All turns and orders.
-    pub fn whole(selection: &Selection, layout: &Layout, station: &Station) -> Result<Self> {
-        Self::new(selection, layout, station, station, None)
+    pub fn whole(selection: &Selection, layout: &Layout, station: &Station, seen: &Arc<Seen>) -> Result<Self> {
+        Self::new(selection, layout, station, station, None, Arc::clone(seen))
     }
 
     /// The turns to fit and those held out, low orders only; all turns where none are held out.
-    pub fn split(selection: &Selection, layout: &Layout, station: &Station) -> Result<Self> {
+    pub fn split(selection: &Selection, layout: &Layout, station: &Station, seen: &Arc<Seen>) -> Result<Self> {
         let part = |which: fn(&runout_core::profile::Split) -> &runout_core::profile::Part| -> Option<Station> {
             let profile = |profile: &runout_core::profile::Profile| {
                 let split = profile.split.as_ref()?;
@@ -93,7 +122,10 @@ impl StationData {
             Some(Station { name: station.name.clone(), z_mm: station.z_mm, profiles })
         };
         let (fit, held_out) = (part(|split| &split.fit), part(|split| &split.held_out));
-        let mut data = Self::new(selection, layout, fit.as_ref().unwrap_or(station), station, held_out.as_ref())?;
+        let mut data = {
+            let fit = fit.as_ref().unwrap_or(station);
+            Self::new(selection, layout, fit, station, held_out.as_ref(), Arc::clone(seen))?
+        };
         data.readings.truncate(TRACED_ORDERS);
         if let Some(held_out) = &mut data.held_out {
             held_out.truncate(TRACED_ORDERS);
@@ -107,16 +139,18 @@ impl StationData {
         fit: &Station,
         whole: &Station,
         held_out: Option<&Station>,
+        seen: Arc<Seen>,
     ) -> Result<Self> {
         let mut readings = Readings::gather(selection, layout, fit)?;
-        let creeping = super::drift::creeping(selection, whole);
-        for (sensor, creeping) in creeping.iter().enumerate() {
+        let all = std::ptr::eq(fit, whole);
+        for (sensor, creeping) in seen.creeping.iter().enumerate() {
             if let Some(creeping) = creeping {
-                creeping.take_out(&mut readings, sensor, std::ptr::eq(fit, whole));
+                creeping.take_out(&mut readings, sensor, all);
             }
         }
-        let all = std::ptr::eq(fit, whole);
-        let creeps = creeping.iter().enumerate().filter_map(|(sensor, creeping)| {
+        seen.changes.iter().for_each(|change| change.widen(&mut readings));
+        let leaks = seen.lines.iter().map(|line| line.leak[if all { 2 } else { 0 }].clone()).collect();
+        let creeps = seen.creeping.iter().enumerate().filter_map(|(sensor, creeping)| {
             let (creep, std) = creeping.filter(|creeping| creeping.certain)?.observed(all);
             Some((sensor, creep, std))
         });
@@ -126,7 +160,7 @@ impl StationData {
         let orders = 1..=readings.max_order;
         let weights: Option<Vec<_>> = orders.map(|order| whitening(&readings, order)).collect();
         let floor = weights.as_ref().map_or_else(Vec::new, |weights| floor(layout, &readings, weights));
-        Ok(Self { name: whole.name.clone(), z_mm: whole.z_mm, creeping, creeps, readings, held_out, weights, floor })
+        Ok(Self { name: whole.name.clone(), z_mm: whole.z_mm, seen, leaks, creeps, readings, held_out, weights, floor })
     }
 
     /// The station without its profiles.

@@ -3,12 +3,17 @@
 use runout_core::{
     Complex64,
     model::diagnosis::{Diagnosis, Estimated},
+    profile::{Profile, Split},
     stage::Station,
 };
 
 use super::data::Shared;
 use crate::{selection::Selection, separators::Readings};
 
+/// Fewest turns of a capture.
+const FEWEST: usize = 8;
+/// Two-sided 95 % quantiles of Student's distribution for 1, 2, 3, … degrees of freedom.
+const STUDENT_95: [f64; 8] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31];
 /// Time constants that are tried, in turns: from 1 to 1000 by equal ratios.
 const TRIED: usize = 61;
 
@@ -62,6 +67,11 @@ impl Creeping {
         self.rate_um_per_rev * self.time_constant_turns * (at(to) - at(from)) / (to.max(from + 1) - from) as f64
     }
 
+    /// Creep over one turn, in µm.
+    pub fn in_turn(&self, turn: usize) -> f64 {
+        self.over(turn, turn + 1)
+    }
+
     /// Mean creep a turn over the turns fitted (or all), and its standard uncertainty, in µm.
     pub fn observed(&self, whole: bool) -> (f64, f64) {
         let creep = self.over(0, if whole { self.turns } else { self.fitted });
@@ -79,7 +89,7 @@ impl Creeping {
         let turns = if whole { self.turns } else { self.fitted };
         let mean = self.over(0, turns);
         let spread =
-            (0..turns).map(|turn| (self.over(turn, turn + 1) - mean).powi(2)).sum::<f64>() / (turns * turns) as f64;
+            (0..turns).map(|turn| (self.in_turn(turn) - mean).powi(2)).sum::<f64>() / (turns * turns) as f64;
         let sensors = readings.count / readings.turns.len().max(1);
         for (matrices, square) in [(&mut readings.covariance, mean * mean), (&mut readings.scatter, spread)] {
             for matrices in matrices.iter_mut().flatten() {
@@ -103,71 +113,142 @@ impl Creeping {
 
 /// What the levels of the turns say of each sensor.
 pub fn creeping(selection: &Selection, station: &Station) -> Vec<Option<Creeping>> {
-    selection.sensors.iter().map(|sensor| of_sensor(*sensor, station)).collect()
+    let levels: Vec<Option<Levels>> =
+        selection.sensors.iter().map(|sensor| Levels::of_sensor(*sensor, station)).collect();
+    let known: Vec<&Levels> = levels.iter().flatten().collect();
+    levels.iter().map(|levels| levels.as_ref()?.fit(&known)).collect()
 }
 
-fn of_sensor(sensor: usize, station: &Station) -> Option<Creeping> {
-    let mut captures: Vec<Vec<f64>> = Vec::new();
-    let mut fitted = 0;
-    for profile in &station.profiles {
-        let split = profile.split.as_ref()?;
-        let channel = profile.sensors.iter().position(|known| *known == sensor)?;
-        captures.push(split.levels.iter().skip(channel).step_by(profile.channels()).copied().collect());
-        fitted = split.fit.turns.len();
+/// Levels of one sensor's turns.
+struct Levels {
+    /// About the mean of each capture, which has a level of its own, `[capture][turn]`.
+    captures: Vec<Vec<f64>>,
+    /// Their mean, `[turn]`.
+    mean: Vec<f64>,
+    fitted: usize,
+}
+
+impl Levels {
+    fn of_sensor(sensor: usize, station: &Station) -> Option<Self> {
+        let splits: Option<Vec<_>> = station.profiles.iter().map(|profile| profile.split.as_ref()).collect();
+        let splits = splits?;
+        let turns = splits.iter().map(|split| split.turns.count()).min().filter(|turns| *turns >= FEWEST)?;
+        let capture = |(profile, split): (&Profile, &&Split)| {
+            let channel = profile.sensors.iter().position(|known| *known == sensor)?;
+            Some(about_mean(split.turns.levels(channel).take(turns).collect()))
+        };
+        let captures: Vec<Vec<f64>> =
+            station.profiles.iter().zip(&splits).map(capture).collect::<Option<_>>()?;
+        let share = 1.0 / captures.len() as f64;
+        let mean = (0..turns).map(|turn| captures.iter().map(|capture| capture[turn]).sum::<f64>() * share).collect();
+        Some(Self { captures, mean, fitted: splits.last()?.fit.turns.len() })
     }
-    let turns = captures.iter().map(Vec::len).min().filter(|turns| *turns >= 8)?;
-    // Each capture has a level of its own.
-    let mean_curve: Vec<f64> = (0..turns)
-        .map(|turn| {
-            let off = |capture: &Vec<f64>| capture[turn] - capture[..turns].iter().sum::<f64>() / turns as f64;
-            captures.iter().map(off).sum::<f64>() / captures.len() as f64
+
+    /// Rate and time constant of the mean over the captures; what all sensors wander from one to the other gives their
+    /// uncertainty.
+    fn fit(&self, all: &[&Self]) -> Option<Creeping> {
+        let turns = self.mean.len();
+        let fit = |tau: f64| {
+            let shape = shape(tau, turns);
+            let rate = dot(&shape, &self.mean) / dot(&shape, &shape);
+            (shape.iter().zip(&self.mean).map(|(a, b)| (b - rate * a).powi(2)).sum::<f64>(), rate)
+        };
+        let tau_of = |step: usize| 10.0_f64.powf(3.0 * step as f64 / (TRIED - 1) as f64);
+        let best = (0..TRIED).map(|step| (fit(tau_of(step)).0, step)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        // Between the neighbours of the best one.
+        let (mut low, mut high) = (tau_of(best.saturating_sub(1)), tau_of((best + 1).min(TRIED - 1)));
+        for _ in 0..40 {
+            let third = (high - low) / 3.0;
+            if fit(low + third).0 < fit(high - third).0 { high -= third } else { low += third }
+        }
+        let tau = 0.5 * (low + high);
+        let (left, rate) = fit(tau);
+        let partials = Partials::new(rate, tau, turns);
+        // Turns that wander together count as one; captures tell how far they do, as far as there are enough of them.
+        let noise = left * TURNS_ALIKE / (turns as f64 - 3.0);
+        let [rate_std, time_constant_std] = match partials.between(all) {
+            Some(between) => [0, 1].map(|which| partials.std(noise, which).max(between[which])),
+            None => [0, 1].map(|which| partials.std(noise, which)),
+        };
+        // A drift comes with every capture; what wanders does not.
+        let rates = self.captures.iter().map(|capture| dot(&partials.by_rate, capture) / partials.normal[0]);
+        let alike = rates.into_iter().all(|found| (found / rate - 1.0).abs() < 0.5);
+        Some(Creeping {
+            certain: alike && rate.abs() > CERTAIN * partials.std(noise, 0),
+            rate_um_per_rev: rate,
+            time_constant_turns: tau,
+            rate_std,
+            time_constant_std,
+            fitted: self.fitted,
+            turns,
         })
-        .collect();
-    let shape = |tau: f64| -> Vec<f64> {
-        // The mean level of a turn is that at its middle.
-        let raw: Vec<f64> = (0..turns).map(|turn| -tau * (-(turn as f64 + 0.5) / tau).exp_m1()).collect();
-        let mean = raw.iter().sum::<f64>() / turns as f64;
-        raw.into_iter().map(|value| value - mean).collect()
-    };
-    let fit = |tau: f64| {
-        let shape = shape(tau);
-        let square: f64 = shape.iter().map(|value| value * value).sum();
-        let rate = shape.iter().zip(&mean_curve).map(|(a, b)| a * b).sum::<f64>() / square;
-        let left: f64 = shape.iter().zip(&mean_curve).map(|(a, b)| (b - rate * a).powi(2)).sum();
-        (left, rate, square)
-    };
-    let tau_of = |step: usize| 10.0_f64.powf(3.0 * step as f64 / (TRIED - 1) as f64);
-    let best = (0..TRIED).map(|step| (fit(tau_of(step)).0, step)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
-    // Golden section between the neighbours of the best one.
-    let (mut low, mut high) = (tau_of(best.saturating_sub(1)), tau_of((best + 1).min(TRIED - 1)));
-    for _ in 0..40 {
-        let third = (high - low) / 3.0;
-        if fit(low + third).0 < fit(high - third).0 { high -= third } else { low += third }
     }
-    let tau = 0.5 * (low + high);
-    let (left, rate, _) = fit(tau);
-    let noise = left * TURNS_ALIKE / (turns as f64 - 3.0);
-    let step = 1e-3 * tau;
-    let (above, below) = (shape(tau + step), shape(tau - step));
-    let by_rate = shape(tau);
-    let by_tau: Vec<f64> = above.iter().zip(&below).map(|(a, b)| rate * (a - b) / (2.0 * step)).collect();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let (a, b, c) = (dot(&by_rate, &by_rate), dot(&by_rate, &by_tau), dot(&by_tau, &by_tau));
-    let determinant = (a * c - b * b).max(f64::MIN_POSITIVE);
-    // A drift comes with every capture; what wanders does not.
-    let of_capture = |capture: &Vec<f64>| dot(&by_rate, &capture[..turns]) / a;
-    let rates: Vec<f64> = captures.iter().map(of_capture).collect();
-    let alike = rates.iter().all(|found| (found / rate - 1.0).abs() < 0.5);
-    let rate_std = (noise * c / determinant).sqrt();
-    Some(Creeping {
-        certain: alike && rate.abs() > CERTAIN * rate_std,
-        rate_um_per_rev: rate,
-        time_constant_turns: tau,
-        rate_std,
-        time_constant_std: (noise * a / determinant).sqrt(),
-        fitted,
-        turns,
-    })
+}
+
+/// How levels change with rate and time constant.
+struct Partials {
+    by_rate: Vec<f64>,
+    by_tau: Vec<f64>,
+    /// Their products: rate with rate, rate with τ, τ with τ.
+    normal: [f64; 3],
+    determinant: f64,
+}
+
+impl Partials {
+    fn new(rate: f64, tau: f64, turns: usize) -> Self {
+        let step = 1e-3 * tau;
+        let by_rate = shape(tau, turns);
+        let (above, below) = (shape(tau + step, turns), shape(tau - step, turns));
+        let by_tau: Vec<f64> = above.iter().zip(&below).map(|(a, b)| rate * (a - b) / (2.0 * step)).collect();
+        let normal = [dot(&by_rate, &by_rate), dot(&by_rate, &by_tau), dot(&by_tau, &by_tau)];
+        let determinant = (normal[0] * normal[2] - normal[1] * normal[1]).max(f64::MIN_POSITIVE);
+        Self { by_rate, by_tau, normal, determinant }
+    }
+
+    /// Of rate (0) or τ (1), from the variance of independent turns.
+    fn std(&self, noise: f64, which: usize) -> f64 {
+        (noise * self.normal[2 * (1 - which)] / self.determinant).sqrt()
+    }
+
+    /// Rate and τ that explain a curve beside those found.
+    fn solve(&self, curve: &[f64]) -> [f64; 2] {
+        let (a, b) = (dot(&self.by_rate, curve), dot(&self.by_tau, curve));
+        let [aa, ab, bb] = self.normal;
+        [(a * bb - b * ab) / self.determinant, (b * aa - a * ab) / self.determinant]
+    }
+
+    /// Standard uncertainty of the mean of rate and τ, from how captures differ in all sensors: for few degrees of freedom
+    /// as much larger as Student's distribution is wider, so that twice it holds 95 %.
+    fn between(&self, all: &[&Levels]) -> Option<[f64; 2]> {
+        let captures = all.iter().map(|levels| levels.captures.len()).min().filter(|captures| *captures >= 2)?;
+        let mut squares = [0.0; 2];
+        for levels in all {
+            for capture in &levels.captures {
+                let off: Vec<f64> = capture.iter().zip(&levels.mean).map(|(one, mean)| one - mean).collect();
+                squares.iter_mut().zip(self.solve(&off)).for_each(|(sum, value)| *sum += value * value);
+            }
+        }
+        // Sensors see two directions between them.
+        let freedom = (captures - 1) * all.len().min(2);
+        let wider = STUDENT_95.get(freedom - 1).map_or(1.0, |quantile| 0.5 * quantile);
+        let count = (captures * (captures - 1) * all.len()) as f64;
+        Some(squares.map(|sum| wider * (sum / count).sqrt()))
+    }
+}
+
+/// τ(1 − e^{−t/τ}) at the turns' middles, about its mean.
+fn shape(tau: f64, turns: usize) -> Vec<f64> {
+    about_mean((0..turns).map(|turn| -tau * (-(turn as f64 + 0.5) / tau).exp_m1()).collect())
+}
+
+fn about_mean(mut values: Vec<f64>) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter_mut().for_each(|value| *value -= mean);
+    values
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Says a drift that was found by its rate and time constant, where the levels tell them.
@@ -175,7 +256,7 @@ pub fn say_rates(diagnosis: &mut Diagnosis, shared: &Shared) {
     for added in diagnosis.added.iter_mut().filter(|added| added.effect == "thermal-drift") {
         let sensors = &shared.selection.rig.sensors;
         let sensor = added.targets.first().and_then(|id| sensors.iter().position(|sensor| sensor.id == *id));
-        let Some(creeping) = sensor.and_then(|sensor| *shared.data.first()?.creeping.get(sensor)?) else { continue };
+        let Some(creeping) = sensor.and_then(|sensor| *shared.data.first()?.seen.creeping.get(sensor)?) else { continue };
         let said = |name: &str, value: f64, std: f64, unit: &str| Estimated {
             name: name.into(),
             value,

@@ -71,6 +71,12 @@ impl SpindleFit {
         &self.layout
     }
 
+    /// Numbers of the asynchronous lines that are taken out.
+    #[must_use]
+    pub(super) fn lines(&self) -> &[usize] {
+        &self.alterations.lines
+    }
+
     /// Highest order fitted.
     #[must_use]
     pub fn max_order(&self) -> usize {
@@ -112,6 +118,9 @@ impl Shared {
 impl Solved {
     fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
         let mut corrected = data.readings.clone();
+        for leak in alterations.lines.iter().filter_map(|line| data.leaks.get(*line)) {
+            corrected.mean.iter_mut().zip(leak).for_each(|(mean, leak)| *mean -= leak);
+        }
         alterations.correct(layout, &mut corrected.mean, corrected.samples_per_rev);
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.
@@ -186,6 +195,10 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
             residual.push((creep - alterations.sensors[*sensor].creep_um) / std);
             dof += 1;
         }
+        for (number, line) in data.seen.lines.iter().enumerate() {
+            residual.push(if alterations.lines.contains(&number) { 0.0 } else { line.evidence.sqrt() });
+            dof += 1;
+        }
         let level = solver.residual(&solved.operators, &solved.corrected, &solved.linear);
         if level.dof > 0 {
             dof += level.dof;
@@ -216,12 +229,19 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
 fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &Alterations) -> Option<(f64, f64)> {
     let mut held = data.held_out.clone()?;
     let mut later = alterations.clone();
-    for (sensor, creeping) in later.sensors.iter_mut().zip(&data.creeping) {
+    for (sensor, creeping) in later.sensors.iter_mut().zip(&data.seen.creeping) {
         sensor.creep_share = creeping.map_or(1.0, |creeping| creeping.held_out_share());
+    }
+    let (mut chi2, mut squares) = (0.0, 0.0);
+    for (number, line) in data.seen.lines.iter().enumerate() {
+        let taken_out = alterations.lines.contains(&number);
+        chi2 += line.held_out[usize::from(taken_out)];
+        if taken_out {
+            held.mean.iter_mut().zip(&line.leak[1]).for_each(|(mean, leak)| *mean -= leak);
+        }
     }
     later.correct(layout, &mut held.mean, held.samples_per_rev);
     let count = held.count;
-    let (mut chi2, mut squares) = (0.0, 0.0);
     for order in 1..=held.max_order.min(solved.corrected.max_order) {
         let at = order * count..(order + 1) * count;
         let operator = &solved.operators.orders[order - 1].operator;
@@ -266,6 +286,7 @@ impl Fit for SpindleFit {
                         if drifts && *sensor == place.index { -std.recip() } else { 0.0 }
                     },
                 ));
+                column.extend(self.shared.data[index].seen.lines.iter().map(|_| 0.0));
             }
         }
         signature
@@ -294,6 +315,19 @@ impl Fit for SpindleFit {
             }
         }
         biases
+    }
+
+    fn moves(&self, effect: usize) -> Vec<Vec<f64>> {
+        let parameters = self.shared.places[effect].effect.parameters.len();
+        let mut moves = vec![Vec::new(); parameters];
+        for (station, solved) in self.stations.iter().enumerate() {
+            for (partial, column) in self.partials(effect, station).iter().zip(&mut moves) {
+                for (unknown, _) in self.layout.unknowns.iter().enumerate().filter(|(_, unknown)| unknown.is_form()) {
+                    column.extend(solved.moved_by(partial, unknown).flat_map(|(_, value)| [value.re, value.im]));
+                }
+            }
+        }
+        moves
     }
 
     fn values(&self) -> Vec<Outcome> {

@@ -1,8 +1,10 @@
 //! The closed loop on spindle measurements.
 
+mod changes;
 mod data;
 mod drift;
 mod fit;
+mod lines;
 mod strangers;
 
 use std::sync::Arc;
@@ -12,7 +14,7 @@ use runout_core::{
     model::{
         Effect, Model, Setting,
         closed_loop::{self, Settings},
-        diagnosis::{Estimated, LostOrders},
+        diagnosis::{Estimated, LostOrders, Unexplained, Verdict},
     },
     stage::{Station, StationDiagnosis},
 };
@@ -22,7 +24,7 @@ use crate::{
     layout::Layout,
     selection::Selection,
 };
-use data::{Shared, StationData};
+use data::{Seen, Shared, StationData};
 pub use fit::SpindleFit;
 
 /// Orders that take part in tracing: form lives in the low ones, and time grows with their number.
@@ -50,12 +52,16 @@ impl SpindleModel {
     ) -> Result<Self> {
         let effects: Arc<[Box<dyn SpindleEffect>]> = effects.into();
         let places = places(&effects, &selection, &layout, second_order);
+        let seen: Vec<Arc<Seen>> =
+            stations.iter().map(|station| Arc::new(Seen::new(&selection, &layout, station))).collect();
+        let each = |data: fn(&Selection, &Layout, &Station, &Arc<Seen>) -> Result<StationData>| {
+            let stations = stations.iter().zip(&seen);
+            stations.map(|(station, seen)| data(&selection, &layout, station, seen)).collect::<Result<Vec<_>>>()
+        };
+        let (all, split) = (each(StationData::whole)?, each(StationData::split)?);
         let whole = Shared {
             effects: places.iter().map(|place| place.effect.clone()).collect(),
-            data: stations
-                .iter()
-                .map(|station| StationData::whole(&selection, &layout, station))
-                .collect::<Result<_>>()?,
+            data: all,
             selection: selection.clone(),
             layout: layout.clone(),
             second_order,
@@ -63,10 +69,7 @@ impl SpindleModel {
             kinds: Arc::clone(&effects),
         };
         let traced = Shared {
-            data: stations
-                .iter()
-                .map(|station| StationData::split(&selection, &layout, station))
-                .collect::<Result<_>>()?,
+            data: split,
             places: whole.places.clone(),
             effects: whole.effects.clone(),
             selection,
@@ -145,6 +148,13 @@ pub fn diagnose(
     let closed = closed_loop::diagnose(&model, &settings(model.effects())?)?;
     let mut diagnosis = closed.diagnosis;
     drift::say_rates(&mut diagnosis, &model.traced);
+    lines::say(&mut diagnosis, &model.traced, closed.after.lines());
+    let changes = model.traced.data.iter().flat_map(|station| &station.seen.changes);
+    let changes: Vec<Unexplained> = changes.map(|change| change.said(&model.traced.selection)).collect();
+    if !changes.is_empty() {
+        diagnosis.verdict = Verdict::Unexplained;
+        diagnosis.unexplained.splice(..0, changes);
+    }
     diagnosis.lost_orders = Some(lost_orders(&closed.after));
     diagnosis.warnings.extend(model.traced.warnings());
     Ok(StationDiagnosis {

@@ -18,6 +18,8 @@ pub struct Alterations {
     pub ripples: Vec<Harmonic>,
     /// Motion along the axis, in µm.
     pub axial_um: Vec<Harmonic>,
+    /// Lines of the turns' spectrum that are taken out of the averages, by number.
+    pub lines: Vec<usize>,
     /// Whether motion keeps the sign of even orders, where the separator assumes otherwise.
     pub even_order_motion: bool,
     /// Whether geometry is exact, where the separator leaves it linear.
@@ -87,6 +89,7 @@ impl Alterations {
             setups: vec![SetupAlteration::default(); count(|reading| reading.setup)],
             ripples: Vec::new(),
             axial_um: Vec::new(),
+            lines: Vec::new(),
             even_order_motion: false,
             exact_geometry: false,
         }

@@ -13,7 +13,7 @@ pub struct AxialMotion {
 
 impl SpindleEffect for AxialMotion {
     fn about(&self) -> About {
-        let parameters = vec![parameter("cosine", "um", 1.0), parameter("sine", "um", 1.0)];
+        let parameters = vec![parameter("cosine", "um", 3.0), parameter("sine", "um", 3.0)];
         About { id: "axial-motion", acts_on: ActsOn::Rig, parameters }
     }
 

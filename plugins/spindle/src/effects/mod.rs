@@ -9,6 +9,7 @@
 //! differences.
 
 mod alterations;
+mod asynchronous_line;
 mod axial_motion;
 mod even_order_motion;
 mod filter_attenuation;
@@ -78,6 +79,9 @@ fn parameter(name: &str, unit: &str, tolerance: f64) -> Parameter {
 /// Orders of uneven speed and of axial motion that are looked for.
 const LOW_ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
 
+/// Asynchronous lines that are looked for.
+pub(crate) const MOST_LINES: usize = 3;
+
 /// Every effect that there is.
 #[must_use]
 pub fn all() -> Vec<Box<dyn SpindleEffect>> {
@@ -94,6 +98,9 @@ pub fn all() -> Vec<Box<dyn SpindleEffect>> {
         Box::new(even_order_motion::EvenOrderMotion),
         Box::new(second_order_geometry::SecondOrderGeometry),
     ];
+    all.extend((0..MOST_LINES).map(|number| -> Box<dyn SpindleEffect> {
+        Box::new(asynchronous_line::AsynchronousLine { number })
+    }));
     for order in LOW_ORDERS {
         all.push(Box::new(speed_ripple::SpeedRipple { order }));
         all.push(Box::new(axial_motion::AxialMotion { order }));

@@ -1,0 +1,27 @@
+//! `asynchronous-line`: the axis moves at an order that is not whole, as by a bearing's cage, a belt or the mains. The averaged
+//! turn hides it, all but a leak; the turns show it (`diagnose/lines.rs`), and there its size and order are fitted. Here it
+//! is only there or not.
+
+use runout_core::Complex64;
+
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
+
+/// A line of the turns' spectrum.
+pub struct AsynchronousLine {
+    /// Its place among those that were found, the largest first.
+    pub number: usize,
+}
+
+impl SpindleEffect for AsynchronousLine {
+    fn about(&self) -> About {
+        About { id: "asynchronous-line", acts_on: ActsOn::Rig, parameters: Vec::new() }
+    }
+
+    fn alter(&self, _target: usize, _values: &[f64], alterations: &mut Alterations) {
+        alterations.lines.push(self.number);
+    }
+
+    fn partials(&self, _target: usize, _predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        Vec::new()
+    }
+}
