@@ -25,6 +25,8 @@ const OWN_SHARE: f64 = 0.8;
 const HELD_OUT_GAIN: f64 = 1e-3;
 /// No effect is this many times larger than its tolerance.
 const MOST: f64 = 100.0;
+/// The data decide a combination of a confounded set's parameters when all of it is this many standard deviations.
+const DECIDED: f64 = 10.0;
 /// Where results hold a confounded set, its members' own sizes hold it this many times more softly.
 const SOFT: f64 = 5.0;
 /// An effect of its usual size that would show with less than this many standard deviations is not seen.
@@ -262,7 +264,7 @@ impl<M: Model> Tracing<'_, M> {
         }
         let mut others = trial.settings;
         others.pop();
-        let priors = if members.len() > 1 { self.priors(&current.fit, &members, &alone) } else { Vec::new() };
+        let priors = if members.len() > 1 { self.priors(&current.fit, &basis, &members, &alone) } else { Vec::new() };
         Some(Found { members, alone, priors, others, values, std, evidence, before, after })
     }
 
@@ -274,34 +276,38 @@ impl<M: Model> Tracing<'_, M> {
         Some((parameter, *value))
     }
 
-    /// Holds a confounded set where the results move least. Form without it, the truth, and everything that the data
-    /// allow between: the nearest of these to form without it is never farther from the truth than that is (Pythagoras).
-    /// The members' own sizes decide where results do not move, and softly where they do.
-    fn priors(&self, fit: &M::Fit, members: &[usize], alone: &[Vec<f64>]) -> Vec<Prior> {
-        let moves: Vec<Vec<f64>> = members.iter().flat_map(|member| fit.moves(*member)).collect();
-        let values: Vec<f64> = alone.iter().flatten().copied().collect();
-        let mut places = 0..;
-        let size = alone.iter().map(|alone| {
-            let columns = alone.iter().zip(&mut places).filter_map(|(value, place)| Some((value, moves.get(place)?)));
-            let mut moved = vec![0.0; moves.first().map_or(0, Vec::len)];
-            for (value, column) in columns {
-                moved.iter_mut().zip(column).for_each(|(moved, entry)| *moved += value * entry);
-            }
-            norm(&moved)
-        });
-        let size = size.fold(0.0, f64::max);
+    /// Holds a confounded set where the results move least, as far as the data do not decide. Form without it, the truth, and
+    /// everything that the data allow between: the nearest of these to form without it is never farther from the truth than
+    /// that is (Pythagoras). Where results do not move, the members' own sizes decide.
+    fn priors(&self, fit: &M::Fit, basis: &[Vec<f64>], members: &[usize], alone: &[Vec<f64>]) -> Vec<Prior> {
         let parameters = members.iter().flat_map(|member| &self.model.effects()[*member].parameters);
-        let soft = if size > 0.0 { SOFT } else { 1.0 };
-        let own = values.iter().zip(parameters).enumerate().map(|(place, (value, known))| {
-            let std = soft * value.abs().max(1e-3 * known.tolerance);
-            Prior { weights: vec![(place, std.recip())] }
-        });
-        let mut priors: Vec<Prior> = own.collect();
-        if size > 0.0 {
-            priors.extend(triangle(moves).into_iter().map(|row| {
-                let weights = row.into_iter().enumerate().map(|(place, entry)| (place, entry / size));
-                Prior { weights: weights.collect() }
-            }));
+        let size = |(value, known): (&f64, &Parameter)| value.abs().max(1e-3 * known.tolerance);
+        let sizes: Vec<f64> = alone.iter().flatten().zip(parameters).map(size).collect();
+        let scaled = |columns: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+            let scaled = columns.into_iter().zip(&sizes);
+            scaled.map(|(column, size)| column.into_iter().map(|entry| entry * size).collect()).collect()
+        };
+        let mut columns = scaled(members.iter().flat_map(|member| fit.signature(*member)).collect());
+        columns.iter_mut().for_each(|column| take_out(column, basis));
+        let undecided = undecided(&columns);
+        let moves = scaled(members.iter().flat_map(|member| fit.moves(*member)).collect());
+        let moved = moves.iter().map(|column| norm(column)).fold(0.0, f64::max);
+        let mut priors = Vec::new();
+        let mut hold = |row: &[f64], softer: f64| {
+            // The row of what is undecided in it, per unit of each parameter.
+            let mut kept = vec![0.0; row.len()];
+            for direction in &undecided {
+                let share = dot(row, direction);
+                kept.iter_mut().zip(direction).for_each(|(kept, entry)| *kept += share * entry);
+            }
+            let weights = kept.iter().zip(&sizes).map(|(entry, size)| entry / (size * softer)).enumerate();
+            priors.push(Prior { weights: weights.collect() });
+        };
+        if moved > 0.0 {
+            triangle(moves).iter().for_each(|row| hold(row, moved));
+        }
+        for direction in &undecided {
+            hold(direction, if moved > 0.0 { SOFT } else { 1.0 });
         }
         priors
     }
@@ -409,6 +415,24 @@ fn independent(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
         return Vec::new();
     }
     orthonormal(columns, basis)
+}
+
+/// Takes out of a column what an orthonormal basis has of it.
+fn take_out(column: &mut [f64], basis: &[Vec<f64>]) {
+    for base in basis {
+        let share = dot(base, column);
+        column.iter_mut().zip(base).for_each(|(entry, base)| *entry -= share * base);
+    }
+}
+
+/// Orthonormal directions among parameters along which one unit changes χ² by too little to tell, from their columns.
+fn undecided(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let count = columns.len();
+    let products = nalgebra::DMatrix::from_fn(count, count, |row, column| dot(&columns[row], &columns[column]));
+    let eigen = products.symmetric_eigen();
+    let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+    let weak = directions.filter(|(value, _)| **value < DECIDED * DECIDED);
+    weak.map(|(_, direction)| direction.iter().copied().collect()).collect()
 }
 
 /// R of columns Q·R, `[row][column]`: as long as they are in every combination.

@@ -13,11 +13,17 @@ const SETTLED: f64 = 1e-3;
 const INDEPENDENT: f64 = 1e-9;
 
 /// A combination of parameters that is held near 0: Σ weight·value has the standard deviation 1.
+///
+/// Only what the data do not decide is held, so that a refit goes [`FIRM`] times nearer to 0 there than the data's noise
+/// would let it; the covariance is that of the plain prior.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// Positions among the settings' parameters, one after the other, and their weights.
     pub weights: Vec<(usize, f64)>,
 }
+
+/// How much more firmly priors hold a refit than they say.
+const FIRM: f64 = 10.0;
 
 impl Prior {
     /// The combination at these values.
@@ -47,7 +53,7 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize, priors: &[P
     let mut fit = model.fit(&settings)?;
     let mut cost = cost_of(&fit, &settings[fixed..], priors);
     for _ in 0..MAX_STEPS {
-        let system = System::new(&fit, &settings[fixed..], priors);
+        let system = System::new(&fit, &settings[fixed..], priors, FIRM);
         let step = system.step();
         let mut share = 1.0;
         let mut better = None;
@@ -73,13 +79,13 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize, priors: &[P
             break;
         }
     }
-    let covariance = System::new(&fit, &settings[fixed..], priors).covariance();
+    let covariance = System::new(&fit, &settings[fixed..], priors, 1.0).covariance();
     Ok(Refit { chi2: fit.remainder().chi2(), settings, fit, covariance })
 }
 
 fn cost_of(fit: &impl Fit, free: &[Setting], priors: &[Prior]) -> f64 {
     let values: Vec<f64> = free.iter().flat_map(|setting| setting.values.iter().copied()).collect();
-    let held: f64 = priors.iter().map(|prior| prior.at(&values).powi(2)).sum();
+    let held: f64 = priors.iter().map(|prior| (FIRM * prior.at(&values)).powi(2)).sum();
     fit.remainder().chi2() + held
 }
 
@@ -93,7 +99,7 @@ struct System {
 }
 
 impl System {
-    fn new(fit: &impl Fit, free: &[Setting], priors: &[Prior]) -> Self {
+    fn new(fit: &impl Fit, free: &[Setting], priors: &[Prior], firm: f64) -> Self {
         let mut columns: Vec<Vec<f64>> = free.iter().flat_map(|setting| fit.signature(setting.effect)).collect();
         let mut right = fit.remainder().residual.clone();
         let values: Vec<f64> = free.iter().flat_map(|setting| setting.values.iter().copied()).collect();
@@ -101,10 +107,10 @@ impl System {
             columns.iter_mut().for_each(|column| column.push(0.0));
             for (place, weight) in &prior.weights {
                 if let Some(entry) = columns.get_mut(*place).and_then(|column| column.last_mut()) {
-                    *entry += weight;
+                    *entry += firm * weight;
                 }
             }
-            right.push(prior.at(&values));
+            right.push(firm * prior.at(&values));
         }
         let count = columns.len();
         let mut scale = Vec::with_capacity(count);
