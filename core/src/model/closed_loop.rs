@@ -2,6 +2,7 @@
 
 use super::{
     Effect, Fit, Model, Parameter, Remainder, Setting,
+    confounded::ConfoundedSet,
     diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Estimated, Level, Moved, Refused, Step, Verdict},
     evidence::Evidence,
     fit::{Prior, Refit, dot, norm, refit},
@@ -25,10 +26,8 @@ const OWN_SHARE: f64 = 0.8;
 const HELD_OUT_GAIN: f64 = 1e-3;
 /// No effect is this many times larger than its tolerance.
 const MOST: f64 = 100.0;
-/// The data decide a combination of a confounded set's parameters when all of it is this many standard deviations.
-const DECIDED: f64 = 10.0;
-/// Where results hold a confounded set, its members' own sizes hold it this many times more softly.
-const SOFT: f64 = 5.0;
+/// Refits of a confounded set from where the one before came to.
+const HOLDING_PASSES: usize = 2;
 /// An effect of its usual size that would show with less than this many standard deviations is not seen.
 const VISIBLE: f64 = 3.0;
 
@@ -60,13 +59,11 @@ pub struct Closed<F> {
 }
 
 /// An effect that was believed, with everything that it cannot be told from.
-struct Found {
+pub(super) struct Found {
     /// The best one first.
-    members: Vec<usize>,
+    pub members: Vec<usize>,
     /// Values of each member as if it were all of it.
-    alone: Vec<Vec<f64>>,
-    /// What holds the members where the data do not decide.
-    priors: Vec<Prior>,
+    pub alone: Vec<Vec<f64>>,
     /// What else was applied, at its best values beside it.
     others: Vec<Setting>,
     /// Values and standard uncertainties as if the best one were all of it.
@@ -164,7 +161,17 @@ impl<M: Model> Tracing<'_, M> {
                 settings.push(Setting { effect: *member, values });
             }
         }
-        refit(model, settings, self.settings.known.len(), &self.priors_so_far())
+        let fixed = self.settings.known.len();
+        let mut last = refit(model, settings, fixed, &[])?;
+        if self.found.iter().all(|found| found.members.len() < 2) {
+            return Ok(last);
+        }
+        // Results are not linear in all parameters: their distance is looked at from where a refit came to.
+        for _ in 0..HOLDING_PASSES {
+            let priors = self.priors(model, &last)?;
+            last = refit(model, last.settings, fixed, &priors)?;
+        }
+        Ok(last)
     }
 
     /// The effect of the lowest rank that earns its place, if any does.
@@ -202,6 +209,7 @@ impl<M: Model> Tracing<'_, M> {
             .collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
+        let held = self.priors(self.model, current).ok()?;
         let mut trials: Vec<(usize, Refit<M::Fit>, Evidence)> = Vec::new();
         for (effect, gain) in ranked.into_iter().take(SHORTLIST.0).filter(|(_, gain)| *gain >= promising) {
             let parameters = self.model.effects()[effect].parameters.len();
@@ -215,7 +223,7 @@ impl<M: Model> Tracing<'_, M> {
             }
             let mut settings = current.settings.clone();
             settings.push(Setting { effect, values: vec![0.0; parameters] });
-            let Ok(trial) = refit(self.model, settings, fixed, &self.priors_so_far()) else { continue };
+            let Ok(trial) = refit(self.model, settings, fixed, &held) else { continue };
             let evidence = evidence(trial.chi2);
             trials.push((effect, trial, evidence));
         }
@@ -264,8 +272,7 @@ impl<M: Model> Tracing<'_, M> {
         }
         let mut others = trial.settings;
         others.pop();
-        let priors = if members.len() > 1 { self.priors(&current.fit, &basis, &members, &alone) } else { Vec::new() };
-        Some(Found { members, alone, priors, others, values, std, evidence, before, after })
+        Some(Found { members, alone, others, values, std, evidence, before, after })
     }
 
     /// A parameter of the last effect of a trial that is far larger than expected.
@@ -276,40 +283,26 @@ impl<M: Model> Tracing<'_, M> {
         Some((parameter, *value))
     }
 
-    /// Holds a confounded set where the results move least, as far as the data do not decide. Form without it, the truth, and
-    /// everything that the data allow between: the nearest of these to form without it is never farther from the truth than
-    /// that is (Pythagoras). Where results do not move, the members' own sizes decide.
-    fn priors(&self, fit: &M::Fit, basis: &[Vec<f64>], members: &[usize], alone: &[Vec<f64>]) -> Vec<Prior> {
-        let parameters = members.iter().flat_map(|member| &self.model.effects()[*member].parameters);
-        let size = |(value, known): (&f64, &Parameter)| value.abs().max(1e-3 * known.tolerance);
-        let sizes: Vec<f64> = alone.iter().flatten().zip(parameters).map(size).collect();
-        let scaled = |columns: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
-            let scaled = columns.into_iter().zip(&sizes);
-            scaled.map(|(column, size)| column.into_iter().map(|entry| entry * size).collect()).collect()
-        };
-        let mut columns = scaled(members.iter().flat_map(|member| fit.signature(*member)).collect());
-        columns.iter_mut().for_each(|column| take_out(column, basis));
-        let undecided = undecided(&columns);
-        let moves = scaled(members.iter().flat_map(|member| fit.moves(*member)).collect());
-        let moved = moves.iter().map(|column| norm(column)).fold(0.0, f64::max);
+    /// Holds each confounded set where the results move least, as far as the data do not decide. Form without the set, the
+    /// truth, and everything that the data allow between: the nearest of these to form without it is never farther from
+    /// the truth than that is (Pythagoras). Where results do not move, the members' own sizes decide.
+    fn priors(&self, model: &M, current: &Refit<M::Fit>) -> Result<Vec<Prior>> {
+        let free = &current.settings[self.settings.known.len()..];
         let mut priors = Vec::new();
-        let mut hold = |row: &[f64], softer: f64| {
-            // The row of what is undecided in it, per unit of each parameter.
-            let mut kept = vec![0.0; row.len()];
-            for direction in &undecided {
-                let share = dot(row, direction);
-                kept.iter_mut().zip(direction).for_each(|(kept, entry)| *kept += share * entry);
+        let (mut first, mut setting) = (0, 0);
+        for found in &self.found {
+            let settings = setting..setting + found.members.len();
+            let count: usize = found.alone.iter().map(Vec::len).sum();
+            if found.members.len() > 1 {
+                let beside = free.iter().enumerate().filter(|(place, _)| !settings.contains(place));
+                let columns = beside.flat_map(|(_, other)| current.fit.signature(other.effect)).collect();
+                let without = model.fit(&found.others)?.results();
+                let set = ConfoundedSet::new(found, model.effects(), &free[settings.clone()], &current.fit, &without);
+                priors.extend(set.priors(&orthonormal(columns, &[]), first));
             }
-            let weights = kept.iter().zip(&sizes).map(|(entry, size)| entry / (size * softer)).enumerate();
-            priors.push(Prior { weights: weights.collect() });
-        };
-        if moved > 0.0 {
-            triangle(moves).iter().for_each(|row| hold(row, moved));
+            (first, setting) = (first + count, settings.end);
         }
-        for direction in &undecided {
-            hold(direction, if moved > 0.0 { SOFT } else { 1.0 });
-        }
-        priors
+        Ok(priors)
     }
 
     /// Keeps the last reason for which an effect was refused.
@@ -345,19 +338,6 @@ impl<M: Model> Tracing<'_, M> {
                 position += setting.values.len();
             }
         }
-    }
-
-    fn priors_so_far(&self) -> Vec<Prior> {
-        let mut priors = Vec::new();
-        let mut first = 0;
-        for found in &self.found {
-            for prior in &found.priors {
-                let weights = prior.weights.iter().map(|(place, weight)| (first + place, *weight));
-                priors.push(Prior { weights: weights.collect() });
-            }
-            first += found.alone.iter().map(Vec::len).sum::<usize>();
-        }
-        priors
     }
 
     /// Takes back the effects that took only a part of what something unknown does. Says whether there were any.
@@ -415,42 +395,6 @@ fn independent(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
         return Vec::new();
     }
     orthonormal(columns, basis)
-}
-
-/// Takes out of a column what an orthonormal basis has of it.
-fn take_out(column: &mut [f64], basis: &[Vec<f64>]) {
-    for base in basis {
-        let share = dot(base, column);
-        column.iter_mut().zip(base).for_each(|(entry, base)| *entry -= share * base);
-    }
-}
-
-/// Orthonormal directions among parameters along which one unit changes χ² by too little to tell, from their columns.
-fn undecided(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let count = columns.len();
-    let products = nalgebra::DMatrix::from_fn(count, count, |row, column| dot(&columns[row], &columns[column]));
-    let eigen = products.symmetric_eigen();
-    let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
-    let weak = directions.filter(|(value, _)| **value < DECIDED * DECIDED);
-    weak.map(|(_, direction)| direction.iter().copied().collect()).collect()
-}
-
-/// R of columns Q·R, `[row][column]`: as long as they are in every combination.
-fn triangle(mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let count = columns.len();
-    let mut upper = vec![vec![0.0; count]; count];
-    for row in 0..count {
-        let left = norm(&columns[row]);
-        if left <= 0.0 {
-            continue;
-        }
-        let base: Vec<f64> = columns[row].iter().map(|entry| entry / left).collect();
-        for (column, entry) in columns.iter_mut().zip(&mut upper[row]).skip(row) {
-            *entry = dot(&base, column);
-            column.iter_mut().zip(&base).for_each(|(value, base)| *value -= *entry * base);
-        }
-    }
-    upper
 }
 
 /// Columns made orthonormal to a basis and to each other; dependent ones are left out.

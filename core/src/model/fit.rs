@@ -12,7 +12,7 @@ const SETTLED: f64 = 1e-3;
 /// A parameter whose column adds less than this, relative, to those before it cannot be told from them.
 const INDEPENDENT: f64 = 1e-9;
 
-/// A combination of parameters that is held near 0: Σ weight·value has the standard deviation 1.
+/// A combination of parameters that is held near 0: Σ weight·value + offset has the standard deviation 1.
 ///
 /// Only what the data do not decide is held, so that a refit goes [`FIRM`] times nearer to 0 there than the data's noise
 /// would let it; the covariance is that of the plain prior.
@@ -20,6 +20,8 @@ const INDEPENDENT: f64 = 1e-9;
 pub struct Prior {
     /// Positions among the settings' parameters, one after the other, and their weights.
     pub weights: Vec<(usize, f64)>,
+    /// What it is where all of them are 0.
+    pub offset: f64,
 }
 
 /// How much more firmly priors hold a refit than they say.
@@ -28,7 +30,8 @@ const FIRM: f64 = 10.0;
 impl Prior {
     /// The combination at these values.
     fn at(&self, values: &[f64]) -> f64 {
-        self.weights.iter().map(|(place, weight)| weight * values.get(*place).copied().unwrap_or(0.0)).sum()
+        let value = |place: usize| values.get(place).copied().unwrap_or(0.0);
+        self.offset + self.weights.iter().map(|(place, weight)| weight * value(*place)).sum::<f64>()
     }
 }
 

@@ -5,6 +5,7 @@
 //! of them the data ask for, adds them, and says what it cannot know. Nothing here knows what is measured.
 
 pub mod closed_loop;
+mod confounded;
 pub mod diagnosis;
 pub mod evidence;
 pub mod fit;
@@ -57,9 +58,15 @@ pub trait Fit {
     /// How the results (form, motion) change with each parameter of an effect: root mean square, per unit of it.
     fn bias(&self, effect: usize) -> Vec<Bias>;
 
-    /// How the result that counts most (form) changes with each parameter of an effect: `[parameter][entry]`, in one unit;
-    /// nothing where there is no such result. What the data cannot decide is left where this moves least.
-    fn moves(&self, _effect: usize) -> Vec<Vec<f64>> {
+    /// The result that counts most (form), in one unit; nothing where there is no such result. Where the data cannot decide
+    /// between effects, it is left as it was as far as possible.
+    fn results(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// How each entry of [`results`](Self::results) changes with each parameter of an effect: `[parameter][entry]`.
+    fn moves(&self, effect: usize) -> Vec<Vec<f64>> {
+        let _ = effect;
         Vec::new()
     }
 

@@ -134,6 +134,11 @@ impl Layout {
         Self { max_noise_gain, ..self }
     }
 
+    /// Places of the forms among the unknowns.
+    pub fn forms(&self) -> impl Iterator<Item = usize> + '_ {
+        self.unknowns.iter().enumerate().filter(|(_, unknown)| unknown.is_form()).map(|(place, _)| place)
+    }
+
     /// Whether motion is taken to have odd orders only.
     #[must_use]
     pub fn assumes_odd_motion(&self) -> bool {

@@ -317,13 +317,26 @@ impl Fit for SpindleFit {
         biases
     }
 
+    fn results(&self) -> Vec<f64> {
+        let told = self.stations.iter().flat_map(|solved| {
+            self.layout.forms().flat_map(move |unknown| {
+                solved.told_orders(unknown).flat_map(move |order| {
+                    let value = solved.estimate.told(order, unknown);
+                    [value.re, value.im]
+                })
+            })
+        });
+        told.collect()
+    }
+
     fn moves(&self, effect: usize) -> Vec<Vec<f64>> {
         let parameters = self.shared.places[effect].effect.parameters.len();
         let mut moves = vec![Vec::new(); parameters];
         for (station, solved) in self.stations.iter().enumerate() {
             for (partial, column) in self.partials(effect, station).iter().zip(&mut moves) {
-                for (unknown, _) in self.layout.unknowns.iter().enumerate().filter(|(_, unknown)| unknown.is_form()) {
-                    column.extend(solved.moved_by(partial, unknown).flat_map(|(_, value)| [value.re, value.im]));
+                for unknown in self.layout.forms() {
+                    // What an effect explains of the readings is no form.
+                    column.extend(solved.moved_by(partial, unknown).flat_map(|(_, value)| [-value.re, -value.im]));
                 }
             }
         }
@@ -393,13 +406,16 @@ impl Solved {
         unknown: usize,
     ) -> impl Iterator<Item = (usize, Complex64)> + 'a {
         let count = self.corrected.count;
-        (2..=self.corrected.max_order).filter(move |order| self.operators.observable[order - 1][unknown]).map(
-            move |order| {
-                let row = &self.operators.orders[order - 1].operator[unknown * count..(unknown + 1) * count];
-                let readings = &partial[order * count..(order + 1) * count];
-                (order, row.iter().zip(readings).map(|(a, b)| a * b).sum())
-            },
-        )
+        self.told_orders(unknown).map(move |order| {
+            let row = &self.operators.orders[order - 1].operator[unknown * count..(unknown + 1) * count];
+            let readings = &partial[order * count..(order + 1) * count];
+            (order, row.iter().zip(readings).map(|(a, b)| a * b).sum())
+        })
+    }
+
+    /// Orders from 2 at which an unknown can be told.
+    fn told_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
+        (2..=self.corrected.max_order).filter(move |order| self.operators.observable[order - 1][unknown])
     }
 }
 

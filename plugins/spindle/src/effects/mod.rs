@@ -98,9 +98,10 @@ pub fn all() -> Vec<Box<dyn SpindleEffect>> {
         Box::new(even_order_motion::EvenOrderMotion),
         Box::new(second_order_geometry::SecondOrderGeometry),
     ];
-    all.extend((0..MOST_LINES).map(|number| -> Box<dyn SpindleEffect> {
-        Box::new(asynchronous_line::AsynchronousLine { number })
-    }));
+    all.extend(
+        (0..MOST_LINES)
+            .map(|number| -> Box<dyn SpindleEffect> { Box::new(asynchronous_line::AsynchronousLine { number }) }),
+    );
     for order in LOW_ORDERS {
         all.push(Box::new(speed_ripple::SpeedRipple { order }));
         all.push(Box::new(axial_motion::AxialMotion { order }));
