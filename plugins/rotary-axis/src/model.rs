@@ -99,6 +99,15 @@ impl RTest {
 }
 
 impl PointModel for RTest {
+    fn effects(&self) -> Vec<Effect> {
+        let harmonic = |order: usize| {
+            let names = COORDINATES.iter().flat_map(|(name, _)| [format!("{name}_cosine"), format!("{name}_sine")]);
+            let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
+            Effect { id: format!("harmonic-{order}"), target: None, parameters }
+        };
+        (2..=self.0.max_order).map(harmonic).collect()
+    }
+
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
         let used = self.used(points)?;
         let count = used.len();
@@ -121,16 +130,10 @@ impl PointModel for RTest {
             };
             [one("level", 0, f64::cos), one("cos C", 1, f64::cos), one("sin C", 1, f64::sin)]
         });
-        let terms = (2..=self.0.max_order).map(|order| {
-            let names = COORDINATES.iter().flat_map(|(name, _)| [format!("{name}_cosine"), format!("{name}_sine")]);
-            let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
+        let terms = (2..).zip(self.effects()).map(|(order, effect)| {
             let columns =
                 (0..3).flat_map(|coordinate| [wave(coordinate, order, f64::cos), wave(coordinate, order, f64::sin)]);
-            Term {
-                effect: Effect { id: format!("harmonic-{order}"), target: None, parameters },
-                columns: columns.collect(),
-                rank: 0,
-            }
+            Term { effect, columns: columns.collect(), rank: 0 }
         });
         let observations = Observations {
             values,

@@ -13,7 +13,7 @@ use runout_core::{
 };
 use runout_spindle::{
     diagnose::diagnose,
-    layout,
+    effects, layout,
     selection::Selection,
     simulate::{Effect, SpindleConfig, simulator},
 };
@@ -83,7 +83,7 @@ fn run(config: &SpindleConfig, campaign: &Campaign, effects: Option<Vec<String>>
     )?;
     let layout = layout::Layout::new(&rig, campaign.rig == Layout::Paper);
     let settings = Settings { effects, ..Settings::default() };
-    let said = diagnose(Selection::whole(&rig), layout, campaign.second_order, &[station], &|_| Ok(settings.clone()))?;
+    let said = diagnose(Selection::whole(&rig), layout, campaign.second_order, effects::all(), &[station], &settings)?;
     Ok(Run { said, truth })
 }
 

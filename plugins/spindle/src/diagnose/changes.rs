@@ -49,12 +49,7 @@ pub fn changes(selection: &Selection, station: &Station, creeping: &[Option<Cree
     selection.setups.iter().enumerate().filter_map(in_setup).collect()
 }
 
-fn in_capture(
-    profile: &Profile,
-    setup: usize,
-    channels: &[usize],
-    creeping: &[Option<Creeping>],
-) -> Option<Change> {
+fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[Option<Creeping>]) -> Option<Change> {
     let turns = &profile.split.as_ref()?.turns;
     let (count, width) = (turns.count(), channels.len());
     if count < FEWEST || turns.orders <= FIRST_ORDER {
@@ -82,7 +77,8 @@ fn in_capture(
     if step < CERTAIN * wander || step < OWN * whole {
         return None;
     }
-    let by = (0..turns.orders).map(|order| if order < FIRST_ORDER { Complex64::ZERO } else { series.step(order, turn, sensor) });
+    let by = (0..turns.orders)
+        .map(|order| if order < FIRST_ORDER { Complex64::ZERO } else { series.step(order, turn, sensor) });
     Some(Change { setup, sensor, turn: turns.numbers[turn], by: by.collect() })
 }
 

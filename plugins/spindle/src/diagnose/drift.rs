@@ -88,8 +88,7 @@ impl Creeping {
         }
         let turns = if whole { self.turns } else { self.fitted };
         let mean = self.over(0, turns);
-        let spread =
-            (0..turns).map(|turn| (self.in_turn(turn) - mean).powi(2)).sum::<f64>() / (turns * turns) as f64;
+        let spread = (0..turns).map(|turn| (self.in_turn(turn) - mean).powi(2)).sum::<f64>() / (turns * turns) as f64;
         let sensors = readings.count / readings.turns.len().max(1);
         for (matrices, square) in [(&mut readings.covariance, mean * mean), (&mut readings.scatter, spread)] {
             for matrices in matrices.iter_mut().flatten() {
@@ -137,8 +136,7 @@ impl Levels {
             let channel = profile.sensors.iter().position(|known| *known == sensor)?;
             Some(about_mean(split.turns.levels(channel).take(turns).collect()))
         };
-        let captures: Vec<Vec<f64>> =
-            station.profiles.iter().zip(&splits).map(capture).collect::<Option<_>>()?;
+        let captures: Vec<Vec<f64>> = station.profiles.iter().zip(&splits).map(capture).collect::<Option<_>>()?;
         let share = 1.0 / captures.len() as f64;
         let mean = (0..turns).map(|turn| captures.iter().map(|capture| capture[turn]).sum::<f64>() * share).collect();
         Some(Self { captures, mean, fitted: splits.last()?.fit.turns.len() })
@@ -256,7 +254,9 @@ pub fn say_rates(diagnosis: &mut Diagnosis, shared: &Shared) {
     for added in diagnosis.added.iter_mut().filter(|added| added.effect == "thermal-drift") {
         let sensors = &shared.selection.rig.sensors;
         let sensor = added.targets.first().and_then(|id| sensors.iter().position(|sensor| sensor.id == *id));
-        let Some(creeping) = sensor.and_then(|sensor| *shared.data.first()?.seen.creeping.get(sensor)?) else { continue };
+        let Some(creeping) = sensor.and_then(|sensor| *shared.data.first()?.seen.creeping.get(sensor)?) else {
+            continue;
+        };
         let said = |name: &str, value: f64, std: f64, unit: &str| Estimated {
             name: name.into(),
             value,

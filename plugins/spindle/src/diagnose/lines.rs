@@ -297,10 +297,11 @@ fn weighed(captures: &[Capture], line: f64, found: &[Vec<Complex64>], explained:
                     (capture.turns.at(turn, order, *channel), a * amplitude.re + b * amplitude.im)
                 };
                 let count = capture.fitted as f64;
-                let (mean, leak) = (0..capture.fitted).map(of).fold(
-                    (Complex64::ZERO, Complex64::ZERO),
-                    |(mean, leak), (value, line)| (mean + value / count, leak + line / count),
-                );
+                let (mean, leak) = (0..capture.fitted)
+                    .map(of)
+                    .fold((Complex64::ZERO, Complex64::ZERO), |(mean, leak), (value, line)| {
+                        (mean + value / count, leak + line / count)
+                    });
                 about_mean += (0..capture.fitted).map(|turn| (of(turn).0 - mean).norm_sqr()).sum::<f64>();
                 entries += 2 * (capture.fitted - 1);
                 for (value, line) in (capture.fitted..capture.turns.count()).map(of) {
