@@ -16,7 +16,7 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     pipeline::{
-        error::Fault,
+        error::{Fault, within},
         registry::{Context, StageConfig},
     },
     points::Points,
@@ -67,13 +67,8 @@ impl QuadratureConfig {
     /// # Errors
     /// The first that cannot be, with its key.
     pub fn model(self) -> std::result::Result<Quadrature, Fault> {
-        if !(2..=MOST_BLOCKS).contains(&self.blocks) {
-            return Err(Fault::at("blocks", format!("expected 2 to {MOST_BLOCKS} blocks, found {}", self.blocks)));
-        }
-        if !(2..=HIGHEST_ORDER).contains(&self.max_order) {
-            let message = format!("expected an order from 2 to {HIGHEST_ORDER}, found {}", self.max_order);
-            return Err(Fault::at("max_order", message));
-        }
+        within("blocks", "blocks", self.blocks, 2..=MOST_BLOCKS)?;
+        within("max_order", "an order", self.max_order, 2..=HIGHEST_ORDER)?;
         Ok(Quadrature(self))
     }
 }

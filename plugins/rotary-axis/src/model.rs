@@ -14,7 +14,7 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     pipeline::{
-        error::Fault,
+        error::{Fault, within},
         registry::{Context, StageConfig},
     },
     points::Points,
@@ -69,10 +69,7 @@ impl RTestConfig {
         if !self.a_deg.is_finite() {
             return Err(Fault::at("a_deg", format!("expected an angle, found {}", self.a_deg)));
         }
-        if !(2..=HIGHEST_ORDER).contains(&self.max_order) {
-            let message = format!("expected an order from 2 to {HIGHEST_ORDER}, found {}", self.max_order);
-            return Err(Fault::at("max_order", message));
-        }
+        within("max_order", "an order", self.max_order, 2..=HIGHEST_ORDER)?;
         Ok(RTest(self))
     }
 }
