@@ -52,7 +52,7 @@ impl SpindleEffect for ProbeLag {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+    #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
     use std::{f64::consts::TAU, path::Path};
 
@@ -145,6 +145,8 @@ mod tests {
             let (selection, layout) = (Selection::whole(&rig), Layout::new(&rig, false));
             let said = diagnose(selection, layout, true, every_effect(), &[station], &Settings::default()).unwrap();
             let diagnosis = said.diagnosis;
+            let chi2 = [&diagnosis.before, &diagnosis.after].map(|level| level.chi2_per_dof.unwrap());
+            println!("simulated, {id} {samples} late: χ² {:.2} → {:.2}, {:?}", chi2[0], chi2[1], diagnosis.added);
             assert_eq!(diagnosis.verdict, Verdict::Explained, "{:?}", diagnosis.added);
             let [added] = &diagnosis.added[..] else { panic!("{:?}", diagnosis.added) };
             assert_eq!((&*added.effect, &*added.targets), ("probe-lag", &[id.to_owned()][..]));
