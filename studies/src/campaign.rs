@@ -86,31 +86,33 @@ pub fn station(
     samples_per_rev: usize,
     turns: usize,
 ) -> Result<(Station, StationTruth)> {
-    station_holding_out(simulator, rig, samples_per_rev, turns, None)
+    station_holding_out(simulator, rig, 0, [samples_per_rev, turns], None)
 }
 
-/// The same, a share of the turns averaged by themselves besides.
+/// Averages the first turns (`[samples_per_rev, turns]`) of any station, a share of them by themselves besides.
 ///
 /// # Errors
 /// When a stage fails.
 pub fn station_holding_out(
     simulator: &SpindleSimulator,
     rig: &Rig,
-    samples_per_rev: usize,
-    turns: usize,
+    station: usize,
+    [samples_per_rev, turns]: [usize; 2],
     share: Option<f64>,
 ) -> Result<(Station, StationTruth)> {
     let recording = simulator.spindle_recording();
     let averager = averager(samples_per_rev)?;
     let profile = |setup: usize| -> Result<Profile> {
-        let stream = recording.open(0, setup)?;
+        let stream = recording.open(station, setup)?;
         let recorded = stream.capture().marks.len().saturating_sub(1);
         let trim = trim(recorded.saturating_sub(turns))?;
         averager.average_holding_out(trim.attach(Box::new(Inspection::new(stream)))?, share)
     };
     let profiles: Result<Vec<Profile>> = (0..rig.setups.len()).map(profile).collect();
-    let truth = recording.truth(0)?.unwrap_or_default();
-    Ok((Station { name: "s001".into(), z_mm: 0.0, profiles: profiles? }, truth))
+    let truth = recording.truth(station)?.unwrap_or_default();
+    let missing = || Error::new("average", format!("station {station}"), "the campaign has no such station");
+    let key = recording.stations().get(station).ok_or_else(missing)?;
+    Ok((Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? }, truth))
 }
 
 fn trim(end_turns: usize) -> Result<Box<dyn Conditioner>> {

@@ -6,5 +6,6 @@ pub mod campaign;
 pub mod coverage;
 pub mod eccentricity;
 pub mod plot;
+pub mod scaling;
 pub mod straightness;
 pub mod surface;

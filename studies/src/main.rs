@@ -5,13 +5,14 @@
 use std::{path::Path, process::ExitCode};
 
 use runout_core::{Result, atomic_file};
-use runout_studies::{averaging, blind, coverage, eccentricity, straightness, surface as unrolled};
+use runout_studies::{averaging, blind, coverage, eccentricity, scaling, straightness, surface as unrolled};
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
        runout-studies blind [CAMPAIGNS [SEED [FILE]]]   what the closed loop says of campaigns that it knows nothing of
        runout-studies blind-campaign INDEX [SEED]   one of them in full
+       runout-studies diagnose-scaling       time of a diagnosis over the number of stations
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth";
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
         }
         ["blind-campaign", index] if index.parse::<u64>().is_ok() => blind_campaign(index, "1"),
         ["blind-campaign", index, seed] if index.parse::<u64>().is_ok() => blind_campaign(index, seed),
+        ["diagnose-scaling"] => scaling::rows().map(|rows| println!("{}", scaling::table(&rows))),
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["straightness-traces", file] => straightness_traces(file),
         ["straightness", file, picture] => straightness(file, picture),

@@ -2,7 +2,7 @@
 
 use runout_core::{
     pipeline::{
-        Pipeline,
+        Pipeline, Registry,
         config::Route,
         document::{Document, Sources},
         run::LostOrders,
@@ -110,8 +110,8 @@ impl Unknown {
 ///
 /// # Errors
 /// When the configuration is wrong.
-pub fn execute(args: &PipelineArgs, json: bool) -> Result<(), Failure> {
-    let (sources, pipeline) = pipeline(args)?;
+pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+    let (sources, pipeline) = pipeline(args, registry)?;
     let report = report(&sources, &pipeline)?;
     print(&report, json, render::check::text)
 }

@@ -15,18 +15,17 @@ use runout_core::{
 use runout_parquet::ComparisonTable;
 
 use super::{pipeline, print};
-use crate::{args::CompareArgs, builtin, failure::Failure, progress::Progress, render};
+use crate::{args::CompareArgs, failure::Failure, progress::Progress, render};
 
 /// Compares separators and says how they differ.
 ///
 /// # Errors
 /// When the configuration is wrong, nothing can be compared, or the data or a file fails.
-pub fn execute(args: &CompareArgs, json: bool) -> std::result::Result<(), Failure> {
-    let registry = builtin::registry();
-    known(&args.with, &registry)?;
-    let (sources, mut pipeline) = pipeline(&args.pipeline)?;
+pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::result::Result<(), Failure> {
+    known(&args.with, registry)?;
+    let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
     let mut output = Output::named(args.out.as_deref(), &sources)?;
-    let comparing = match Comparing::new(&mut pipeline, &args.with, &registry, sources.folder()) {
+    let comparing = match Comparing::new(&mut pipeline, &args.with, registry, sources.folder()) {
         Ok(comparing) => comparing,
         Err(fault) => return Err(Document::parse(&sources)?.diagnose(fault).into()),
     };

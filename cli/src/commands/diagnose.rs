@@ -1,6 +1,6 @@
 //! `runout diagnose`.
 
-use runout_core::pipeline::diagnose;
+use runout_core::pipeline::{Registry, diagnose};
 
 use super::{pipeline, print};
 use crate::{args::PipelineArgs, failure::Failure, progress::Progress, render};
@@ -9,8 +9,8 @@ use crate::{args::PipelineArgs, failure::Failure, progress::Progress, render};
 ///
 /// # Errors
 /// When the configuration is wrong, or the data or a file fails. Whatever the verdict, a diagnosis is no failure.
-pub fn execute(args: &PipelineArgs, json: bool) -> Result<(), Failure> {
-    let (_, pipeline) = pipeline(args)?;
+pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+    let (_, pipeline) = pipeline(args, registry)?;
     let progress = Progress::new("stations");
     let diagnosis = diagnose::diagnose(&pipeline, &progress)?;
     drop(progress);

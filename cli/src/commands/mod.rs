@@ -10,12 +10,11 @@ pub mod run;
 pub mod schema;
 pub mod simulate;
 
-use runout_core::pipeline::{Pipeline, config::INCLUDE_KEY, document::Sources};
+use runout_core::pipeline::{Pipeline, Registry, config::INCLUDE_KEY, document::Sources};
 use serde::Serialize;
 
 use crate::{
     args::{Command, PipelineArgs},
-    builtin,
     failure::Failure,
     render,
 };
@@ -24,24 +23,24 @@ use crate::{
 ///
 /// # Errors
 /// When it cannot be done.
-pub fn execute(command: Command, json: bool) -> Result<(), Failure> {
+pub fn execute(command: Command, json: bool, registry: &Registry) -> Result<(), Failure> {
     match command {
-        Command::Run(args) => run::execute(&args, json),
-        Command::Check(args) => check::execute(&args, json),
-        Command::Diagnose(args) => diagnose::execute(&args, json),
-        Command::Compare(args) => compare::execute(&args, json),
-        Command::Simulate(args) => simulate::execute(&args, json),
+        Command::Run(args) => run::execute(&args, json, registry),
+        Command::Check(args) => check::execute(&args, json, registry),
+        Command::Diagnose(args) => diagnose::execute(&args, json, registry),
+        Command::Compare(args) => compare::execute(&args, json, registry),
+        Command::Simulate(args) => simulate::execute(&args, json, registry),
         Command::Plan(args) => plan::execute(&args, json),
-        Command::Plugins(args) => plugins::execute(&args, json),
-        Command::Schema(args) => schema::execute(&args, json),
+        Command::Plugins(args) => plugins::execute(&args, json, registry),
+        Command::Schema(args) => schema::execute(&args, json, registry),
         Command::Inspect(args) => inspect::execute(&args, json),
     }
 }
 
 /// The texts of a pipeline and what they make.
-fn pipeline(args: &PipelineArgs) -> Result<(Sources, Pipeline), Failure> {
+fn pipeline(args: &PipelineArgs, registry: &Registry) -> Result<(Sources, Pipeline), Failure> {
     let sources = Sources::read(&args.pipeline, &args.overrides.set, INCLUDE_KEY)?;
-    let pipeline = Pipeline::from_sources(&sources, &builtin::registry())?;
+    let pipeline = Pipeline::from_sources(&sources, registry)?;
     Ok((sources, pipeline))
 }
 

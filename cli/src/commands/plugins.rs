@@ -1,27 +1,28 @@
 //! `runout plugins`: what is on board, and the keys of each.
 
-use runout_core::pipeline::{Registry, error::known_names, registry::Catalogue};
+use runout_core::pipeline::{Registry, effects::EffectEntry, error::known_names, registry::Catalogue};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value, json};
 
 use super::print;
 use crate::{
     args::PluginsArgs,
-    builtin,
     failure::Failure,
     render::{keys, table::Table},
 };
 
+const EFFECT: &str = "effect";
+
 /// One plugin.
 #[derive(Debug, Serialize)]
 pub struct Entry {
-    /// The table's key in TOML; "simulate" for scenarios.
+    /// The table's key in TOML; "simulate" for scenarios, "effect" for what `[diagnose]` looks for.
     pub stage: &'static str,
     /// Kebab-case name in TOML.
     pub name: &'static str,
     /// What it does.
     pub about: &'static str,
-    /// JSON Schema of its keys.
+    /// JSON Schema of its keys; of an effect, of what may stand in `values` where it is known.
     pub schema: Value,
 }
 
@@ -29,8 +30,8 @@ pub struct Entry {
 ///
 /// # Errors
 /// When the name is unknown.
-pub fn execute(args: &PluginsArgs, json: bool) -> Result<(), Failure> {
-    let entries = entries(&builtin::registry());
+pub fn execute(args: &PluginsArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+    let entries = entries(registry);
     match &args.name {
         None => print(&entries.iter().collect::<Vec<_>>(), json, |entries| list(entries)),
         Some(name) => match named(&entries, name) {
@@ -42,7 +43,7 @@ pub fn execute(args: &PluginsArgs, json: bool) -> Result<(), Failure> {
     }
 }
 
-/// Every plugin, by stage.
+/// Every plugin, by stage, and every effect.
 #[must_use]
 pub fn entries(registry: &Registry) -> Vec<Entry> {
     let mut entries = Vec::new();
@@ -51,6 +52,12 @@ pub fn entries(registry: &Registry) -> Vec<Entry> {
     add(&mut entries, "separate", &registry.separators);
     add(&mut entries, "export", &registry.exporters);
     add(&mut entries, "simulate", &registry.simulators);
+    entries.extend(registry.effects.iter().map(|effect| Entry {
+        stage: EFFECT,
+        name: effect.name,
+        about: effect.about,
+        schema: values(effect),
+    }));
     entries
 }
 
@@ -61,6 +68,20 @@ fn add<S>(entries: &mut Vec<Entry>, stage: &'static str, catalogue: &Catalogue<S
         about: plugin.about,
         schema: plugin.schema().to_value(),
     }));
+}
+
+/// Schema of an effect's parameters.
+fn values(effect: &EffectEntry) -> Value {
+    let properties: Map<String, Value> = effect
+        .parameters
+        .iter()
+        .map(|parameter| {
+            let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
+            let description = format!("Usually within ±{}{unit}.", parameter.tolerance);
+            (parameter.name.clone(), json!({ "type": "number", "description": description }))
+        })
+        .collect();
+    json!({ "type": "object", "additionalProperties": false, "properties": properties })
 }
 
 /// Those that are meant by a name alone, or by `stage/name`.
@@ -93,6 +114,7 @@ fn list(entries: &[&Entry]) -> String {
 fn describe(entry: &Entry) -> String {
     let table = match entry.stage {
         "simulate" => "a scenario".to_owned(),
+        EFFECT => "[diagnose] effects, values in known".to_owned(),
         stage @ ("preprocess" | "export") => format!("[[{stage}]]"),
         stage => format!("[{stage}]"),
     };

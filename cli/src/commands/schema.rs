@@ -17,24 +17,23 @@ use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
 use super::{check, plan, plugins};
-use crate::{args::SchemaArgs, builtin, failure::Failure, render};
+use crate::{args::SchemaArgs, failure::Failure, render};
 
 /// Prints schemas, or writes them to a folder.
 ///
 /// # Errors
 /// When the name is unknown or a file cannot be written.
-pub fn execute(args: &SchemaArgs, json: bool) -> Result<(), Failure> {
-    let registry = builtin::registry();
+pub fn execute(args: &SchemaArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
-        let written = write(&registry, folder)?;
+        let written = write(registry, folder)?;
         return super::print(&json!({ "outputs": written }), json, |_| format!("written: {}\n", written.join(", ")));
     }
-    let files = files(&registry);
+    let files = files(registry);
     let schema = match &args.name {
         None => Value::Object(files.into_iter().map(|(name, schema)| (name.to_owned(), schema)).collect()),
         Some(name) => match files.iter().find(|(file, _)| file == name) {
             Some((_, schema)) => schema.clone(),
-            None => of_plugin(&registry, name, &files.iter().map(|(file, _)| *file).collect::<Vec<_>>())?,
+            None => of_plugin(registry, name, &files.iter().map(|(file, _)| *file).collect::<Vec<_>>())?,
         },
     };
     Ok(render::document(&schema)?)

@@ -18,7 +18,7 @@ use runout_hdf5::{SampleFormat, Scale, WriteOptions, write_measurement};
 use serde::Serialize;
 
 use super::print;
-use crate::{args::SimulateArgs, builtin, failure::Failure, progress::Progress, render::count};
+use crate::{args::SimulateArgs, failure::Failure, progress::Progress, render::count};
 
 /// What was made. What is hidden in it stays hidden.
 #[derive(Debug, Serialize)]
@@ -38,10 +38,10 @@ struct Report {
 ///
 /// # Errors
 /// When the scenario is wrong, cannot be computed, or the file cannot be written.
-pub fn execute(args: &SimulateArgs, json: bool) -> Result<(), Failure> {
+pub fn execute(args: &SimulateArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let sources = Sources::read(&args.scenario, &args.overrides.set, INCLUDE_KEY)?;
     let document = Document::parse(&sources)?;
-    let scenario = Scenario::build(document.root(), &sources, args.out.clone(), &builtin::registry())
+    let scenario = Scenario::build(document.root(), &sources, args.out.clone(), registry)
         .map_err(|fault| document.diagnose(fault))?;
     let report = write(&scenario)?;
     print(&report, json, text)

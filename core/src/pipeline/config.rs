@@ -8,18 +8,19 @@ use toml::{Spanned, de::DeValue};
 
 use super::{
     compare::{self, Candidate},
-    diagnose::config::DiagnoseConfig,
+    diagnose::config::{Diagnose, DiagnoseConfig},
     document::{self, ConfigError, Document, Sources, Table},
     error::{Fault, known_names},
     registry::{Catalogue, Context, Plugin, Registry},
 };
 use crate::{
     atomic_file::resolved,
+    model::Effect,
     rig::{Rig, RigConfig},
     separation::Assessment,
     stage::{
         Averager, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Separator, SourceKind,
-        StationSeparator, TraceSeparator,
+        StationModel, StationSeparator, TraceSeparator,
     },
     surface::SurfaceConfig,
 };
@@ -42,7 +43,7 @@ pub struct Pipeline {
     /// The separators of `[[compare]]`, which `run` leaves alone.
     pub compare: Vec<Candidate>,
     /// What the closed loop may consider.
-    pub diagnose: DiagnoseConfig,
+    pub diagnose: Diagnose,
     /// How sections become a surface.
     pub surface: SurfaceConfig,
     /// In the order configured.
@@ -63,6 +64,8 @@ pub enum Route {
         averager: Box<dyn Averager>,
         /// Profiles to form and motion.
         separator: Box<dyn StationSeparator>,
+        /// The separator's model for the closed loop, where it has one.
+        model: Option<Box<dyn StationModel>>,
     },
     /// Measured points, all at once.
     Points {
@@ -79,6 +82,18 @@ pub enum Route {
         /// Traces to straightness.
         separator: Box<dyn TraceSeparator>,
     },
+}
+
+impl Route {
+    /// What its model may lack.
+    fn effects(&self) -> Vec<Effect> {
+        match self {
+            Self::Turns { model, .. } => model.as_ref().map_or_else(Vec::new, |model| model.effects().to_vec()),
+            Self::Points { separator } => separator.model().map_or_else(Vec::new, PointModel::effects),
+            Self::Model { model } => model.effects(),
+            Self::Traces { .. } => Vec::new(),
+        }
+    }
 }
 
 const KEYS: [&str; 9] = ["title", "rig", "load", "preprocess", "separate", "compare", "surface", "diagnose", "export"];
@@ -110,12 +125,6 @@ impl Pipeline {
         };
         let rig = table(root, "rig")?.map(|table| checked::<RigConfig, _>(&table, RigConfig::check)).transpose()?;
         let context = Context { folder: sources.folder(), rig: rig.as_ref() };
-        let diagnose_table = table(root, "diagnose")?;
-        let diagnose = diagnose_table
-            .as_ref()
-            .map(|table| checked::<DiagnoseConfig, _>(table, |config| config.check(sources.folder())))
-            .transpose()?
-            .unwrap_or_default();
         let surface = table(root, "surface")?
             .map(|table| checked::<SurfaceConfig, _>(&table, SurfaceConfig::check))
             .transpose()?
@@ -134,13 +143,9 @@ impl Pipeline {
                     return Err(Fault::here("missing key `rig`").help("describe sensors and setups in [rig]"));
                 }
                 let separator = registry.separators.build(&separate_table, &context)?;
-                turns(preprocessors, separator, &separate_table, root)?
+                turns(preprocessors, separator, &separate_table, root, registry)?
             }
             SourceKind::Points => {
-                if let (Some(table), Some(_)) = (&diagnose_table, diagnose.hold_out) {
-                    let fault = Fault::at("hold_out", "measured points are left out group by group, not by a share");
-                    return Err(document::resolve(fault.help("leave `hold_out` out"), table));
-                }
                 if let Some((_, table)) = preprocessors.first() {
                     let fault = Fault::here("measured points take no preprocessor").help("leave [[preprocess]] out");
                     return Err(document::resolve(fault, table));
@@ -148,6 +153,14 @@ impl Pipeline {
                 (points(registry.separators.build(&separate_table, &context)?, &separate_table, root)?, None)
             }
         };
+        let diagnose = table(root, "diagnose")?
+            .map(|table| {
+                checked::<DiagnoseConfig, _>(&table, |config| {
+                    config.check(sources.folder(), loader.kind(), &route.effects())
+                })
+            })
+            .transpose()?
+            .unwrap_or_default();
         let compare = tables(root, "compare")?
             .iter()
             .map(|table| compare::candidate(table, registry, &context))
@@ -268,6 +281,7 @@ fn turns(
     separator: Separator,
     separate_table: &Table,
     root: &Table,
+    registry: &Registry,
 ) -> Result<(Route, Option<Assessment>), Fault> {
     let mut conditioners = Vec::new();
     let mut averager = None;
@@ -289,7 +303,8 @@ fn turns(
         Separator::Stations(separator) => {
             let assessment =
                 separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
-            Ok((Route::Turns { conditioners, averager, separator }, Some(assessment)))
+            let model = separator.model(&registry.effects);
+            Ok((Route::Turns { conditioners, averager, separator, model }, Some(assessment)))
         }
         Separator::Points(_) | Separator::Model(_) | Separator::Traces(_) => {
             let fault = Fault::at("plugin", "this separator takes measured points; [load] gives recorded turns");

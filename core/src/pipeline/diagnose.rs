@@ -12,13 +12,13 @@ use crate::{
     Error, Result,
     atomic_file::{PendingFile, commit_all},
     model::{
-        Model, closed_loop,
+        closed_loop,
         diagnosis::{Diagnosis, Step, Truth},
     },
     points::Points,
     provenance::Input,
     separation::Quantity,
-    stage::{Conclusion, PointModel, Source, Station, StationSeparator},
+    stage::{Conclusion, PointModel, Source, Station, StationModel},
 };
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form.
@@ -36,11 +36,11 @@ pub fn diagnose(pipeline: &Pipeline, observer: &dyn Observer) -> Result<Diagnosi
             diagnose_points(pipeline, points, model, observer)
         }
         (Source::Points(points), Route::Model { model }) => diagnose_points(pipeline, points, &**model, observer),
-        (Source::Turns(recording), Route::Turns { conditioners, averager, separator }) => {
+        (Source::Turns(recording), Route::Turns { conditioners, averager, model: Some(model), .. }) => {
             let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
             let hold_out = Some(pipeline.diagnose.hold_out.unwrap_or(HOLD_OUT));
             let line = Line { rig, recording: &**recording, conditioners, averager: &**averager, hold_out };
-            diagnose_turns(pipeline, &line, &**separator, observer)
+            diagnose_turns(pipeline, &line, &**model, observer)
         }
         _ => Err(no_model(&pipeline.separator)),
     }
@@ -52,7 +52,7 @@ const HOLD_OUT: f64 = 0.2;
 fn diagnose_turns(
     pipeline: &Pipeline,
     line: &Line,
-    separator: &dyn StationSeparator,
+    model: &dyn StationModel,
     observer: &dyn Observer,
 ) -> Result<Diagnosis> {
     let recording = line.recording;
@@ -68,10 +68,7 @@ fn diagnose_turns(
             Ok(())
         },
     )?;
-    let found = separator.diagnose(&stations, &|effects| pipeline.diagnose.settings(effects)).ok_or_else(|| {
-        let problem = format!("`{}` has no model of effects for the closed loop", pipeline.separator);
-        Error::new("diagnose", &pipeline.title, problem)
-    })??;
+    let found = model.diagnose(&stations, &pipeline.diagnose.settings)?;
     let mut diagnosis = found.diagnosis;
     let info =
         RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
@@ -120,9 +117,8 @@ fn diagnose_points(
     let outputs: Vec<_> = pipeline.outputs().into_iter().chain(pipeline.diagnosis_path()).collect();
     spare_inputs(&outputs, std::slice::from_ref(&points.input))?;
     let terms = model.terms(points)?;
-    let settings = pipeline.diagnose.settings(terms.effects())?;
+    let settings = closed_loop::Settings { max_added: MOST_ADDED, ..pipeline.diagnose.settings.clone() };
     let terms = terms.with_known(&settings.known);
-    let settings = closed_loop::Settings { max_added: MOST_ADDED, ..settings };
     let closed = closed_loop::diagnose(&terms, &settings)?;
     let Conclusion { shape, remarks } = model.conclude(points, &closed.after)?;
     let mut diagnosis = closed.diagnosis;

@@ -1,6 +1,6 @@
 //! Configuration mistakes and where they stand.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 /// A value that the configuration should not hold.
 ///
@@ -76,6 +76,17 @@ impl Fault {
         }
         self
     }
+}
+
+/// Refuses a whole number outside a range; `what` names it: "an order".
+///
+/// # Errors
+/// When it is outside.
+pub fn within(key: &str, what: &str, value: usize, range: RangeInclusive<usize>) -> Result<(), Fault> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    Err(Fault::at(key, format!("expected {what} from {} to {}, found {value}", range.start(), range.end())))
 }
 
 /// A fault with the text that it points into, ready to be shown.

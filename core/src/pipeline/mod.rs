@@ -4,6 +4,7 @@ pub mod compare;
 pub mod config;
 pub mod diagnose;
 pub mod document;
+pub mod effects;
 pub mod error;
 mod line;
 pub mod registry;

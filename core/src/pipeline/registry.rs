@@ -8,6 +8,7 @@ use toml::{Spanned, de::DeTable};
 
 use super::{
     document::{self, Table},
+    effects::EffectCatalogue,
     error::{Fault, known_names},
 };
 use crate::{
@@ -15,7 +16,7 @@ use crate::{
     stage::{Exporter, Loader, Preprocessor, Separator, Simulator},
 };
 
-/// Every plugin by stage.
+/// Every plugin by stage, and every effect.
 #[derive(Default)]
 pub struct Registry {
     /// From files to recordings.
@@ -28,6 +29,8 @@ pub struct Registry {
     pub exporters: Catalogue<Box<dyn Exporter>>,
     /// From scenarios to recordings.
     pub simulators: Catalogue<Box<dyn Simulator>>,
+    /// What models may lack.
+    pub effects: EffectCatalogue,
 }
 
 /// The plugins of one stage.

@@ -63,7 +63,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     }
     let mut gathering = Gathering::begin(pipeline, &info)?;
     let (inputs, surface, remarks) = match (&source, &pipeline.route) {
-        (Source::Turns(recording), Route::Turns { conditioners, averager, separator }) => {
+        (Source::Turns(recording), Route::Turns { conditioners, averager, separator, .. }) => {
             let rig = pipeline
                 .rig
                 .as_ref()

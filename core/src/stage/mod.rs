@@ -10,7 +10,7 @@ pub use exporter::{Export, Exporter, StraightnessExporter};
 pub use loader::{Loader, Source, SourceKind};
 pub use preprocessor::{Averager, Conditioner, Preprocessor};
 pub use separator::{
-    Conclusion, PointModel, PointSeparator, Separator, Shape, Station, StationDiagnosis, StationSeparator,
-    TraceSeparator,
+    Conclusion, PointModel, PointSeparator, Separator, Shape, Station, StationDiagnosis, StationModel,
+    StationSeparator, TraceSeparator,
 };
 pub use simulator::Simulator;

@@ -4,7 +4,7 @@ use crate::{
     Result,
     model::linear_terms::{LinearFit, LinearTerms},
     model::{Effect, closed_loop::Settings, diagnosis::Diagnosis},
-    pipeline::error::Fault,
+    pipeline::{effects::EffectCatalogue, error::Fault},
     points::Points,
     profile::Profile,
     rig::Rig,
@@ -45,18 +45,23 @@ pub trait StationSeparator: Send + Sync {
     /// When the profiles do not fit the rig.
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity>;
 
-    /// Runs the closed loop on all stations at once; `None` where the method has no model of effects. `settings` says how,
-    /// for a model with these effects.
+    /// Its model for the closed loop, which may lack those of these effects that are of its domain; `None` where the method
+    /// has no such model.
+    fn model(&self, _effects: &EffectCatalogue) -> Option<Box<dyn StationModel>> {
+        None
+    }
+}
+
+/// A model of one rig's turns for the closed loop.
+pub trait StationModel: Send + Sync {
+    /// What it may lack, at each target.
+    fn effects(&self) -> &[Effect];
+
+    /// Runs the loop on all stations at once; `settings` count effects as [`effects`](Self::effects) does.
     ///
     /// # Errors
     /// When the profiles do not fit the rig.
-    fn diagnose(
-        &self,
-        _stations: &[Station],
-        _settings: &dyn Fn(&[Effect]) -> Result<Settings>,
-    ) -> Option<Result<StationDiagnosis>> {
-        None
-    }
+    fn diagnose(&self, stations: &[Station], settings: &Settings) -> Result<StationDiagnosis>;
 }
 
 /// What the closed loop found, with form and motion before and after.
@@ -117,6 +122,9 @@ pub trait PointSeparator: Send + Sync {
 
 /// A model of measured points for the closed loop.
 pub trait PointModel: Send + Sync {
+    /// What it may lack, in the order of the terms; what is usual of a parameter may depend on the points.
+    fn effects(&self) -> Vec<Effect>;
+
     /// What is declared of these points, and the effects that this may lack.
     ///
     /// # Errors

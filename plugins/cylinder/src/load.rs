@@ -3,13 +3,11 @@
 use std::path::PathBuf;
 
 use runout_core::{
-    Result,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
-    rig::Rig,
-    stage::{Loader, Source, SourceKind},
+    stage::Loader,
 };
 use runout_traces::Columns;
 use schemars::JsonSchema;
@@ -30,27 +28,9 @@ impl StageConfig for CylinderTracesConfig {
     const NAME: &'static str = "cylinder-traces";
     const ABOUT: &'static str = "circles and generatrices measured on a cylinder, from CSV";
 
-    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        if self.path.as_os_str().is_empty() {
-            return Err(Fault::at("path", "expected the name of a file"));
-        }
-        Ok(Box::new(CylinderTraces { path: context.path(&self.path) }))
+    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
+        runout_traces::loader(&self.path, context, |path| COLUMNS.read(path))
     }
 }
 
 const COLUMNS: Columns = Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"] };
-
-/// The loader `cylinder-traces`.
-struct CylinderTraces {
-    path: PathBuf,
-}
-
-impl Loader for CylinderTraces {
-    fn kind(&self) -> SourceKind {
-        SourceKind::Points
-    }
-
-    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
-        COLUMNS.read(&self.path).map(Source::Points)
-    }
-}

@@ -129,6 +129,10 @@ impl<'a> Basis<'a> {
 }
 
 impl PointModel for LeastSquaresCylinder {
+    fn effects(&self) -> Vec<Effect> {
+        missing(0.0).into_iter().map(|missing| missing.effect).collect()
+    }
+
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
         let basis = Basis::of(self, points)?;
         let scans: Vec<&Scan> = basis.circles.iter().map(|circle| &circle.scan).collect();

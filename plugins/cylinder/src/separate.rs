@@ -3,7 +3,7 @@
 use runout_core::{
     Error, Result,
     pipeline::{
-        error::{Fault, known_names},
+        error::{Fault, known_names, within},
         registry::{Context, StageConfig},
     },
     points::{Points, Trace},
@@ -80,10 +80,7 @@ impl LeastSquaresCylinderConfig {
         if self.used.is_empty() {
             return Err(Fault::at("use", "expected at least one kind or trace").help("use = [\"circle\"]"));
         }
-        if !(2..=HIGHEST_ORDER).contains(&self.max_order) {
-            let message = format!("expected an order from 2 to {HIGHEST_ORDER}, found {}", self.max_order);
-            return Err(Fault::at("max_order", message));
-        }
+        within("max_order", "an order", self.max_order, 2..=HIGHEST_ORDER)?;
         if !(self.outlier_mad.is_finite() && self.outlier_mad >= 1.0) {
             let message = format!("expected at least 1 (half of the points lie nearer), found {}", self.outlier_mad);
             return Err(Fault::at("outlier_mad", message).help("a large number keeps every point"));

@@ -3,13 +3,11 @@
 use std::path::PathBuf;
 
 use runout_core::{
-    Result,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
-    rig::Rig,
-    stage::{Loader, Source, SourceKind},
+    stage::Loader,
 };
 use runout_traces::Numbers;
 use schemars::JsonSchema;
@@ -31,27 +29,9 @@ impl StageConfig for QuadratureSamplesConfig {
     const NAME: &'static str = "quadrature-samples";
     const ABOUT: &'static str = "phase and radius of a quadrature signal, from CSV";
 
-    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        if self.path.as_os_str().is_empty() {
-            return Err(Fault::at("path", "expected the name of a file"));
-        }
-        Ok(Box::new(QuadratureSamples { path: context.path(&self.path) }))
+    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
+        runout_traces::loader(&self.path, context, |path| NUMBERS.read(path, "signal"))
     }
 }
 
 const NUMBERS: Numbers = Numbers { read: &["phase_deg", "radius_counts"], ignored: &["deviation_counts"] };
-
-/// The loader `quadrature-samples`.
-struct QuadratureSamples {
-    path: PathBuf,
-}
-
-impl Loader for QuadratureSamples {
-    fn kind(&self) -> SourceKind {
-        SourceKind::Points
-    }
-
-    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
-        NUMBERS.read(&self.path, "signal").map(Source::Points)
-    }
-}

@@ -16,7 +16,7 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     pipeline::{
-        error::Fault,
+        error::{Fault, within},
         registry::{Context, StageConfig},
     },
     points::Points,
@@ -67,13 +67,8 @@ impl QuadratureConfig {
     /// # Errors
     /// The first that cannot be, with its key.
     pub fn model(self) -> std::result::Result<Quadrature, Fault> {
-        if !(2..=MOST_BLOCKS).contains(&self.blocks) {
-            return Err(Fault::at("blocks", format!("expected 2 to {MOST_BLOCKS} blocks, found {}", self.blocks)));
-        }
-        if !(2..=HIGHEST_ORDER).contains(&self.max_order) {
-            let message = format!("expected an order from 2 to {HIGHEST_ORDER}, found {}", self.max_order);
-            return Err(Fault::at("max_order", message));
-        }
+        within("blocks", "blocks", self.blocks, 2..=MOST_BLOCKS)?;
+        within("max_order", "an order", self.max_order, 2..=HIGHEST_ORDER)?;
         Ok(Quadrature(self))
     }
 }
@@ -86,7 +81,33 @@ const UNIT: &str = "counts";
 /// What could usually be expected, relative to the radius: 1 % of offset, gain ratio and angle.
 const USUAL: f64 = 0.01;
 
+impl Quadrature {
+    /// What a signal of a radius may lack, by order from 1.
+    fn effects_on(&self, radius: f64) -> Vec<Effect> {
+        let usual = USUAL * radius;
+        let pair = |id: String, [first, second]: [(&str, &str, f64); 2]| {
+            let parameter = |(name, unit, tolerance): (&str, &str, f64)| Parameter {
+                name: name.into(),
+                unit: unit.into(),
+                tolerance,
+            };
+            Effect { id, target: None, parameters: vec![parameter(first), parameter(second)] }
+        };
+        let wave = |size: f64| [("cosine", UNIT, size), ("sine", UNIT, size)];
+        let mut effects = vec![
+            pair("quadrature-offset".into(), wave(usual)),
+            pair("quadrature-gain-and-angle".into(), [("gain_ratio_less_1", "", USUAL), ("angle_error", "rad", USUAL)]),
+        ];
+        effects.extend((3..=self.0.max_order).map(|order| pair(format!("harmonic-{order}"), wave(0.1 * usual))));
+        effects
+    }
+}
+
 impl PointModel for Quadrature {
+    fn effects(&self) -> Vec<Effect> {
+        self.effects_on(1.0)
+    }
+
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
         let phase: Vec<f64> = points.column("phase_deg")?.iter().map(|phase| phase.to_radians()).collect();
         let radius = points.column("radius_counts")?;
@@ -102,28 +123,14 @@ impl PointModel for Quadrature {
         let wave = |order: usize, size: f64, function: fn(f64) -> f64| -> Vec<f64> {
             phase.iter().map(|phase| size * function(order as f64 * phase)).collect()
         };
-        let pair = |id: String, order: usize, sizes: [f64; 2], names: [(&str, &str, f64); 2], rank: usize| Term {
-            effect: Effect {
-                id,
-                target: None,
-                parameters: names
-                    .map(|(name, unit, tolerance)| Parameter { name: name.into(), unit: unit.into(), tolerance })
-                    .into(),
-            },
-            columns: vec![wave(order, sizes[0], f64::cos), wave(order, sizes[1], f64::sin)],
-            rank,
-        };
-        let half = 0.5 * mean;
-        let usual = USUAL * mean;
-        let ratio_and_angle = [("gain_ratio_less_1", "", USUAL), ("angle_error", "rad", USUAL)];
-        let mut terms = vec![
-            pair("quadrature-offset".into(), 1, [1.0; 2], [("cosine", UNIT, usual), ("sine", UNIT, usual)], 0),
-            pair("quadrature-gain-and-angle".into(), 2, [-half, half], ratio_and_angle, 0),
-        ];
-        terms.extend((3..=self.0.max_order).map(|order| {
-            let names = [("cosine", UNIT, 0.1 * usual), ("sine", UNIT, 0.1 * usual)];
-            pair(format!("harmonic-{order}"), order, [1.0; 2], names, 1)
-        }));
+        let terms = (1..).zip(self.effects_on(mean)).map(|(order, effect)| {
+            let [cosine, sine] = if order == 2 { [-0.5 * mean, 0.5 * mean] } else { [1.0; 2] };
+            Term {
+                effect,
+                columns: vec![wave(order, cosine, f64::cos), wave(order, sine, f64::sin)],
+                rank: usize::from(order > 2),
+            }
+        });
         let observations = Observations {
             values: radius.to_vec(),
             unit: UNIT.into(),
@@ -132,7 +139,7 @@ impl PointModel for Quadrature {
             groups: (1..=self.0.blocks).map(|block| format!("block {block}")).collect(),
         };
         let circle = Declared { name: "radius".into(), unit: UNIT.into(), column: vec![1.0; phase.len()] };
-        LinearTerms::new(observations, vec![circle], terms)
+        LinearTerms::new(observations, vec![circle], terms.collect())
     }
 
     fn conclude(&self, points: &Points, _fit: &LinearFit) -> Result<Conclusion> {

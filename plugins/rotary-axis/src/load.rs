@@ -3,13 +3,11 @@
 use std::path::PathBuf;
 
 use runout_core::{
-    Result,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
-    rig::Rig,
-    stage::{Loader, Source, SourceKind},
+    stage::Loader,
 };
 use runout_traces::Numbers;
 use schemars::JsonSchema;
@@ -31,27 +29,9 @@ impl StageConfig for RTestPointsConfig {
     const NAME: &'static str = "r-test-points";
     const ABOUT: &'static str = "deviations of the ball in an R-test, from CSV";
 
-    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        if self.path.as_os_str().is_empty() {
-            return Err(Fault::at("path", "expected the name of a file"));
-        }
-        Ok(Box::new(RTestPoints { path: context.path(&self.path) }))
+    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
+        runout_traces::loader(&self.path, context, |path| NUMBERS.read(path, "r-test"))
     }
 }
 
 const NUMBERS: Numbers = Numbers { read: &["a_deg", "c_deg", "dx_mm", "dy_mm", "dz_mm"], ignored: &["point"] };
-
-/// The loader `r-test-points`.
-struct RTestPoints {
-    path: PathBuf,
-}
-
-impl Loader for RTestPoints {
-    fn kind(&self) -> SourceKind {
-        SourceKind::Points
-    }
-
-    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
-        NUMBERS.read(&self.path, "r-test").map(Source::Points)
-    }
-}

@@ -14,7 +14,7 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     pipeline::{
-        error::Fault,
+        error::{Fault, within},
         registry::{Context, StageConfig},
     },
     points::Points,
@@ -69,10 +69,7 @@ impl RTestConfig {
         if !self.a_deg.is_finite() {
             return Err(Fault::at("a_deg", format!("expected an angle, found {}", self.a_deg)));
         }
-        if !(2..=HIGHEST_ORDER).contains(&self.max_order) {
-            let message = format!("expected an order from 2 to {HIGHEST_ORDER}, found {}", self.max_order);
-            return Err(Fault::at("max_order", message));
-        }
+        within("max_order", "an order", self.max_order, 2..=HIGHEST_ORDER)?;
         Ok(RTest(self))
     }
 }
@@ -99,6 +96,15 @@ impl RTest {
 }
 
 impl PointModel for RTest {
+    fn effects(&self) -> Vec<Effect> {
+        let harmonic = |order: usize| {
+            let names = COORDINATES.iter().flat_map(|(name, _)| [format!("{name}_cosine"), format!("{name}_sine")]);
+            let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
+            Effect { id: format!("harmonic-{order}"), target: None, parameters }
+        };
+        (2..=self.0.max_order).map(harmonic).collect()
+    }
+
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
         let used = self.used(points)?;
         let count = used.len();
@@ -121,16 +127,10 @@ impl PointModel for RTest {
             };
             [one("level", 0, f64::cos), one("cos C", 1, f64::cos), one("sin C", 1, f64::sin)]
         });
-        let terms = (2..=self.0.max_order).map(|order| {
-            let names = COORDINATES.iter().flat_map(|(name, _)| [format!("{name}_cosine"), format!("{name}_sine")]);
-            let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
+        let terms = (2..).zip(self.effects()).map(|(order, effect)| {
             let columns =
                 (0..3).flat_map(|coordinate| [wave(coordinate, order, f64::cos), wave(coordinate, order, f64::sin)]);
-            Term {
-                effect: Effect { id: format!("harmonic-{order}"), target: None, parameters },
-                columns: columns.collect(),
-                rank: 0,
-            }
+            Term { effect, columns: columns.collect(), rank: 0 }
         });
         let observations = Observations {
             values,

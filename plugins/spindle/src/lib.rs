@@ -23,4 +23,7 @@ pub fn register(registry: &mut Registry) {
     registry.separators.add(Plugin::of::<MethodConfig<MultiStep>>());
     registry.separators.add(Plugin::of::<HarmonicLeastSquaresConfig>());
     registry.simulators.add(Plugin::of::<SpindleConfig>());
+    for effect in effects::all() {
+        registry.effects.add(effects::entry(effect));
+    }
 }

@@ -87,8 +87,8 @@ fn diagnosed(config: &SpindleConfig) -> (StationDiagnosis, [f64; 2]) {
     let rig = config.rig.clone().check().unwrap();
     let (station, truth) = averaged(config, &rig);
     let layout = Layout::new(&rig, false);
-    let settings = |_: &[_]| Ok(Settings::default());
-    let found = diagnose(Selection::whole(&rig), layout, true, &[station], &settings).unwrap();
+    let settings = Settings::default();
+    let found = diagnose(Selection::whole(&rig), layout, true, effects::all(), &[station], &settings).unwrap();
     let errors = [&found.before, &found.after].map(|separations| form_error_um(&separations[0], &truth));
     (found, errors)
 }

@@ -3,13 +3,11 @@
 use std::path::PathBuf;
 
 use runout_core::{
-    Result,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
-    rig::Rig,
-    stage::{Loader, Source, SourceKind},
+    stage::Loader,
 };
 use runout_traces::Columns;
 use schemars::JsonSchema;
@@ -31,27 +29,9 @@ impl StageConfig for AxialTracesConfig {
     const NAME: &'static str = "axial-traces";
     const ABOUT: &'static str = "traces along a cylinder or a straightedge in two setups, from CSV";
 
-    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        if self.path.as_os_str().is_empty() {
-            return Err(Fault::at("path", "expected the name of a file"));
-        }
-        Ok(Box::new(AxialTraces { path: context.path(&self.path) }))
+    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
+        runout_traces::loader(&self.path, context, |path| COLUMNS.read(path))
     }
 }
 
 const COLUMNS: Columns = Columns { kind: "setup", numbers: &["z_mm", "reading_um"] };
-
-/// The loader `axial-traces`.
-struct AxialTraces {
-    path: PathBuf,
-}
-
-impl Loader for AxialTraces {
-    fn kind(&self) -> SourceKind {
-        SourceKind::Points
-    }
-
-    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
-        COLUMNS.read(&self.path).map(Source::Points)
-    }
-}

@@ -1,4 +1,4 @@
-//! CSV files of traces, which the loaders of measured points share.
+//! CSV files of traces and points, and the loader of one, which the crates of measured points share.
 //!
 //! A row is a point: the trace that it belongs to, what tells the traces apart (their kind, their setup), and numbers.
 //! The points of a trace follow one another. Columns come in any order, separated by comma, semicolon or tab; the last
@@ -7,14 +7,47 @@
 use std::{
     fs::File,
     io::{BufRead, BufReader, Read, Seek},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use csv::{ByteRecord, ReaderBuilder, Trim};
 use runout_core::{
     Error, Result,
+    pipeline::{error::Fault, registry::Context},
     points::{Column, Points, Trace},
+    rig::Rig,
+    stage::{Loader, Source, SourceKind},
 };
+
+/// A loader of the file that a configuration names by `path`.
+///
+/// # Errors
+/// When it names none.
+pub fn loader(
+    path: &Path,
+    context: &Context,
+    read: fn(&Path) -> Result<Points>,
+) -> std::result::Result<Box<dyn Loader>, Fault> {
+    if path.as_os_str().is_empty() {
+        return Err(Fault::at("path", "expected the name of a file"));
+    }
+    Ok(Box::new(PointFile { path: context.path(path), read }))
+}
+
+struct PointFile {
+    path: PathBuf,
+    read: fn(&Path) -> Result<Points>,
+}
+
+impl Loader for PointFile {
+    fn kind(&self) -> SourceKind {
+        SourceKind::Points
+    }
+
+    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
+        (self.read)(&self.path).map(Source::Points)
+    }
+}
 
 /// The column of the traces' ids.
 const TRACE: &str = "trace";

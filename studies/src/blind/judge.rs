@@ -13,7 +13,7 @@ use runout_core::{
 };
 use runout_spindle::{
     diagnose::diagnose,
-    layout,
+    effects, layout,
     selection::Selection,
     simulate::{Effect, SpindleConfig, simulator},
 };
@@ -74,16 +74,11 @@ fn run(config: &SpindleConfig, campaign: &Campaign, effects: Option<Vec<String>>
     let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
     let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
     let recording = &config.recording;
-    let (station, truth) = campaign::station_holding_out(
-        &simulator,
-        &rig,
-        recording.samples_per_rev,
-        recording.revolutions,
-        Some(HOLD_OUT),
-    )?;
+    let size = [recording.samples_per_rev, recording.revolutions];
+    let (station, truth) = campaign::station_holding_out(&simulator, &rig, 0, size, Some(HOLD_OUT))?;
     let layout = layout::Layout::new(&rig, campaign.rig == Layout::Paper);
     let settings = Settings { effects, ..Settings::default() };
-    let said = diagnose(Selection::whole(&rig), layout, campaign.second_order, &[station], &|_| Ok(settings.clone()))?;
+    let said = diagnose(Selection::whole(&rig), layout, campaign.second_order, effects::all(), &[station], &settings)?;
     Ok(Run { said, truth })
 }
 

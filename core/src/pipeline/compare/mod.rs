@@ -70,7 +70,8 @@ impl<'a> Comparing<'a> {
     ) -> std::result::Result<Self, Fault> {
         let configured = std::mem::take(&mut pipeline.compare);
         let pipeline = &*pipeline;
-        let (Route::Turns { conditioners, averager, separator }, Some(rig)) = (&pipeline.route, &pipeline.rig) else {
+        let (Route::Turns { conditioners, averager, separator, .. }, Some(rig)) = (&pipeline.route, &pipeline.rig)
+        else {
             let fault = Fault::at("load", "compare takes recorded turns; [load] gives measured points");
             return Err(fault.help("`runout run` separates measured points and traces"));
         };

@@ -9,9 +9,9 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    Error, Result,
     model::{Effect, Setting, closed_loop::Settings},
     pipeline::error::{Fault, known_names},
+    stage::SourceKind,
 };
 
 /// `[diagnose]`: what the closed loop may consider. `run` leaves it alone.
@@ -67,83 +67,93 @@ pub struct KnownEffect {
     pub values: BTreeMap<String, f64>,
 }
 
+/// What the closed loop is to do, for the model of a pipeline.
+#[derive(Debug, Clone, Default)]
+pub struct Diagnose {
+    /// How the loop runs.
+    pub settings: Settings,
+    /// Share of the turns held out, where it is configured.
+    pub hold_out: Option<f64>,
+    /// Where the diagnosis goes, where it is configured.
+    pub path: Option<PathBuf>,
+}
+
 impl DiagnoseConfig {
-    /// Checks the values and resolves the path.
+    /// Checks the values for measurements of a kind and a model with these effects.
     ///
     /// # Errors
     /// The first that cannot be, with its key.
-    pub(crate) fn check(mut self, folder: &Path) -> std::result::Result<Self, Fault> {
-        if let Some(share) = self.hold_out
-            && !(share > 0.0 && share < 1.0)
-        {
-            return Err(Fault::at("hold_out", format!("expected a share between 0 and 1, found {share}")));
-        }
-        for (index, known) in self.known.iter().enumerate() {
-            if let Some((name, value)) = known.values.iter().find(|(_, value)| !value.is_finite()) {
-                let fault = Fault::at(name, format!("expected a finite number, found {value}"));
-                return Err(fault.under("values").under_item("known", index));
+    pub(crate) fn check(self, folder: &Path, kind: SourceKind, effects: &[Effect]) -> Result<Diagnose, Fault> {
+        if let Some(share) = self.hold_out {
+            if matches!(kind, SourceKind::Points) {
+                let fault = Fault::at("hold_out", "measured points are left out group by group, not by a share");
+                return Err(fault.help("leave `hold_out` out"));
+            }
+            if !(share > 0.0 && share < 1.0) {
+                return Err(Fault::at("hold_out", format!("expected a share between 0 and 1, found {share}")));
             }
         }
-        self.path = self.path.map(|path| folder.join(path));
-        Ok(self)
-    }
-
-    /// How to run the loop on a model with these effects.
-    ///
-    /// # Errors
-    /// When it names an effect or a parameter that the model does not have.
-    pub fn settings(&self, effects: &[Effect]) -> Result<Settings> {
-        let ids = || {
-            let mut ids: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
-            ids.sort_unstable();
-            ids.dedup();
-            ids
-        };
-        let unknown = |id: &str| Error::new("look for", format!("`{id}`"), "the model has no such effect");
-        let chosen = match &self.effects {
+        let chosen = match self.effects {
             Effects::Word(AllEffects::All) => None,
             Effects::Some(chosen) => {
-                if let Some(id) = chosen.iter().find(|id| !ids().contains(&id.as_str())) {
-                    return Err(unknown(id).help(known_names(id, ids())));
+                for (index, id) in chosen.iter().enumerate() {
+                    exists(id, effects).map_err(|fault| fault.under_item("effects", index))?;
                 }
-                Some(chosen.clone())
+                Some(chosen)
             }
         };
-        let known = self.known.iter().map(|known| {
-            let named = |effect: &Effect| effect.id == known.effect && effect.target == known.target;
-            let index = effects.iter().position(named).ok_or_else(|| {
-                let targets: Vec<&str> = effects
-                    .iter()
-                    .filter(|effect| effect.id == known.effect)
-                    .map(|effect| effect.target.as_deref().unwrap_or("none"))
-                    .collect();
-                if targets.is_empty() {
-                    return unknown(&known.effect).help(known_names(&known.effect, ids()));
-                }
-                let target = known.target.as_deref().unwrap_or("none");
-                let problem = format!("it cannot act on `{target}`");
-                Error::new("apply", format!("`{}`", known.effect), problem)
-                    .help(format!("its targets: {}", targets.join(", ")))
-            })?;
-            let parameters = &effects[index].parameters;
-            let names = || parameters.iter().map(|parameter| parameter.name.as_str());
-            if let Some(name) = known.values.keys().find(|name| names().all(|known| known != *name)) {
-                let problem = format!("it has no parameter `{name}`");
-                return Err(
-                    Error::new("apply", format!("`{}`", known.effect), problem).help(known_names(name, names()))
-                );
+        let known = self.known.iter().enumerate();
+        let known =
+            known.map(|(index, known)| known.setting(effects).map_err(|fault| fault.under_item("known", index)));
+        let settings = Settings { effects: chosen, known: known.collect::<Result<_, _>>()?, ..Settings::default() };
+        Ok(Diagnose { settings, hold_out: self.hold_out, path: self.path.map(|path| folder.join(path)) })
+    }
+}
+
+/// Refuses an id that no effect has.
+fn exists(id: &str, effects: &[Effect]) -> Result<(), Fault> {
+    let mut ids: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    if ids.contains(&id) {
+        return Ok(());
+    }
+    Err(Fault::here(format!("the model has no effect `{id}`")).help(known_names(id, ids)))
+}
+
+impl KnownEffect {
+    fn setting(&self, effects: &[Effect]) -> Result<Setting, Fault> {
+        exists(&self.effect, effects).map_err(|fault| fault.under("effect"))?;
+        let of_this_id = || effects.iter().enumerate().filter(|(_, effect)| effect.id == self.effect);
+        let Some((index, effect)) = of_this_id().find(|(_, effect)| effect.target == self.target) else {
+            let target = |target: &Option<String>| target.clone().unwrap_or_else(|| "none".into());
+            let targets: Vec<String> = of_this_id().map(|(_, effect)| target(&effect.target)).collect();
+            let key = if self.target.is_some() { "target" } else { "effect" };
+            let fault = Fault::at(key, format!("`{}` cannot act on `{}`", self.effect, target(&self.target)));
+            return Err(fault.help(format!("its targets: {}", targets.join(", "))));
+        };
+        let names = || effect.parameters.iter().map(|parameter| parameter.name.as_str());
+        for (name, value) in &self.values {
+            if !value.is_finite() {
+                return Err(Fault::at(name, format!("expected a finite number, found {value}")).under("values"));
             }
-            let values = names().map(|name| known.values.get(name).copied().unwrap_or(0.0)).collect();
-            Ok(Setting { effect: index, values })
-        });
-        Ok(Settings { effects: chosen, known: known.collect::<Result<_>>()?, ..Settings::default() })
+            if names().all(|known| known != name) {
+                let fault = Fault::at(name, format!("`{}` has no parameter `{name}`", self.effect));
+                return Err(fault.help(known_names(name, names())).under("values"));
+            }
+        }
+        let values = names().map(|name| self.values.get(name).copied().unwrap_or(0.0)).collect();
+        Ok(Setting { effect: index, values })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Parameter;
+    use crate::{
+        model::Parameter,
+        pipeline::error::{Place, Step},
+    };
 
     fn effect(target: &str) -> Effect {
         let parameter = |name: &str| Parameter { name: name.into(), unit: "um".into(), tolerance: 1.0 };
@@ -151,30 +161,55 @@ mod tests {
         Effect { id: "offset".into(), target: Some(target.into()), parameters }
     }
 
-    fn settings(text: &str) -> Result<Settings> {
-        toml::from_str::<DiagnoseConfig>(text).unwrap().settings(&[effect("S1"), effect("S2")])
+    fn checked(text: &str) -> Result<Diagnose, Fault> {
+        let config = toml::from_str::<DiagnoseConfig>(text).unwrap();
+        config.check(Path::new(""), SourceKind::Turns, &[effect("S1"), effect("S2")])
     }
 
     #[test]
     fn effects_and_known_ones_are_found_by_name() {
-        let found = settings("known = [{ effect = 'offset', target = 'S2', values = { y = 2.0 } }]").unwrap();
+        let found = checked("known = [{ effect = 'offset', target = 'S2', values = { y = 2.0 } }]").unwrap().settings;
         assert_eq!((found.effects, found.known), (None, vec![Setting { effect: 1, values: vec![0.0, 2.0] }]));
-        assert_eq!(settings("effects = ['offset']").unwrap().effects, Some(vec!["offset".to_owned()]));
-        let refused = |text: &str| {
-            let error = settings(text).unwrap_err();
-            format!("{error}; {}", error.advice().unwrap_or_default())
-        };
-        assert!(refused("effects = ['ofset']").contains("did you mean `offset`"));
-        assert!(refused("known = [{ effect = 'offset', values = {} }]").contains("its targets: S1, S2"));
-        let wrong = "known = [{ effect = 'offset', target = 'S1', values = { z = 1.0 } }]";
-        assert!(refused(wrong).contains("it has no parameter `z`"));
+        assert_eq!(checked("effects = ['offset']").unwrap().settings.effects, Some(vec!["offset".to_owned()]));
+    }
+
+    #[test]
+    fn what_the_model_does_not_have_is_refused_at_its_place() {
+        let key = |name: &str| Step::Key(name.into());
+        for (text, place, words) in [
+            ("effects = ['offset', 'ofset']", vec![key("effects"), Step::Index(1)], "did you mean `offset`"),
+            (
+                "known = [{ effect = 'offset', values = {} }]",
+                vec![key("known"), Step::Index(0), key("effect")],
+                "its targets: S1, S2",
+            ),
+            (
+                "known = [{ effect = 'offset', target = 'S3', values = {} }]",
+                vec![key("known"), Step::Index(0), key("target")],
+                "cannot act on `S3`",
+            ),
+            (
+                "known = [{ effect = 'offset', target = 'S1', values = { z = 1.0 } }]",
+                vec![key("known"), Step::Index(0), key("values"), key("z")],
+                "no parameter `z`",
+            ),
+            (
+                "known = [{ effect = 'offset', target = 'S1', values = { x = inf } }]",
+                vec![key("known"), Step::Index(0), key("values"), key("x")],
+                "finite",
+            ),
+        ] {
+            let fault = checked(text).unwrap_err();
+            let said = format!("{fault}; {}", fault.help.clone().unwrap_or_default());
+            assert!(said.contains(words), "{said}");
+            assert_eq!(fault.place, Place::Path(place), "{text}");
+        }
     }
 
     #[test]
     fn a_share_is_between_none_and_all() {
-        for (share, fits) in [(0.0, false), (0.3, true), (1.0, false), (f64::NAN, false)] {
-            let config = DiagnoseConfig { hold_out: Some(share), ..DiagnoseConfig::default() };
-            assert_eq!(config.check(Path::new("")).is_ok(), fits, "{share}");
+        for (share, fits) in [("0.0", false), ("0.3", true), ("1.0", false), ("nan", false)] {
+            assert_eq!(checked(&format!("hold_out = {share}")).is_ok(), fits, "{share}");
         }
     }
 }

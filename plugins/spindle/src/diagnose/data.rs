@@ -28,7 +28,7 @@ pub struct Shared {
     /// As declared.
     pub layout: Layout,
     pub second_order: bool,
-    pub kinds: Arc<[Box<dyn SpindleEffect>]>,
+    pub kinds: Arc<[Arc<dyn SpindleEffect>]>,
     pub places: Vec<Place>,
     /// Of the places, for the loop.
     pub effects: Vec<Effect>,

@@ -273,19 +273,18 @@ impl Fit for SpindleFit {
         let count = self.shared.places[effect].effect.parameters.len();
         let mut signature = vec![Vec::with_capacity(self.remainder.residual.len()); count];
         let place = &self.shared.places[effect];
-        let drifts = place.effect.id == "thermal-drift";
+        let kind = self.shared.kind(effect);
         for (index, solved) in self.stations.iter().enumerate() {
-            for (partial, column) in self.partials(effect, index).iter().zip(&mut signature) {
+            for (parameter, (partial, column)) in self.partials(effect, index).iter().zip(&mut signature).enumerate() {
                 // What the model predicts more of, the residual has less of.
                 project(&solved.whitened, partial, solved.corrected.count, |_, values| {
                     column.extend(values.iter().flat_map(|value| [-value.re, -value.im]));
                 });
                 let creeps = self.shared.data[index].creeps.iter();
-                column.extend(creeps.map(
-                    |(sensor, _, std)| {
-                        if drifts && *sensor == place.index { -std.recip() } else { 0.0 }
-                    },
-                ));
+                column.extend(creeps.map(|(sensor, _, std)| {
+                    let creep = kind.creep_partials(place.index, *sensor).get(parameter).copied();
+                    -creep.unwrap_or(0.0) / std
+                }));
                 column.extend(self.shared.data[index].seen.lines.iter().map(|_| 0.0));
             }
         }

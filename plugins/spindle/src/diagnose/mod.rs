@@ -2,6 +2,7 @@
 
 mod changes;
 mod data;
+mod declared;
 mod drift;
 mod fit;
 mod lines;
@@ -20,11 +21,12 @@ use runout_core::{
 };
 
 use crate::{
-    effects::{self, ActsOn, SpindleEffect},
+    effects::{ActsOn, SpindleEffect},
     layout::Layout,
     selection::Selection,
 };
 use data::{Seen, Shared, StationData};
+pub use declared::DeclaredSpindle;
 pub use fit::SpindleFit;
 
 /// Orders that take part in tracing: form lives in the low ones, and time grows with their number.
@@ -47,10 +49,10 @@ impl SpindleModel {
         selection: Selection,
         layout: Layout,
         second_order: bool,
-        effects: Vec<Box<dyn SpindleEffect>>,
+        effects: Vec<Arc<dyn SpindleEffect>>,
         stations: &[Station],
     ) -> Result<Self> {
-        let effects: Arc<[Box<dyn SpindleEffect>]> = effects.into();
+        let effects: Arc<[Arc<dyn SpindleEffect>]> = effects.into();
         let places = places(&effects, &selection, &layout, second_order);
         let seen: Vec<Arc<Seen>> =
             stations.iter().map(|station| Arc::new(Seen::new(&selection, &layout, station))).collect();
@@ -84,7 +86,7 @@ impl SpindleModel {
 
 /// Each effect at each of its targets. The first setup is what the others are counted from.
 fn places(
-    kinds: &[Box<dyn SpindleEffect>],
+    kinds: &[Arc<dyn SpindleEffect>],
     selection: &Selection,
     layout: &Layout,
     second_order: bool,
@@ -94,9 +96,7 @@ fn places(
     for (kind, effect) in kinds.iter().enumerate() {
         let about = effect.about();
         // Nothing can lack what it has.
-        let has = (about.id == "even-order-motion" && !layout.assumes_odd_motion())
-            || (about.id == "second-order-geometry" && second_order);
-        if has {
+        if effect.is_declared(layout, second_order) {
             continue;
         }
         let targets: Vec<(usize, Option<String>)> = match about.acts_on {
@@ -133,7 +133,7 @@ impl Model for SpindleModel {
     }
 }
 
-/// Runs the loop on averaged stations with all effects that there are.
+/// Runs the loop on averaged stations; `settings` count the effects as [`DeclaredSpindle`] does.
 ///
 /// # Errors
 /// When the profiles do not fit the rig.
@@ -141,11 +141,12 @@ pub fn diagnose(
     selection: Selection,
     layout: Layout,
     second_order: bool,
+    effects: Vec<Arc<dyn SpindleEffect>>,
     stations: &[Station],
-    settings: &dyn Fn(&[Effect]) -> Result<Settings>,
+    settings: &Settings,
 ) -> Result<StationDiagnosis> {
-    let model = SpindleModel::new(selection, layout, second_order, effects::all(), stations)?;
-    let closed = closed_loop::diagnose(&model, &settings(model.effects())?)?;
+    let model = SpindleModel::new(selection, layout, second_order, effects, stations)?;
+    let closed = closed_loop::diagnose(&model, settings)?;
     let mut diagnosis = closed.diagnosis;
     drift::say_rates(&mut diagnosis, &model.traced);
     lines::say(&mut diagnosis, &model.traced, closed.after.lines());

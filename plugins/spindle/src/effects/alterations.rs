@@ -1,5 +1,7 @@
 //! What effects change: where sensors and part truly are, how readings follow from displacements.
 
+use std::{fmt, sync::Arc};
+
 use runout_core::{Complex64, numerics::fourier::Fourier};
 
 use crate::{
@@ -8,7 +10,7 @@ use crate::{
 };
 
 /// Everything that effects change, at its declared value until one does.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Alterations {
     /// One entry a sensor.
     pub sensors: Vec<SensorAlteration>,
@@ -27,7 +29,7 @@ pub struct Alterations {
 }
 
 /// One sensor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct SensorAlteration {
     /// Relative gain less 1.
     pub gain: f64,
@@ -47,6 +49,25 @@ pub struct SensorAlteration {
     pub creep_share: f64,
     /// Reciprocal of the order at which a first-order low-pass is −3 dB.
     pub inverse_cutoff: f64,
+    /// What a channel does besides, order by order: for effects of other crates.
+    pub transfers: Vec<Transfer>,
+}
+
+/// Reading over displacement at an order, never 0: any linear change of a channel.
+#[derive(Clone)]
+pub struct Transfer(Arc<dyn Fn(usize) -> Complex64 + Send + Sync>);
+
+impl Transfer {
+    /// By a function of the order.
+    pub fn new(of: impl Fn(usize) -> Complex64 + Send + Sync + 'static) -> Self {
+        Self(Arc::new(of))
+    }
+}
+
+impl fmt::Debug for Transfer {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        write!(formatter, "Transfer(… {} at order 1 …)", (self.0)(1))
+    }
 }
 
 /// One setup.
@@ -161,12 +182,14 @@ impl SensorAlteration {
         creep_um: 0.0,
         creep_share: 1.0,
         inverse_cutoff: 0.0,
+        transfers: Vec::new(),
     };
 
-    /// Reading over displacement at an order: gain and low-pass.
+    /// Reading over displacement at an order: gain, low-pass and what else the channel does.
     #[must_use]
     pub fn response(&self, order: usize) -> Complex64 {
-        (1.0 + self.gain) / Complex64::new(1.0, -(order as f64) * self.inverse_cutoff)
+        let known = (1.0 + self.gain) / Complex64::new(1.0, -(order as f64) * self.inverse_cutoff);
+        self.transfers.iter().fold(known, |response, transfer| response * (transfer.0)(order))
     }
 
     /// u from u + quadratic·u² + cubic·u³, by Newton's method.

@@ -14,7 +14,12 @@ pub struct AsynchronousLine {
 
 impl SpindleEffect for AsynchronousLine {
     fn about(&self) -> About {
-        About { id: "asynchronous-line", acts_on: ActsOn::Rig, parameters: Vec::new() }
+        About {
+            id: "asynchronous-line",
+            does: "a motion that repeats, but not with the turn",
+            acts_on: ActsOn::Rig,
+            parameters: Vec::new(),
+        }
     }
 
     fn alter(&self, _target: usize, _values: &[f64], alterations: &mut Alterations) {

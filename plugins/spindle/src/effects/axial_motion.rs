@@ -14,7 +14,7 @@ pub struct AxialMotion {
 impl SpindleEffect for AxialMotion {
     fn about(&self) -> About {
         let parameters = vec![parameter("cosine", "um", 3.0), parameter("sine", "um", 3.0)];
-        About { id: "axial-motion", acts_on: ActsOn::Rig, parameters }
+        About { id: "axial-motion", does: "the spindle moves along its axis", acts_on: ActsOn::Rig, parameters }
     }
 
     fn alter(&self, _target: usize, values: &[f64], alterations: &mut Alterations) {

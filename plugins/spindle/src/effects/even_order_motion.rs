@@ -4,13 +4,19 @@
 use runout_core::Complex64;
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
+use crate::layout::Layout;
 
 /// Even orders of motion keep their sign.
 pub struct EvenOrderMotion;
 
 impl SpindleEffect for EvenOrderMotion {
     fn about(&self) -> About {
-        About { id: "even-order-motion", acts_on: ActsOn::Rig, parameters: Vec::new() }
+        About {
+            id: "even-order-motion",
+            does: "motion of even orders did not change its sign, as was assumed",
+            acts_on: ActsOn::Rig,
+            parameters: Vec::new(),
+        }
     }
 
     fn alter(&self, _target: usize, _values: &[f64], alterations: &mut Alterations) {
@@ -19,5 +25,9 @@ impl SpindleEffect for EvenOrderMotion {
 
     fn partials(&self, _target: usize, _predicted: &Predicted) -> Vec<Vec<Complex64>> {
         Vec::new()
+    }
+
+    fn is_declared(&self, layout: &Layout, _second_order: bool) -> bool {
+        !layout.assumes_odd_motion()
     }
 }

@@ -12,7 +12,12 @@ impl SpindleEffect for FilterAttenuation {
     fn about(&self) -> About {
         // −3 dB at order 1000.
         let parameters = vec![parameter("inverse-cut-off", "rev", 1e-3)];
-        About { id: "filter-attenuation", acts_on: ActsOn::Sensor, parameters }
+        About {
+            id: "filter-attenuation",
+            does: "a first-order low-pass in one channel",
+            acts_on: ActsOn::Sensor,
+            parameters,
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

@@ -4,9 +4,8 @@
 //! readings per unit of each parameter. Readings are u = form + motion along the sensor (`physics.md` section 1). Partials are
 //! those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied.
 //!
-//! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own that hands it to
-//! [`crate::diagnose::SpindleModel`]. `tests/diagnose.rs` checks every effect's partials against finite
-//! differences.
+//! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own whose `register` adds it
+//! by [`entry`] (`examples/14-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
 
 mod alterations;
 mod asynchronous_line;
@@ -24,13 +23,18 @@ mod setup_motion_change;
 mod speed_ripple;
 mod thermal_drift;
 
+use std::sync::Arc;
+
 use runout_core::{
     Complex64,
     model::{Parameter, diagnosis::Estimated},
+    pipeline::effects::EffectEntry,
 };
 
-pub use alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, creep};
+pub use alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, Transfer, creep};
 pub use predicted::Predicted;
+
+use crate::layout::Layout;
 
 /// An effect on a spindle measurement.
 pub trait SpindleEffect: Send + Sync {
@@ -43,6 +47,17 @@ pub trait SpindleEffect: Send + Sync {
     /// ∂(reading)/∂(parameter) of all readings, `[parameter][order][reading]`.
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>>;
 
+    /// Whether the declared model has it anyway, and cannot lack it.
+    fn is_declared(&self, _layout: &Layout, _second_order: bool) -> bool {
+        false
+    }
+
+    /// ∂(mean creep of a sensor over one turn, in µm)/∂(parameter): the levels of the turns observe it besides the averaged turn.
+    /// Nothing where the effect changes no level.
+    fn creep_partials(&self, _target: usize, _sensor: usize) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// Its parameters as people say them.
     fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {
         estimated
@@ -54,6 +69,8 @@ pub trait SpindleEffect: Send + Sync {
 pub struct About {
     /// Its id.
     pub id: &'static str,
+    /// One line for lists.
+    pub does: &'static str,
     /// Where it acts.
     pub acts_on: ActsOn,
     /// What it is described by; nothing where it only can be there or not.
@@ -72,7 +89,8 @@ pub enum ActsOn {
 }
 
 /// A parameter with its unit and usual size.
-fn parameter(name: &str, unit: &str, tolerance: f64) -> Parameter {
+#[must_use]
+pub fn parameter(name: &str, unit: &str, tolerance: f64) -> Parameter {
     Parameter { name: name.into(), unit: unit.into(), tolerance }
 }
 
@@ -82,29 +100,36 @@ const LOW_ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
 /// Asynchronous lines that are looked for.
 pub(crate) const MOST_LINES: usize = 3;
 
-/// Every effect that there is.
+/// An effect for the registry.
 #[must_use]
-pub fn all() -> Vec<Box<dyn SpindleEffect>> {
-    let mut all: Vec<Box<dyn SpindleEffect>> = vec![
-        Box::new(sensor_gain::SensorGain),
-        Box::new(sensor_angle::SensorAngle),
-        Box::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: false }),
-        Box::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: true }),
-        Box::new(sensor_nonlinearity::SensorNonlinearity),
-        Box::new(reversal_angle::ReversalAngle),
-        Box::new(setup_motion_change::SetupMotionChange),
-        Box::new(thermal_drift::ThermalDrift),
-        Box::new(filter_attenuation::FilterAttenuation),
-        Box::new(even_order_motion::EvenOrderMotion),
-        Box::new(second_order_geometry::SecondOrderGeometry),
+pub fn entry(effect: Arc<dyn SpindleEffect>) -> EffectEntry {
+    let About { id, does, parameters, .. } = effect.about();
+    EffectEntry::new(id, does, parameters, effect)
+}
+
+/// Every effect of this crate.
+#[must_use]
+pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
+    let mut all: Vec<Arc<dyn SpindleEffect>> = vec![
+        Arc::new(sensor_gain::SensorGain),
+        Arc::new(sensor_angle::SensorAngle),
+        Arc::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: false }),
+        Arc::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: true }),
+        Arc::new(sensor_nonlinearity::SensorNonlinearity),
+        Arc::new(reversal_angle::ReversalAngle),
+        Arc::new(setup_motion_change::SetupMotionChange),
+        Arc::new(thermal_drift::ThermalDrift),
+        Arc::new(filter_attenuation::FilterAttenuation),
+        Arc::new(even_order_motion::EvenOrderMotion),
+        Arc::new(second_order_geometry::SecondOrderGeometry),
     ];
     all.extend(
         (0..MOST_LINES)
-            .map(|number| -> Box<dyn SpindleEffect> { Box::new(asynchronous_line::AsynchronousLine { number }) }),
+            .map(|number| -> Arc<dyn SpindleEffect> { Arc::new(asynchronous_line::AsynchronousLine { number }) }),
     );
     for order in LOW_ORDERS {
-        all.push(Box::new(speed_ripple::SpeedRipple { order }));
-        all.push(Box::new(axial_motion::AxialMotion { order }));
+        all.push(Arc::new(speed_ripple::SpeedRipple { order }));
+        all.push(Arc::new(axial_motion::AxialMotion { order }));
     }
     all
 }

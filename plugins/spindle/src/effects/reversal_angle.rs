@@ -10,7 +10,12 @@ pub struct ReversalAngle;
 impl SpindleEffect for ReversalAngle {
     fn about(&self) -> About {
         let parameters = vec![parameter("angle", "rad", 0.005)];
-        About { id: "reversal-angle", acts_on: ActsOn::LaterSetup, parameters }
+        About {
+            id: "reversal-angle",
+            does: "the part was clamped at another angle",
+            acts_on: ActsOn::LaterSetup,
+            parameters,
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

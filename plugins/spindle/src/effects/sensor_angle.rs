@@ -11,7 +11,12 @@ pub struct SensorAngle;
 impl SpindleEffect for SensorAngle {
     fn about(&self) -> About {
         // A degree: sensors are set up by eye and scale.
-        About { id: "sensor-angle", acts_on: ActsOn::Sensor, parameters: vec![parameter("angle", "rad", 0.0175)] }
+        About {
+            id: "sensor-angle",
+            does: "a sensor stands at another angle",
+            acts_on: ActsOn::Sensor,
+            parameters: vec![parameter("angle", "rad", 0.0175)],
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

@@ -16,7 +16,12 @@ pub struct SensorAxialPosition {
 impl SpindleEffect for SensorAxialPosition {
     fn about(&self) -> About {
         let parameters = vec![parameter("shift", "mm", 1.0)];
-        About { id: "sensor-axial-position", acts_on: ActsOn::Sensor, parameters }
+        About {
+            id: "sensor-axial-position",
+            does: "a sensor sits at another place along the axis",
+            acts_on: ActsOn::Sensor,
+            parameters,
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

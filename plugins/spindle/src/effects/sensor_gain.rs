@@ -9,7 +9,12 @@ pub struct SensorGain;
 
 impl SpindleEffect for SensorGain {
     fn about(&self) -> About {
-        About { id: "sensor-gain", acts_on: ActsOn::Sensor, parameters: vec![parameter("gain", "1", 0.01)] }
+        About {
+            id: "sensor-gain",
+            does: "a sensor's readings are too large by a factor",
+            acts_on: ActsOn::Sensor,
+            parameters: vec![parameter("gain", "1", 0.01)],
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

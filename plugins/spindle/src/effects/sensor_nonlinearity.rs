@@ -10,7 +10,12 @@ pub struct SensorNonlinearity;
 impl SpindleEffect for SensorNonlinearity {
     fn about(&self) -> About {
         let parameters = vec![parameter("quadratic", "1/um", 1e-3), parameter("cubic", "1/um^2", 1e-4)];
-        About { id: "sensor-nonlinearity", acts_on: ActsOn::Sensor, parameters }
+        About {
+            id: "sensor-nonlinearity",
+            does: "a sensor's characteristic is bent",
+            acts_on: ActsOn::Sensor,
+            parameters,
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

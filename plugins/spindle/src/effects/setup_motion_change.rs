@@ -11,7 +11,12 @@ pub struct SetupMotionChange;
 impl SpindleEffect for SetupMotionChange {
     fn about(&self) -> About {
         let parameters = vec![parameter("ratio less 1", "1", 0.1)];
-        About { id: "setup-motion-change", acts_on: ActsOn::LaterSetup, parameters }
+        About {
+            id: "setup-motion-change",
+            does: "the spindle moved more or less in one setup",
+            acts_on: ActsOn::LaterSetup,
+            parameters,
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

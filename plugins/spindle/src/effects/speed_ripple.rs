@@ -14,7 +14,12 @@ pub struct SpeedRipple {
 impl SpindleEffect for SpeedRipple {
     fn about(&self) -> About {
         let parameters = vec![parameter("cosine", "rad", 1e-3), parameter("sine", "rad", 1e-3)];
-        About { id: "speed-ripple", acts_on: ActsOn::Rig, parameters }
+        About {
+            id: "speed-ripple",
+            does: "the spindle turns unevenly within the turn",
+            acts_on: ActsOn::Rig,
+            parameters,
+        }
     }
 
     fn alter(&self, _target: usize, values: &[f64], alterations: &mut Alterations) {

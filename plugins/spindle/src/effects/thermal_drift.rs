@@ -11,7 +11,12 @@ pub struct ThermalDrift;
 impl SpindleEffect for ThermalDrift {
     fn about(&self) -> About {
         let parameters = vec![parameter("creep", "um/rev", 0.05)];
-        About { id: "thermal-drift", acts_on: ActsOn::Sensor, parameters }
+        About {
+            id: "thermal-drift",
+            does: "a sensor's reading creeps over each capture",
+            acts_on: ActsOn::Sensor,
+            parameters,
+        }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
@@ -21,5 +26,9 @@ impl SpindleEffect for ThermalDrift {
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let gain = 1.0 + predicted.alterations.sensors[target].gain;
         vec![predicted.each(|reading| reading.sensor == target, |order, _| creep(order) / gain)]
+    }
+
+    fn creep_partials(&self, target: usize, sensor: usize) -> Vec<f64> {
+        vec![if sensor == target { 1.0 } else { 0.0 }]
     }
 }

@@ -4,14 +4,14 @@ use std::{f64::consts::TAU, marker::PhantomData};
 
 use runout_core::{
     Complex64, Result,
-    model::{Effect, closed_loop::Settings},
     pipeline::{
+        effects::EffectCatalogue,
         error::Fault,
         registry::{Context, StageConfig},
     },
     rig::Rig,
     separation::{Assessment, Quantity, Sensitivity, Separation},
-    stage::{Separator, Station, StationDiagnosis, StationSeparator, separator::require_rig},
+    stage::{Separator, Station, StationModel, StationSeparator, separator::require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -22,7 +22,7 @@ use super::{
     solution::{Operators, OrderOperator, Solver},
 };
 use crate::{
-    diagnose,
+    diagnose::DeclaredSpindle,
     layout::{Layout, UM_PER_MM_URAD},
     selection::Selection,
 };
@@ -177,13 +177,9 @@ impl StationSeparator for ClosedFormSeparator {
         self.solver().sensitivity(station, |readings| self.operators(readings))
     }
 
-    fn diagnose(
-        &self,
-        stations: &[Station],
-        settings: &dyn Fn(&[Effect]) -> Result<Settings>,
-    ) -> Option<Result<StationDiagnosis>> {
+    fn model(&self, effects: &EffectCatalogue) -> Option<Box<dyn StationModel>> {
         let (selection, layout) = (self.selection.clone(), self.layout.clone());
-        Some(diagnose::diagnose(selection, layout, self.second_order, stations, settings))
+        Some(Box::new(DeclaredSpindle::new(selection, layout, self.second_order, effects)))
     }
 }
 

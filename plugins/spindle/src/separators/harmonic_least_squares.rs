@@ -2,14 +2,14 @@
 
 use runout_core::{
     Complex64, Result,
-    model::{Effect, closed_loop::Settings},
     pipeline::{
+        effects::EffectCatalogue,
         error::Fault,
         registry::{Context, StageConfig},
     },
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},
-    stage::{Separator, Station, StationDiagnosis, StationSeparator, separator::require_rig},
+    stage::{Separator, Station, StationModel, StationSeparator, separator::require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -20,7 +20,7 @@ use super::{
     solution::{Operators, OrderOperator, Solver},
     weights,
 };
-use crate::{diagnose, layout::Layout, selection::Selection};
+use crate::{diagnose::DeclaredSpindle, layout::Layout, selection::Selection};
 
 /// How readings are weighed against each other where there are more than unknowns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -114,13 +114,9 @@ impl StationSeparator for HarmonicLeastSquares {
         self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting))
     }
 
-    fn diagnose(
-        &self,
-        stations: &[Station],
-        settings: &dyn Fn(&[Effect]) -> Result<Settings>,
-    ) -> Option<Result<StationDiagnosis>> {
+    fn model(&self, effects: &EffectCatalogue) -> Option<Box<dyn StationModel>> {
         let (selection, layout) = (self.selection.clone(), self.layout.clone());
-        Some(diagnose::diagnose(selection, layout, self.second_order, stations, settings))
+        Some(Box::new(DeclaredSpindle::new(selection, layout, self.second_order, effects)))
     }
 }
 

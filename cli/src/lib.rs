@@ -1,0 +1,41 @@
+//! `runout`: separates the form of a turning part from the error motion of its spindle.
+//!
+//! The program is [`main_with`] on the [built-in](builtin) list. A program of your own adds to that list:
+//!
+//! ```no_run
+//! fn main() -> std::process::ExitCode {
+//!     let mut registry = runout_cli::builtin::registry();
+//!     // my_crate::register(&mut registry);
+//!     runout_cli::main_with(&registry)
+//! }
+//! ```
+
+mod args;
+pub mod builtin;
+mod commands;
+mod failure;
+mod progress;
+mod render;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use runout_core::pipeline::Registry;
+
+use args::CommandLine;
+use failure::Failure;
+
+/// Does what the command line asks for with what is registered.
+#[must_use]
+pub fn main_with(registry: &Registry) -> ExitCode {
+    let (json, outcome) = match CommandLine::try_parse() {
+        Ok(line) => (line.json, commands::execute(line.command, line.json, registry)),
+        Err(error) if error.use_stderr() => (std::env::args_os().any(|word| word == "--json"), Err(error.into())),
+        // `--help` and `--version` come this way, and clap knows best how to print them.
+        Err(error) => (false, error.print().map_err(Failure::Output)),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(json),
+    }
+}
