@@ -8,6 +8,7 @@ pub mod closed_loop;
 pub mod diagnosis;
 pub mod evidence;
 pub mod fit;
+pub mod foresight;
 pub mod linear_terms;
 
 use self::diagnosis::{Estimated, Unexplained};
