@@ -1,6 +1,7 @@
 //! `runout check`: everything that can be said without the data.
 
 use runout_core::{
+    model::foresight::Foresight,
     pipeline::{
         Pipeline,
         config::Route,
@@ -30,6 +31,9 @@ pub struct Report {
     /// What the rig can and cannot separate; absent for measured points.
     #[serde(flatten)]
     pub separability: Option<Separability>,
+    /// Effects that the closed loop would show, be blind to or confound; absent where there is no model of effects.
+    #[serde(flatten)]
+    pub foresight: Option<Foresight>,
     /// What the user should know.
     pub notes: Vec<String>,
 }
@@ -129,11 +133,16 @@ fn report(sources: &Sources, pipeline: &Pipeline) -> Result<Report, Failure> {
     } else if pipeline.exporters.is_empty() {
         notes.push("there is no [[export]]: a run would only print its summary".into());
     }
+    let foresight = match &pipeline.route {
+        Route::Turns { separator, .. } => separator.foresee().transpose()?,
+        _ => None,
+    };
     Ok(Report {
         title: pipeline.title.clone(),
         stages: stages(sources)?,
         rig: pipeline.rig.as_ref().map(RigSize::from),
         separability: pipeline.assessment.as_ref().map(|found| Separability::new(found, pipeline.rig.as_ref())),
+        foresight,
         notes,
     })
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    Effect, Fit, Model, Setting,
+    Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
     closed_loop::{VISIBLE, blind, orthonormal},
     diagnosis::{BiasPerUnit, Blind},
     fit::{dot, norm},
@@ -83,8 +83,8 @@ impl Foresight {
 /// # Errors
 /// When the model cannot be fitted.
 pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
-    let fit = model.fit(&[])?;
     let effects = model.effects();
+    let fit = Kept::new(model.fit(&[])?, effects.len());
     let all: Vec<usize> = (0..effects.len()).collect();
     let mut blind_to: Vec<Unseen> = Vec::new();
     for blind in blind(effects, &all, &fit) {
@@ -144,6 +144,36 @@ impl Foresight {
         for (known, found) in known.parameters.iter_mut().zip(parameters) {
             known.visible_from = known.visible_from.max(found.visible_from);
         }
+    }
+}
+
+/// A fit that works out each signature once.
+struct Kept<F> {
+    fit: F,
+    signatures: Vec<Vec<Vec<f64>>>,
+}
+
+impl<F: Fit> Kept<F> {
+    fn new(fit: F, effects: usize) -> Self {
+        Self { signatures: (0..effects).map(|effect| fit.signature(effect)).collect(), fit }
+    }
+}
+
+impl<F: Fit> Fit for Kept<F> {
+    fn remainder(&self) -> &Remainder {
+        self.fit.remainder()
+    }
+
+    fn signature(&self, effect: usize) -> Vec<Vec<f64>> {
+        self.signatures[effect].clone()
+    }
+
+    fn bias(&self, effect: usize) -> Vec<Bias> {
+        self.fit.bias(effect)
+    }
+
+    fn values(&self) -> Vec<Outcome> {
+        self.fit.values()
     }
 }
 

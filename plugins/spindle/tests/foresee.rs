@@ -23,7 +23,12 @@ fn foreseen(name: &str, rig: &Rig) -> Foresight {
         for parameter in &visible.parameters {
             println!(
                 "  {} {:?} {} from {:.3e} of {:.3e} {}",
-                visible.effect, visible.targets, parameter.name, parameter.visible_from, parameter.tolerance, parameter.unit
+                visible.effect,
+                visible.targets,
+                parameter.name,
+                parameter.visible_from,
+                parameter.tolerance,
+                parameter.unit
             );
         }
     }

@@ -309,7 +309,11 @@ impl Fit for SpindleFit {
             for (on, squares, count) in [("form", form, forms), ("motion", shift, shifts)] {
                 if count > 0 {
                     let value = (0.5 * squares / f64::from(count)).sqrt();
-                    let unit = if parameter.unit == "1" { "um".into() } else { format!("um/({})", parameter.unit) };
+                    let unit = match parameter.unit.as_str() {
+                        "1" => "um".into(),
+                        plain if !plain.contains('/') => format!("um/{plain}"),
+                        divided => format!("um/({divided})"),
+                    };
                     biases.push(Bias { on: on.into(), value, unit });
                 }
             }

@@ -34,7 +34,7 @@ const SAMPLES_PER_REV: usize = 512;
 /// Form and motion have orders 2 to this one.
 const MAX_ORDER: usize = 40;
 /// Angles a turn on which what is not linear is worked out: enough for products of two orders.
-const ANGLES: usize = 4 * MAX_ORDER;
+const ANGLES: usize = 128;
 
 /// The campaign in words.
 #[must_use]

@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, marker::PhantomData};
 
 use runout_core::{
     Complex64, Result,
-    model::{Effect, closed_loop::Settings},
+    model::{Effect, closed_loop::Settings, foresight::Foresight},
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
@@ -24,6 +24,7 @@ use super::{
 use crate::{
     diagnose,
     layout::{Layout, UM_PER_MM_URAD},
+    plan,
     selection::Selection,
 };
 
@@ -175,6 +176,10 @@ impl StationSeparator for ClosedFormSeparator {
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| self.operators(readings))
+    }
+
+    fn foresee(&self) -> Option<Result<Foresight>> {
+        Some(plan::foresee(&self.selection, &self.layout, self.second_order))
     }
 
     fn diagnose(

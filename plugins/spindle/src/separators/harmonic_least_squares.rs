@@ -2,7 +2,7 @@
 
 use runout_core::{
     Complex64, Result,
-    model::{Effect, closed_loop::Settings},
+    model::{Effect, closed_loop::Settings, foresight::Foresight},
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
@@ -20,7 +20,7 @@ use super::{
     solution::{Operators, OrderOperator, Solver},
     weights,
 };
-use crate::{diagnose, layout::Layout, selection::Selection};
+use crate::{diagnose, layout::Layout, plan, selection::Selection};
 
 /// How readings are weighed against each other where there are more than unknowns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -112,6 +112,10 @@ impl StationSeparator for HarmonicLeastSquares {
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting))
+    }
+
+    fn foresee(&self) -> Option<Result<Foresight>> {
+        Some(plan::foresee(&self.selection, &self.layout, self.second_order))
     }
 
     fn diagnose(
