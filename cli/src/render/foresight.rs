@@ -18,7 +18,7 @@ pub fn visible(page: &mut Page, foresight: &Foresight) {
         let Some(first) = alike.first() else { continue };
         let targets = targets(alike.iter().map(|one| &one.targets));
         if first.parameters.is_empty() {
-            table.row([&first.effect, &targets, "", "as it is", ""]);
+            table.row([first.effect.as_str(), &targets, "", "as it is", ""]);
         }
         for (index, parameter) in first.parameters.iter().enumerate() {
             let from = alike.iter().filter_map(|one: &&Visible| Some(one.parameters.get(index)?.visible_from));
