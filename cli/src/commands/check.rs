@@ -1,10 +1,12 @@
 //! `runout check`: everything that can be said without the data.
 
 use runout_core::{
+    model::foresight::Foresight,
     pipeline::{
         Pipeline, Registry,
         config::Route,
         document::{Document, Sources},
+        effects::EffectCatalogue,
         run::LostOrders,
     },
     rig::{Rig, Rotation},
@@ -30,6 +32,9 @@ pub struct Report {
     /// What the rig can and cannot separate; absent for measured points.
     #[serde(flatten)]
     pub separability: Option<Separability>,
+    /// Effects that the closed loop would show, be blind to or confound; absent where there is no model of effects.
+    #[serde(flatten)]
+    pub foresight: Option<Foresight>,
     /// What the user should know.
     pub notes: Vec<String>,
 }
@@ -112,11 +117,11 @@ impl Unknown {
 /// When the configuration is wrong.
 pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, pipeline) = pipeline(args, registry)?;
-    let report = report(&sources, &pipeline)?;
+    let report = report(&sources, &pipeline, &registry.effects)?;
     print(&report, json, render::check::text)
 }
 
-fn report(sources: &Sources, pipeline: &Pipeline) -> Result<Report, Failure> {
+fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
     if let Err(error) = pipeline.loader.open(pipeline.rig.as_ref()) {
         notes.push(format!("the data are not there yet, or cannot be used: {error}"));
@@ -129,11 +134,16 @@ fn report(sources: &Sources, pipeline: &Pipeline) -> Result<Report, Failure> {
     } else if pipeline.exporters.is_empty() {
         notes.push("there is no [[export]]: a run would only print its summary".into());
     }
+    let foresight = match &pipeline.route {
+        Route::Turns { separator, .. } => separator.foresee(effects).transpose()?,
+        _ => None,
+    };
     Ok(Report {
         title: pipeline.title.clone(),
         stages: stages(sources)?,
         rig: pipeline.rig.as_ref().map(RigSize::from),
         separability: pipeline.assessment.as_ref().map(|found| Separability::new(found, pipeline.rig.as_ref())),
+        foresight,
         notes,
     })
 }

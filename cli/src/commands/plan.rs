@@ -1,4 +1,5 @@
-//! `runout plan`: what a rig can separate and how well, what to add to it, and better angles for its sensors.
+//! `runout plan`: what a rig can separate and how well, which effects it would show, what to add to it, and better angles
+//! for its sensors.
 
 mod map;
 mod report;
@@ -14,7 +15,7 @@ use runout_core::{
 };
 use runout_spindle::{
     layout::Layout,
-    plan::{self, Optimum, Search, TooTight, optimise},
+    plan::{self, Change, Optimum, Search, Suggestion, TooTight, optimise},
 };
 
 use super::{check::Separability, print};
@@ -24,7 +25,7 @@ use crate::{
     progress::Progress,
     render,
 };
-pub use report::{Arrangement, Gain, Optimised, Report, Score, Suggested};
+pub use report::{Arrangement, Gain, Optimised, Report, Score, Suggested, Unresolved};
 
 /// Plans a rig.
 ///
@@ -35,16 +36,38 @@ pub fn execute(args: &PlanArgs, json: bool) -> Result<(), Failure> {
     let sources = Sources::read(&args.rig, &args.overrides.set, "")?;
     let rig = rig(&sources)?;
     map::refuse(args.map.as_deref(), &sources)?;
-    let before = plan::suggest::score(&rig, &args.orders);
     let optimum = args.optimise.map(|Optimise::Angles| better_angles(&rig, args)).transpose()?;
     let suggestions = plan::suggest(&rig, &args.orders, args.clearance);
-    let mut report = Report::new(&rig, assess(&rig, &args.orders));
-    report.suggestions = suggestions.iter().map(|found| Suggested::new(found, &rig, before)).collect();
+    let foresight = plan::foresee_rig(&rig)?;
+    let changes = plan::changes(&rig, &foresight, &suggestions, args.clearance)?;
+    let mut report = Report::new(&rig, assess(&rig, &args.orders), foresight);
+    report.suggestions = suggested(&rig, &args.orders, &suggestions, &changes.found);
+    report.unresolved = Unresolved { blind_to: changes.still_blind, confounded: changes.still_confounded };
     report.optimised = optimum.as_ref().map(|optimum| Optimised::new(optimum, &rig, args));
     if let Some(path) = &args.map {
         report.map = Some(map::write(path, &rig, &args.orders, &suggestions, optimum.as_ref())?);
     }
     print(&report, json, render::plan::text)
+}
+
+/// What helps form's noise gain and what changes which effects would show, best first.
+fn suggested(
+    rig: &Rig,
+    orders: &RangeInclusive<usize>,
+    for_form: &[Suggestion],
+    for_effects: &[Change],
+) -> Vec<Suggested> {
+    let before = plan::suggest::score(rig, orders);
+    let mut all = for_form.to_vec();
+    for change in for_effects {
+        if !all.iter().any(|known| known.addition == change.addition) {
+            let after = plan::suggest::score(&change.rig, orders);
+            all.push(Suggestion { addition: change.addition, rig: change.rig.clone(), after });
+        }
+    }
+    all.sort_by(|a, b| a.after.compare(&b.after, plan::Criterion::Worst));
+    let change = |found: &Suggestion| for_effects.iter().find(|change| change.addition == found.addition);
+    all.iter().map(|found| Suggested::new(found, change(found), rig, before)).collect()
 }
 
 fn rig(sources: &Sources) -> Result<Rig, Failure> {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use runout_core::rig::Rotation;
 
 use super::{
-    count,
+    count, foresight,
     number::{ranges, same, significant, spread},
     page::Page,
     table::Table,
@@ -30,6 +30,9 @@ pub fn text(report: &Report) -> String {
         orders(&mut page, separability);
         lost_orders(&mut page, separability);
         noise_gain(&mut page, separability);
+    }
+    if let Some(found) = &report.foresight {
+        foresight::hidden(&mut page, found);
     }
     page.bullets("Notes", &report.notes);
     page.into_text()

@@ -5,6 +5,7 @@ pub mod compare;
 pub mod diagnosis;
 pub mod diagnostic;
 pub mod file;
+pub mod foresight;
 pub mod keys;
 pub mod number;
 pub mod page;

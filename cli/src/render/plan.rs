@@ -1,7 +1,7 @@
 //! A plan, for people.
 
 use super::{
-    check,
+    check, foresight,
     number::{same, significant, spread},
     page::Page,
     table::Table,
@@ -21,6 +21,9 @@ pub fn text(report: &Report) -> String {
     check::noise_gain(&mut page, &report.separability);
     gains(&mut page, &report.noise_gain.form);
     suggestions(&mut page, &report.suggestions);
+    foresight::visible(&mut page, &report.foresight);
+    foresight::hidden(&mut page, &report.foresight);
+    additions(&mut page, report);
     if let Some(optimised) = &report.optimised {
         angles(&mut page, optimised);
     }
@@ -69,6 +72,35 @@ fn suggestions(page: &mut Page, suggestions: &[Suggested]) {
         table.row([vec![suggestion.text.clone()], score(&suggestion.after)].concat());
     }
     page.headed_table("What one addition does for form, best first", &table);
+}
+
+/// What would tell more of the effects.
+fn additions(page: &mut Page, report: &Report) {
+    let mut lines = Vec::new();
+    for suggestion in &report.suggestions {
+        let mut does = Vec::new();
+        if !suggestion.reveals.is_empty() {
+            does.push(format!("shows {}", foresight::names(&suggestion.reveals)));
+        }
+        if !suggestion.tells_apart.is_empty() {
+            does.push(format!("tells apart {}", sets(&suggestion.tells_apart)));
+        }
+        if !does.is_empty() {
+            lines.push(format!("{}: {}", suggestion.text, does.join("; ")));
+        }
+    }
+    let left = &report.unresolved;
+    if !left.blind_to.is_empty() {
+        lines.push(format!("no single addition that was tried shows {}", foresight::names(&left.blind_to)));
+    }
+    if !left.confounded.is_empty() {
+        lines.push(format!("no single addition that was tried tells apart {}", sets(&left.confounded)));
+    }
+    page.bullets("What one addition does for the effects", &lines);
+}
+
+fn sets(sets: &[Vec<String>]) -> String {
+    sets.iter().map(|set| foresight::names(set)).collect::<Vec<_>>().join("; ")
 }
 
 fn angles(page: &mut Page, optimised: &Optimised) {

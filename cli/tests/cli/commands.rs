@@ -156,8 +156,16 @@ fn plan_of_a_rig_that_loses_orders() {
     assert_eq!(report["residual_dof"][1], json!({ "order": 3, "dof": 2 }));
     let best = &report["suggestions"][0];
     assert_eq!([&best["before"]["lost_form_orders"], &best["after"]["lost_form_orders"]], [40, 0]);
-    // What is not worked out yet is not claimed.
-    assert!(report.get("blind_to").is_none() && report.get("confounded").is_none());
+    // Two sensors a section show only the ratio of their gains; a third one tells whose it is.
+    let gains = json!(["sensor-gain S1", "sensor-gain S2"]);
+    assert!(report["confounded"].as_array().unwrap().contains(&gains));
+    let tells = |entry: &&Value| entry["tells_apart"].as_array().unwrap().contains(&gains);
+    let addition = report["suggestions"].as_array().unwrap().iter().find(tells).unwrap();
+    assert_eq!([&addition["add"], &addition["section"]], ["sensor", "a"]);
+    // With the part reversed and nothing else, an angle that is off by a little looks like another form.
+    let blind = |entry: &&Value| entry["effect"] == "reversal-angle" && entry["targets"] == json!(["reversed"]);
+    let unseen = report["blind_to"].as_array().unwrap().iter().find(blind).unwrap();
+    assert_eq!(unseen["bias_per_unit"]["unit"], "um/rad");
 }
 
 /// Better angles and the map, with nothing but the document on stdout and no progress in a pipe.

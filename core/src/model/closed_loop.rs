@@ -29,7 +29,7 @@ const MOST: f64 = 100.0;
 /// Refits of a confounded set from where the one before came to.
 const HOLDING_PASSES: usize = 2;
 /// An effect of its usual size that would show with less than this many standard deviations is not seen.
-const VISIBLE: f64 = 3.0;
+pub(super) const VISIBLE: f64 = 3.0;
 
 /// How a loop is to be run.
 #[derive(Debug, Clone, PartialEq)]
@@ -398,7 +398,7 @@ fn independent(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Columns made orthonormal to a basis and to each other; dependent ones are left out.
-fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
+pub(super) fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut made: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for mut column in columns {
         let whole = norm(&column);
@@ -470,7 +470,7 @@ fn moved(before: &impl Fit, after: &impl Fit) -> Vec<Moved> {
 }
 
 /// Effects of which the usual size would not show.
-fn blind(effects: &[Effect], considered: &[usize], fit: &impl Fit) -> Vec<Blind> {
+pub(super) fn blind(effects: &[Effect], considered: &[usize], fit: &impl Fit) -> Vec<Blind> {
     if !fit.remainder().noise_is_known() {
         return Vec::new();
     }

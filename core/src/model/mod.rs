@@ -9,6 +9,7 @@ mod confounded;
 pub mod diagnosis;
 pub mod evidence;
 pub mod fit;
+pub mod foresight;
 pub mod linear_terms;
 
 use self::diagnosis::{Estimated, Unexplained};

@@ -3,7 +3,7 @@
 use crate::{
     Result,
     model::linear_terms::{LinearFit, LinearTerms},
-    model::{Effect, closed_loop::Settings, diagnosis::Diagnosis},
+    model::{Effect, closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight},
     pipeline::{effects::EffectCatalogue, error::Fault},
     points::Points,
     profile::Profile,
@@ -44,6 +44,12 @@ pub trait StationSeparator: Send + Sync {
     /// # Errors
     /// When the profiles do not fit the rig.
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity>;
+
+    /// Which effects the closed loop could find with its rig, in a campaign of usual size; `None` where the method has no
+    /// model of effects.
+    fn foresee(&self, _effects: &EffectCatalogue) -> Option<Result<Foresight>> {
+        None
+    }
 
     /// Its model for the closed loop, which may lack those of these effects that are of its domain; `None` where the method
     /// has no such model.

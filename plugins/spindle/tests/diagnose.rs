@@ -3,84 +3,24 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
-use std::path::Path;
+mod campaigns;
 
+use campaigns::{averaged, campaign};
 use runout_core::{
     Complex64,
-    inspection::Inspection,
-    measurement::{Recording, StationTruth},
+    measurement::StationTruth,
     model::{Fit, Model, Setting, closed_loop::Settings, diagnosis::Verdict},
     numerics::fourier::Fourier,
-    pipeline::registry::{Context, StageConfig},
-    rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     separation::{Quantity, Separation},
-    stage::{Preprocessor, Station, StationDiagnosis},
+    stage::StationDiagnosis,
 };
-use runout_preprocess::SynchronousAverageConfig;
 use runout_spindle::{
     diagnose::{SpindleModel, diagnose},
     effects,
     layout::Layout,
     selection::Selection,
-    simulate::{self, SpindleConfig},
+    simulate::SpindleConfig,
 };
-
-/// `physics.md` section 4: sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm, motion 1.5 µm rms, 8 µm off centre.
-fn campaign(seed: u64, effects: &str) -> SpindleConfig {
-    let sensor = |id: &str, angle_deg: f64, z_mm: f64, section: &str| SensorConfig {
-        id: id.into(),
-        angle_deg,
-        z_mm,
-        section: section.into(),
-        sign: 1,
-    };
-    let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
-    let rig = RigConfig {
-        part_radius_mm: 30.0,
-        rotation: Rotation::Ccw,
-        sensors: vec![
-            sensor("S1", 0.0, 100.0, "a"),
-            sensor("S2", 90.0, 100.0, "a"),
-            sensor("S3", 0.0, 130.0, "b"),
-            sensor("S4", 90.0, 130.0, "b"),
-        ],
-        setups: [("a", 0.0), ("b", 99.844), ("c", 202.5)].into_iter().map(setup).collect(),
-    };
-    let mut config = SpindleConfig::new(rig);
-    config.seed = seed;
-    config.form.rms_um = 4.0;
-    config.motion.x_rms_um = 1.5;
-    config.motion.y_rms_um = 1.5;
-    config.motion.tilt_rms_urad = 3.0;
-    config.eccentricity.offset_um = 8.0;
-    config.asynchronous.rms_um = Some(0.15);
-    config.noise.rms_um = 0.05;
-    config.effect = serde_json::from_str(effects).unwrap();
-    config
-}
-
-/// The station that a campaign records, a fifth of its turns held out, and its truth.
-fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
-    let simulator = simulate::simulator(config).unwrap();
-    let recording = simulator.spindle_recording();
-    let average = SynchronousAverageConfig {
-        samples_per_rev: 512,
-        min_turns: 2,
-        turn_tolerance_percent: 5.0,
-        outlier_sigma: None,
-        speed_tolerance_percent: 2.0,
-    };
-    let Preprocessor::Averager(averager) = average.check(&Context { folder: Path::new(""), rig: None }).unwrap() else {
-        panic!("no averager");
-    };
-    let profile = |setup| {
-        let stream = Inspection::new(recording.open(0, setup).unwrap());
-        averager.average_holding_out(Box::new(stream), Some(0.2)).unwrap()
-    };
-    let profiles = (0..rig.setups.len()).map(profile).collect();
-    let station = Station { name: "s001".into(), z_mm: 0.0, profiles };
-    (station, recording.truth(0).unwrap().unwrap())
-}
 
 /// A diagnosis, and the form errors before and after, in µm rms over both sections and orders 2 to 60.
 fn diagnosed(config: &SpindleConfig) -> (StationDiagnosis, [f64; 2]) {

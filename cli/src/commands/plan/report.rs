@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use runout_core::rig::Rig;
-use runout_spindle::plan::{self, Addition, Optimum, Suggestion};
+use runout_core::{model::foresight::Foresight, rig::Rig};
+use runout_spindle::plan::{self, Addition, Change, Optimum, Suggestion};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -24,8 +24,14 @@ pub struct Report {
     pub noise_gain: NoiseGain,
     /// Readings (complex) that are left over for a residual, by order.
     pub residual_dof: Vec<ResidualDof>,
-    /// What to add to the rig, best first: the best setup of each kind, and the best sensor in each section.
+    /// Effects that would show, be blind or confounded.
+    #[serde(flatten)]
+    pub foresight: Foresight,
+    /// What to add to the rig, best for form first: the best setup of each kind, the best sensor in each section, and the
+    /// cheapest addition for each effect that is blind or confounded.
     pub suggestions: Vec<Suggested>,
+    /// What stays blind or confounded with every single addition that was tried.
+    pub unresolved: Unresolved,
     /// Better angles, where they were asked for.
     pub optimised: Option<Optimised>,
     /// The map that was written.
@@ -70,6 +76,15 @@ pub struct Score {
     pub rms: Option<f64>,
 }
 
+/// What no single addition changes.
+#[derive(Debug, Default, Serialize, JsonSchema)]
+pub struct Unresolved {
+    /// Blind effects, "effect target".
+    pub blind_to: Vec<String>,
+    /// Confounded sets.
+    pub confounded: Vec<Vec<String>>,
+}
+
 /// Something to add to the rig.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Suggested {
@@ -89,6 +104,10 @@ pub struct Suggested {
     /// Of a sensor: where it stands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle_deg: Option<f64>,
+    /// Blind effects, "effect target", that would show with this.
+    pub reveals: Vec<String>,
+    /// Confounded sets that would be told apart.
+    pub tells_apart: Vec<Vec<String>>,
     /// The rig as it is.
     pub before: Score,
     /// The rig with this.
@@ -155,14 +174,16 @@ pub(super) fn form_gains(separability: &Separability) -> Vec<Gain> {
 
 impl Report {
     /// Without suggestions yet.
-    pub(super) fn new(rig: &Rig, separability: Separability) -> Self {
+    pub(super) fn new(rig: &Rig, separability: Separability, foresight: Foresight) -> Self {
         let dof = |order: &Order| ResidualDof { order: order.order, dof: order.residual_dof };
         Self {
             rig: RigSize::from(rig),
             noise_gain: NoiseGain { form: form_gains(&separability) },
             residual_dof: separability.orders.iter().map(dof).collect(),
             separability,
+            foresight,
             suggestions: Vec::new(),
+            unresolved: Unresolved::default(),
             optimised: None,
             map: None,
         }
@@ -170,7 +191,7 @@ impl Report {
 }
 
 impl Suggested {
-    pub(super) fn new(found: &Suggestion, rig: &Rig, before: plan::Score) -> Self {
+    pub(super) fn new(found: &Suggestion, change: Option<&Change>, rig: &Rig, before: plan::Score) -> Self {
         let setup = found.rig.setups.last().filter(|_| matches!(found.addition, Addition::Setup { .. }));
         let (add, part_deg, section, angle_deg) = match found.addition {
             Addition::Setup { part_deg, .. } => ("setup", Some(part_deg), None, None),
@@ -185,6 +206,8 @@ impl Suggested {
             sensors_deg: setup.map(|setup| degrees(setup.sensors_rad)),
             section,
             angle_deg,
+            reveals: change.map(|change| change.reveals.clone()).unwrap_or_default(),
+            tells_apart: change.map(|change| change.tells_apart.clone()).unwrap_or_default(),
             before: before.into(),
             after: found.after.into(),
         }

@@ -308,7 +308,11 @@ impl Fit for SpindleFit {
             for (on, squares, count) in [("form", form, forms), ("motion", shift, shifts)] {
                 if count > 0 {
                     let value = (0.5 * squares / f64::from(count)).sqrt();
-                    let unit = if parameter.unit == "1" { "um".into() } else { format!("um/({})", parameter.unit) };
+                    let unit = match parameter.unit.as_str() {
+                        "1" => "um".into(),
+                        plain if !plain.contains('/') => format!("um/{plain}"),
+                        divided => format!("um/({divided})"),
+                    };
                     biases.push(Bias { on: on.into(), value, unit });
                 }
             }
@@ -387,13 +391,12 @@ impl Fit for SpindleFit {
 
     fn told_apart_by(&self, effects: &[usize]) -> Option<String> {
         let on = |effect: &usize| self.shared.kind(*effect).about().acts_on;
-        if effects.iter().all(|effect| on(effect) == ActsOn::Sensor) {
-            Some(
-                "a third sensor in the section, or a setup with the part at another angle and the sensors moved".into(),
-            )
+        let more = if effects.iter().all(|effect| on(effect) == ActsOn::Sensor) {
+            "a third sensor in the section"
         } else {
-            Some("another setup with the part at an angle that no other setup has".into())
-        }
+            "another setup with the part at an angle that no other setup has"
+        };
+        Some(format!("{more}; `runout plan` tries what helps"))
     }
 }
 

@@ -104,7 +104,7 @@ fn best(
 
 impl Addition {
     /// The rig with this added; `None` where the rig has it already or a sensor would break the clearance.
-    fn to(self, rig: &Rig, clearance_deg: f64) -> Option<Rig> {
+    pub(super) fn to(self, rig: &Rig, clearance_deg: f64) -> Option<Rig> {
         let mut rig = rig.clone();
         match self {
             Self::Setup { part_deg, sensors_turned } => {

@@ -4,6 +4,7 @@ use std::{f64::consts::TAU, marker::PhantomData};
 
 use runout_core::{
     Complex64, Result,
+    model::foresight::Foresight,
     pipeline::{
         effects::EffectCatalogue,
         error::Fault,
@@ -24,6 +25,7 @@ use super::{
 use crate::{
     diagnose::DeclaredSpindle,
     layout::{Layout, UM_PER_MM_URAD},
+    plan,
     selection::Selection,
 };
 
@@ -175,6 +177,10 @@ impl StationSeparator for ClosedFormSeparator {
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| self.operators(readings))
+    }
+
+    fn foresee(&self, effects: &EffectCatalogue) -> Option<Result<Foresight>> {
+        Some(plan::foresee(&self.selection, &self.layout, self.second_order, effects.of()))
     }
 
     fn model(&self, effects: &EffectCatalogue) -> Option<Box<dyn StationModel>> {

@@ -2,6 +2,7 @@
 
 use runout_core::{
     Complex64, Result,
+    model::foresight::Foresight,
     pipeline::{
         effects::EffectCatalogue,
         error::Fault,
@@ -20,7 +21,7 @@ use super::{
     solution::{Operators, OrderOperator, Solver},
     weights,
 };
-use crate::{diagnose::DeclaredSpindle, layout::Layout, selection::Selection};
+use crate::{diagnose::DeclaredSpindle, layout::Layout, plan, selection::Selection};
 
 /// How readings are weighed against each other where there are more than unknowns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -112,6 +113,10 @@ impl StationSeparator for HarmonicLeastSquares {
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting))
+    }
+
+    fn foresee(&self, effects: &EffectCatalogue) -> Option<Result<Foresight>> {
+        Some(plan::foresee(&self.selection, &self.layout, self.second_order, effects.of()))
     }
 
     fn model(&self, effects: &EffectCatalogue) -> Option<Box<dyn StationModel>> {

@@ -1,0 +1,170 @@
+//! Which effects a rig would show, before anyone measures, and which addition would show more.
+
+use std::sync::Arc;
+
+use runout_core::{
+    Result,
+    model::foresight::{self, Foresight},
+    rig::Rig,
+};
+
+use super::{
+    nominal,
+    suggest::{Addition, Suggestion},
+};
+use crate::{
+    diagnose::SpindleModel,
+    effects::{self, SpindleEffect},
+    layout::Layout,
+    selection::Selection,
+};
+
+/// Angles at which the part is clamped or a sensor stands, in degrees, round ones first.
+const TRIED_DEG: [f64; 9] = [90.0, 180.0, 270.0, 45.0, 135.0, 225.0, 60.0, 120.0, 100.0];
+
+/// Left out: single turns show them in any rig, and an average says little of them.
+const SHOWN_BY_TURNS: [&str; 2] = ["thermal-drift", "asynchronous-line"];
+
+/// An addition, and what the rig would tell with it that it does not without.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// What to add.
+    pub addition: Addition,
+    /// The rig with it.
+    pub rig: Rig,
+    /// Blind effects ("effect target") that would show.
+    pub reveals: Vec<String>,
+    /// Confounded sets of which every two members would be told apart.
+    pub tells_apart: Vec<Vec<String>>,
+}
+
+/// Additions that make effects visible or tell them apart.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Changes {
+    /// The cheapest for each blind effect and confounded set: a clamping of the part, then one with the sensors turned
+    /// too, then a sensor.
+    pub found: Vec<Change>,
+    /// Blind effects that stay so with every addition tried.
+    pub still_blind: Vec<String>,
+    /// Confounded sets that stay so.
+    pub still_confounded: Vec<Vec<String>>,
+}
+
+/// What the closed loop could find of these effects in the average of a campaign of usual size ([`Foresight::assuming`]).
+///
+/// # Errors
+/// When the model cannot be fitted.
+pub fn foresee(
+    selection: &Selection,
+    layout: &Layout,
+    second_order: bool,
+    mut kinds: Vec<Arc<dyn SpindleEffect>>,
+) -> Result<Foresight> {
+    let station = nominal::station(selection);
+    kinds.retain(|kind| !SHOWN_BY_TURNS.contains(&kind.about().id));
+    let model = SpindleModel::new(selection.clone(), layout.clone(), second_order, kinds, &[station])?;
+    Ok(Foresight { assuming: nominal::words(), ..foresight::foresee(&model)? })
+}
+
+/// The same with all of a rig, the general separator and every effect of this crate.
+///
+/// # Errors
+/// When the model cannot be fitted.
+pub fn foresee_rig(rig: &Rig) -> Result<Foresight> {
+    foresee(&Selection::whole(rig), &Layout::new(rig, false), true, effects::all())
+}
+
+/// The cheapest single additions that change what a rig is blind to or confounds; those `known` are tried first.
+///
+/// # Errors
+/// When a model cannot be fitted.
+pub fn changes(rig: &Rig, foresight: &Foresight, known: &[Suggestion], clearance_deg: f64) -> Result<Changes> {
+    let mut open = Open { blind: foresight.blind_names().collect(), confounded: foresight.confounded.clone() };
+    let mut found = Vec::new();
+    for class in classes(rig, known) {
+        if open.is_empty() {
+            break;
+        }
+        let mut candidates = Vec::new();
+        for addition in class {
+            if let Some(larger) = addition.to(rig, clearance_deg) {
+                let after = foresee_rig(&larger)?;
+                candidates.push((addition, larger, after));
+            }
+        }
+        loop {
+            let settled = candidates.iter().map(|(.., after)| open.settled_by(after));
+            // The first of the best: round angles are tried first.
+            let best =
+                settled.enumerate().reduce(|best, next| if next.1.count() > best.1.count() { next } else { best });
+            let Some((index, settled)) = best.filter(|(_, settled)| !settled.is_empty()) else { break };
+            open.blind.retain(|name| !settled.blind.contains(name));
+            open.confounded.retain(|set| !settled.confounded.contains(set));
+            let (addition, rig, _) = candidates.remove(index);
+            found.push(Change { addition, rig, reveals: settled.blind, tells_apart: settled.confounded });
+        }
+    }
+    Ok(Changes { found, still_blind: open.blind, still_confounded: open.confounded })
+}
+
+/// What is blind or confounded and not settled.
+struct Open {
+    blind: Vec<String>,
+    confounded: Vec<Vec<String>>,
+}
+
+impl Open {
+    fn is_empty(&self) -> bool {
+        self.blind.is_empty() && self.confounded.is_empty()
+    }
+
+    fn count(&self) -> usize {
+        self.blind.len() + self.confounded.len()
+    }
+
+    /// What of it a rig tells that foresees this.
+    fn settled_by(&self, after: &Foresight) -> Self {
+        let blind: Vec<String> = after.blind_names().collect();
+        let together = |set: &Vec<String>| {
+            let shared = |other: &Vec<String>| other.iter().filter(|name| set.contains(name)).count();
+            // A member that now looks like what was added is no better off.
+            let added = |other: &Vec<String>| other.iter().any(|name| name.ends_with(ADDED));
+            after.confounded.iter().any(|other| shared(other) > 1 || (shared(other) == 1 && added(other)))
+        };
+        Self {
+            blind: self.blind.iter().filter(|name| !blind.contains(name)).cloned().collect(),
+            confounded: self
+                .confounded
+                .iter()
+                .filter(|set| !together(set) && !set.iter().any(|name| blind.contains(name)))
+                .cloned()
+                .collect(),
+        }
+    }
+}
+
+/// Ends the name of an effect at what [`Addition::to`] adds.
+const ADDED: &str = " added";
+
+/// Candidates, the cheaper ones first.
+fn classes(rig: &Rig, known: &[Suggestion]) -> Vec<Vec<Addition>> {
+    let setups =
+        |sensors_turned| TRIED_DEG.iter().map(move |part_deg| Addition::Setup { part_deg: *part_deg, sensors_turned });
+    let sensors = (0..rig.sections.len()).flat_map(|section| {
+        std::iter::once(0.0).chain(TRIED_DEG).map(move |angle_deg| Addition::Sensor { section, angle_deg })
+    });
+    let cost = |addition: &Addition| match addition {
+        Addition::Setup { sensors_turned: false, .. } => 0,
+        Addition::Setup { sensors_turned: true, .. } => 1,
+        Addition::Sensor { .. } => 2,
+    };
+    let mut classes = vec![Vec::new(); 3];
+    let known = known.iter().map(|suggestion| suggestion.addition);
+    for addition in known.chain(setups(false)).chain(setups(true)).chain(sensors) {
+        let class: &mut Vec<Addition> = &mut classes[cost(&addition)];
+        if !class.contains(&addition) {
+            class.push(addition);
+        }
+    }
+    classes
+}

@@ -1,0 +1,70 @@
+//! Simulated campaigns: the data come from the time-domain simulator, which shares no formula with the model.
+
+use std::path::Path;
+
+use runout_core::{
+    inspection::Inspection,
+    measurement::{Recording, StationTruth},
+    pipeline::registry::{Context, StageConfig},
+    rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
+    stage::{Preprocessor, Station},
+};
+use runout_preprocess::SynchronousAverageConfig;
+use runout_spindle::simulate::{self, SpindleConfig};
+
+/// `physics.md` section 4: sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm, motion 1.5 µm rms, 8 µm off centre.
+pub fn campaign(seed: u64, effects: &str) -> SpindleConfig {
+    let sensor = |id: &str, angle_deg: f64, z_mm: f64, section: &str| SensorConfig {
+        id: id.into(),
+        angle_deg,
+        z_mm,
+        section: section.into(),
+        sign: 1,
+    };
+    let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
+    let rig = RigConfig {
+        part_radius_mm: 30.0,
+        rotation: Rotation::Ccw,
+        sensors: vec![
+            sensor("S1", 0.0, 100.0, "a"),
+            sensor("S2", 90.0, 100.0, "a"),
+            sensor("S3", 0.0, 130.0, "b"),
+            sensor("S4", 90.0, 130.0, "b"),
+        ],
+        setups: [("a", 0.0), ("b", 99.844), ("c", 202.5)].into_iter().map(setup).collect(),
+    };
+    let mut config = SpindleConfig::new(rig);
+    config.seed = seed;
+    config.form.rms_um = 4.0;
+    config.motion.x_rms_um = 1.5;
+    config.motion.y_rms_um = 1.5;
+    config.motion.tilt_rms_urad = 3.0;
+    config.eccentricity.offset_um = 8.0;
+    config.asynchronous.rms_um = Some(0.15);
+    config.noise.rms_um = 0.05;
+    config.effect = serde_json::from_str(effects).unwrap();
+    config
+}
+
+/// The station that a campaign records, a fifth of its turns held out, and its truth.
+pub fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
+    let simulator = simulate::simulator(config).unwrap();
+    let recording = simulator.spindle_recording();
+    let average = SynchronousAverageConfig {
+        samples_per_rev: 512,
+        min_turns: 2,
+        turn_tolerance_percent: 5.0,
+        outlier_sigma: None,
+        speed_tolerance_percent: 2.0,
+    };
+    let Preprocessor::Averager(averager) = average.check(&Context { folder: Path::new(""), rig: None }).unwrap() else {
+        panic!("no averager");
+    };
+    let profile = |setup| {
+        let stream = Inspection::new(recording.open(0, setup).unwrap());
+        averager.average_holding_out(Box::new(stream), Some(0.2)).unwrap()
+    };
+    let profiles = (0..rig.setups.len()).map(profile).collect();
+    let station = Station { name: "s001".into(), z_mm: 0.0, profiles };
+    (station, recording.truth(0).unwrap().unwrap())
+}
