@@ -68,7 +68,8 @@ impl Ball {
         }
         for [i, j] in pairs() {
             for held in (0..i).map(|k| [k, i, j].map(|i| all[i])) {
-                if let Some(place) = equal_heights(cloud, held) {
+                let place = equal_heights(cloud, held).filter(|_| acute(held.map(at)));
+                if let Some(place) = place {
                     offer(place, &held);
                 }
             }
@@ -88,4 +89,12 @@ fn equal_heights(cloud: &Cloud<2>, [a, b, c]: [usize; 3]) -> Option<[f64; 2]> {
     let area = x_a * y_b - y_a * x_b;
     let place = [(level_a * y_b - level_b * y_a) / area, (x_a * level_b - x_b * level_a) / area];
     place.iter().all(|place| place.is_finite()).then_some(place)
+}
+
+/// Whether no corner's angle is above a right one: the triangle holds the centre of its circle.
+fn acute([a, b, c]: [[f64; 2]; 3]) -> bool {
+    let corner = |at: [f64; 2], one: [f64; 2], two: [f64; 2]| {
+        (one[0] - at[0]) * (two[0] - at[0]) + (one[1] - at[1]) * (two[1] - at[1])
+    };
+    [corner(a, b, c), corner(b, c, a), corner(c, a, b)].iter().all(|cosine| *cosine >= 0.0)
 }

@@ -3,7 +3,7 @@
 use super::{Circle, Points};
 use crate::numerics::{chebyshev::inverse, lanes::load};
 
-const LANES: usize = 2;
+const LANES: usize = 4;
 /// Sums over the points: count, x, y, xx, xy, yy of the directions, and d, dx, dy, dd with the deviations.
 type Sums = [f64; 10];
 /// Points that the first guess looks at, at most about.
@@ -37,8 +37,8 @@ pub(super) fn circle(points: &Points) -> Option<Circle> {
             place = [place[0] + s_x, place[1] + s_y];
         }
         let length = step[0].hypot(step[1]);
-        // Below a nanometre's millionth steps shrink until they are rounding.
-        if length == 0.0 || (length < 1e-9 * (points.radius_um() * 1e-3) && length >= 0.25 * scale) {
+        // The next step would be shorter by the same ratio: rounding ends it.
+        if length * length <= scale.min(points.radius_um()) * points.tolerance() {
             break;
         }
         scale = length;
@@ -53,18 +53,19 @@ fn sums(points: &Points, place: [f64; 2]) -> Sums {
     let [x0, y0] = place.map(|place| place / radius);
     let mut sums = [[0.0; LANES]; 10];
     let mut add = |u: [f64; LANES], v: [f64; LANES], w: [f64; LANES]| {
-        for lane in 0..LANES {
-            let lifted = w[lane] - u[lane] * place[0] - v[lane] * place[1] + common;
-            let there = if lifted.is_nan() { 0.0 } else { 1.0 };
-            let lifted = if lifted.is_nan() { 0.0 } else { lifted };
-            let stretch = (1.0 + 2.0 * lifted / radius).max(f64::MIN_POSITIVE).sqrt();
-            let deviation = 2.0 * lifted / (1.0 + stretch);
-            let (x, y) = (there * (u[lane] - x0) / stretch, there * (v[lane] - y0) / stretch);
-            let terms =
-                [there, x, y, x * x, x * y, y * y, deviation, deviation * x, deviation * y, deviation * deviation];
-            for (sum, term) in sums.iter_mut().zip(terms) {
-                sum[lane] += term;
-            }
+        let lanes = |value: &dyn Fn(usize) -> f64| -> [f64; LANES] { std::array::from_fn(value) };
+        let lifted = lanes(&|l| w[l] - u[l] * place[0] - v[l] * place[1] + common);
+        let there = lanes(&|l| if lifted[l].is_nan() { 0.0 } else { 1.0 });
+        let lifted = lanes(&|l| if lifted[l].is_nan() { 0.0 } else { lifted[l] });
+        let stretch = lanes(&|l| (1.0 + 2.0 * lifted[l] / radius).max(f64::MIN_POSITIVE).sqrt());
+        let d = lanes(&|l| 2.0 * lifted[l] / (1.0 + stretch[l]));
+        let x = lanes(&|l| there[l] * (u[l] - x0) / stretch[l]);
+        let y = lanes(&|l| there[l] * (v[l] - y0) / stretch[l]);
+        let product = |a: [f64; LANES], b: [f64; LANES]| lanes(&|l| a[l] * b[l]);
+        let terms =
+            [there, x, y, product(x, x), product(x, y), product(y, y), d, product(d, x), product(d, y), product(d, d)];
+        for (sum, term) in sums.iter_mut().zip(terms) {
+            (0..LANES).for_each(|l| sum[l] += term[l]);
         }
     };
     let whole = levels.len() - levels.len() % LANES;

@@ -6,10 +6,10 @@ use super::{Circle, Reference, Values, circumscribed, least_squares, search};
 use crate::numerics::cloud::Cloud;
 
 /// Directions of a profile's points, to be kept and used for many profiles.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Angles {
-    pub(super) cos: Vec<f64>,
-    pub(super) sin: Vec<f64>,
+    cos: Vec<f64>,
+    sin: Vec<f64>,
 }
 
 impl Angles {
@@ -17,6 +17,11 @@ impl Angles {
     #[must_use]
     pub fn equal(count: usize) -> Self {
         (0..count).map(|index| TAU * index as f64 / count as f64).collect()
+    }
+
+    /// Sine and cosine of each.
+    pub fn sin_cos(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.sin.iter().copied().zip(self.cos.iter().copied())
     }
 
     /// Number of angles.
