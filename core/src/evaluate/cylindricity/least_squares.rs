@@ -37,8 +37,9 @@ pub(super) fn axis(points: &Points) -> Option<(Axis, f64)> {
             (0..4).for_each(|k| axis[k] += step[k]);
         }
         let length = step.iter().map(|step| step * step).sum::<f64>().sqrt();
-        // The next step would be shorter by the same ratio: rounding ends it.
-        if length * length <= scale * points.tolerance() {
+        // What is left shrinks as this step did, or as the neglected curvature lets it; below rounding it is done.
+        let shrinks = (length / scale).max(points.span_um / points.radius_um).min(1.0);
+        if length * shrinks <= 0.1 * points.tolerance() {
             break;
         }
         scale = length;

@@ -21,7 +21,7 @@ pub struct Section<'a> {
 /// what the plane knows, less a term for the tilt.
 #[derive(Debug, Clone)]
 pub struct Points {
-    radius_um: f64,
+    pub(super) radius_um: f64,
     middle_mm: f64,
     half_um: f64,
     /// f, w and ζ; w is NaN where the point is missing.

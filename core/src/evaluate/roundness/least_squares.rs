@@ -37,8 +37,9 @@ pub(super) fn circle(points: &Points) -> Option<Circle> {
             place = [place[0] + s_x, place[1] + s_y];
         }
         let length = step[0].hypot(step[1]);
-        // The next step would be shorter by the same ratio: rounding ends it.
-        if length * length <= scale.min(points.radius_um()) * points.tolerance() {
+        // What is left shrinks as this step did, or as the neglected curvature lets it; below rounding it is done.
+        let shrinks = (length / scale).max(points.span_um / points.radius_um()).min(1.0);
+        if length * shrinks <= 0.1 * points.tolerance() {
             break;
         }
         scale = length;
