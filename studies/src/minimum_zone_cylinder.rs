@@ -72,8 +72,7 @@ impl Wall {
     /// When it cannot be read, or holds no circle.
     pub fn measured(path: &Path, radius_mm: f64) -> Result<Self> {
         let file = Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"] }.read(path)?;
-        let [z, angle, form] =
-            [file.column("z_mm")?, file.column("angle_deg")?, file.column("deviation_um")?];
+        let [z, angle, form] = [file.column("z_mm")?, file.column("angle_deg")?, file.column("deviation_um")?];
         let circles = file.traces.iter().filter(|trace| trace.kind == "circle");
         let points = circles.flat_map(|trace| trace.points.clone());
         let points: Vec<_> = points.map(|point| (angle[point].to_radians(), z[point], form[point])).collect();
@@ -165,7 +164,8 @@ impl Search {
                 if corners[4].0 - corners[0].0 < 1e-12 || spent > before + EVALUATIONS / 2 {
                     break;
                 }
-                let middle: Axis = std::array::from_fn(|k| 0.25 * corners[..4].iter().map(|(_, axis)| axis[k]).sum::<f64>());
+                let middle: Axis =
+                    std::array::from_fn(|k| 0.25 * corners[..4].iter().map(|(_, axis)| axis[k]).sum::<f64>());
                 let away = |factor: f64| -> (f64, Axis) {
                     let axis = std::array::from_fn(|k| middle[k] + factor * (corners[4].1[k] - middle[k]));
                     (self.width(&axis), axis)
