@@ -37,7 +37,7 @@ impl Wall {
                     })
                     .sum();
                 let centre = (x + u * height + bow * height * height) * angle.cos() + (y + v * height) * angle.sin();
-                let noise = if seed % 3 == 0 { 0.0 } else { 0.1 * unit() };
+                let noise = if seed.is_multiple_of(3) { 0.0 } else { 0.1 * unit() };
                 let missing = seed % 5 == 4 && i < count / 8;
                 if missing { f64::NAN } else { size * (lobed + 3.0 * centre + taper * height + noise) }
             });

@@ -79,7 +79,7 @@ impl<const D: usize, const N: usize> Chebyshev<D, N> {
         tolerance: f64,
     ) -> Option<Optimum<D, N>> {
         for step in 0..MOST {
-            let rows = basis.map(|contact| self.row(contact, cloud));
+            let rows = basis.map(|contact| row(contact, cloud));
             let inverse = inverse(rows)?;
             let right = basis.map(|contact| right(contact, cloud, limits));
             let unknowns: [f64; N] = std::array::from_fn(|j| dot(&inverse[j], &right));
@@ -95,7 +95,7 @@ impl<const D: usize, const N: usize> Chebyshev<D, N> {
                 let contacts = std::array::from_fn(|i| (basis[i], multipliers[i]));
                 return Some(Optimum { place, cost: dot(cost, &unknowns), contacts });
             };
-            let direction = from_left(&self.row(enters, cloud), &inverse);
+            let direction = from_left(&row(enters, cloud), &inverse);
             let ratio = |i: usize| multipliers[i] / direction[i];
             let leaves = (0..N).filter(|i| direction[*i] > PIVOT).min_by(|a, b| {
                 let tie =
@@ -114,7 +114,7 @@ impl<const D: usize, const N: usize> Chebyshev<D, N> {
         let bounds: Vec<Contact> = bounds.into_iter().filter_map(|(there, contact)| there.then_some(contact)).collect();
         let mut rest = *cost;
         for (contact, column) in bounds.iter().zip(D..) {
-            let row = self.row(*contact, cloud);
+            let row: [f64; N] = row(*contact, cloud);
             let multiplier = cost[column] / row[column];
             (0..D).for_each(|k| rest[k] -= multiplier * row[k]);
         }
@@ -123,24 +123,6 @@ impl<const D: usize, const N: usize> Chebyshev<D, N> {
             None if rest[i] < 0.0 => Contact::Most(i),
             None => Contact::Least(i),
         }))
-    }
-
-    /// Row a of a·(s, A, B) ≥ right.
-    fn row(&self, contact: Contact, cloud: &Cloud<D>) -> [f64; N] {
-        let mut row = [0.0; N];
-        match contact {
-            Contact::Outer(point) => {
-                row[..D].copy_from_slice(&cloud.features(point));
-                row[D] = 1.0;
-            }
-            Contact::Inner(point) => {
-                row[..D].copy_from_slice(&cloud.features(point).map(|feature| -feature));
-                row[N - 1] = -1.0;
-            }
-            Contact::Least(k) => row[k] = 1.0,
-            Contact::Most(k) => row[k] = -1.0,
-        }
-        row
     }
 
     /// The constraint that is violated most, or the first that is.
@@ -189,6 +171,24 @@ impl<const D: usize, const N: usize> Chebyshev<D, N> {
         }
         enters
     }
+}
+
+/// Row a of a·(s, A, B) ≥ right.
+fn row<const D: usize, const N: usize>(contact: Contact, cloud: &Cloud<D>) -> [f64; N] {
+    let mut row = [0.0; N];
+    match contact {
+        Contact::Outer(point) => {
+            row[..D].copy_from_slice(&cloud.features(point));
+            row[D] = 1.0;
+        }
+        Contact::Inner(point) => {
+            row[..D].copy_from_slice(&cloud.features(point).map(|feature| -feature));
+            row[N - 1] = -1.0;
+        }
+        Contact::Least(k) => row[k] = 1.0,
+        Contact::Most(k) => row[k] = -1.0,
+    }
+    row
 }
 
 fn right<const D: usize>(contact: Contact, cloud: &Cloud<D>, limits: &[(f64, f64); D]) -> f64 {
@@ -255,7 +255,7 @@ mod tests {
         let mut chebyshev = Chebyshev::<1, 2>::new(true, false);
         let found = chebyshev.solve(&cloud, &[0.0, 1.0], &[(-9.0, 9.0)], 1e-14).unwrap();
         assert!((found.cost - 1.0).abs() < 1e-14, "{found:?}");
-        assert_eq!(found.contacts.map(|(_, multiplier)| multiplier), [0.5, 0.5]);
+        assert!(found.contacts.iter().all(|(_, multiplier)| (multiplier - 0.5).abs() < 1e-14), "{found:?}");
     }
 
     #[test]

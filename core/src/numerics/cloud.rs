@@ -109,6 +109,7 @@ impl<const D: usize> Cloud<D> {
 
     /// The first point of a range at exactly this height, as [`extremes`](Self::extremes) gave it.
     #[must_use]
+    #[allow(clippy::float_cmp, reason = "the same operations in the same order")]
     pub fn find(&self, mut range: Range<usize>, place: &[f64; D], height: f64) -> Option<usize> {
         range.find(|point| self.height(*point, place) == height)
     }

@@ -24,7 +24,10 @@ pub fn check(profile: &Profile, reference: Reference) -> Result<(), String> {
     let circle = points.reference(reference).ok_or("none found")?;
     let seen = seen(profile, &circle);
     let (low, high) = extremes(&seen);
-    let at = |contact: &usize| seen.iter().find(|(index, ..)| index == contact).copied().unwrap();
+    let at = |contact: &usize| {
+        let Some(point) = seen.iter().find(|(index, ..)| index == contact) else { panic!("{contact} is missing") };
+        *point
+    };
     for contact in &circle.outer {
         let lacks = high - at(contact).1;
         if lacks > TOLERANCE_UM {
@@ -95,4 +98,31 @@ fn contact_conditions_hold_on_ten_thousand_profiles() {
         }
     }
     assert!(wrong.is_empty(), "{} wrong, such as\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n"));
+}
+
+/// Deviations up to a third of the radius: what a polar plot about a small base circle looks like.
+pub fn plot(seed: u64) -> Profile {
+    let mut plot = profile(seed, 4..=12);
+    let largest =
+        plot.form_um.iter().filter(|form| form.is_finite()).fold(0.0, |largest: f64, form| largest.max(form.abs()));
+    plot.radius_mm = 3e-3 * largest;
+    plot
+}
+
+#[test]
+fn contact_conditions_hold_on_polar_plots() {
+    let (mut wrong, mut found) = (Vec::new(), 0);
+    for seed in 0..2000 {
+        let plot = plot(seed);
+        for reference in [Reference::MinimumZone, Reference::MaximumInscribed, Reference::MinimumCircumscribed] {
+            // Few points of a bad circle may not surround any; those that have a circle have a proven one.
+            match check(&plot, reference) {
+                Ok(()) => found += 1,
+                Err(problem) if problem == "none found" => {}
+                Err(problem) => wrong.push(format!("{seed} ({}), {}: {problem}", plot.kind, reference.symbol())),
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong, such as\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n"));
+    assert!(found > 5000, "only {found} of 6000 have a circle");
 }

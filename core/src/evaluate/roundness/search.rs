@@ -168,7 +168,9 @@ impl<'a, const N: usize> Search<'a, N> {
                 Contact::Least(_) | Contact::Most(_) => {}
             }
         }
-        found.iter_mut().for_each(|points| points.sort_unstable());
+        for points in &mut found {
+            points.sort_unstable();
+        }
         Some(found)
     }
 }
