@@ -101,3 +101,33 @@ fn small_profiles_have_no_better_circle() {
     }
     assert!(wrong.is_empty(), "{} wrong, such as\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n"));
 }
+
+#[test]
+fn plots_have_the_smallest_circle_and_no_better_one_than_all_subsets() {
+    let mut wrong = Vec::new();
+    let (mut best, mut all) = ([0; 2], [0; 2]);
+    for seed in 0..400 {
+        let plot = crate::contact::plot(seed);
+        let places: Vec<Place> = plot.places().into_iter().map(|(_, place)| place).collect();
+        let points = plot.points();
+        // Rounding relative to the plot's size, magnified by bisectors of points that lie near each other.
+        let tolerance = 1e-9 * points.radius_um();
+        let radius = |reference| points.reference(reference).map(|circle| points.radius_um() + circle.deviation_um);
+        if radius(Reference::MinimumCircumscribed).is_none_or(|found| (found - circumscribed(&places)).abs() > tolerance) {
+            wrong.push(format!("{seed}: MCCI"));
+        }
+        // The others may be a local optimum: never better than the best of all, and mostly the best.
+        let zone = points.reference(Reference::MinimumZone).map(|circle| points.values(&circle).ront_um - zone(&places));
+        let inscribed = radius(Reference::MaximumInscribed).map(|found| inscribed(&places, tolerance) - found);
+        for (kind, off) in [zone, inscribed].into_iter().enumerate().filter_map(|(kind, off)| Some((kind, off?))) {
+            all[kind] += 1;
+            best[kind] += usize::from(off <= tolerance);
+            if off < -tolerance {
+                wrong.push(format!("{seed}: {kind} better than all by {off}"));
+            }
+        }
+    }
+    println!("MZCI, MICI: the best of all in {best:?} of {all:?} plots with deviations of a third of the radius");
+    assert!(wrong.is_empty(), "{} wrong, such as {:?}", wrong.len(), &wrong[..wrong.len().min(20)]);
+    assert!((0..2).all(|kind| 2 * best[kind] > all[kind]), "{best:?} of {all:?}");
+}
