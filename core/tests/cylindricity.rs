@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use runout_core::evaluate::{
     cylindricity::{Cylinder, Generatrices, MedianLine, Points, Reference, Section},
-    roundness::Angles,
+    roundness::{self, Angles},
 };
 
 const RADIUS_MM: f64 = 15.0;
@@ -180,4 +180,23 @@ fn what_is_not_determined_is_not_given() {
         // A perfect cylinder: rounding.
         assert!(values.cylt_um < 1e-9, "{}: {values:?}", reference.symbol());
     }
+}
+
+#[test]
+fn a_part_of_a_turn_surrounds_nothing() {
+    // 40 % of the turn: an inscribed cylinder could grow for ever, a circumscribed one cannot shrink for ever.
+    let angles = Angles::equal(50);
+    let form_um: Vec<f64> = (0..50).map(|i| if i < 20 { f64::from(i * i % 7) } else { f64::NAN }).collect();
+    let sections: Vec<Section> =
+        [0.0, 5.0, 20.0].map(|z_mm| Section { z_mm, angles: &angles, form_um: &form_um }).to_vec();
+    let points = Points::of_sections(RADIUS_MM, &sections);
+    assert!((points.coverage() - 0.4).abs() < 1e-12);
+    assert_eq!(points.reference(Reference::MaximumInscribed), None);
+    let lscy = points.reference(Reference::LeastSquares).unwrap();
+    assert_eq!(points.values(&lscy).points, 60);
+    let mut circle = roundness::Points::default();
+    circle.set_profile(&angles, &form_um, RADIUS_MM);
+    assert_eq!(circle.reference(roundness::Reference::MaximumInscribed), None);
+    let found = circle.reference(roundness::Reference::MinimumCircumscribed).unwrap();
+    assert!(found.outer.iter().all(|point| *point < 20), "{found:?}");
 }

@@ -113,11 +113,14 @@ fn plots_have_the_smallest_circle_and_no_better_one_than_all_subsets() {
         // Rounding relative to the plot's size, magnified by bisectors of points that lie near each other.
         let tolerance = 1e-9 * points.radius_um();
         let radius = |reference| points.reference(reference).map(|circle| points.radius_um() + circle.deviation_um);
-        if radius(Reference::MinimumCircumscribed).is_none_or(|found| (found - circumscribed(&places)).abs() > tolerance) {
+        if radius(Reference::MinimumCircumscribed)
+            .is_none_or(|found| (found - circumscribed(&places)).abs() > tolerance)
+        {
             wrong.push(format!("{seed}: MCCI"));
         }
         // The others may be a local optimum: never better than the best of all, and mostly the best.
-        let zone = points.reference(Reference::MinimumZone).map(|circle| points.values(&circle).ront_um - zone(&places));
+        let zone =
+            points.reference(Reference::MinimumZone).map(|circle| points.values(&circle).ront_um - zone(&places));
         let inscribed = radius(Reference::MaximumInscribed).map(|found| inscribed(&places, tolerance) - found);
         for (kind, off) in [zone, inscribed].into_iter().enumerate().filter_map(|(kind, off)| Some((kind, off?))) {
             all[kind] += 1;

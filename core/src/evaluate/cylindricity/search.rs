@@ -8,6 +8,8 @@ use crate::numerics::{
 
 /// Blocks of neighbouring points, of which the highest and lowest are looked at first.
 const BLOCKS: usize = 512;
+/// Multipliers of the region's limits above this: the axis was still running away.
+const ADRIFT: f64 = 1e-3;
 /// Linear problems of one set of chosen points, and looks at all points, before giving up.
 const MOST_STEPS: usize = 500;
 
@@ -27,6 +29,11 @@ pub(super) fn search<const N: usize>(points: &Points, start: Axis, reference: Re
         let (low, high) = search.extremes(&axis);
         if search.grow(&axis, low - tolerance, high + tolerance) {
             continue;
+        }
+        let limits =
+            optimum.contacts.iter().filter(|(contact, _)| matches!(contact, Contact::Least(_) | Contact::Most(_)));
+        if limits.map(|(_, multiplier)| *multiplier).any(|multiplier| multiplier > ADRIFT) {
+            return None;
         }
         let deviation = match (outer, inner) {
             (true, true) => 0.5 * (low + high),
