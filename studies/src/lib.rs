@@ -5,6 +5,7 @@ pub mod blind;
 pub mod campaign;
 pub mod coverage;
 pub mod eccentricity;
+pub mod minimum_zone_cylinder;
 pub mod plot;
 pub mod scaling;
 pub mod straightness;

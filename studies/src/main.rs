@@ -5,7 +5,11 @@
 use std::{path::Path, process::ExitCode};
 
 use runout_core::{Result, atomic_file};
-use runout_studies::{averaging, blind, coverage, eccentricity, scaling, straightness, surface as unrolled};
+use runout_studies::{
+    averaging, blind, coverage, eccentricity,
+    minimum_zone_cylinder::{self, Wall},
+    scaling, straightness, surface as unrolled,
+};
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
@@ -15,7 +19,8 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies diagnose-scaling       time of a diagnosis over the number of stations
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
-       runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth";
+       runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth
+       runout-studies minimum-zone-cylinder [WALLS [STARTS]]   MZCY beside a global search, simulated and measured";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -37,6 +42,10 @@ fn main() -> ExitCode {
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["straightness-traces", file] => straightness_traces(file),
         ["straightness", file, picture] => straightness(file, picture),
+        ["minimum-zone-cylinder", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [50, 200]).is_some() => {
+            let [walls, starts] = sizes(rest, [50, 200]).unwrap_or_default();
+            minimum_zone_cylinder(walls, starts as usize)
+        }
         ["averaging"] => averaging(None),
         ["averaging", picture] => averaging(Some(picture)),
         _ => {
@@ -75,8 +84,25 @@ fn coverage(campaigns: u64) -> Result<()> {
 
 /// Campaigns and seed, as far as they are given.
 fn numbers(words: &[&str]) -> Option<[u64; 2]> {
+    sizes(words, [240, 1])
+}
+
+/// Two numbers, as far as they are given.
+fn sizes(words: &[&str], [first, second]: [u64; 2]) -> Option<[u64; 2]> {
     let number = |place: usize, default| words.get(place).map_or(Some(default), |word| word.parse().ok());
-    Some([number(0, 240)?, number(1, 1)?])
+    Some([number(0, first)?, number(1, second)?])
+}
+
+fn minimum_zone_cylinder(walls: u64, starts: usize) -> Result<()> {
+    let mut rows = (0..walls).map(|seed| Wall::simulated(seed).study(starts)).collect::<Result<Vec<_>>>()?;
+    let measured = Path::new("../shared/data/zeiss-cylinder/cylinder-r15.csv");
+    if measured.is_file() {
+        rows.push(Wall::measured(measured, 15.056)?.study(starts)?);
+    } else {
+        println!("{} is not there; example 10 says where it is public", measured.display());
+    }
+    println!("{}", minimum_zone_cylinder::table(&rows, starts));
+    Ok(())
 }
 
 fn blind(campaigns: u64, seed: u64, file: Option<&str>) -> Result<()> {

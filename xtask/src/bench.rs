@@ -1,4 +1,4 @@
-//! The peers' campaign, by runout and by the peers themselves: `benchmarks/campaign`.
+//! The peers' work, by runout and by the peers themselves: `benchmarks`.
 
 use std::{
     path::{Path, PathBuf},
@@ -10,7 +10,16 @@ use crate::{
     setup::{self, cargo},
 };
 
-const PYTHON_PACKAGES: [&str; 3] = ["numpy", "scipy", "h5py"];
+/// Modules that the peers of a campaign and of reference circles import, and the packages that bring them.
+const CAMPAIGN: [[&str; 2]; 3] = [["numpy"; 2], ["scipy"; 2], ["h5py"; 2]];
+const ROUNDNESS: [[&str; 2]; 6] = [
+    ["numpy"; 2],
+    ["scipy"; 2],
+    ["circle_fit", "circle-fit"],
+    ["miniball"; 2],
+    ["cv2", "opencv-python-headless"],
+    ["shapely"; 2],
+];
 /// Samples a turn and turns of a section, as in the record that the peers are measured with.
 const SAMPLES_PER_REV: usize = 2560;
 const TURNS: usize = 120;
@@ -51,15 +60,8 @@ impl Wanted {
 /// Writes the record once, times both programs on it in turns and prints a table.
 pub fn campaign(words: &[&str]) -> Outcome {
     let wanted = Wanted::read(words)?;
-    let peers = std::env::var_os("RUNOUT_PEERS").map_or_else(|| root().join("../shared/peers"), PathBuf::from);
-    if !peers.join("record.py").is_file() || !peers.join("pipeline.py").is_file() {
-        say(&format!(
-            "skipped: there are no peers in {} (record.py, pipeline.py); RUNOUT_PEERS can name their folder",
-            peers.display()
-        ));
-        return Ok(());
-    }
-    let python = python()?;
+    let Some(peers) = peers(&["record.py", "pipeline.py"]) else { return Ok(()) };
+    let python = python(&CAMPAIGN)?;
     let script = |name: &str| {
         let mut command = Command::new(&python);
         command.arg("-B").arg(Path::new("benchmarks/campaign").join(name));
@@ -79,13 +81,34 @@ pub fn campaign(words: &[&str]) -> Outcome {
     Ok(())
 }
 
+/// Times the reference circles of runout and of the peers on the same points.
+pub fn roundness() -> Outcome {
+    run(&mut cargo(&["build", "--release", "--package", "runout-core", "--example", "reference_circles"])?)?;
+    let Some(peers) = peers(&["roundness_bench.py", "roundness.py"]) else { return Ok(()) };
+    let mut compare = Command::new(python(&ROUNDNESS)?);
+    compare.arg("-B").arg("benchmarks/roundness/compare.py");
+    run(compare.arg(target().join("release/examples/reference_circles")).arg(&peers).arg(target().join("bench")))
+}
+
+/// The folder of the peers, if it holds these files; says why not.
+fn peers(files: &[&str]) -> Option<PathBuf> {
+    let peers = std::env::var_os("RUNOUT_PEERS").map_or_else(|| root().join("../shared/peers"), PathBuf::from);
+    if files.iter().all(|file| peers.join(file).is_file()) {
+        return Some(peers);
+    }
+    let (folder, files) = (peers.display(), files.join(", "));
+    say(&format!("skipped: there are no peers in {folder} ({files}); RUNOUT_PEERS can name their folder"));
+    None
+}
+
 /// A Python with what the peers need, installed below target/ where it is not yet.
-fn python() -> Outcome<PathBuf> {
+fn python(needed: &[[&str; 2]]) -> Outcome<PathBuf> {
     let folder = tools().join("peers-venv");
     setup::python_environment(&folder)?;
     let interpreter = folder.join("bin/python");
-    if answer(&interpreter, &["-c", &format!("import {}", PYTHON_PACKAGES.join(", "))]).is_none() {
-        run(Command::new(folder.join("bin/pip")).args(["install", "--quiet"]).args(PYTHON_PACKAGES))?;
+    let [modules, packages] = [0, 1].map(|part| needed.iter().map(|names| names[part]).collect::<Vec<&str>>());
+    if answer(&interpreter, &["-c", &format!("import {}", modules.join(", "))]).is_none() {
+        run(Command::new(folder.join("bin/pip")).args(["install", "--quiet"]).args(packages))?;
     }
     Ok(interpreter)
 }

@@ -20,6 +20,8 @@ cargo xtask COMMAND
   schemas       write schemas/ anew from the types
   bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]
                 time a campaign of 98 million samples beside the same work in NumPy and SciPy; 1.6 GB in target/bench
+  bench-roundness
+                time reference circles of 2560 and 36 000 points beside SciPy and others
 
 Every command does the set-up it needs first.
 ";
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
         ["test", "--ci"] => chores::test(true),
         ["schemas"] => chores::schemas(),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
+        ["bench-roundness"] => bench::roundness(),
         ["studies", ref arguments @ ..] => chores::studies(arguments),
         _ => {
             say(&format!("unknown command `{}`\n\n{HELP}", words.join(" ")));

@@ -1,5 +1,6 @@
 //! The standards' values of a separated form.
 
+pub mod cylindricity;
 pub mod roundness;
 pub mod straightness;
 pub mod texture;

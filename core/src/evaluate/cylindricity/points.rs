@@ -1,0 +1,177 @@
+//! The points of a wall, and what they are about an axis.
+
+use super::{Cylinder, Reference, Values, least_squares, search};
+use crate::evaluate::roundness::Angles;
+
+/// One circle of a wall.
+#[derive(Debug, Clone, Copy)]
+pub struct Section<'a> {
+    /// Its height.
+    pub z_mm: f64,
+    /// Directions of its points.
+    pub angles: &'a Angles,
+    /// Radial deviations from the nominal radius, one at each angle; what is not finite is missing.
+    pub form_um: &'a [f64],
+}
+
+/// Points of a wall.
+///
+/// A point p at height z is held as f = p/R, w = (|p|² − R²)/2R and ζ, which is −1 and 1 at the ends of the wall. About
+/// the axis (x, y) + (a, b)·z its squared distance is |q|² − (a·q₁ + b·q₂)²/(1 + a² + b²) with q = p − (x, y) − (a, b)·z:
+/// what the plane knows, less a term for the tilt.
+#[derive(Debug, Clone)]
+pub struct Points {
+    pub(super) radius_um: f64,
+    middle_mm: f64,
+    half_um: f64,
+    /// f, w and ζ; w is NaN where the point is missing.
+    held: Vec<[f64; 4]>,
+    /// The largest |w|.
+    pub(super) span_um: f64,
+}
+
+/// An axis inside: x and y midway and how far it leans until the end, in µm.
+pub(super) type Axis = [f64; 4];
+
+impl Points {
+    /// Points (angle in rad, z in mm, radial deviation in µm) about a nominal radius (positive).
+    #[must_use]
+    pub fn new(radius_mm: f64, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
+        let points = points.into_iter().map(|(angle, z, form)| (angle.sin_cos(), z, form));
+        Self::of(radius_mm, points.collect())
+    }
+
+    /// The points of sections, one after the other.
+    #[must_use]
+    pub fn of_sections(radius_mm: f64, sections: &[Section]) -> Self {
+        let mut points = Vec::new();
+        for section in sections {
+            let directions = section.angles.sin_cos();
+            points.extend(directions.zip(section.form_um).map(|(direction, form)| (direction, section.z_mm, *form)));
+        }
+        Self::of(radius_mm, points)
+    }
+
+    fn of(radius_mm: f64, points: Vec<((f64, f64), f64, f64)>) -> Self {
+        let radius = 1e3 * radius_mm;
+        let there = |z: f64, form: f64| z.is_finite() && form.is_finite();
+        let heights = points.iter().filter(|(_, z, form)| there(*z, *form)).map(|(_, z, _)| *z);
+        let (bottom, top) =
+            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+        let (middle_mm, half_mm) = (0.5 * (bottom + top), 0.5 * (top - bottom));
+        let held = points.into_iter().map(|((sin, cos), z, form)| {
+            let scale = 1.0 + form / radius;
+            let level = form + form * form / (2.0 * radius);
+            if there(z, form) {
+                [scale * cos, scale * sin, level, (z - middle_mm) / half_mm]
+            } else {
+                [0.0, 0.0, f64::NAN, 0.0]
+            }
+        });
+        let held: Vec<[f64; 4]> = held.collect();
+        let span_um = held.iter().map(|held| held[2].abs()).fold(0.0, f64::max);
+        Self { radius_um: radius, middle_mm, half_um: 1e3 * half_mm, held, span_um }
+    }
+
+    /// Points, those that are missing included.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.held.len()
+    }
+
+    /// Whether there is no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.held.is_empty()
+    }
+
+    /// Share of the points that are there.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        self.there().count() as f64 / self.len() as f64
+    }
+
+    pub(super) fn there(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.len()).filter(|point| !self.held[*point][2].is_nan())
+    }
+
+    /// The reference cylinder; `None` where it is not determined: fewer than five points, all at one height, or, but for
+    /// MCCY, points that do not surround an axis.
+    ///
+    /// MZCY, MICY and MCCY are reached downhill from LSCY; deviations are taken to be small beside the radius.
+    #[must_use]
+    pub fn reference(&self, reference: Reference) -> Option<Cylinder> {
+        let determined = self.radius_um > 0.0 && self.half_um > 0.0 && self.half_um.is_finite();
+        if !determined || self.there().count() < 5 {
+            return None;
+        }
+        let (axis, deviation) = least_squares::axis(self)?;
+        match reference {
+            Reference::LeastSquares => Some(self.about(axis, deviation, vec![])),
+            Reference::MinimumZone => search::search::<6>(self, axis, reference),
+            _ => search::search::<5>(self, axis, reference),
+        }
+    }
+
+    /// Deviation of each point from a cylinder, at right angles to its axis, outward positive; NaN where it is missing.
+    pub fn deviations_um<'a>(&'a self, cylinder: &Cylinder) -> impl Iterator<Item = f64> + 'a {
+        let lean = 1e-6 * self.half_um;
+        let moved = 1e3 * (self.middle_mm - cylinder.z_mm) * 1e-6;
+        let [x, y] = [(cylinder.x_um, cylinder.slope_x_urad), (cylinder.y_um, cylinder.slope_y_urad)]
+            .map(|(at, slope)| at + slope * moved);
+        let axis = [x, y, cylinder.slope_x_urad * lean, cylinder.slope_y_urad * lean];
+        let deviation = cylinder.deviation_um;
+        (0..self.len()).map(move |point| self.deviation(point, &axis) - deviation)
+    }
+
+    /// CYLt, CYLp, CYLv and CYLq about a cylinder; NaN where no point is there.
+    #[must_use]
+    pub fn values(&self, cylinder: &Cylinder) -> Values {
+        let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
+        for deviation in self.deviations_um(cylinder).filter(|deviation| !deviation.is_nan()) {
+            (low, high) = (low.min(deviation), high.max(deviation));
+            squares += deviation * deviation;
+            points += 1;
+        }
+        if points == 0 {
+            (low, high) = (f64::NAN, f64::NAN);
+        }
+        let cylq_um = (squares / points as f64).sqrt();
+        Values { cylt_um: high - low, cylp_um: high.max(0.0), cylv_um: (-low).max(0.0), cylq_um, points }
+    }
+
+    /// Distance from an axis less R.
+    pub(super) fn deviation(&self, point: usize, axis: &Axis) -> f64 {
+        self.with_slopes(point, axis).0
+    }
+
+    /// Distance from an axis less R, and its derivatives by the axis.
+    pub(super) fn with_slopes(&self, point: usize, axis: &Axis) -> (f64, Axis) {
+        let [u, v, level, zeta] = self.held[point];
+        let radius = self.radius_um;
+        let [a, b] = [axis[2] / self.half_um, axis[3] / self.half_um];
+        let length = 1.0 + a * a + b * b;
+        let [x, y] = [axis[0] + axis[2] * zeta, axis[1] + axis[3] * zeta];
+        let [q_x, q_y] = [radius * u - x, radius * v - y];
+        let along = a * q_x + b * q_y;
+        let lifted = level - x * u - y * v + (x * x + y * y - along * along / length) / (2.0 * radius);
+        let stretch = (1.0 + 2.0 * lifted / radius).max(f64::MIN_POSITIVE).sqrt();
+        let across = |q: f64, slope: f64| (slope * along / length - q) / (radius * stretch);
+        let turned =
+            |q: f64, slope: f64| along * (slope * along / length - q) / (radius * stretch * length * self.half_um);
+        let [s_x, s_y] = [across(q_x, a), across(q_y, b)];
+        let slopes = [s_x, s_y, s_x * zeta + turned(q_x, a), s_y * zeta + turned(q_y, b)];
+        (2.0 * lifted / (1.0 + stretch), slopes)
+    }
+
+    /// Deviations that differ by less are equal: rounding of coordinates.
+    pub(super) fn tolerance(&self) -> f64 {
+        4.0 * f64::EPSILON * (self.radius_um + self.span_um)
+    }
+
+    pub(super) fn about(&self, axis: Axis, deviation_um: f64, touches: Vec<super::Touch>) -> Cylinder {
+        let [x_um, y_um, ..] = axis;
+        let [slope_x_urad, slope_y_urad] = [axis[2], axis[3]].map(|lean| 1e6 * lean / self.half_um);
+        Cylinder { z_mm: self.middle_mm, x_um, y_um, slope_x_urad, slope_y_urad, deviation_um, touches }
+    }
+}

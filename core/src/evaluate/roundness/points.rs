@@ -1,0 +1,204 @@
+//! The points of a profile, and what they are about a circle.
+
+use std::f64::consts::TAU;
+
+use super::{Circle, Reference, Values, circumscribed, least_squares, search};
+use crate::numerics::cloud::Cloud;
+
+/// Directions of a profile's points, to be kept and used for many profiles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Angles {
+    cos: Vec<f64>,
+    sin: Vec<f64>,
+}
+
+impl Angles {
+    /// `count` equal steps from 0 on.
+    #[must_use]
+    pub fn equal(count: usize) -> Self {
+        (0..count).map(|index| TAU * index as f64 / count as f64).collect()
+    }
+
+    /// Sine and cosine of each.
+    pub fn sin_cos(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.sin.iter().copied().zip(self.cos.iter().copied())
+    }
+
+    /// Number of angles.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.cos.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.cos.is_empty()
+    }
+}
+
+/// From angles in rad.
+impl FromIterator<f64> for Angles {
+    fn from_iter<T: IntoIterator<Item = f64>>(angles: T) -> Self {
+        let (sin, cos) = angles.into_iter().map(f64::sin_cos).unzip();
+        Self { cos, sin }
+    }
+}
+
+/// Points of a profile; memory is reused from one profile to the next.
+///
+/// A point p is held as f = p/R and w = (|p|² − R²)/2R. Its squared distance ρ² from a centre c is then
+/// R² + 2R·(w − f·c + |c|²/2R): linear in c up to a term that all points share, without cancellation, and exact. A
+/// deviation that is not a finite number is a point that is missing (a lost angle, a keyway).
+#[derive(Debug, Clone, Default)]
+pub struct Points {
+    pub(super) cloud: Cloud<2>,
+    radius_um: f64,
+    origin_um: [f64; 2],
+    /// The largest |w|.
+    pub(super) span_um: f64,
+}
+
+impl Points {
+    /// Takes a profile: radial deviations `form_um` from a circle of `radius_mm` (positive), one at each angle.
+    ///
+    /// Deviations may be as large as the radius: for a polar plot, `radius_mm` is its base circle.
+    pub fn set_profile(&mut self, angles: &Angles, form_um: &[f64], radius_mm: f64) {
+        let radius = 1e3 * radius_mm;
+        (self.radius_um, self.origin_um) = (radius, [0.0; 2]);
+        let ([u, v], levels) = self.cloud.columns_mut();
+        let scale = |form: &f64| if form.is_finite() { 1.0 + form / radius } else { 0.0 };
+        let level = |form: &f64| if form.is_finite() { form + form * form / (2.0 * radius) } else { f64::NAN };
+        u.clear();
+        u.extend(form_um.iter().zip(&angles.cos).map(|(form, cos)| scale(form) * cos));
+        v.clear();
+        v.extend(form_um.iter().zip(&angles.sin).map(|(form, sin)| scale(form) * sin));
+        levels.clear();
+        levels.extend(form_um.iter().zip(&angles.cos).map(|(form, _)| level(form)));
+        self.measure();
+    }
+
+    /// Takes points of the plane, in any order; the mean distance from their centroid serves as nominal radius.
+    pub fn set_plane(&mut self, x_um: &[f64], y_um: &[f64]) {
+        let there = || x_um.iter().zip(y_um).filter(|(x, y)| x.is_finite() && y.is_finite());
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / there().count().max(1) as f64;
+        let [x0, y0] = [mean(&mut there().map(|(x, _)| *x)), mean(&mut there().map(|(_, y)| *y))];
+        let radius = mean(&mut there().map(|(x, y)| (x - x0).hypot(y - y0)));
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        (self.radius_um, self.origin_um) = (radius, [x0, y0]);
+        self.cloud.clear();
+        for (x, y) in x_um.iter().zip(y_um) {
+            let distance = (x - x0).hypot(y - y0);
+            if distance.is_finite() {
+                let level = (distance - radius) * (distance + radius) / (2.0 * radius);
+                self.cloud.push([(x - x0) / radius, (y - y0) / radius], level);
+            } else {
+                self.cloud.push([0.0; 2], f64::NAN);
+            }
+        }
+        self.measure();
+    }
+
+    fn measure(&mut self) {
+        let (low, high) = self.cloud.extremes(0..self.cloud.len(), &[0.0; 2]);
+        self.span_um = if high < low { 0.0 } else { high.abs().max(low.abs()) };
+    }
+
+    /// The nominal radius R.
+    #[must_use]
+    pub fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    /// Points, those that are missing included.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.cloud.len()
+    }
+
+    /// Whether there is no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.cloud.is_empty()
+    }
+
+    /// Share of the points that are there.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        self.there() as f64 / self.len() as f64
+    }
+
+    pub(super) fn there(&self) -> usize {
+        self.cloud.levels().iter().filter(|level| !level.is_nan()).count()
+    }
+
+    /// The reference circle; `None` where it is not determined: fewer than three points (two for MCCI), or, but for
+    /// MCCI, points that do not surround a centre.
+    ///
+    /// MZCI and MICI are those whose centre is reached downhill (uphill) from that of the algebraic least-squares circle
+    /// (Kåsa). Where deviations are small beside the radius there is no better one; a profile that is far from a circle
+    /// (a polar plot with the base circle's size) may have several of them, as a kidney has several inscribed circles.
+    #[must_use]
+    pub fn reference(&self, reference: Reference) -> Option<Circle> {
+        if !(self.radius_um > 0.0 && self.radius_um.is_finite()) {
+            return None;
+        }
+        match reference {
+            Reference::LeastSquares => least_squares::circle(self),
+            Reference::MinimumZone => search::minimum_zone(self),
+            Reference::MaximumInscribed => search::maximum_inscribed(self),
+            Reference::MinimumCircumscribed => circumscribed::circle(self),
+        }
+    }
+
+    /// Deviation of each point from a circle, outward positive; NaN where it is missing.
+    pub fn deviations_um<'a>(&'a self, circle: &Circle) -> impl Iterator<Item = f64> + 'a {
+        let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
+        let (common, deviation) = (self.common(&place), circle.deviation_um);
+        let [u, v] = [self.cloud.column(0), self.cloud.column(1)];
+        let points = self.cloud.levels().iter().zip(u.iter().zip(v));
+        points.map(move |(w, (u, v))| self.deviation(w - u * place[0] - v * place[1] + common) - deviation)
+    }
+
+    /// RONt, RONp, RONv and RONq about a circle; NaN where no point is there.
+    #[must_use]
+    pub fn values(&self, circle: &Circle) -> Values {
+        let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
+        for deviation in self.deviations_um(circle).filter(|deviation| !deviation.is_nan()) {
+            (low, high) = (low.min(deviation), high.max(deviation));
+            squares += deviation * deviation;
+            points += 1;
+        }
+        if points == 0 {
+            (low, high) = (f64::NAN, f64::NAN);
+        }
+        let ronq_um = (squares / points as f64).sqrt();
+        Values { ront_um: high - low, ronp_um: high.max(0.0), ronv_um: (-low).max(0.0), ronq_um, points }
+    }
+
+    /// |c|²/2R, which all heights over a centre lack to (ρ² − R²)/2R.
+    pub(super) fn common(&self, place: &[f64; 2]) -> f64 {
+        (place[0] * place[0] + place[1] * place[1]) / (2.0 * self.radius_um)
+    }
+
+    /// ρ/R of (ρ² − R²)/2R.
+    pub(super) fn stretch(&self, lifted: f64) -> f64 {
+        (1.0 + 2.0 * lifted / self.radius_um).max(0.0).sqrt()
+    }
+
+    /// ρ − R of (ρ² − R²)/2R.
+    pub(super) fn deviation(&self, lifted: f64) -> f64 {
+        2.0 * lifted / (1.0 + self.stretch(lifted))
+    }
+
+    /// Heights that differ by less are equal: rounding of coordinates.
+    pub(super) fn tolerance(&self) -> f64 {
+        4.0 * f64::EPSILON * (self.radius_um + self.span_um)
+    }
+
+    /// A circle about a place of the cloud.
+    pub(super) fn about(&self, place: [f64; 2], deviation_um: f64, [outer, inner]: [Vec<usize>; 2]) -> Circle {
+        let [x_um, y_um] = [place[0] + self.origin_um[0], place[1] + self.origin_um[1]];
+        Circle { x_um, y_um, deviation_um, outer, inner }
+    }
+}

@@ -1,0 +1,136 @@
+//! All subsets of contacts of small profiles.
+
+use runout_core::evaluate::roundness::{Points, Reference};
+
+use crate::profiles::{Profile, profile};
+
+type Place = [f64; 2];
+
+fn distance(a: Place, b: Place) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// Where the bisectors of two pairs meet.
+fn meet([a, b]: [Place; 2], [c, d]: [Place; 2]) -> Place {
+    let line = |a: Place, b: Place| {
+        let (x, y) = (b[0] - a[0], b[1] - a[1]);
+        (x, y, 0.5 * (x * (a[0] + b[0]) + y * (a[1] + b[1])))
+    };
+    let ((p, q, r), (s, t, u)) = (line(a, b), line(c, d));
+    let area = p * t - q * s;
+    [(r * t - q * u) / area, (p * u - r * s) / area]
+}
+
+fn extremes(places: &[Place], centre: Place) -> (f64, f64) {
+    let distances = places.iter().map(|place| distance(*place, centre));
+    distances.fold((f64::INFINITY, 0.0), |(low, high), distance| (low.min(distance), f64::max(high, distance)))
+}
+
+fn pairs(places: &[Place]) -> impl Iterator<Item = [Place; 2]> + Clone + '_ {
+    (0..places.len()).flat_map(move |a| (0..a).map(move |b| [places[a], places[b]]))
+}
+
+/// The narrowest zone about the meeting point of any two bisectors; any centre bounds it from above.
+fn zone(places: &[Place]) -> f64 {
+    let centres = pairs(places).flat_map(|first| pairs(places).map(move |second| meet(first, second)));
+    let widths = centres.filter(|centre| centre[0].is_finite()).map(|centre| {
+        let (low, high) = extremes(places, centre);
+        high - low
+    });
+    widths.fold(f64::INFINITY, f64::min)
+}
+
+/// The largest empty circle whose three contacts surround its centre.
+fn inscribed(places: &[Place], tolerance: f64) -> f64 {
+    let mut best = 0.0;
+    for [a, b] in pairs(places) {
+        for c in places {
+            let centre = meet([a, b], [b, *c]);
+            let turn =
+                |a: Place, b: Place| (a[0] - centre[0]) * (b[1] - centre[1]) - (a[1] - centre[1]) * (b[0] - centre[0]);
+            let turns = [turn(a, b), turn(b, *c), turn(*c, a)];
+            let low = extremes(places, centre).0;
+            if (turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0))
+                && distance(a, centre) <= low + tolerance
+            {
+                best = f64::max(best, low);
+            }
+        }
+    }
+    best
+}
+
+fn circumscribed(places: &[Place]) -> f64 {
+    let middles = pairs(places).map(|[a, b]| [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]);
+    let triples = pairs(places).flat_map(|[a, b]| places.iter().map(move |c| meet([a, b], [b, *c])));
+    let centres = middles.chain(triples).filter(|centre| centre[0].is_finite());
+    centres.map(|centre| extremes(places, centre).1).fold(f64::INFINITY, f64::min)
+}
+
+fn compare(profile: &Profile, points: &Points, wrong: &mut Vec<String>, seed: u64) {
+    let places: Vec<Place> = profile.places().into_iter().map(|(_, place)| place).collect();
+    // Rounding of coordinates, magnified by bisectors of points that lie near each other; µm.
+    let tolerance = 1e-12 * 1e3 * profile.radius_mm + 1e-9;
+    for reference in [Reference::MinimumZone, Reference::MaximumInscribed, Reference::MinimumCircumscribed] {
+        let circle = points.reference(reference);
+        let found = circle.map(|circle| match reference {
+            Reference::MinimumZone => points.values(&circle).ront_um,
+            _ => 1e3 * profile.radius_mm + circle.deviation_um,
+        });
+        let expected = match reference {
+            Reference::MinimumZone => zone(&places),
+            Reference::MaximumInscribed => inscribed(&places, tolerance),
+            _ => circumscribed(&places),
+        };
+        if found.is_none_or(|found| (found - expected).abs() > tolerance) {
+            let (kind, count) = (profile.kind, places.len());
+            let found = found.map(|found| found - expected);
+            wrong.push(format!("{seed} ({kind}, {count}), {}: {found:?} off {expected}", reference.symbol()));
+        }
+    }
+}
+
+#[test]
+fn small_profiles_have_no_better_circle() {
+    let mut wrong = Vec::new();
+    for seed in 0..800 {
+        let profile = profile(seed, 4..=12);
+        if profile.places().len() > 3 {
+            compare(&profile, &profile.points(), &mut wrong, seed);
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong, such as\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n"));
+}
+
+#[test]
+fn plots_have_the_smallest_circle_and_no_better_one_than_all_subsets() {
+    let mut wrong = Vec::new();
+    let (mut best, mut all) = ([0; 2], [0; 2]);
+    for seed in 0..400 {
+        let plot = crate::contact::plot(seed);
+        let places: Vec<Place> = plot.places().into_iter().map(|(_, place)| place).collect();
+        let points = plot.points();
+        // Rounding relative to the plot's size, magnified by bisectors of points that lie near each other.
+        let tolerance = 1e-9 * points.radius_um();
+        let radius = |reference| points.reference(reference).map(|circle| points.radius_um() + circle.deviation_um);
+        if radius(Reference::MinimumCircumscribed)
+            .is_none_or(|found| (found - circumscribed(&places)).abs() > tolerance)
+        {
+            wrong.push(format!("{seed}: MCCI"));
+        }
+        // The others may be a local optimum: never better than the best of all, and mostly the best.
+        let zone =
+            points.reference(Reference::MinimumZone).map(|circle| points.values(&circle).ront_um - zone(&places));
+        let inscribed = radius(Reference::MaximumInscribed).map(|found| inscribed(&places, tolerance) - found);
+        for (kind, off) in [zone, inscribed].into_iter().enumerate().filter_map(|(kind, off)| Some((kind, off?))) {
+            all[kind] += 1;
+            best[kind] += usize::from(off <= tolerance);
+            if off < -tolerance {
+                wrong.push(format!("{seed}: {kind} better than all by {off}"));
+            }
+        }
+    }
+    println!("MZCI, MICI: the best of all in {best:?} of {all:?} plots with deviations of a third of the radius");
+    assert!(wrong.is_empty(), "{} wrong, such as {:?}", wrong.len(), &wrong[..wrong.len().min(20)]);
+    assert!((0..2).all(|kind| 2 * best[kind] > all[kind]), "{best:?} of {all:?}");
+}
