@@ -1,5 +1,7 @@
 //! The standards' values of a separated form.
 
+pub mod areal;
+pub mod parameter;
 pub mod roundness;
 pub mod straightness;
 pub mod texture;

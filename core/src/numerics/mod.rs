@@ -1,5 +1,7 @@
 //! Numerical tools that know nothing of rigs.
 
+pub mod filter;
 pub mod fourier;
+pub mod height_map;
 pub mod lanes;
 pub mod least_squares;
