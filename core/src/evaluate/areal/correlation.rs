@@ -70,7 +70,9 @@ pub(super) fn correlate(map: &HeightMap, heights: &[f64], mut visit: impl FnMut(
                 }
             }
         }
-        block.iter_mut().for_each(|bin| *bin = bin.norm_sqr().into());
+        for bin in &mut *block {
+            *bin = bin.norm_sqr().into();
+        }
         up.process_with_scratch(block, &mut column_scratch);
         for (row, line) in spectrum.chunks_exact_mut(bins).enumerate() {
             for (index, bin) in line[first..first + together].iter_mut().enumerate() {
@@ -89,7 +91,9 @@ pub(super) fn correlate(map: &HeightMap, heights: &[f64], mut visit: impl FnMut(
         let _ = inverse.process_with_scratch(line, target, &mut scratch[..inverse.get_scratch_len()]);
     }
     let scale = (width as f64 * height as f64).recip();
-    values.iter_mut().for_each(|value| *value *= scale);
+    for value in &mut values {
+        *value *= scale;
+    }
     Correlation { values, width }
 }
 
@@ -97,7 +101,7 @@ pub(super) fn correlate(map: &HeightMap, heights: &[f64], mut visit: impl FnMut(
 fn lines(column: &[Complex64], rows: usize, across: usize) -> impl Iterator<Item = Line> + '_ {
     (0..rows).filter(move |along| 2 * along != rows).map(move |along| Line {
         across,
-        along: if 2 * along < rows { along as isize } else { along as isize - rows as isize },
+        along: if 2 * along < rows { along.cast_signed() } else { along.cast_signed() - rows.cast_signed() },
         amplitude: column[2 * along].norm_sqr().sqrt(),
     })
 }

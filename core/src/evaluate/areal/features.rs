@@ -93,53 +93,69 @@ impl<'a> Relief<'a> {
 
     /// Steps to the eight neighbours.
     fn neighbours(&self) -> [isize; 8] {
-        let stride = self.stride as isize;
+        let stride = self.stride.cast_signed();
         [-stride - 1, -stride, -stride + 1, -1, 1, stride - 1, stride, stride + 1]
     }
 
-    /// Measured points, not the frame.
-    fn points(&self) -> impl Iterator<Item = usize> + '_ {
-        let columns = self.map.columns();
-        let rows = (1..=self.map.rows()).map(move |row| row * self.stride);
-        rows.flat_map(move |start| start + 1..=start + columns).filter(|point| self.heights[*point].is_finite())
+    /// Points of each row of the map, as indices into the frame.
+    fn rows(&self) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
+        let (stride, columns) = (self.stride, self.map.columns());
+        (1..=self.map.rows()).map(move |row| row * stride + 1..row * stride + 1 + columns)
     }
 
-    /// A point of the frame is one of the other side.
-    fn real(&self, point: usize) -> usize {
-        match point % self.stride {
-            0 => point + self.stride - 2,
-            column if column == self.stride - 1 => point - (self.stride - 2),
-            _ => point,
-        }
-    }
-
-    /// Basins: each point runs down to its lowest neighbour until there is none. Points are labelled from 1, the frame
-    /// and gaps by 0; for each label its pit.
-    fn basins(&self) -> (Vec<u32>, Vec<usize>) {
+    /// Where each point runs down to: its lowest neighbour, or itself in a pit.
+    fn descent(&self) -> Vec<u32> {
         let steps = self.neighbours();
+        let mut down: Vec<u32> = (0..self.heights.len() as u32).collect();
+        let (mut lowest, mut way) = (vec![0.0; self.map.columns()], vec![0.0; self.map.columns()]);
+        for row in self.rows() {
+            lowest.copy_from_slice(&self.heights[row.clone()]);
+            way.fill(0.0);
+            // One direction after the other along the row, without branches, so that vector registers serve.
+            for step in steps {
+                let beside = &self.heights[row.start.wrapping_add_signed(step)..][..lowest.len()];
+                for ((lowest, way), height) in lowest.iter_mut().zip(&mut way).zip(beside) {
+                    let lower = height < lowest;
+                    *lowest = if lower { *height } else { *lowest };
+                    *way = if lower { step as f64 } else { *way };
+                }
+            }
+            for (point, way) in row.clone().zip(&way) {
+                down[point] = point.wrapping_add_signed(*way as isize) as u32;
+            }
+            // What lies in the frame is the point on the other side.
+            let turn = (self.stride - 2) as u32;
+            let [first, last] = [row.start, row.end - 1];
+            if (down[first] as usize).is_multiple_of(self.stride) {
+                down[first] += turn;
+            }
+            if down[last] as usize % self.stride == self.stride - 1 {
+                down[last] -= turn;
+            }
+        }
+        down
+    }
+
+    /// Basins: points that run down to the same pit. Points are labelled from 1, walls by 0; for each label its pit.
+    fn basins(&self) -> (Vec<u32>, Vec<usize>) {
+        let down = self.descent();
         let mut labels = vec![0_u32; self.heights.len()];
         let mut pits = vec![0];
         let mut path = Vec::new();
-        for start in self.points() {
+        for start in self.rows().flatten() {
+            if labels[start] != 0 || self.heights[start] == f64::INFINITY {
+                continue;
+            }
             let mut point = start;
-            let label = loop {
-                if labels[point] != 0 {
-                    break labels[point];
-                }
+            while labels[point] == 0 && down[point] as usize != point {
                 path.push(point);
-                let (mut lowest, mut height) = (point, self.heights[point]);
-                for step in steps {
-                    let neighbour = point.wrapping_add_signed(step);
-                    if self.heights[neighbour] < height {
-                        (lowest, height) = (neighbour, self.heights[neighbour]);
-                    }
-                }
-                if lowest == point {
-                    pits.push(point);
-                    break (pits.len() - 1) as u32;
-                }
-                point = self.real(lowest);
-            };
+                point = down[point] as usize;
+            }
+            if labels[point] == 0 {
+                labels[point] = pits.len() as u32;
+                pits.push(point);
+            }
+            let label = labels[point];
             path.drain(..).for_each(|point| labels[point] = label);
         }
         if self.map.closed() {
@@ -159,48 +175,44 @@ impl<'a> Relief<'a> {
         let (labels, pits) = self.basins();
         let steps = self.neighbours();
         let mut edge = vec![false; pits.len()];
-        let mut saddles: Vec<(f64, usize)> = Vec::new();
-        for point in self.points() {
+        let mut saddles: Vec<(f64, u32, u32)> = Vec::new();
+        for point in self.rows().flatten() {
             let (label, height) = (labels[point], self.heights[point]);
-            let (mut wall, mut border) = (false, false);
+            if label == 0 {
+                continue;
+            }
+            // A point is the saddle to the lower neighbours that run elsewhere.
+            let mut last = label;
             for step in steps {
                 let neighbour = point.wrapping_add_signed(step);
-                wall |= labels[neighbour] == 0;
-                border |= labels[neighbour] != label && self.heights[neighbour] <= height;
-            }
-            edge[label as usize] |= wall;
-            if border {
-                saddles.push((height, point));
+                let other = labels[neighbour];
+                if other == last || other == label {
+                    continue;
+                }
+                if other == 0 {
+                    edge[label as usize] = true;
+                } else if self.heights[neighbour] <= height {
+                    saddles.push((height, label, other));
+                    last = other;
+                }
             }
         }
-        saddles.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let depth = |label: usize| self.heights[pits[label]];
+        saddles.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let depths: Vec<f64> = pits.iter().map(|pit| self.heights[*pit]).collect();
         // Parts that are connected below the water; and what of them is one dale. A root is the label of the lowest pit.
         let (mut parts, mut dales) = (Sets::new(pits.len()), Sets::new(pits.len()));
-        for (height, point) in saddles {
-            for step in steps {
-                let neighbour = point.wrapping_add_signed(step);
-                let [a, b] = [labels[point], labels[neighbour]].map(|label| label as usize);
-                if a == b || b == 0 || self.heights[neighbour] > height {
-                    continue;
-                }
-                let [one, other] = [parts.root(a), parts.root(b)];
-                if one == other {
-                    continue;
-                }
-                let (deep, shallow) = if depth(one) <= depth(other) { (one, other) } else { (other, one) };
-                parts.join(deep, shallow);
-                if height - depth(shallow) < pruning {
-                    let [one, other] = [dales.root(a), dales.root(b)];
-                    let (deep, shallow) = if depth(one) <= depth(other) { (one, other) } else { (other, one) };
-                    dales.join(deep, shallow);
-                    edge[deep] |= edge[shallow];
-                }
+        for (height, a, b) in saddles {
+            let (a, b) = (a as usize, b as usize);
+            let Some((_, shallow)) = parts.join(a, b, &depths) else { continue };
+            if height - depths[shallow] < pruning
+                && let Some((deep, shallow)) = dales.join(a, b, &depths)
+            {
+                edge[deep] |= edge[shallow];
             }
         }
         (1..pits.len())
             .filter(|label| dales.root(*label) == *label && !edge[*label])
-            .map(|label| Extreme { depth: depth(label), curvature: self.curvature(pits[label]) })
+            .map(|label| Extreme { depth: depths[label], curvature: self.curvature(pits[label]) })
             .collect()
     }
 
@@ -231,8 +243,12 @@ impl Sets {
         label
     }
 
-    /// The root of the first set becomes that of both.
-    fn join(&mut self, root: usize, other: usize) {
-        self.0[other] = root as u32;
+    /// Joins the sets of two labels; the root of the deeper one becomes that of both. Deep and shallow root, where they
+    /// were two.
+    fn join(&mut self, a: usize, b: usize, depths: &[f64]) -> Option<(usize, usize)> {
+        let [a, b] = [self.root(a), self.root(b)];
+        let (deep, shallow) = if depths[a] <= depths[b] { (a, b) } else { (b, a) };
+        self.0[shallow] = deep as u32;
+        (a != b).then_some((deep, shallow))
     }
 }

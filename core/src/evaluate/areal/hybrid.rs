@@ -34,7 +34,7 @@ fn gradient(map: &HeightMap) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for row in 3..rows.saturating_sub(3) {
         let ring = |step: isize| &map.heights_um()[row.saturating_add_signed(step) * columns..][..columns];
-        let rings: [&[f64]; 7] = std::array::from_fn(|index| ring(index as isize - 3));
+        let rings: [&[f64]; 7] = std::array::from_fn(|index| ring(index.cast_signed() - 3));
         let here = rings[3];
         let mut add = |column: usize, dx: f64| {
             let slope = across * dx;
@@ -50,7 +50,7 @@ fn gradient(map: &HeightMap) -> f64 {
         }
         if map.closed() {
             for column in (0..3.min(columns)).chain(columns.saturating_sub(3).max(3)..columns) {
-                let beside = |step: isize| (column as isize + step).rem_euclid(columns as isize) as usize;
+                let beside = |step: isize| (column.cast_signed() + step).rem_euclid(columns.cast_signed()) as usize;
                 add(column, derivative(|step| here[beside(step)]));
             }
         }
@@ -63,18 +63,14 @@ fn developed(map: &HeightMap) -> f64 {
     let columns = map.columns();
     let [across, along] = [map.dx_mm(), map.dy_mm()].map(|distance| 1e-3 / distance);
     let (mut sum, mut count) = (0.0, 0_usize);
-    // √(1 + s) − 1 without cancellation, since slopes are small.
-    let excess = |p: f64, q: f64| {
-        let square = p * p + q * q;
-        square / (1.0 + (1.0 + square).sqrt())
-    };
+    let area = |p: f64, q: f64| (1.0 + p * p + q * q).sqrt();
     let mut rows = map.heights_um().chunks_exact(columns);
     let Some(mut lower) = rows.next() else { return f64::NAN };
     for upper in rows {
         let mut add = |left: usize, right: usize| {
             let [p0, p1] = [lower, upper].map(|row| across * (row[right] - row[left]));
             let [q0, q1] = [left, right].map(|column| along * (upper[column] - lower[column]));
-            let cell = 0.25 * (excess(p0, q0) + excess(p0, q1) + excess(p1, q0) + excess(p1, q1));
+            let cell = 0.25 * (area(p0, q0) + area(p0, q1) + area(p1, q0) + area(p1, q1)) - 1.0;
             if cell.is_finite() {
                 sum += cell;
                 count += 1;

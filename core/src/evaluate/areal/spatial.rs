@@ -95,17 +95,21 @@ impl<'a> Decay<'a> {
         let inside = self.map.closed() || across.unsigned_abs() < self.map.columns();
         let row = along.unsigned_abs();
         (inside && row < self.map.rows())
-            .then(|| self.values[row * self.width + across.rem_euclid(self.width as isize) as usize])
+            .then(|| self.values[row * self.width + across.rem_euclid(self.width.cast_signed()) as usize])
     }
 
     /// Shortest and longest lag at which the level is reached, in mm. The shortest is NaN where it is never reached; the
     /// longest where the region reaches the end of the map, or goes all the way round.
     fn lengths(&self) -> [f64; 2] {
+        // A flat map has no autocorrelation.
+        if self.level <= 0.0 {
+            return [f64::NAN; 2];
+        }
         let mut seen = vec![false; self.values.len()];
         let mut open = vec![(0_isize, 0_isize)];
         seen[0] = true;
         let (mut shortest, mut longest) = (f64::INFINITY, 0.0_f64);
-        let furthest = if self.map.closed() { self.width as isize / 2 } else { self.width as isize };
+        let furthest = if self.map.closed() { self.width.cast_signed() / 2 } else { self.width.cast_signed() };
         let mut contained = true;
         while let Some((across, along)) = open.pop() {
             let here = self.at(across, along).unwrap_or(f64::NAN);
@@ -127,7 +131,7 @@ impl<'a> Decay<'a> {
                 if y < 0 {
                     (x, y) = (-x, -y);
                 }
-                let place = y.unsigned_abs() * self.width + x.rem_euclid(self.width as isize) as usize;
+                let place = y.unsigned_abs() * self.width + x.rem_euclid(self.width.cast_signed()) as usize;
                 if !std::mem::replace(&mut seen[place], true) {
                     open.push((x, y));
                 }

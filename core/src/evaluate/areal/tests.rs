@@ -147,8 +147,8 @@ fn missing_points_are_left_out_of_every_value() {
     assert_eq!(some.points + some.missing, 80_000);
     assert_eq!(some.missing, gapped.missing());
     for (a, b) in all.parameters().into_iter().zip(some.parameters()) {
-        // 3.5 % of the points are gone; hills and dales at the gaps are incomplete, and here all are.
-        if !a.clause.starts_with('5') && a.value.is_finite() && a.value != 0.0 {
+        // 3.5 % of the points are gone; hills and dales at the gaps are incomplete, and nearly all are. Ssk is 0 here.
+        if !a.clause.starts_with('5') && a.value.abs() > 1e-9 {
             assert!((b.value / a.value - 1.0).abs() < 0.06, "{}: {} and {}", a.symbol, a.value, b.value);
         }
     }

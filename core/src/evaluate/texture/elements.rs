@@ -106,12 +106,11 @@ fn sides(points: &[(f64, f64)]) -> Vec<Side> {
     let mut before: Option<(f64, f64)> = None;
     for &(position, height) in points {
         let above = height > 0.0;
-        match sides.last_mut().filter(|side| side.above == above) {
-            Some(side) => side.height = side.height.max(height.abs()),
-            None => {
-                let start = before.map_or(position, |(left, from)| left + (position - left) * from / (from - height));
-                sides.push(Side { start, width: 0.0, above, height: height.abs() });
-            }
+        if let Some(side) = sides.last_mut().filter(|side| side.above == above) {
+            side.height = side.height.max(height.abs());
+        } else {
+            let start = before.map_or(position, |(left, from)| left + (position - left) * from / (from - height));
+            sides.push(Side { start, width: 0.0, above, height: height.abs() });
         }
         before = Some((position, height));
     }

@@ -105,7 +105,8 @@ impl<'a> Profile<'a> {
         let spacing_um = 1e3 * (self.positions_mm[1] - self.positions_mm[0]);
         let points = if self.turn_mm.is_some() { 0..count } else { 3..count - 3 };
         let squares = points.filter_map(|point| {
-            let at = |step: isize| self.heights_um[(point as isize + step).rem_euclid(count as isize) as usize];
+            let at =
+                |step: isize| self.heights_um[(point.cast_signed() + step).rem_euclid(count.cast_signed()) as usize];
             let square = (derivative(at) / spacing_um).powi(2);
             square.is_finite().then_some(square)
         });

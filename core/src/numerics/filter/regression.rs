@@ -61,7 +61,9 @@ impl Smoother {
 
     fn new(mut positions: Vec<f64>, period: Option<f64>, cutoff: f64, degree: Degree) -> Self {
         let width = degree.width() * cutoff;
-        positions.iter_mut().for_each(|position| *position /= width);
+        for position in &mut positions {
+            *position /= width;
+        }
         let count = positions.len();
         let spacing = match (positions.first(), positions.last(), period) {
             (_, _, Some(period)) => period / width / count as f64,
