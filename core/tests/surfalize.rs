@@ -1,5 +1,7 @@
 //! Areal and profile values beside those of surfalize (PyPI), from a file that it wrote: `surfalize/write.py`.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use std::collections::BTreeMap;
 
 use runout_core::evaluate::{
