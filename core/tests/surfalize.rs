@@ -88,9 +88,10 @@ fn profile_values_are_those_of_surfalize() {
     let golden = Golden::read();
     let map = golden.map();
     let profile = &map.heights_um()[..map.columns()];
-    let positions: Vec<f64> = (0..map.columns()).map(|column| column as f64 * map.dx_mm()).collect();
-    // Five sections, as its default has it.
-    let found = texture::along(&positions, profile, &texture::Settings::default());
+    // Five sections, as its default has it. It parts them by points, 24 each, runout by length: along an open line of 119
+    // distances that is another parting, around a closed one of 120 the same.
+    let radius_mm = map.columns() as f64 * map.dx_mm() / std::f64::consts::TAU;
+    let found = texture::around(profile, radius_mm, &texture::Settings::default());
     assert_eq!(found.sections, 5);
     for one in found.parameters() {
         match one.symbol {
