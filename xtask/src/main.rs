@@ -1,5 +1,6 @@
 //! Chores of this repository: set-up, demo, tests, schemas. It needs nothing but Rust, so that it can bring the rest.
 
+mod areal;
 mod bench;
 mod chores;
 mod foreign;
@@ -22,6 +23,8 @@ cargo xtask COMMAND
                 time a campaign of 98 million samples beside the same work in NumPy and SciPy; 1.6 GB in target/bench
   bench-roundness
                 time reference circles of 2560 and 36 000 points beside SciPy and others
+  areal-peers [RINGS POINTS ROUNDS]
+                print areal and profile values of one surface beside surfalize's, with both times
 
 Every command does the set-up it needs first.
 ";
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1")),
         ["test", "--ci"] => chores::test(true),
         ["schemas"] => chores::schemas(),
+        ["areal-peers", ref rest @ ..] => areal::peers(rest),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
         ["bench-roundness"] => bench::roundness(),
         ["studies", ref arguments @ ..] => chores::studies(arguments),

@@ -1,6 +1,8 @@
 //! The standards' values of a separated form.
 
+pub mod areal;
 pub mod cylindricity;
+pub mod parameter;
 pub mod roundness;
 pub mod straightness;
 pub mod texture;

@@ -2,6 +2,8 @@
 
 pub mod chebyshev;
 pub mod cloud;
+pub mod filter;
 pub mod fourier;
+pub mod height_map;
 pub mod lanes;
 pub mod least_squares;

@@ -1,0 +1,103 @@
+use std::f64::consts::{PI, TAU};
+
+use super::*;
+
+#[test]
+fn ra_of_a_cosine_is_its_amplitude_times_two_over_pi() {
+    let profile: Vec<f64> =
+        (0..36_000).map(|index| 3.0 + 2.0 * (TAU * 7.0 * f64::from(index) / 36_000.0).cos()).collect();
+    // 1e-6: the rectangle rule on |cos| with 36 000 points.
+    assert!((ra_um(&profile) - 4.0 / PI).abs() < 1e-6);
+}
+
+/// A turn of 100 mm: waves of 10 mm (1 µm) under waves of 0.5 mm (0.2 µm).
+fn turn(points: usize) -> Vec<f64> {
+    let wave = |count: f64, point: usize| (TAU * count * point as f64 / points as f64 + 0.2).sin();
+    (0..points).map(|point| wave(10.0, point) + 0.2 * wave(200.0, point)).collect()
+}
+
+#[test]
+fn a_sine_around_a_part_has_its_closed_forms() {
+    let settings = Settings { lambda_c_mm: Some(2.5), ..Settings::default() };
+    let found = around(&turn(8000), 100.0 / TAU, &settings);
+    // What a high-pass of 2.5 mm passes of 0.5 mm and 10 mm waves: 1 − 2^−25 and 1 − 2^−(1/16).
+    let (short, long) = (0.2 * (1.0 - (-25_f64).exp2()), 1.0 - (-1.0 / 16.0_f64).exp2());
+    let rq = (0.5 * (short * short + long * long)).sqrt();
+    assert!((found.rq - rq).abs() < 1e-6, "Rq {} instead of {rq}", found.rq);
+    assert_eq!((found.points, found.missing, found.sections), (8000, 0, 40));
+    // Each section holds five waves of 0.5 mm, sampled 40 times: its extremes are those of both waves together, within
+    // the sampling's (π/40)²/2 and what the long wave bends.
+    let section_peak = found.rp - short;
+    assert!(section_peak.abs() < long, "Rp {} for {short}", found.rp);
+    assert!((found.rt - 2.0 * (short + long)).abs() < 0.01, "Rt {}", found.rt);
+    let slope = TAU * (0.5 * ((short / 500.0).powi(2) + (long / 1e4).powi(2))).sqrt();
+    // Differences over seven points have an error of order (step)⁶: 40 points a wave leave 1e-6 of the slope.
+    assert!((found.rdq / slope - 1.0).abs() < 1e-5, "Rdq {} instead of {slope}", found.rdq);
+    assert!((found.rsm_mm - 0.5).abs() < 1e-3, "Rsm {}", found.rsm_mm);
+}
+
+#[test]
+fn filters_take_the_wavelengths_they_are_asked_to() {
+    let rq = |settings: Settings| around(&turn(8000), 100.0 / TAU, &settings).rq;
+    let amplitude = |short: f64, long: f64| (0.5 * (0.04 * short * short + long * long)).sqrt();
+    let none = Settings::default();
+    assert!((rq(none) - amplitude(1.0, 1.0)).abs() < 1e-9);
+    // At the cut-off, half.
+    assert!((rq(Settings { lambda_s_mm: Some(0.5), ..none }) - amplitude(0.5, (-1.0_f64 / 400.0).exp2())).abs() < 1e-5);
+    assert!((rq(Settings { lambda_c_mm: Some(10.0), ..none }) - amplitude(1.0, 0.5)).abs() < 1e-5);
+}
+
+#[test]
+fn small_hills_are_part_of_a_dale() {
+    // 20 waves of 1 mm; in each dale a hill of 0.05 µm that crosses the mean line, in each hill a dent that does.
+    let wave = |z: f64| {
+        (TAU * z).sin() + 1.02 * (-((z - 0.75) / 0.02).powi(2)).exp() - 1.02 * (-((z - 0.25) / 0.02).powi(2)).exp()
+    };
+    let positions: Vec<f64> = (0..=4000).map(|point| f64::from(point) * 0.005).collect();
+    let profile: Vec<f64> = positions.iter().map(|z| wave(z.fract())).collect();
+    let settings = Settings { section_mm: Some(2.0), ..Settings::default() };
+    let found = along(&positions, &profile, &settings);
+    assert!((found.rsm_mm - 1.0).abs() < 1e-3, "Rsm {}", found.rsm_mm);
+    assert_eq!(found.sections, 10);
+    // Where the crossings are real ones, they count.
+    let taller: Vec<f64> = positions
+        .iter()
+        .zip(&profile)
+        .map(|(z, height)| {
+            let bump = |at: f64| (-((z.fract() - at) / 0.02).powi(2)).exp();
+            height + 0.5 * bump(0.75) - 0.5 * bump(0.25)
+        })
+        .collect();
+    assert!(along(&positions, &taller, &settings).rsm_mm < 0.4);
+}
+
+#[test]
+fn uneven_spacings_weigh_what_they_stand_for() {
+    // A ramp from 0 to 1 mm: Ra = 1/4, Rq = 1/√12 of its height, on points twice as dense in the first half.
+    let positions: Vec<f64> = (0..4000)
+        .map(|point| f64::from(point) / 8000.0)
+        .chain((0..=2000).map(|point| 0.5 + f64::from(point) / 4000.0))
+        .collect();
+    let found = along(&positions, &positions, &Settings::default());
+    // 1e-3: the ends' cells, 1/8000 and 1/4000.
+    assert!((found.ra - 0.25).abs() < 1e-3 && (found.rq - 12_f64.sqrt().recip()).abs() < 1e-3, "{found:?}");
+    assert!(found.rdq.is_nan());
+}
+
+#[test]
+fn missing_points_are_left_out_and_counted() {
+    let whole = turn(8000);
+    let mut gapped = whole.clone();
+    gapped[1000..1400].fill(f64::NAN);
+    gapped[7990..].fill(f64::NAN);
+    let settings = Settings { lambda_c_mm: Some(2.5), ..Settings::default() };
+    let (all, some) = (around(&whole, 100.0 / TAU, &settings), around(&gapped, 100.0 / TAU, &settings));
+    assert_eq!((some.points, some.missing), (7590, 410));
+    // The gap leaves some ten of 200 waves out, and bends the mean line at its edges.
+    for (a, b) in [(all.ra, some.ra), (all.rq, some.rq), (all.rz, some.rz), (all.rsm_mm, some.rsm_mm)] {
+        assert!((a / b - 1.0).abs() < 0.05, "{all:?}\n{some:?}");
+    }
+    let nothing = around(&[f64::NAN; 100], 10.0, &settings);
+    assert!(nothing.ra.is_nan() && nothing.rz.is_nan() && nothing.rt.is_nan() && nothing.rsm_mm.is_nan());
+    assert!(along(&[], &[], &settings).rq.is_nan() && along(&[1.0], &[2.0], &settings).rsm_mm.is_nan());
+}

@@ -1,0 +1,53 @@
+//! The robust Gaussian regression filter (ISO 16610-31).
+
+use super::Smoother;
+
+/// c over the median |z − w|: the biweight's limit at three standard deviations of normal noise (ISO 16610-31).
+const LIMIT: f64 = 4.4478;
+/// The iteration ends when the limit moves by less than this share.
+const SETTLED: f64 = 1e-4;
+/// Iterations at most; ordinary profiles need 5 to 15.
+const MOST_ITERATIONS: usize = 50;
+
+/// What a robust filter makes of a profile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robust {
+    /// The waviness; NaN where the profile is.
+    pub low_pass: Vec<f64>,
+    /// Say of each point, 0 (a scratch) to 1.
+    pub weights: Vec<f64>,
+    /// Iterations made.
+    pub iterations: usize,
+    /// Whether the limit came to rest.
+    pub settled: bool,
+}
+
+/// The robust Gaussian filter (ISO 16610-31): a Gaussian regression is repeated with Tukey's biweight
+/// δ = (1 − (r/c)²)² for |r| ≤ c and 0 beyond, of r = z − w with c = 4.4478 median |r|.
+///
+/// The standard takes a smoother of [`Degree::Two`](super::Degree::Two).
+#[must_use]
+pub fn robust_gaussian(smoother: &Smoother, profile: &[f64]) -> Robust {
+    let mut weights = vec![1.0; profile.len()];
+    let mut low_pass = smoother.low_pass(profile, None);
+    let mut previous = f64::INFINITY;
+    for iterations in 1..=MOST_ITERATIONS {
+        let residual = || profile.iter().zip(&low_pass).map(|(value, waviness)| (value - waviness).abs());
+        let limit = LIMIT * median(residual().filter(|value| value.is_finite()).collect());
+        // Half of the points lie on the waviness: there is nothing left to weigh by.
+        if limit == 0.0 || !limit.is_finite() || (limit - previous).abs() <= SETTLED * limit {
+            return Robust { low_pass, weights, iterations, settled: true };
+        }
+        for (weight, residual) in weights.iter_mut().zip(residual()) {
+            *weight = if residual < limit { (1.0 - (residual / limit).powi(2)).powi(2) } else { 0.0 };
+        }
+        low_pass = smoother.low_pass(profile, Some(&weights));
+        previous = limit;
+    }
+    Robust { low_pass, weights, iterations: MOST_ITERATIONS, settled: false }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
