@@ -36,5 +36,5 @@ fn what_it_cannot_do_is_said() {
     let ran = folder.run(&["diagnose", "pipeline.toml", "--set", "diagnose.path=r-test.csv"]);
     assert!(ran.status == 1 && ran.stderr.contains("it is what the run reads"), "{}", ran.stderr);
     let ran = folder.run(&["diagnose", "pipeline.toml", "--set", "diagnose.effects=[\"harmonics-2\"]"]);
-    assert!(ran.status == 1 && ran.stderr.contains("did you mean `harmonic-2`"), "{}", ran.stderr);
+    assert!(ran.status == 2 && ran.stderr.contains("did you mean `harmonic-2`"), "{}", ran.stderr);
 }
