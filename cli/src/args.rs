@@ -67,6 +67,11 @@ pub struct RunArgs {
     /// Stations worked on at a time; as many as there are processors without it.
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
+    /// End with exit status 1 unless every value under a [[limit]] is proven to keep it: its 95 % interval lies within (ISO
+    /// 14253-1). A value without uncertainty, and a limit that names no value, prove nothing. Files and the summary are
+    /// written all the same. Without any [[limit]] that is a mistake (exit status 2).
+    #[arg(long)]
+    pub fail_on_limit: bool,
 }
 
 /// `runout compare`.

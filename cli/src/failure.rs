@@ -26,6 +26,8 @@ pub enum Failure {
     Configuration(ConfigError),
     /// The data or the work failed.
     Work(Error),
+    /// Limits that are not proven to be kept, after a result that has been shown.
+    Limit(Vec<String>),
     /// Standard output cannot be written to.
     Output(io::Error),
 }
@@ -64,13 +66,14 @@ impl Failure {
     /// Shows it on stderr, with `json` also as a document on stdout, and gives its exit status.
     pub fn report(&self, json: bool) -> ExitCode {
         render::to_stderr(&self.text());
-        if json {
+        // The result itself is the one document then.
+        if json && !matches!(self, Self::Limit(_)) {
             // When stdout cannot be written to either, the exit status has to tell.
             let _ = render::document(&json!({ "error": self.document() }));
         }
         ExitCode::from(match self {
             Self::CommandLine(_) | Self::Name { .. } | Self::Configuration(_) => 2,
-            Self::Work(_) | Self::Output(_) => 1,
+            Self::Work(_) | Self::Limit(_) | Self::Output(_) => 1,
         })
     }
 
@@ -83,6 +86,7 @@ impl Failure {
             Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
                 plain(&error.to_string(), error.advice())
             }
+            Self::Limit(open) => plain(&format!("not proven to be kept: {}", open.join("; ")), None),
             Self::Output(error) => plain(&format!("cannot write to stdout: {error}"), None),
         }
     }
@@ -109,6 +113,7 @@ impl Failure {
             Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
                 json!({ "message": error.to_string(), "help": error.advice() })
             }
+            Self::Limit(open) => json!({ "message": "not proven to be kept", "limits": open }),
             Self::Output(error) => json!({ "message": error.to_string() }),
         }
     }

@@ -98,6 +98,9 @@ const STAGES: &str = r#"
     samples_per_rev = 4096
     [separate]
     plugin = "harmonic-least-squares"
+    # Cylindricity needs all sections at a time.
+    [evaluate]
+    values = ["roundness", "texture"]
 "#;
 
 /// Samples of one station: 2 setups, 4 sensors, 6 turns of 4096, in f64.
@@ -105,7 +108,7 @@ const STATION_BYTES: usize = 2 * 4 * 6 * 4096 * 8;
 const FEW: usize = 16;
 const MANY: usize = 48;
 /// What a station may leave behind: its lines in the summary and in the tables' indices, as values, then as text.
-const LEFT_BYTES: usize = 24 * 1024;
+const LEFT_BYTES: usize = 64 * 1024;
 
 fn registry() -> Registry {
     let mut registry = Registry::default();
@@ -173,7 +176,7 @@ fn peak_memory_does_not_grow_with_stations() {
     let grown = many.counted.saturating_sub(few.counted);
     assert!(grown < more * LEFT_BYTES, "{grown} bytes more with {more} stations more");
     // A station's samples are far more than what it may leave; else this would show nothing.
-    const { assert!(STATION_BYTES > 50 * LEFT_BYTES) };
+    const { assert!(STATION_BYTES > 20 * LEFT_BYTES) };
 
     if let (Some(few), Some(many)) = (few.resident, many.resident) {
         println!("resident: {few} bytes with {FEW} stations, {many} with {MANY}");

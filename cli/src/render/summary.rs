@@ -1,6 +1,7 @@
 //! What a run found, for people: `run`'s last words.
 
 mod straightness;
+mod values;
 
 use runout_core::{
     evaluate::Value,
@@ -36,6 +37,8 @@ pub fn text(summary: &Summary) -> String {
         if sections(stations).any(|(_, section)| section.form_std_um.is_some()) {
             page.line("  ± is the standard uncertainty: beside rms that of the form at any one angle");
         }
+        values::part(&mut page, summary);
+        values::limits(&mut page, summary);
         residual(&mut page, stations);
         motion_truth(&mut page, stations);
         lost_orders(&mut page, summary);
@@ -113,15 +116,14 @@ fn rejected(page: &mut Page, stations: &[StationSummary]) {
     page.bullets("Rejected turns", &shown);
 }
 
-/// Symbols of the values that any section has, in order of first appearance.
+/// Values of sections that are shown, each by the first one there is: unfiltered, about LSCI and the mean line unless the
+/// pipeline has others. All of them are in the files.
+const SHOWN: [&str; 2] = ["RONt", "Ra"];
+
+/// Symbols and units of the values shown that any section has.
 fn symbols(stations: &[StationSummary]) -> Vec<(String, String)> {
-    let mut found: Vec<(String, String)> = Vec::new();
-    for value in sections(stations).flat_map(|(_, section)| &section.values) {
-        if !found.iter().any(|(symbol, _)| *symbol == value.symbol) {
-            found.push((value.symbol.clone(), unit(&value.unit)));
-        }
-    }
-    found
+    let first = |symbol| sections(stations).find_map(|(_, section)| value_of(section, symbol));
+    SHOWN.into_iter().filter_map(first).map(|value| (value.symbol.clone(), unit(&value.unit))).collect()
 }
 
 fn unit(id: &str) -> String {

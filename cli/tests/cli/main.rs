@@ -11,3 +11,4 @@ mod other_rigs;
 mod safety;
 mod schemas;
 mod straightness;
+mod values;

@@ -11,25 +11,27 @@ pub mod uncertainty;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One value of one section.
+/// One value of a section, of a station or of the whole part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Value {
     /// The standard's symbol.
     pub symbol: String,
-    /// Its unit.
+    /// Its unit; empty for a number without one.
     pub unit: String,
     /// The number.
     pub value: f64,
     /// Standard and clause, or paper and equation.
     pub source: String,
-    /// Undulations per revolution over which it was computed, both ends included.
+    /// Undulations per revolution over which it was computed, both ends included; a filter's end is where half passes.
     pub band_upr: [usize; 2],
-    /// Orders of that band that the layout cannot tell: they are not in the value.
+    /// Orders that the layout cannot tell, of which the filter would pass a hundredth or more: they are not in the value.
     pub lost_orders: Vec<usize>,
     /// The filter applied.
     pub filter: String,
     /// What the profile was referred to.
     pub reference: String,
+    /// Share of the profile or surface that was there; gaps are left out.
+    pub coverage: f64,
     /// From the covariance of the separation; null where none is known.
     pub uncertainty: Option<uncertainty::Uncertainty>,
 }

@@ -30,11 +30,76 @@ pub struct Uncertainty {
     pub draws: usize,
 }
 
-/// The uncertainty of values of a profile, from the variance E|δ|² of its harmonics by order from 0; orders without a
-/// known variance, and those below 2, are taken as exact. `None` where no variance is known.
-///
-/// `form_um` lies on equal angles; `values` computes sizes (none below 0) from such a profile. The interval is 2v − (the draws' 97.5 % point)
-/// to 2v − (their 2.5 % point) for a value v: the error of v about the truth is that of a draw about v.
+/// Draws of the errors of a profile on equal angles.
+pub struct Errors {
+    amplitudes: Vec<f64>,
+    random: ChaCha8Rng,
+    /// The errors last drawn, before they are turned.
+    errors_um: Vec<f64>,
+    start: usize,
+    turn: usize,
+}
+
+impl Errors {
+    /// From the variance E|δ|² of the harmonics by order from 0; orders without a known variance, and those below
+    /// `lowest`, are taken as exact. `None` where no variance is known.
+    #[must_use]
+    pub fn new(variance: &[f64], lowest: usize, seed: u64) -> Option<Self> {
+        // A coefficient's real and imaginary part have half of its variance each; a level is real.
+        let share = |order: usize| if order == 0 { 1.0 } else { 0.5 };
+        let known = |order: usize, variance: f64| order >= lowest && variance.is_finite() && variance > 0.0;
+        let amplitude = |(order, variance): (usize, &f64)| {
+            if known(order, *variance) { (share(order) * variance).sqrt() } else { 0.0 }
+        };
+        let amplitudes: Vec<f64> = variance.iter().enumerate().map(amplitude).collect();
+        let some = amplitudes.iter().any(|amplitude| *amplitude > 0.0);
+        let random = ChaCha8Rng::seed_from_u64(seed);
+        some.then(|| Self { amplitudes, random, errors_um: Vec::new(), start: 0, turn: 0 })
+    }
+
+    /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
+    pub fn draw(&mut self, fourier: &mut Fourier, form_um: &[f64], drawn: &mut Vec<f64>) {
+        let length = fourier.length();
+        if self.turn == 0 {
+            let mut part = |amplitude: f64| -> f64 {
+                let normal: f64 = StandardNormal.sample(&mut self.random);
+                amplitude * normal
+            };
+            let harmonics: Vec<Complex64> =
+                self.amplitudes.iter().map(|amplitude| Complex64::new(part(*amplitude), part(*amplitude))).collect();
+            self.errors_um.clear();
+            self.errors_um.extend_from_slice(fourier.synthesise(harmonics));
+            self.start = self.random.random_range(0..length);
+        }
+        let (head, tail) = self.errors_um.split_at((self.start + self.turn * length / TURNS_OF_A_DRAW) % length);
+        self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
+        drawn.clear();
+        drawn.extend(form_um.iter().zip(tail.iter().chain(head)).map(|(form, error)| form + error));
+    }
+}
+
+/// Values with their uncertainty: `draw` computes them once from what was found (given false) and then `draws` times from
+/// what was drawn (given true), always the same ones in the same order. The interval is 2v − (the draws' 97.5 % point) to
+/// 2v − (their 2.5 % point) for a value v: the error of v about the truth is that of a draw about v. It ends at 0 for a
+/// value that no draw has below 0. A value that is not a number, or not in every draw, has no uncertainty.
+pub fn monte_carlo_of(draws: usize, mut draw: impl FnMut(bool, &mut Vec<f64>)) -> Vec<(f64, Option<Uncertainty>)> {
+    let mut found = Vec::new();
+    draw(false, &mut found);
+    let mut results: Vec<Vec<f64>> = found.iter().map(|_| Vec::with_capacity(draws)).collect();
+    let mut row = Vec::with_capacity(found.len());
+    for _ in 0..draws {
+        row.clear();
+        draw(true, &mut row);
+        results.iter_mut().zip(&row).for_each(|(all, value)| all.push(*value));
+    }
+    let known =
+        |value: f64, drawn: &[f64]| value.is_finite() && drawn.len() > 1 && drawn.iter().all(|draw| draw.is_finite());
+    let pairs = found.into_iter().zip(results);
+    pairs.map(|(value, mut drawn)| (value, known(value, &drawn).then(|| summed_up(&mut drawn, value)))).collect()
+}
+
+/// The uncertainty of values of a profile on equal angles, from the variance of its harmonics by order from 0; those
+/// below 2 are taken as exact. `None` where no variance is known.
 #[must_use]
 pub fn monte_carlo<const N: usize>(
     form_um: &[f64],
@@ -42,43 +107,19 @@ pub fn monte_carlo<const N: usize>(
     seed: u64,
     values: impl Fn(&[f64]) -> [f64; N],
 ) -> Option<[Uncertainty; N]> {
-    let known = |variance: &f64| variance.is_finite() && *variance > 0.0;
-    let amplitudes: Vec<f64> = variance
-        .iter()
-        .enumerate()
-        .map(|(order, variance)| if order >= 2 && known(variance) { (0.5 * variance).sqrt() } else { 0.0 })
-        .collect();
-    if form_um.is_empty() || amplitudes.iter().all(|amplitude| *amplitude == 0.0) {
+    if form_um.len() < 2 {
         return None;
     }
-    let length = form_um.len();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut fourier = Fourier::new(length);
-    let mut drawn = vec![0.0; length];
-    let mut results: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(DRAWS));
-    for _ in 0..DRAWS / TURNS_OF_A_DRAW {
-        let mut part = |amplitude: f64| -> f64 {
-            let normal: f64 = StandardNormal.sample(&mut random);
-            amplitude * normal
-        };
-        let harmonics: Vec<Complex64> =
-            amplitudes.iter().map(|amplitude| Complex64::new(part(*amplitude), part(*amplitude))).collect();
-        let errors = fourier.synthesise(harmonics);
-        let start = random.random_range(0..length);
-        for turn in 0..TURNS_OF_A_DRAW {
-            let shift = (start + turn * length / TURNS_OF_A_DRAW) % length;
-            let (head, tail) = errors.split_at(shift);
-            let turned = tail.iter().chain(head);
-            drawn.iter_mut().zip(form_um).zip(turned).for_each(|((drawn, form), error)| *drawn = form + error);
-            results.iter_mut().zip(values(&drawn)).for_each(|(all, value)| all.push(value));
+    let (mut errors, mut fourier) = (Errors::new(variance, 2, seed)?, Fourier::new(form_um.len()));
+    let mut drawn = form_um.to_vec();
+    let found = monte_carlo_of(DRAWS, |disturbed, found| {
+        if disturbed {
+            errors.draw(&mut fourier, form_um, &mut drawn);
         }
-    }
-    let found = values(form_um);
-    let mut results = results.into_iter().zip(found);
-    Some(std::array::from_fn(|_| {
-        let (mut draws, value) = results.next().unwrap_or_default();
-        summed_up(&mut draws, value)
-    }))
+        found.extend(values(&drawn));
+    });
+    let all: Option<Vec<Uncertainty>> = found.into_iter().map(|(_, uncertainty)| uncertainty).collect();
+    all?.try_into().ok()
 }
 
 fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
@@ -92,9 +133,10 @@ fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
         let [low, high] = [below, below + 1].map(|index| draws.get(index).copied().unwrap_or(value));
         low + (high - low) * position.fract()
     };
+    let floor = if draws.first().is_some_and(|lowest| *lowest >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
     Uncertainty {
         std: (squares / (count - 1.0).max(1.0)).sqrt(),
-        interval_95: [(2.0 * value - point(1.0 - TAIL)).max(0.0), 2.0 * value - point(TAIL)],
+        interval_95: [(2.0 * value - point(1.0 - TAIL)).max(floor), 2.0 * value - point(TAIL)],
         draws: draws.len(),
     }
 }

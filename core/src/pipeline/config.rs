@@ -11,6 +11,7 @@ use super::{
     diagnose::config::{Diagnose, DiagnoseConfig},
     document::{self, ConfigError, Document, Sources, Table},
     error::{Fault, known_names},
+    evaluate::{Evaluate, EvaluateConfig, Limit},
     registry::{Catalogue, Context, Plugin, Registry},
 };
 use crate::{
@@ -46,6 +47,8 @@ pub struct Pipeline {
     pub diagnose: Diagnose,
     /// How sections become a surface.
     pub surface: SurfaceConfig,
+    /// Which of the standards' values are computed, and their limits.
+    pub evaluate: Evaluate,
     /// In the order configured.
     pub exporters: Vec<Box<dyn Exporter>>,
     /// What the separator can tell with the rig.
@@ -96,7 +99,8 @@ impl Route {
     }
 }
 
-const KEYS: [&str; 9] = ["title", "rig", "load", "preprocess", "separate", "compare", "surface", "diagnose", "export"];
+const KEYS: [&str; 11] =
+    ["title", "rig", "load", "preprocess", "separate", "compare", "surface", "evaluate", "limit", "diagnose", "export"];
 
 impl Pipeline {
     /// Checks a configuration against the registry and builds every stage.
@@ -165,6 +169,7 @@ impl Pipeline {
             .iter()
             .map(|table| compare::candidate(table, registry, &context))
             .collect::<Result<_, _>>()?;
+        let evaluate = evaluate(root, &route, rig.as_ref())?;
         let exporters = exporters(root, sources, registry, &context, &route, diagnose.path.as_deref())?;
         Ok(Self {
             title,
@@ -175,6 +180,7 @@ impl Pipeline {
             compare,
             diagnose,
             surface,
+            evaluate,
             exporters,
             assessment,
             configuration: document::resolved_text(root, sources)?,
@@ -230,6 +236,22 @@ fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<
             Err(document::resolve(fault, separate_table))
         }
     }
+}
+
+/// What is evaluated of a form, and the limits of it.
+fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, Fault> {
+    let configured = table(root, "evaluate")?;
+    let limits = tables(root, "limit")?;
+    if let (Route::Traces { .. } | Route::Model { .. }, Some(table)) = (route, configured.as_ref().or(limits.first())) {
+        return Err(Fault::span(table.span(), "there is no form here whose values could be chosen or limited"));
+    }
+    let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, EvaluateConfig::check)).transpose()?;
+    let mut evaluate = configured.unwrap_or_default();
+    for table in limits {
+        let limit = checked::<Limit, _>(&table, |limit| limit.check(&evaluate, rig))?;
+        evaluate.add_limit(limit);
+    }
+    Ok(evaluate)
 }
 
 /// The exporters, none of which writes over what is read or what another file is for.
@@ -380,6 +402,8 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
             "separate": choice(&registry.separators),
             "compare": { "type": "array", "items": choice(&registry.separators) },
             "surface": inline::<SurfaceConfig>(),
+            "evaluate": inline::<EvaluateConfig>(),
+            "limit": { "type": "array", "items": inline::<Limit>() },
             "diagnose": inline::<DiagnoseConfig>(),
             "export": { "type": "array", "items": choice(&registry.exporters) },
         },

@@ -4,8 +4,9 @@ pub mod config;
 
 use super::{
     config::{Pipeline, Route},
+    evaluate::Evaluate,
     line::Line,
-    result::{RunInfo, complete, true_error},
+    result::{Evaluation, RunInfo, complete, true_error},
     run::{Gathering, Observer, spare_inputs, take_sections},
 };
 use crate::{
@@ -74,16 +75,18 @@ fn diagnose_turns(
         RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
     let mut gathering = Gathering::begin(pipeline, &info)?;
     let mut errors = [Vec::new(), Vec::new()];
+    let nothing = Evaluate::nothing();
     for (index, (station, (before, after))) in
         stations.into_iter().zip(found.before.into_iter().zip(found.after)).enumerate()
     {
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
-        let complete = |separation, profiles| {
-            complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone())
+        let complete = |separation, profiles, evaluate| {
+            let evaluation = Evaluation { evaluate, radius_mm: line.rig.part_radius_mm };
+            complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone(), evaluation)
         };
-        let declared = complete(before, Vec::new());
-        let result = complete(after, station.profiles);
+        let declared = complete(before, Vec::new(), &nothing);
+        let result = complete(after, station.profiles, &pipeline.evaluate);
         for (errors, result) in errors.iter_mut().zip([&declared, &result]) {
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);
             errors.extend(forms.filter_map(|form| true_error(result, form)));
@@ -130,7 +133,7 @@ fn diagnose_points(
     };
     let info = RunInfo { title: pipeline.title.clone(), rig: None, assessment: None };
     let mut gathering = Gathering::begin(pipeline, &info)?;
-    take_sections(shape.sections, pipeline.surface.angles, observer, &mut gathering)?;
+    take_sections(shape.sections, pipeline, shape.radius_mm, observer, &mut gathering)?;
     let surface = gathering.build_surface(shape.radius_mm)?;
     gathering.conclude(vec![Input::of(&points.input)?], diagnosis.warnings.clone(), surface.as_ref(), written)?;
     Ok(diagnosis)

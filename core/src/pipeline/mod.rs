@@ -6,6 +6,7 @@ pub mod diagnose;
 pub mod document;
 pub mod effects;
 pub mod error;
+pub mod evaluate;
 mod line;
 pub mod registry;
 pub mod result;

@@ -1,8 +1,9 @@
 //! What a run knows of one station, and gives to exporters.
 
+use super::evaluate::{Evaluate, section_values};
 use crate::{
     Complex64,
-    evaluate::{Value, roundness, texture, uncertainty},
+    evaluate::Value,
     measurement::StationTruth,
     numerics::fourier::Fourier,
     profile::Profile,
@@ -51,6 +52,13 @@ impl StationResult {
     }
 }
 
+/// Which of the standards' values a part of some nominal radius gets.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Evaluation<'a> {
+    pub evaluate: &'a Evaluate,
+    pub radius_mm: f64,
+}
+
 /// Adds the standards' values to a separation.
 pub(super) fn complete(
     station: String,
@@ -59,45 +67,13 @@ pub(super) fn complete(
     separation: Separation,
     profiles: Vec<Profile>,
     truth: Option<StationTruth>,
+    evaluation: Evaluation,
 ) -> StationResult {
     let mut result = StationResult { station, z_mm, angles, separation, profiles, values: Vec::new(), truth };
     let sections = 0..result.separation.sections.len();
-    result.values = sections.map(|section| section_values(&result, section)).collect();
+    let Evaluation { evaluate, radius_mm } = evaluation;
+    result.values = sections.map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
     result
-}
-
-fn section_values(result: &StationResult, section: usize) -> Vec<Value> {
-    let Some(unknown) = result.separation.position(Quantity::Form(section)) else { return Vec::new() };
-    // Level and centring are no form deviation, also where the method knows them.
-    let harmonics = result.separation.coefficients(unknown);
-    let from_two = harmonics.enumerate().map(|(order, value)| if order < 2 { Complex64::ZERO } else { value });
-    let mut fourier = Fourier::new(result.angles);
-    let form_um = fourier.synthesise(from_two).to_vec();
-    let highest = result.separation.max_order();
-    let width = result.separation.unknowns.len();
-    let variance: Vec<f64> = result.separation.variance.iter().skip(unknown).step_by(width).copied().collect();
-    let section_id = result.separation.sections.get(section).map_or("", |at| at.id.as_str());
-    let seed = uncertainty::seed(&[&result.station, section_id]);
-    let ront_and_ra = |profile: &[f64]| [roundness::ront_lsci_um(profile), texture::ra_um(profile)];
-    let [ront, ra] = ront_and_ra(&form_um);
-    let uncertainties = uncertainty::monte_carlo(&form_um, &variance, seed, ront_and_ra);
-    let [of_ront, of_ra] = uncertainties.map_or([None, None], |found| found.map(Some));
-    let lost: Vec<usize> = result.separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect();
-    let value = |symbol: &str, value, source: &str, reference: &str, uncertainty| Value {
-        symbol: symbol.into(),
-        unit: "um".into(),
-        value,
-        source: source.into(),
-        band_upr: [2, highest],
-        lost_orders: lost.clone(),
-        filter: "none".into(),
-        reference: reference.into(),
-        uncertainty,
-    };
-    vec![
-        value("RONt", ront, "ISO 12181-1:2011, peak-to-valley roundness deviation", "LSCI", of_ront),
-        value("Ra", ra, "Qiao, Xu, Zhao 2024: unfiltered circumferential profile", "mean line", of_ra),
-    ]
 }
 
 /// True motion at a place along the spindle, where the separation reports it: x + z·ε_y, y − z·ε_x.
@@ -171,7 +147,8 @@ mod tests {
             warnings: Vec::new(),
         };
         let truth = StationTruth { form_um: Vec::new(), motion: Some([2.0, -0.5, 2.0, 5.0].map(cosine)) };
-        let result = complete("s1".into(), 0.0, 32, separation, Vec::new(), Some(truth));
+        let evaluation = Evaluation { evaluate: &Evaluate::nothing(), radius_mm: 30.0 };
+        let result = complete("s1".into(), 0.0, 32, separation, Vec::new(), Some(truth), evaluation);
         for quantity in [Quantity::X, Quantity::Y] {
             // Rounding of transforms of values near 1.
             assert!(true_error(&result, quantity).unwrap() < 1e-14, "{quantity:?}");

@@ -4,12 +4,14 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use super::{
     config::{Pipeline, Route},
+    evaluate::{Evaluate, Group, add_areal, decide, part_summary},
     line::{Line, separate},
-    result::complete,
+    result::{Evaluation, complete},
     summary::summarise,
     traces,
 };
 pub use super::{
+    evaluate::{Decision, Limit, LimitSummary, LimitValue, PartSummary, PlacedValue},
     result::{RunInfo, StationResult},
     summary::{
         CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary,
@@ -69,18 +71,20 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 .as_ref()
                 .ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
             let line = Line { rig, recording: &**recording, conditioners, averager: &**averager, hold_out: None };
+            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm };
             let work = |index, station: Station| {
                 let separation = separate(&**separator, &station)?;
                 let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
                 let truth = recording.truth(index)?;
-                Ok(complete(station.name, station.z_mm, angles, separation, station.profiles, truth))
+                Ok(complete(station.name, station.z_mm, angles, separation, station.profiles, truth, evaluation))
             };
             let inputs = line.run(threads, observer, work, |result| gathering.take(&result, Some(rig)))?;
             (inputs, gathering.build_surface(rig.part_radius_mm)?, recording.remarks())
         }
         (Source::Points(points), Route::Points { separator }) => {
-            take_sections(separator.separate(points)?, pipeline.surface.angles, observer, &mut gathering)?;
-            let surface = gathering.build_surface(separator.reference_radius_mm(points)?)?;
+            let radius_mm = separator.reference_radius_mm(points)?;
+            take_sections(separator.separate(points)?, pipeline, radius_mm, observer, &mut gathering)?;
+            let surface = gathering.build_surface(radius_mm)?;
             let remarks = separator.remarks(points, surface.as_ref())?;
             (vec![Input::of(&points.input)?], surface, remarks)
         }
@@ -95,7 +99,14 @@ const MISFIT_CHI2: f64 = 4.0;
 /// Results on their way to the exporters.
 pub(super) struct Gathering {
     exports: Vec<Box<dyn Export>>,
-    surface: Option<SurfaceBuilder>,
+    /// Sections for a surface, or for values of all of them.
+    sections: Option<SurfaceBuilder>,
+    /// Whether someone takes the surface.
+    wanted: bool,
+    angles: usize,
+    evaluate: Evaluate,
+    /// Whether the sections' centres and mean radii are known.
+    placed: bool,
     summary: Summary,
     summary_path: Option<PathBuf>,
 }
@@ -104,10 +115,17 @@ impl Gathering {
     pub(super) fn begin(pipeline: &Pipeline, info: &RunInfo) -> Result<Self> {
         let exports: Result<Vec<_>> = pipeline.exporters.iter().map(|exporter| exporter.begin(info)).collect();
         let tested = matches!(&pipeline.route, Route::Points { separator } if separator.needs_surface());
-        let wanted = tested || pipeline.exporters.iter().any(|exporter| exporter.needs_surface());
+        let evaluate = pipeline.evaluate.clone();
+        let exported = pipeline.exporters.iter().any(|exporter| exporter.needs_surface());
+        let wanted = tested || exported || evaluate.has(Group::Areal);
+        let gathered = wanted || evaluate.has(Group::Cylindricity);
         Ok(Self {
             exports: exports?,
-            surface: wanted.then(|| SurfaceBuilder::new(&pipeline.surface)),
+            sections: gathered.then(|| SurfaceBuilder::new(&pipeline.surface)),
+            wanted,
+            angles: pipeline.surface.angles,
+            evaluate,
+            placed: matches!(&pipeline.route, Route::Points { .. }),
             summary_path: pipeline.summary_path(),
             summary: begun(pipeline),
         })
@@ -117,15 +135,24 @@ impl Gathering {
         for export in &mut self.exports {
             export.station(result)?;
         }
-        if let Some(surface) = &mut self.surface {
-            surface.add(result);
+        if let Some(sections) = &mut self.sections {
+            sections.add(result);
         }
         self.summary.stations.push(summarise(result, rig));
         Ok(())
     }
 
+    /// The surface, where someone takes it; and the values of all sections together.
     pub(super) fn build_surface(&mut self, radius_mm: f64) -> Result<Option<Surface>> {
-        let surface = self.surface.take().map(|builder| builder.build(radius_mm)).transpose()?;
+        let Some(builder) = self.sections.take() else { return Ok(None) };
+        let evaluate = &self.evaluate;
+        if evaluate.has(Group::Cylindricity) || evaluate.has(Group::Areal) {
+            self.summary.part = part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
+        }
+        let surface = self.wanted.then(|| builder.build(radius_mm)).transpose()?;
+        if let (true, Some(surface)) = (evaluate.has(Group::Areal), &surface) {
+            add_areal(self.summary.part.get_or_insert_with(PartSummary::default), surface, evaluate)?;
+        }
         self.summary.surface = surface.as_ref().map(|surface| SurfaceSummary {
             angles: surface.angles,
             rings: surface.z_mm.len(),
@@ -147,6 +174,9 @@ impl Gathering {
         self.summary.provenance.inputs = inputs;
         self.summary.warnings.extend(remarks);
         self.summary.warnings.extend(misfit(&self.summary.stations));
+        let (limits, unmatched) = decide(self.evaluate.limits(), &self.summary.values());
+        self.summary.limits = limits;
+        self.summary.warnings.extend(unmatched);
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&self.summary, surface)?);
@@ -167,6 +197,8 @@ pub(super) fn begun(pipeline: &Pipeline) -> Summary {
         },
         lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
         stations: Vec::new(),
+        part: None,
+        limits: Vec::new(),
         surface: None,
         straightness: None,
         outputs: Vec::new(),
@@ -224,15 +256,17 @@ fn misfit(stations: &[StationSummary]) -> Option<String> {
 /// Completes sections of measured points.
 pub(super) fn take_sections(
     sections: Vec<Separation>,
-    angles: usize,
+    pipeline: &Pipeline,
+    radius_mm: f64,
     observer: &dyn Observer,
     gathering: &mut Gathering,
 ) -> Result<()> {
     observer.begin(sections.len());
+    let (evaluation, angles) = (Evaluation { evaluate: &pipeline.evaluate, radius_mm }, pipeline.surface.angles);
     for separation in sections {
         let (name, z_mm) =
             separation.sections.first().map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));
-        let result = complete(name, z_mm, angles, separation, Vec::new(), None);
+        let result = complete(name, z_mm, angles, separation, Vec::new(), None, evaluation);
         gathering.take(&result, None)?;
         observer.station(&result.station);
     }

@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::result::{StationResult, true_error};
+use super::{
+    evaluate::{LimitSummary, PartSummary, PlacedValue, placed},
+    result::{StationResult, true_error},
+};
 use crate::{
     evaluate::{Value, straightness::strt_lsli_um},
     profile::{Profile, Rejection, TurnLength},
@@ -27,6 +30,10 @@ pub struct Summary {
     pub lost_orders: LostOrders,
     /// One entry a station.
     pub stations: Vec<StationSummary>,
+    /// Values of all sections together, where they were asked for and there are two sections or more.
+    pub part: Option<PartSummary>,
+    /// The limits of the pipeline, in their order, with what was found.
+    pub limits: Vec<LimitSummary>,
     /// The surface, where one was built.
     pub surface: Option<SurfaceSummary>,
     /// Straightness of part and slide, where traces along an axis were separated.
@@ -38,6 +45,12 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// Every value of the run: of sections, then of their station, station by station; the whole part's last.
+    #[must_use]
+    pub fn values(&self) -> Vec<PlacedValue<'_>> {
+        placed(&self.stations, self.part.as_ref())
+    }
+
     /// The run's warnings, then each station's behind its name.
     pub fn all_warnings(&self) -> impl Iterator<Item = String> + '_ {
         let of_station = |station: &'_ StationSummary| -> Vec<String> {
@@ -73,6 +86,8 @@ pub struct StationSummary {
     pub captures: Vec<CaptureSummary>,
     /// Form, section by section.
     pub sections: Vec<SectionSummary>,
+    /// The standards' values of the station as a whole.
+    pub values: Vec<Value>,
     /// Root mean square that the fit leaves of the readings, in µm; absent where nothing is redundant.
     pub residual_rms_um: Option<f64>,
     /// What the covariance of the averages lets expect of it, in µm.
@@ -238,6 +253,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
         z_mm: result.z_mm,
         captures: result.profiles.iter().map(|profile| capture_summary(profile, rig)).collect(),
         sections,
+        values: Vec::new(),
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),
         chi2_per_dof: known(separation.residual.chi2_per_dof),

@@ -28,19 +28,19 @@ pub struct SurfaceBuilder {
 
 /// One section's form, order by order from 0; `None` where it is not known.
 #[derive(Debug)]
-struct Section {
-    id: String,
-    station: String,
-    z_mm: f64,
-    orders: Vec<Option<Order>>,
+pub(crate) struct Section {
+    pub(crate) id: String,
+    pub(crate) station: String,
+    pub(crate) z_mm: f64,
+    pub(crate) orders: Vec<Option<Order>>,
 }
 
 /// One order of a form.
 #[derive(Debug, Clone, Copy)]
-struct Order {
-    value: Complex64,
+pub(crate) struct Order {
+    pub(crate) value: Complex64,
     /// E|δ|², µm²; NaN where not known.
-    variance: f64,
+    pub(crate) variance: f64,
 }
 
 impl Section {
@@ -54,6 +54,11 @@ impl SurfaceBuilder {
     #[must_use]
     pub fn new(config: &SurfaceConfig) -> Self {
         Self { config: config.clone(), ..Self::default() }
+    }
+
+    /// What was added.
+    pub(crate) fn sections(&self) -> &[Section] {
+        &self.sections
     }
 
     /// Adds a station's sections.

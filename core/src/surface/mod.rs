@@ -8,6 +8,7 @@ use std::f64::consts::{PI, TAU};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use builder::Section;
 pub use builder::SurfaceBuilder;
 
 use crate::pipeline::error::Fault;

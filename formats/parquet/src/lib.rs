@@ -6,7 +6,8 @@
 //! - `motion.parquet`: error motion over the spindle's angle, one row a (station, angle); only where a motion was
 //!   solved for. Columns of a motion that was not (a tilt seen by one section) are null;
 //! - `harmonics.parquet`: the coefficients that both are made of, one row a (station, quantity, section, order).
-//!   Orders run from 1; order 0, the mean level, has a row where the method knows it (its value is not 0).
+//!   Orders run from 1; order 0, the mean level, has a row where the method knows it (its value is not 0);
+//! - `values.parquet`: the standards' values of sections, stations and the whole part, one row each.
 //!
 //! Orders that the layout cannot tell are NaN with `observable` false in the harmonics, and left out of the sums in
 //! the other two, whose metadata names them. Where traces along an axis were separated, the folder receives
@@ -18,6 +19,7 @@ mod columns;
 mod comparison;
 mod straightness;
 mod table;
+mod values;
 
 use std::path::PathBuf;
 
@@ -49,7 +51,7 @@ pub fn register(registry: &mut Registry) {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParquetConfig {
-    /// Folder for form.parquet, motion.parquet and harmonics.parquet, or straightness.parquet; made where it is missing.
+    /// Folder for form.parquet, motion.parquet, harmonics.parquet and values.parquet, or straightness.parquet; made where it is missing.
     pub path: PathBuf,
 }
 
@@ -57,7 +59,7 @@ impl StageConfig for ParquetConfig {
     type Stage = Box<dyn Exporter>;
 
     const NAME: &'static str = "parquet";
-    const ABOUT: &'static str = "tables of form, motion and harmonics, or of straightness";
+    const ABOUT: &'static str = "tables of form, motion, harmonics and values, or of straightness";
 
     fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         if self.path.as_os_str().is_empty() {
@@ -85,6 +87,10 @@ impl Parquet {
         self.folder.join("harmonics.parquet")
     }
 
+    fn values(&self) -> PathBuf {
+        self.folder.join("values.parquet")
+    }
+
     fn straightness_table(&self) -> PathBuf {
         self.folder.join("straightness.parquet")
     }
@@ -101,7 +107,7 @@ impl Parquet {
 
 impl Exporter for Parquet {
     fn outputs(&self) -> Vec<PathBuf> {
-        vec![self.form(), self.motion(), self.harmonics(), self.straightness_table()]
+        vec![self.form(), self.motion(), self.harmonics(), self.values(), self.straightness_table()]
     }
 
     fn straightness(&self) -> Option<&dyn StraightnessExporter> {
@@ -113,6 +119,7 @@ impl Exporter for Parquet {
         Ok(Box::new(Tables {
             form: Table::create(self.form(), columns::form_schema())?,
             harmonics: Table::create(self.harmonics(), columns::harmonics_schema())?,
+            values: Table::create(self.values(), values::schema())?,
             motion: None,
             motion_path: self.motion(),
             content: Content::default(),
@@ -133,6 +140,7 @@ impl StraightnessExporter for Parquet {
 struct Tables {
     form: Table,
     harmonics: Table,
+    values: Table,
     motion: Option<Table>,
     motion_path: PathBuf,
     content: Content,
@@ -153,10 +161,11 @@ impl Export for Tables {
         Ok(())
     }
 
-    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
+    fn finish(mut self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
         let entries = self.content.entries(summary);
+        self.values.append(values::rows(summary))?;
         let had_motion = self.motion.is_some();
-        let tables = [Some(self.form), self.motion, Some(self.harmonics)].into_iter().flatten();
+        let tables = [Some(self.form), self.motion, Some(self.harmonics), Some(self.values)].into_iter().flatten();
         let complete: Vec<PendingFile> = tables.map(|table| table.close(&entries)).collect::<Result<_>>()?;
         if !had_motion && self.motion_path.is_file() {
             // An earlier run's motion beside this run's form would be taken for this run's.

@@ -9,9 +9,10 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use runout_core::{
     Complex64,
     atomic_file::commit_all,
+    evaluate::{Value, uncertainty::Uncertainty},
     pipeline::{
         registry::{Context, StageConfig},
-        run::{LostOrders, RunInfo, StationResult, Summary},
+        run::{LostOrders, PartSummary, RunInfo, SectionSummary, StationResult, StationSummary, Summary},
     },
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
@@ -70,6 +71,8 @@ fn summary() -> Summary {
         },
         lost_orders: LostOrders { form: vec![LOST], motion: vec![LOST] },
         stations: Vec::new(),
+        part: None,
+        limits: Vec::new(),
         surface: None,
         straightness: None,
         outputs: Vec::new(),
@@ -217,7 +220,7 @@ fn a_part_without_motion_has_no_motion_table_not_even_an_old_one() {
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    assert_eq!(names, ["form.parquet", "harmonics.parquet"]);
+    assert_eq!(names, ["form.parquet", "harmonics.parquet", "values.parquet"]);
 }
 
 #[test]
@@ -234,9 +237,71 @@ fn a_run_that_fails_leaves_what_was_there() {
     export.station(&station(5, true)).unwrap();
     drop(export);
     assert_eq!(std::fs::read(folder.path().join("form.parquet")).unwrap(), before);
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
     let in_the_way = ParquetConfig { path: "form.parquet".into() }.check(&context).unwrap().begin(&info);
     assert!(in_the_way.is_err_and(|error| error.to_string().contains("there is a file of that name")));
+}
+
+#[test]
+fn values_are_rows_and_null_where_there_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let context = Context { folder: Path::new(""), rig: None };
+    let exporter = ParquetConfig { path: folder.path().to_path_buf() }.check(&context).unwrap();
+    let export = exporter.begin(&RunInfo { title: String::new(), rig: None, assessment: None }).unwrap();
+    let interval = Uncertainty { std: 0.1, interval_95: [3.7, 4.1], draws: 400 };
+    let value = |symbol: &str, value, uncertainty| Value {
+        symbol: symbol.into(),
+        unit: "um".into(),
+        value,
+        source: "ISO 12181-1:2011".into(),
+        band_upr: [2, 50],
+        lost_orders: vec![LOST],
+        filter: "Gaussian 50 UPR".into(),
+        reference: "MZCI".into(),
+        coverage: 0.75,
+        uncertainty,
+    };
+    let mut told = summary();
+    let section = SectionSummary {
+        section: "a".into(),
+        z_mm: 40.0,
+        form_rms_um: 1.0,
+        form_std_um: None,
+        values: vec![value("RONt", 3.9, Some(interval))],
+        truth_form_rms_error_um: None,
+    };
+    told.stations = vec![StationSummary {
+        station: "s00".into(),
+        z_mm: 10.0,
+        captures: Vec::new(),
+        sections: vec![section],
+        values: vec![value("total", 1.5, None)],
+        residual_rms_um: None,
+        expected_residual_rms_um: None,
+        chi2_per_dof: None,
+        truth: None,
+        warnings: Vec::new(),
+    }];
+    told.part = Some(PartSummary { values: vec![value("CYLt", 6.0, None)], ..PartSummary::default() });
+    commit_all(export.finish(&told, None).unwrap()).unwrap();
+    let (table, entries) = read(&folder.path().join("values.parquet"));
+    assert_eq!(entries["runout.title"], "Probelauf µ");
+    assert_eq!(table.num_rows(), 3);
+    for (row, symbol, value) in [(0, "RONt", 3.9), (1, "total", 1.5), (2, "CYLt", 6.0)] {
+        assert_eq!((texts(&table, "symbol").value(row), numbers(&table, "value").value(row)), (symbol, value));
+        let there = ["station", "section"].map(|name| texts(&table, name).is_valid(row));
+        assert_eq!(there, [row < 2, row < 1]);
+        assert_eq!(numbers(&table, "z_mm").is_valid(row), row < 2);
+        for name in ["std", "low_95", "high_95"] {
+            assert_eq!(numbers(&table, name).is_valid(row), row < 1, "{name}");
+        }
+        assert_eq!(texts(&table, "lost_orders").value(row), "[4]");
+        assert_eq!(numbers(&table, "coverage").value(row), 0.75);
+    }
+    let ends: &UInt32Array = table.column_by_name("band_high_upr").unwrap().as_any().downcast_ref().unwrap();
+    assert_eq!((ends.value(0), numbers(&table, "high_95").value(0)), (50, 4.1));
+    let schema = table.schema();
+    assert!(schema.fields().iter().all(|field| field.metadata().contains_key("meaning")));
 }
 
 /// pyarrow, a reader that shares no code with the writer, adds the harmonics up and gets form and motion.

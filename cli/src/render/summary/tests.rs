@@ -34,6 +34,7 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
         lost_orders: vec![],
         filter: "none".into(),
         reference: "LSCI".into(),
+        coverage: 1.0,
         uncertainty: std.map(|std| Uncertainty {
             std,
             interval_95: [value - 2.0 * std, value + 2.0 * std],
@@ -58,6 +59,7 @@ fn summary(stations: usize) -> Summary {
             z_mm,
             captures: vec![capture("initial", 0), capture("reversed", index % 2)],
             sections: vec![section("a", 200.0 + z_mm), section("b", 230.0 + z_mm)],
+            values: Vec::new(),
             residual_rms_um: Some(0.0066 + 1e-4 * index as f64),
             expected_residual_rms_um: Some(0.0065),
             chi2_per_dof: Some(1.02),
@@ -82,6 +84,8 @@ fn summary(stations: usize) -> Summary {
         provenance: Provenance::default(),
         lost_orders: LostOrders { form: (2..=80).step_by(2).collect(), motion: vec![1] },
         stations: (0..stations).map(station).collect(),
+        part: None,
+        limits: Vec::new(),
         surface: Some(SurfaceSummary {
             angles: 720,
             rings: 2 * stations,

@@ -41,6 +41,44 @@ impl Default for Settings {
     }
 }
 
+/// Symbol, unit and clause of every value, in the order of [`Areal::parameters`].
+pub const PARAMETERS: [(&str, &str, &str); 34] = [
+    ("Sq", "µm", "4.2.2"),
+    ("Ssk", "", "4.2.3"),
+    ("Sku", "", "4.2.4"),
+    ("Sp", "µm", "4.2.5"),
+    ("Sv", "µm", "4.2.6"),
+    ("Sz", "µm", "4.2.7"),
+    ("Sa", "µm", "4.2.8"),
+    ("Sal", "mm", "4.3.2"),
+    ("Str", "", "4.3.3"),
+    ("Std", "°", "4.3.4"),
+    ("Ssw", "mm", "4.3.5"),
+    ("Sdq", "", "4.4.2"),
+    ("Sdr", "%", "4.4.3"),
+    ("Sdc", "µm", "4.5.3"),
+    ("Sk", "µm", "4.5.4"),
+    ("Spk", "µm", "4.5.4"),
+    ("Svk", "µm", "4.5.4"),
+    ("Spkx", "µm", "4.5.4"),
+    ("Svkx", "µm", "4.5.4"),
+    ("Smrk1", "%", "4.5.4"),
+    ("Smrk2", "%", "4.5.4"),
+    ("Sak1", "µm·%", "4.5.4"),
+    ("Sak2", "µm·%", "4.5.4"),
+    ("Vmp", "µm³/µm²", "4.5.6"),
+    ("Vmc", "µm³/µm²", "4.5.6"),
+    ("Vvv", "µm³/µm²", "4.5.7"),
+    ("Vvc", "µm³/µm²", "4.5.7"),
+    ("Spd", "1/mm²", "5.8.2"),
+    ("Svd", "1/mm²", "5.8.3"),
+    ("Spc", "1/mm", "5.8.4"),
+    ("Svc", "1/mm", "5.8.5"),
+    ("S5p", "µm", "5.8.6"),
+    ("S5v", "µm", "5.8.7"),
+    ("S10z", "µm", "5.8.8"),
+];
+
 /// All values of one surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Areal {
@@ -84,44 +122,44 @@ impl Areal {
     #[must_use]
     pub fn parameters(&self) -> Vec<Parameter> {
         let Self { height, spatial, hybrid, functional, features, .. } = self;
-        [
-            ("Sq", "µm", "4.2.2", height.sq),
-            ("Ssk", "", "4.2.3", height.ssk),
-            ("Sku", "", "4.2.4", height.sku),
-            ("Sp", "µm", "4.2.5", height.sp),
-            ("Sv", "µm", "4.2.6", height.sv),
-            ("Sz", "µm", "4.2.7", height.sz),
-            ("Sa", "µm", "4.2.8", height.sa),
-            ("Sal", "mm", "4.3.2", spatial.sal_mm),
-            ("Str", "", "4.3.3", spatial.str),
-            ("Std", "°", "4.3.4", spatial.std_deg),
-            ("Ssw", "mm", "4.3.5", spatial.ssw_mm),
-            ("Sdq", "", "4.4.2", hybrid.sdq),
-            ("Sdr", "%", "4.4.3", hybrid.sdr_percent),
-            ("Sdc", "µm", "4.5.3", functional.sdc),
-            ("Sk", "µm", "4.5.4", functional.sk),
-            ("Spk", "µm", "4.5.4", functional.spk),
-            ("Svk", "µm", "4.5.4", functional.svk),
-            ("Spkx", "µm", "4.5.4", functional.spkx),
-            ("Svkx", "µm", "4.5.4", functional.svkx),
-            ("Smrk1", "%", "4.5.4", functional.smrk1_percent),
-            ("Smrk2", "%", "4.5.4", functional.smrk2_percent),
-            ("Sak1", "µm·%", "4.5.4", functional.sak1),
-            ("Sak2", "µm·%", "4.5.4", functional.sak2),
-            ("Vmp", "µm³/µm²", "4.5.6", functional.vmp),
-            ("Vmc", "µm³/µm²", "4.5.6", functional.vmc),
-            ("Vvv", "µm³/µm²", "4.5.7", functional.vvv),
-            ("Vvc", "µm³/µm²", "4.5.7", functional.vvc),
-            ("Spd", "1/mm²", "5.8.2", features.spd_per_mm2),
-            ("Svd", "1/mm²", "5.8.3", features.svd_per_mm2),
-            ("Spc", "1/mm", "5.8.4", features.spc_per_mm),
-            ("Svc", "1/mm", "5.8.5", features.svc_per_mm),
-            ("S5p", "µm", "5.8.6", features.s5p),
-            ("S5v", "µm", "5.8.7", features.s5v),
-            ("S10z", "µm", "5.8.8", features.s10z),
-        ]
-        .map(|(symbol, unit, clause, value)| Parameter::new(symbol, unit, clause, value))
-        .to_vec()
+        let values = [
+            height.sq,
+            height.ssk,
+            height.sku,
+            height.sp,
+            height.sv,
+            height.sz,
+            height.sa,
+            spatial.sal_mm,
+            spatial.str,
+            spatial.std_deg,
+            spatial.ssw_mm,
+            hybrid.sdq,
+            hybrid.sdr_percent,
+            functional.sdc,
+            functional.sk,
+            functional.spk,
+            functional.svk,
+            functional.spkx,
+            functional.svkx,
+            functional.smrk1_percent,
+            functional.smrk2_percent,
+            functional.sak1,
+            functional.sak2,
+            functional.vmp,
+            functional.vmc,
+            functional.vvv,
+            functional.vvc,
+            features.spd_per_mm2,
+            features.svd_per_mm2,
+            features.spc_per_mm,
+            features.svc_per_mm,
+            features.s5p,
+            features.s5v,
+            features.s10z,
+        ];
+        let named = PARAMETERS.iter().zip(values);
+        named.map(|((symbol, unit, clause), value)| Parameter::new(symbol, unit, clause, value)).collect()
     }
 }
 

@@ -58,6 +58,20 @@ pub struct Texture {
     pub section_mm: f64,
 }
 
+/// Symbol, unit and clause of every value, in the order of [`Texture::parameters`].
+pub const PARAMETERS: [(&str, &str, &str); 10] = [
+    ("Ra", "µm", "field parameters"),
+    ("Rq", "µm", "field parameters"),
+    ("Rsk", "", "field parameters"),
+    ("Rku", "", "field parameters"),
+    ("Rt", "µm", "field parameters"),
+    ("Rdq", "", "field parameters"),
+    ("Rp", "µm", "feature parameters"),
+    ("Rv", "µm", "feature parameters"),
+    ("Rz", "µm", "feature parameters"),
+    ("Rsm", "mm", "feature parameters"),
+];
+
 /// Texture of a closed profile on equal angles of a part with a radius.
 #[must_use]
 pub fn around(form_um: &[f64], radius_mm: f64, settings: &Settings) -> Texture {
@@ -94,19 +108,10 @@ fn filtered(profile_um: &[f64], settings: &Settings, smoother: impl Fn(f64) -> S
 impl Texture {
     /// Every value with symbol, unit and clause.
     #[must_use]
-    pub fn parameters(&self) -> [Parameter; 10] {
-        [
-            Parameter::new("Ra", "µm", "field parameters", self.ra),
-            Parameter::new("Rq", "µm", "field parameters", self.rq),
-            Parameter::new("Rsk", "", "field parameters", self.rsk),
-            Parameter::new("Rku", "", "field parameters", self.rku),
-            Parameter::new("Rt", "µm", "field parameters", self.rt),
-            Parameter::new("Rdq", "", "field parameters", self.rdq),
-            Parameter::new("Rp", "µm", "feature parameters", self.rp),
-            Parameter::new("Rv", "µm", "feature parameters", self.rv),
-            Parameter::new("Rz", "µm", "feature parameters", self.rz),
-            Parameter::new("Rsm", "mm", "feature parameters", self.rsm_mm),
-        ]
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let values = [self.ra, self.rq, self.rsk, self.rku, self.rt, self.rdq, self.rp, self.rv, self.rz, self.rsm_mm];
+        let named = PARAMETERS.iter().zip(values);
+        named.map(|((symbol, unit, clause), value)| Parameter::new(symbol, unit, clause, value)).collect()
     }
 }
 

@@ -27,9 +27,10 @@ use super::{
     Pipeline, Registry,
     config::Route,
     error::Fault,
+    evaluate::Evaluate,
     line::{Line, separate},
     registry::Context,
-    result::complete,
+    result::{Evaluation, complete},
     run::{Observer, spare_inputs},
     summary::LostOrders,
 };
@@ -149,6 +150,7 @@ impl<'a> Comparing<'a> {
         let scatter = Scatter::of(station);
         let separators = std::iter::once(self.reference).chain(self.methods.iter().map(|method| &*method.separator));
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
+        let evaluation = Evaluation { evaluate: &Evaluate::ront(), radius_mm: self.rig.part_radius_mm };
         let mut results = Vec::new();
         let mut estimates = Vec::new();
         let mut warnings: Vec<String> =
@@ -158,7 +160,8 @@ impl<'a> Comparing<'a> {
             warnings.extend(separation.warnings.iter().map(|warning| format!("{name}: {warning}")));
             estimates.push(Estimates::new(&separation, separator.sensitivity(station)?));
             // Profiles are shared; the standards' values need none.
-            results.push(complete(station.name.clone(), station.z_mm, angles, separation, Vec::new(), truth.cloned()));
+            let name = station.name.clone();
+            results.push(complete(name, station.z_mm, angles, separation, Vec::new(), truth.cloned(), evaluation));
         }
         Ok(StationComparison {
             station: station.name.clone(),

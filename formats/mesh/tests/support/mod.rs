@@ -89,6 +89,8 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
         },
         lost_orders: LostOrders { form: vec![1, 4, 500], motion: Vec::new() },
         stations: Vec::new(),
+        part: None,
+        limits: Vec::new(),
         surface: None,
         straightness: None,
         outputs: Vec::new(),

@@ -1,0 +1,90 @@
+//! Values of all sections together, and limits.
+
+use runout_core::{
+    evaluate::Value,
+    pipeline::run::{Decision, LimitSummary, LimitValue, Summary},
+};
+
+use super::{FEW_STATIONS, known, std_of, unit};
+use crate::render::{
+    number::{significant, with_std},
+    page::Page,
+    table::Table,
+};
+
+/// Peak-to-valley values of the whole part, unfiltered.
+pub fn part(page: &mut Page, summary: &Summary) {
+    let Some(part) = &summary.part else { return };
+    let mut table = Table::new(2, ["value", "reference", ""]);
+    let shown = |value: &&Value| ["CYLt", "Sa", "Sz"].contains(&&*value.symbol) && value.filter == "none";
+    for value in part.values.iter().filter(shown) {
+        let number = match std_of(value) {
+            Some(std) => with_std(value.value, Some(std)),
+            None => significant(value.value, 4),
+        };
+        table.row([format!("{} {}", value.symbol, unit(&value.unit)), value.reference.clone(), number]);
+    }
+    page.headed_table("The whole part", &table);
+}
+
+/// What was found of each limit, by its worst value.
+pub fn limits(page: &mut Page, summary: &Summary) {
+    let mut table = Table::new(1, ["limit", "values", "proven", "the worst", "95 % interval", "decision"]);
+    for limit in &summary.limits {
+        let worst = worst(limit);
+        let proven = limit.values.iter().filter(|value| value.decision == Decision::Conforms).count();
+        let interval = worst.and_then(|value| value.interval_95);
+        table.row([
+            limit.limit.name(),
+            limit.values.len().to_string(),
+            proven.to_string(),
+            known(worst.map(|value| value.value), 4),
+            interval.map_or_else(String::new, |ends| ends.map(|end| significant(end, 4)).join(" to ")),
+            decided(limit, worst),
+        ]);
+    }
+    page.headed_table("Limits", &table);
+    let beyond = summary.limits.iter().flat_map(|limit| {
+        let open = limit.values.iter().filter(|value| value.decision != Decision::Conforms);
+        open.map(|value| format!("{}: {}", limit.limit.name(), place(value)))
+    });
+    let mut beyond: Vec<String> = beyond.collect();
+    let more = beyond.len().saturating_sub(FEW_STATIONS);
+    beyond.truncate(FEW_STATIONS);
+    if more > 0 {
+        beyond.push(format!("and {more} more: every one is listed with --json"));
+    }
+    page.bullets("Not proven to be kept", &beyond);
+}
+
+fn decided(limit: &LimitSummary, worst: Option<&LimitValue>) -> String {
+    match (limit.decision, worst) {
+        (Decision::Conforms, _) => "conforms".into(),
+        (Decision::DoesNotConform, _) => "does not conform".into(),
+        (Decision::Undecided, None) => "undecided: no value".into(),
+        (Decision::Undecided, Some(LimitValue { interval_95: None, within, .. })) => {
+            format!("undecided: {}, without uncertainty", if *within { "within" } else { "beyond" })
+        }
+        (Decision::Undecided, Some(_)) => "undecided: the interval holds the limit".into(),
+    }
+}
+
+/// The value nearest to a limit, or farthest beyond it.
+fn worst(limit: &LimitSummary) -> Option<&LimitValue> {
+    let room = |value: &LimitValue| {
+        let [from, to] = value.interval_95.unwrap_or([value.value; 2]);
+        let above = limit.limit.lower.map_or(f64::INFINITY, |lower| from - lower);
+        let below = limit.limit.upper.map_or(f64::INFINITY, |upper| upper - to);
+        above.min(below)
+    };
+    limit.values.iter().min_by(|a, b| room(a).total_cmp(&room(b)))
+}
+
+/// "s31, section a, MZCI, 5.31".
+fn place(value: &LimitValue) -> String {
+    let section = value.section.as_ref().map(|section| format!("section {section}"));
+    let filter = (value.filter != "none").then(|| value.filter.clone());
+    let words =
+        [value.station.clone(), section, Some(value.reference.clone()), filter, Some(significant(value.value, 4))];
+    words.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,201 @@
+//! `[evaluate]`: which of the standards' values a run gives.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{
+    filter::{between_name, low_pass_name},
+    limit::Limit,
+};
+use crate::{
+    evaluate::{areal, roundness::Reference, texture},
+    pipeline::error::Fault,
+};
+
+/// `[evaluate]`: which of the standards' values a run gives, and how.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EvaluateConfig {
+    /// Groups of values; without it `roundness`, `texture` and `cylindricity`.
+    pub values: Option<Vec<Group>>,
+    /// Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY). Without it LSCI and
+    /// MZCI.
+    pub references: Option<Vec<Reference>>,
+    /// Cut-offs of the Gaussian low-pass (ISO 16610-21) for roundness and cylindricity, in undulations per revolution, as
+    /// 15, 50, 150, 500, 1500. Unfiltered values are always there besides. Without it 50, where the orders reach it.
+    pub filter_upr: Option<Vec<f64>>,
+    /// λc, the longest wavelength of texture and areal values, in mm; it makes Rq, Rp, Rv, Rz, Rt, Rsk, Rku, Rsm and Rdq
+    /// besides the unfiltered Ra.
+    pub lambda_c_mm: Option<f64>,
+    /// λs, the shortest, in mm.
+    pub lambda_s_mm: Option<f64>,
+}
+
+/// Values that belong together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Group {
+    /// RONt about each reference, RONp, RONv, RONq about LSCI, of each section.
+    Roundness,
+    /// Ra of each section's unfiltered profile; with λc the values of ISO 21920-2.
+    Texture,
+    /// CYLt about each reference, CYLp, CYLv, CYLq about LSCY, of all sections together.
+    Cylindricity,
+    /// ISO 25178-2 on the surface without its least-squares cylinder.
+    Areal,
+    /// ISO 230-7, of each station.
+    ErrorMotion,
+}
+
+/// What to evaluate, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluate {
+    groups: Vec<Group>,
+    pub(super) references: Vec<Reference>,
+    filter_upr: Option<Vec<f64>>,
+    pub(super) lambda_c_mm: Option<f64>,
+    pub(super) lambda_s_mm: Option<f64>,
+    limits: Vec<Limit>,
+}
+
+impl Default for Evaluate {
+    fn default() -> Self {
+        Self {
+            groups: vec![Group::Roundness, Group::Texture, Group::Cylindricity],
+            references: vec![Reference::LeastSquares, Reference::MinimumZone],
+            filter_upr: None,
+            lambda_c_mm: None,
+            lambda_s_mm: None,
+            limits: Vec::new(),
+        }
+    }
+}
+
+/// The cut-off where nothing is said, in undulations per revolution.
+const USUAL_UPR: f64 = 50.0;
+
+impl EvaluateConfig {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// The first that cannot be, with its key.
+    pub(in crate::pipeline) fn check(self) -> Result<Evaluate, Fault> {
+        for (index, cutoff) in self.filter_upr.iter().flatten().enumerate() {
+            if !(cutoff.is_finite() && *cutoff > 0.0) {
+                let fault = Fault::here(format!("the cut-off must be above 0 undulations a turn, found {cutoff}"));
+                return Err(fault.under_item("filter_upr", index));
+            }
+        }
+        for (key, wavelength) in [("lambda_c_mm", self.lambda_c_mm), ("lambda_s_mm", self.lambda_s_mm)] {
+            match wavelength {
+                Some(length) if !(length.is_finite() && length > 0.0) => {
+                    return Err(Fault::at(key, format!("the wavelength must be above 0 mm, found {length}")));
+                }
+                _ => {}
+            }
+        }
+        match (self.lambda_s_mm, self.lambda_c_mm) {
+            (Some(shortest), Some(longest)) if shortest >= longest => {
+                let message = format!("λs must be shorter than λc = {longest} mm, found {shortest}");
+                return Err(Fault::at("lambda_s_mm", message));
+            }
+            (Some(_), None) => {
+                return Err(Fault::at("lambda_s_mm", "λs alone makes no texture").help("add `lambda_c_mm`"));
+            }
+            _ => {}
+        }
+        if matches!(&self.references, Some(references) if references.is_empty()) {
+            return Err(Fault::at("references", "expected at least one of LSCI, MZCI, MICI, MCCI"));
+        }
+        let usual = Evaluate::default();
+        Ok(Evaluate {
+            groups: self.values.unwrap_or(usual.groups),
+            references: once_each(self.references.unwrap_or(usual.references)),
+            filter_upr: self.filter_upr.map(once_each),
+            lambda_c_mm: self.lambda_c_mm,
+            lambda_s_mm: self.lambda_s_mm,
+            limits: Vec::new(),
+        })
+    }
+}
+
+fn once_each<T: PartialEq>(items: Vec<T>) -> Vec<T> {
+    let mut kept = Vec::new();
+    for item in items {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+    }
+    kept
+}
+
+impl Evaluate {
+    /// The peak-to-valley about LSCI alone, for comparisons.
+    #[must_use]
+    pub fn ront() -> Self {
+        Self {
+            groups: vec![Group::Roundness],
+            references: vec![Reference::LeastSquares],
+            filter_upr: Some(Vec::new()),
+            ..Self::default()
+        }
+    }
+
+    /// Nothing.
+    #[must_use]
+    pub fn nothing() -> Self {
+        Self { groups: Vec::new(), ..Self::default() }
+    }
+
+    pub(in crate::pipeline) fn add_limit(&mut self, limit: Limit) {
+        self.limits.push(limit);
+    }
+
+    /// What values have to keep.
+    #[must_use]
+    pub fn limits(&self) -> &[Limit] {
+        &self.limits
+    }
+
+    /// Whether a group of values is asked for.
+    #[must_use]
+    pub fn has(&self, group: Group) -> bool {
+        self.groups.contains(&group)
+    }
+
+    /// Cut-offs for orders up to `highest`; `None` is no filter.
+    pub(super) fn cutoffs_upr(&self, highest: usize) -> Vec<Option<f64>> {
+        let usual: &[f64] = if highest as f64 >= USUAL_UPR { &[USUAL_UPR] } else { &[] };
+        let cutoffs = self.filter_upr.as_deref().unwrap_or(usual);
+        std::iter::once(None).chain(cutoffs.iter().copied().map(Some)).collect()
+    }
+
+    /// Names of the filters that values may have.
+    pub(super) fn filter_names(&self) -> Vec<String> {
+        let cutoffs = self.filter_upr.as_deref().unwrap_or(&[USUAL_UPR]);
+        let round = std::iter::once(None).chain(cutoffs.iter().copied().map(Some)).map(low_pass_name);
+        once_each(round.chain([between_name(self.lambda_s_mm, self.lambda_c_mm)]).collect())
+    }
+
+    /// Symbols and units of the values that may come, but for those of error motion.
+    pub(super) fn symbols(&self) -> Vec<(&'static str, &'static str)> {
+        let mut symbols = Vec::new();
+        if self.has(Group::Roundness) {
+            symbols.extend(["RONt", "RONp", "RONv", "RONq"].map(|symbol| (symbol, "µm")));
+        }
+        if self.has(Group::Texture) {
+            symbols.push(("Ra", "µm"));
+            if self.lambda_c_mm.is_some() {
+                symbols.extend(texture::PARAMETERS[1..].iter().map(|(symbol, unit, _)| (*symbol, *unit)));
+            }
+        }
+        if self.has(Group::Cylindricity) {
+            let names = ["CYLt", "CYLp", "CYLv", "CYLq", "CYLtt", "STRt", "coaxiality"];
+            symbols.extend(names.map(|symbol| (symbol, "µm")));
+        }
+        if self.has(Group::Areal) {
+            symbols.extend(areal::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
+        }
+        symbols
+    }
+}

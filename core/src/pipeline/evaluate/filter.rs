@@ -1,0 +1,95 @@
+//! A filter of closed profiles with its name.
+
+use crate::{
+    Complex64,
+    numerics::filter::{Band, upr},
+};
+
+/// Orders of which a filter passes less do not matter.
+const MATTERS: f64 = 0.01;
+
+/// A Gaussian filter (ISO 16610-21) by order.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Filter {
+    pub name: String,
+    band: Band,
+}
+
+impl Filter {
+    /// Everything passes, or what is below a cut-off.
+    pub fn low_pass(cutoff_upr: Option<f64>) -> Self {
+        Self { name: low_pass_name(cutoff_upr), band: Band { above_upr: None, below_upr: cutoff_upr } }
+    }
+
+    /// What lies between λs and λc along the circumference of a radius.
+    pub fn between(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>, radius_mm: f64) -> Self {
+        let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
+        let band = Band { above_upr: lambda_c_mm.map(upr), below_upr: lambda_s_mm.map(upr) };
+        Self { name: between_name(lambda_s_mm, lambda_c_mm), band }
+    }
+
+    /// Harmonics behind the filter.
+    pub fn harmonics(&self, harmonics: &[Complex64]) -> Vec<Complex64> {
+        let mut filtered = harmonics.to_vec();
+        self.band.apply(&mut filtered);
+        filtered
+    }
+
+    /// Variances behind the filter.
+    pub fn variance(&self, variance: &[f64]) -> Vec<f64> {
+        variance.iter().enumerate().map(|(order, variance)| variance * self.band.weight(order).powi(2)).collect()
+    }
+
+    /// Orders of which half passes or more, from 2 to at most `highest`.
+    pub fn band_upr(&self, highest: usize) -> [usize; 2] {
+        let low = self.band.above_upr.map_or(2, |cutoff| (cutoff.ceil() as usize).max(2));
+        let high = self.band.below_upr.map_or(highest, |cutoff| (cutoff.floor() as usize).min(highest));
+        [low.min(high), high]
+    }
+
+    /// Those of the lost orders that it would pass.
+    pub fn lost(&self, lost: &[usize]) -> Vec<usize> {
+        lost.iter().copied().filter(|order| self.band.weight(*order) >= MATTERS).collect()
+    }
+}
+
+/// "none", "Gaussian 50 UPR".
+pub(super) fn low_pass_name(cutoff_upr: Option<f64>) -> String {
+    cutoff_upr.map_or_else(|| "none".into(), |cutoff| format!("Gaussian {cutoff} UPR"))
+}
+
+/// "none", "Gaussian λs 0.0025 mm, λc 0.8 mm".
+pub(super) fn between_name(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>) -> String {
+    let named = [("λs", lambda_s_mm), ("λc", lambda_c_mm)];
+    let named = named.iter().filter_map(|(name, wavelength)| Some(format!("{name} {} mm", (*wavelength)?)));
+    let names: Vec<String> = named.collect();
+    if names.is_empty() { "none".into() } else { format!("Gaussian {}", names.join(", ")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_an_order_at_the_cut_off_passes_and_a_quarter_of_its_variance() {
+        let filter = Filter::low_pass(Some(50.0));
+        let harmonics = filter.harmonics(&vec![Complex64::new(3.0, -4.0); 101]);
+        // ISO 16610-21: 50 % at the cut-off, 2^-4 at twice that.
+        assert!((harmonics[50].norm() - 2.5).abs() < 1e-12 && (harmonics[100].norm() - 5.0 / 16.0).abs() < 1e-12);
+        assert!((filter.variance(&[1.0; 51])[50] - 0.25).abs() < 1e-12);
+        assert_eq!((filter.band_upr(255), filter.band_upr(40)), ([2, 50], [2, 40]));
+        // 2^-(129/50)² is 0.0099.
+        assert_eq!(filter.lost(&[4, 128, 129]), [4, 128]);
+    }
+
+    #[test]
+    fn wavelengths_become_orders_of_the_circumference() {
+        // 2π·30 mm / 0.8 mm are 235.6 waves a turn.
+        let filter = Filter::between(None, Some(0.8), 30.0);
+        assert_eq!(filter.band_upr(500), [236, 500]);
+        let passed = filter.harmonics(&vec![Complex64::ONE; 501]);
+        assert!(passed[2].norm() < 1e-4 && (passed[236].norm() - 0.5).abs() < 2e-3, "{}", passed[236]);
+        assert_eq!(filter.name, "Gaussian λc 0.8 mm");
+        assert_eq!(Filter::between(Some(0.0025), Some(0.8), 30.0).name, "Gaussian λs 0.0025 mm, λc 0.8 mm");
+    }
+}

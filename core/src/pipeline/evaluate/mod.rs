@@ -1,0 +1,98 @@
+//! The standards' values of a run: which (`[evaluate]`), of what, and the limits that they have to keep (`[[limit]]`).
+
+mod config;
+mod filter;
+mod limit;
+mod part;
+mod section;
+
+pub use config::{Evaluate, EvaluateConfig, Group};
+pub(super) use limit::decide;
+pub use limit::{Decision, Limit, LimitSummary, LimitValue};
+pub use part::PartSummary;
+pub(super) use part::{add_areal, part_summary};
+pub(super) use section::section_values;
+
+use super::summary::StationSummary;
+use crate::evaluate::{Value, uncertainty::Uncertainty};
+use filter::Filter;
+
+/// A value and where it belongs.
+#[derive(Debug, Clone, Copy)]
+pub struct PlacedValue<'a> {
+    /// The station; none for a value of the whole part.
+    pub station: Option<&'a str>,
+    /// The section; none for a value of a station or the whole part.
+    pub section: Option<&'a str>,
+    /// Place of the section, or of the carriage, along the axis.
+    pub z_mm: Option<f64>,
+    /// The value.
+    pub value: &'a Value,
+}
+
+/// Values of sections, then of their station, station by station; the whole part's last.
+pub(super) fn placed<'a>(stations: &'a [StationSummary], part: Option<&'a PartSummary>) -> Vec<PlacedValue<'a>> {
+    let mut all = Vec::new();
+    for station in stations {
+        let name = Some(station.station.as_str());
+        for section in &station.sections {
+            let (id, z_mm) = (Some(section.section.as_str()), Some(section.z_mm));
+            all.extend(section.values.iter().map(|value| PlacedValue { station: name, section: id, z_mm, value }));
+        }
+        let z_mm = Some(station.z_mm);
+        all.extend(station.values.iter().map(|value| PlacedValue { station: name, section: None, z_mm, value }));
+    }
+    let of_part = part.iter().flat_map(|part| &part.values);
+    all.extend(of_part.map(|value| PlacedValue { station: None, section: None, z_mm: None, value }));
+    all
+}
+
+/// What a number is, before it is known.
+#[derive(Debug, Clone)]
+struct Label {
+    symbol: &'static str,
+    unit: &'static str,
+    source: String,
+    reference: String,
+}
+
+impl Label {
+    fn new(symbol: &'static str, unit: &'static str, source: impl Into<String>, reference: impl Into<String>) -> Self {
+        Self { symbol, unit, source: source.into(), reference: reference.into() }
+    }
+}
+
+/// Units as files write them.
+fn ascii_unit(unit: &str) -> String {
+    unit.replace('µ', "u").replace('°', "deg")
+}
+
+/// Numbers under their labels; what is no number is left out: the profile or the wall does not have that value.
+fn labelled(
+    labels: Vec<Label>,
+    found: Vec<(f64, Option<Uncertainty>)>,
+    filter: &Filter,
+    highest: usize,
+    lost: &[usize],
+    coverage: f64,
+) -> Vec<Value> {
+    let lost_orders = filter.lost(lost);
+    let known = labels.into_iter().zip(found).filter(|(_, (value, _))| value.is_finite());
+    known
+        .map(|(label, (value, uncertainty))| Value {
+            symbol: label.symbol.into(),
+            unit: ascii_unit(label.unit),
+            value,
+            source: label.source,
+            band_upr: filter.band_upr(highest),
+            lost_orders: lost_orders.clone(),
+            filter: filter.name.clone(),
+            reference: label.reference,
+            coverage,
+            uncertainty,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,250 @@
+//! Values of all sections together: cylindricity, and areal values of the surface.
+
+use std::collections::BTreeSet;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Evaluate, Filter, Group, Label, labelled};
+use crate::{
+    Complex64, Result,
+    evaluate::{
+        Value, areal,
+        cylindricity::{Generatrices, MedianLine, Points, Reference, Section, Values},
+        roundness::{self, Angles},
+        uncertainty::{DRAWS, Errors, monte_carlo_of, seed},
+    },
+    numerics::{
+        filter::areal_gaussian,
+        fourier::{Fourier, max_order},
+        height_map::HeightMap,
+    },
+    surface::{self, Surface},
+};
+
+/// Angles at which a wall is looked at, at most: a surface's usual ones.
+const MOST_ANGLES: usize = 720;
+/// Points that all draws of one filter look at together, about: a wall of many sections has fewer draws, down to
+/// [`FEWEST_DRAWS`].
+const POINTS_DRAWN: usize = 2_000_000;
+const FEWEST_DRAWS: usize = 50;
+/// Draws of what is fitted to each of a wall's generatrices.
+const DRAWS_OF_LINES: usize = 100;
+
+/// Values of all sections together.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PartSummary {
+    /// Sections that they are of.
+    pub sections: usize,
+    /// First and last place of a section along the axis, in mm.
+    pub z_mm: [f64; 2],
+    /// Equal angles at which each section was looked at.
+    pub angles: usize,
+    /// The standards' values.
+    pub values: Vec<Value>,
+    /// What the values are not.
+    pub remarks: Vec<String>,
+}
+
+/// Cylindricity of sections about a nominal radius; `None` where they do not lie at two heights. `placed` says that their
+/// centres and mean radii are known relative to each other, which only a measuring machine tells.
+pub fn part_summary(
+    sections: &[surface::Section],
+    angles: usize,
+    evaluate: &Evaluate,
+    radius_mm: f64,
+    placed: bool,
+) -> Option<PartSummary> {
+    let there: Vec<&surface::Section> = sections.iter().filter(|section| section.z_mm.is_finite()).collect();
+    let heights = || there.iter().map(|section| section.z_mm);
+    let z_mm = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
+    if z_mm[0] >= z_mm[1] {
+        return None;
+    }
+    let wall = Wall::of(&there, angles.min(MOST_ANGLES), radius_mm, placed);
+    let mut part = PartSummary { sections: there.len(), z_mm, angles: wall.count, ..PartSummary::default() };
+    if evaluate.has(Group::Cylindricity) {
+        for cutoff in evaluate.cutoffs_upr(wall.highest) {
+            part.values.extend(wall.cylindricity(&Filter::low_pass(cutoff), &evaluate.references));
+        }
+        if placed {
+            part.values.extend(wall.lines());
+        } else {
+            part.remarks.push(CENTRED.into());
+        }
+    }
+    if there.len() < sections.len() {
+        part.remarks.push(format!("{} sections without a place along z are left out", sections.len() - there.len()));
+    }
+    Some(part)
+}
+
+const CENTRED: &str = "every section is centred, without its 1/rev, and has the nominal radius: displacement sensors do \
+    not tell a section's centre and mean radius. Taper (CYLtt), straightness of generatrices and coaxiality are therefore \
+    not given, and CYLt holds none of them";
+
+/// Adds ISO 25178-2's values of the unrolled surface, without its least-squares cylinder and filtered by λs and λc; where it
+/// comes from sections with lost orders, these are in no value.
+///
+/// # Errors
+/// When the rings are not at equal distances.
+pub fn add_areal(part: &mut PartSummary, surface: &Surface, evaluate: &Evaluate) -> Result<()> {
+    let mut map = areal::without_cylinder(&HeightMap::unrolled(surface)?)?;
+    if let Some(shortest) = evaluate.lambda_s_mm {
+        map = map.with(areal_gaussian(&map, shortest));
+    }
+    if let Some(longest) = evaluate.lambda_c_mm {
+        let mut rest = map.heights_um().to_vec();
+        rest.iter_mut().zip(areal_gaussian(&map, longest)).for_each(|(height, waviness)| *height -= waviness);
+        map = map.with(rest);
+    }
+    let found = areal::areal(&map, &areal::Settings::default());
+    let label = |(symbol, unit, clause): &(&'static str, &'static str, &str)| {
+        Label::new(symbol, unit, format!("ISO 25178-2:2021, {clause}"), "LSCY removed, mean")
+    };
+    let lost = part.values.first().map(|value| value.lost_orders.clone()).unwrap_or_default();
+    part.values.extend(labelled(
+        areal::PARAMETERS.iter().map(label).collect(),
+        found.parameters().iter().map(|parameter| (parameter.value, None)).collect(),
+        &Filter::between(evaluate.lambda_s_mm, evaluate.lambda_c_mm, surface.radius_mm),
+        max_order(surface.angles),
+        &lost,
+        found.points as f64 / (found.points + found.missing) as f64,
+    ));
+    Ok(())
+}
+
+/// Circles of a wall on common angles.
+struct Wall {
+    angles: Angles,
+    count: usize,
+    radius_mm: f64,
+    placed: bool,
+    rings: Vec<Ring>,
+    highest: usize,
+    lost: Vec<usize>,
+}
+
+struct Ring {
+    z_mm: f64,
+    harmonics: Vec<Complex64>,
+    variance: Vec<f64>,
+    seed: u64,
+}
+
+impl Wall {
+    fn of(sections: &[&surface::Section], count: usize, radius_mm: f64, placed: bool) -> Self {
+        let (lowest, fitting) = (if placed { 0 } else { 2 }, max_order(count) + 1);
+        let mut lost = BTreeSet::new();
+        let mut highest = 0;
+        let rings = sections.iter().map(|section| {
+            let orders = || section.orders.iter().take(fitting).enumerate();
+            lost.extend(orders().filter(|(order, known)| *order >= 2 && known.is_none()).map(|(order, _)| order));
+            highest = highest.max(orders().count().saturating_sub(1));
+            let known = || orders().map(|(order, known)| known.filter(|_| order >= lowest));
+            Ring {
+                z_mm: section.z_mm,
+                harmonics: known().map(|known| known.map_or(Complex64::ZERO, |known| known.value)).collect(),
+                variance: known().map(|known| known.map_or(f64::NAN, |known| known.variance)).collect(),
+                seed: seed(&[&section.station, &section.id]),
+            }
+        });
+        let rings = rings.collect();
+        let (angles, lost) = (Angles::equal(count), lost.into_iter().collect());
+        Self { angles, count, radius_mm, placed, rings, highest, lost }
+    }
+
+    fn cylindricity(&self, filter: &Filter, circles: &[roundness::Reference]) -> Vec<Value> {
+        let references: Vec<Reference> = circles.iter().map(|circle| cylinder(*circle)).collect();
+        let mut labels = Vec::new();
+        for reference in &references {
+            let name = if self.placed { "" } else { " of centred sections" };
+            let name = format!("{}{name}", reference.symbol());
+            let cyl = |symbol, meaning: &str| {
+                Label::new(symbol, "µm", format!("ISO 12180-1:2011, {meaning} cylindricity deviation"), name.clone())
+            };
+            labels.push(cyl("CYLt", "peak-to-valley"));
+            if *reference == Reference::LeastSquares {
+                labels.extend([cyl("CYLp", "peak-to-reference"), cyl("CYLv", "reference-to-valley")]);
+                labels.push(cyl("CYLq", "root mean square"));
+            }
+        }
+        let draws = POINTS_DRAWN / (self.rings.len() * self.count).max(1);
+        self.evaluate(filter, labels, draws.clamp(FEWEST_DRAWS, DRAWS), |sections, found| {
+            let points = Points::of_sections(self.radius_mm, sections);
+            for reference in &references {
+                let about = points.reference(*reference).map(|cylinder| points.values(&cylinder));
+                let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+                found.push(of(|values| values.cylt_um));
+                if *reference == Reference::LeastSquares {
+                    found.extend([
+                        of(|values| values.cylp_um),
+                        of(|values| values.cylv_um),
+                        of(|values| values.cylq_um),
+                    ]);
+                }
+            }
+        })
+    }
+
+    /// What needs the sections' centres and mean radii.
+    fn lines(&self) -> Vec<Value> {
+        let coaxiality = "ISO 1101:2017, coaxiality: the largest of a section's LSCI centre with the axis";
+        let labels = vec![
+            Label::new("CYLtt", "µm", "ISO 12180-1:2011, cylinder taper", "LSCY"),
+            Label::new("STRt", "µm", "ISO 12780-1:2011, the largest of the generatrices", "LSLI of generatrices"),
+            Label::new("STRt", "µm", "ISO 12780-1:2011, of the median line, a diameter", "LSLI of the median line"),
+            Label::new("coaxiality", "µm", coaxiality, "LSCY"),
+        ];
+        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, |sections, found| {
+            let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
+            let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
+            let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
+            found.push(lines.as_ref().map_or(f64::NAN, Generatrices::cyltt_um));
+            found.push(lines.as_ref().map_or(f64::NAN, Generatrices::largest_strt_um));
+            found.push(median.as_ref().map_or(f64::NAN, |median| median.straightness_um));
+            let coaxiality = median.iter().flat_map(|median| &median.coaxiality_um);
+            found.push(coaxiality.copied().fold(f64::NAN, f64::max));
+        })
+    }
+
+    fn evaluate(
+        &self,
+        filter: &Filter,
+        labels: Vec<Label>,
+        draws: usize,
+        mut values: impl FnMut(&[Section], &mut Vec<f64>),
+    ) -> Vec<Value> {
+        let mut fourier = Fourier::new(self.count);
+        let lowest = if self.placed { 0 } else { 2 };
+        let forms: Vec<Vec<f64>> =
+            self.rings.iter().map(|ring| fourier.synthesise(filter.harmonics(&ring.harmonics)).to_vec()).collect();
+        let errors = self.rings.iter().map(|ring| Errors::new(&filter.variance(&ring.variance), lowest, ring.seed));
+        // A wall of which some sections have no known error has none either.
+        let mut errors: Vec<Errors> = errors.collect::<Option<_>>().unwrap_or_default();
+        let draws = if errors.is_empty() { 0 } else { draws };
+        let mut drawn = forms.clone();
+        let found = monte_carlo_of(draws, |disturbed, found| {
+            if disturbed {
+                for ((errors, form), drawn) in errors.iter_mut().zip(&forms).zip(&mut drawn) {
+                    errors.draw(&mut fourier, form, drawn);
+                }
+            }
+            let sections = self.rings.iter().zip(&drawn);
+            let sections: Vec<Section> =
+                sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles: &self.angles, form_um }).collect();
+            values(&sections, found);
+        });
+        labelled(labels, found, filter, self.highest, &self.lost, 1.0)
+    }
+}
+
+/// The cylinder that corresponds to a circle.
+pub(super) fn cylinder(circle: roundness::Reference) -> Reference {
+    match circle {
+        roundness::Reference::LeastSquares => Reference::LeastSquares,
+        roundness::Reference::MinimumZone => Reference::MinimumZone,
+        roundness::Reference::MaximumInscribed => Reference::MaximumInscribed,
+        roundness::Reference::MinimumCircumscribed => Reference::MinimumCircumscribed,
+    }
+}

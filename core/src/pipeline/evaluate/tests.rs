@@ -1,0 +1,281 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::f64::consts::{PI, SQRT_2};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::{
+    Complex64,
+    pipeline::{
+        error::{Fault, Place, Step},
+        result::StationResult,
+        summary::{SectionSummary, StationSummary},
+    },
+    separation::{Quantity, Residual, SectionAt, Separation},
+    surface::{SurfaceBuilder, SurfaceConfig},
+};
+
+const RADIUS_MM: f64 = 30.0;
+/// Form²/R of 6 µm on 30 mm: what centring and circles that are no limaçons leave.
+const EXACT_UM: f64 = 1.2e-3;
+
+/// A section at z with these waves (order, coefficient), orders to `highest`, each of one variance.
+fn station(z_mm: f64, waves: &[(usize, Complex64)], highest: usize, variance: f64, lost: &[usize]) -> StationResult {
+    let mut estimate = vec![Complex64::ZERO; highest + 1];
+    waves.iter().for_each(|(order, value)| estimate[*order] = *value);
+    let separation = Separation {
+        sections: vec![SectionAt { id: "a".into(), z_mm }],
+        unknowns: vec![Quantity::Form(0)],
+        estimate,
+        variance: vec![variance; highest + 1],
+        observable: (0..=highest).map(|order| !lost.contains(&order)).collect(),
+        motion_z_mm: 0.0,
+        residual: Residual::default(),
+        warnings: Vec::new(),
+    };
+    StationResult {
+        station: format!("s{z_mm}"),
+        z_mm,
+        angles: 720,
+        separation,
+        profiles: Vec::new(),
+        values: Vec::new(),
+        truth: None,
+    }
+}
+
+fn lobes(order: usize, amplitude_um: f64) -> (usize, Complex64) {
+    (order, Complex64::from(amplitude_um))
+}
+
+fn evaluate(text: &str) -> Result<Evaluate, Fault> {
+    toml::from_str::<EvaluateConfig>(text).unwrap().check()
+}
+
+fn find<'a>(values: &'a [Value], symbol: &str, reference: &str, filter: &str) -> &'a Value {
+    let wanted = |value: &&Value| value.symbol == symbol && value.reference == reference && value.filter == filter;
+    values.iter().find(wanted).unwrap_or_else(|| panic!("no {symbol} {reference} {filter} in {values:?}"))
+}
+
+#[test]
+fn three_lobes_have_the_values_of_their_amplitude() {
+    // Level and eccentricity are no form; 2 µm of three lobes are 4 µm high about every circle.
+    let waves = [lobes(0, 7.0), lobes(1, 5.0), lobes(3, 2.0)];
+    let evaluate = evaluate("references = ['LSCI', 'MZCI', 'MICI', 'MCCI']").unwrap();
+    let values = section_values(&station(0.0, &waves, 60, f64::NAN, &[7, 55, 1]), 0, &evaluate, RADIUS_MM);
+    for reference in ["LSCI", "MZCI", "MICI", "MCCI"] {
+        let ront = find(&values, "RONt", reference, "none");
+        assert!((ront.value - 4.0).abs() < EXACT_UM, "{reference}: {}", ront.value);
+        assert_eq!((&*ront.unit, ront.band_upr, ront.uncertainty.as_ref()), ("um", [2, 60], None));
+        assert_eq!(ront.lost_orders, [7, 55]);
+        // ISO 16610-21: of three lobes 2^-(3/50)² pass.
+        let filtered = find(&values, "RONt", reference, "Gaussian 50 UPR");
+        assert!((filtered.value - 4.0 * (-(3.0_f64 / 50.0).powi(2)).exp2()).abs() < EXACT_UM);
+        assert_eq!((filtered.band_upr, &*filtered.lost_orders), ([2, 50], &[7, 55][..]));
+    }
+    for (symbol, expected) in [("RONp", 2.0), ("RONv", 2.0), ("RONq", SQRT_2)] {
+        let found = find(&values, symbol, "LSCI", "none").value;
+        assert!((found - expected).abs() < EXACT_UM, "{symbol} {found}");
+    }
+    // 720 angles miss the mean of a rectified wave by (π·3/720)²/3.
+    assert!((find(&values, "Ra", "mean line", "none").value - 4.0 / PI).abs() < 1e-4);
+    assert_eq!(values.iter().filter(|value| value.symbol == "Ra").count(), 1);
+}
+
+#[test]
+fn half_of_a_wave_at_the_cut_off_is_left() {
+    for cutoff in [15, 50, 150] {
+        let evaluate = evaluate(&format!("filter_upr = [{cutoff}]")).unwrap();
+        let values = section_values(&station(0.0, &[lobes(cutoff, 2.0)], 200, f64::NAN, &[]), 0, &evaluate, RADIUS_MM);
+        let [all, half] =
+            ["none", &format!("Gaussian {cutoff} UPR")].map(|filter| find(&values, "RONt", "LSCI", filter));
+        // 720 angles miss the peaks of 150 lobes by the same share of both.
+        assert!((half.value / all.value - 0.5).abs() < 1e-4, "{cutoff}: {}", half.value / all.value);
+    }
+    // 20 orders do not reach the usual cut-off.
+    let values = section_values(&station(0.0, &[lobes(3, 2.0)], 20, f64::NAN, &[]), 0, &Evaluate::default(), RADIUS_MM);
+    assert!(values.iter().all(|value| value.filter == "none"));
+}
+
+#[test]
+fn texture_lies_between_its_wavelengths() {
+    // λc = 0.8 mm on a circumference of 188.5 mm: 300 waves of 0.63 mm pass to 66 %, 5 of 37.7 mm do not.
+    let evaluate = evaluate("values = ['texture']\nlambda_c_mm = 0.8").unwrap();
+    let values =
+        section_values(&station(0.0, &[lobes(5, 9.0), lobes(300, 1.0)], 340, f64::NAN, &[]), 0, &evaluate, RADIUS_MM);
+    let passed = 1.0 - (-(300.0 * 0.8 / (60.0 * PI)).powi(2)).exp2();
+    let rq = find(&values, "Rq", "mean line", "Gaussian λc 0.8 mm");
+    assert!((rq.value - passed / SQRT_2).abs() < 1e-3, "{} {passed}", rq.value);
+    assert_eq!(rq.band_upr, [236, 340]);
+    assert!(find(&values, "Ra", "mean line", "none").value > 5.0);
+}
+
+/// 95 % intervals of values that are not linear hold the truth about as often as they say.
+#[test]
+fn intervals_hold_the_truth() {
+    const TRIALS: usize = 200;
+    let truth = [lobes(2, 1.0), lobes(3, 2.0), lobes(5, 0.7)];
+    let evaluate = evaluate("values = ['roundness']\nreferences = ['MZCI']\nfilter_upr = []").unwrap();
+    let of = |waves: &[(usize, Complex64)], variance| {
+        let mut result = station(0.0, waves, 20, variance, &[]);
+        result.angles = 90;
+        section_values(&result, 0, &evaluate, RADIUS_MM).remove(0)
+    };
+    let expected = of(&truth, f64::NAN).value;
+    let (variance, mut random) = (4e-4, ChaCha8Rng::seed_from_u64(11));
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut inside = 0;
+    for _ in 0..TRIALS {
+        let share = (0.5_f64 * variance).sqrt();
+        let mut waves: Vec<(usize, Complex64)> =
+            (2..=20).map(|order| (order, Complex64::new(share * normal(), share * normal()))).collect();
+        truth.iter().for_each(|(order, value)| waves[order - 2].1 += value);
+        let [low, high] = of(&waves, variance).uncertainty.unwrap().interval_95;
+        inside += usize::from(low <= expected && expected <= high);
+    }
+    // 95 % of 200 are 190 ± 3.1; coarse ends of 400 draws and what a linear model does not hold take some.
+    assert!((178..=199).contains(&inside), "{inside} of {TRIALS}");
+}
+
+fn part(stations: &[StationResult], placed: bool, text: &str) -> PartSummary {
+    let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 360, step_mm: None });
+    stations.iter().for_each(|station| builder.add(station));
+    part_summary(builder.sections(), 360, &evaluate(text).unwrap(), RADIUS_MM, placed).unwrap()
+}
+
+#[test]
+fn centred_sections_have_their_form_and_no_taper() {
+    let tapered = |z: f64, amplitude| station(z, &[lobes(0, z), lobes(1, z), lobes(3, amplitude)], 20, 1e-6, &[]);
+    let found = part(&[tapered(0.0, 2.0), tapered(10.0, 3.0)], false, "");
+    let cylt = find(&found.values, "CYLt", "LSCY of centred sections", "none");
+    assert!((cylt.value - 6.0).abs() < EXACT_UM, "{}", cylt.value);
+    // Four peaks of √(½ · 19 · 1e-6 µm²) each: not below one peak's noise, not above five times as much.
+    let std = cylt.uncertainty.as_ref().unwrap().std;
+    assert!(std > 0.002 && std < 0.016, "{std}");
+    assert!(find(&found.values, "CYLt", "MZCY of centred sections", "none").value < cylt.value + EXACT_UM);
+    assert!(found.values.iter().all(|value| value.symbol.starts_with("CYL") && value.symbol != "CYLtt"));
+    assert!(found.remarks[0].contains("CYLtt"));
+}
+
+#[test]
+fn placed_sections_have_taper_bend_and_coaxiality() {
+    // Radii 1 µm more and less at the ends: diameters differ by 4 µm.
+    let cone = |z: f64, level| station(z, &[lobes(0, level)], 10, 1e-6, &[]);
+    let found = part(&[cone(0.0, -1.0), cone(10.0, 0.0), cone(20.0, 1.0)], true, "references = ['LSCI']");
+    let value = |symbol, reference| find(&found.values, symbol, reference, "none").value;
+    assert!((value("CYLtt", "LSCY") - 2.0).abs() < EXACT_UM);
+    assert!((value("CYLt", "LSCY") - 2.0).abs() < EXACT_UM);
+    assert!(find(&found.values, "CYLtt", "LSCY", "none").uncertainty.is_some());
+
+    // A section 3 µm aside: the axis lies 1 µm aside, and 2 µm from that section.
+    let bent = |z: f64, aside| station(z, &[lobes(1, aside)], 10, f64::NAN, &[]);
+    let found = part(&[bent(0.0, 0.0), bent(10.0, 3.0), bent(20.0, 0.0)], true, "references = ['LSCI']");
+    let value = |symbol, reference| find(&found.values, symbol, reference, "none").value;
+    assert!((value("coaxiality", "LSCY") - 4.0).abs() < EXACT_UM);
+    assert!((value("STRt", "LSLI of the median line") - 4.0).abs() < EXACT_UM);
+    assert!((value("STRt", "LSLI of generatrices") - 3.0).abs() < EXACT_UM);
+}
+
+fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
+    let uncertainty =
+        |std: f64, value: f64| Uncertainty { std, interval_95: [value - 2.0 * std, value + 2.0 * std], draws: 400 };
+    let value = |reference: &str, value: f64, std: Option<f64>| Value {
+        symbol: "RONt".into(),
+        unit: "um".into(),
+        value,
+        source: String::new(),
+        band_upr: [2, 50],
+        lost_orders: Vec::new(),
+        filter: "none".into(),
+        reference: reference.into(),
+        coverage: 1.0,
+        uncertainty: std.map(|std| uncertainty(std, value)),
+    };
+    let section = |id: &str, values| SectionSummary {
+        section: id.into(),
+        z_mm: 0.0,
+        form_rms_um: 1.0,
+        form_std_um: None,
+        values,
+        truth_form_rms_error_um: None,
+    };
+    let station = StationSummary {
+        station: "s0".into(),
+        z_mm: 0.0,
+        captures: Vec::new(),
+        sections: vec![
+            section("a", vec![value("LSCI", 4.0, Some(0.25)), value("MZCI", 3.8, Some(0.25))]),
+            section("b", vec![value("LSCI", 4.0, None)]),
+        ],
+        values: Vec::new(),
+        residual_rms_um: None,
+        expected_residual_rms_um: None,
+        chi2_per_dof: None,
+        truth: None,
+        warnings: Vec::new(),
+    };
+    let mut evaluate = Evaluate::default();
+    let limit: Limit = toml::from_str(limits).unwrap();
+    evaluate.add_limit(limit.check(&evaluate, None).unwrap());
+    let (decided, remarks) = decide(evaluate.limits(), &placed(&[station], None));
+    let of = |value: &LimitValue| (value.decision, value.within);
+    decided.iter().map(|one| (one.decision, one.values.iter().map(of).collect(), remarks.len())).collect()
+}
+
+/// 4.0 ± 0.5 µm and 3.8 ± 0.5 µm of section a, 4.0 µm without uncertainty of section b.
+#[test]
+fn a_limit_is_kept_only_where_that_is_proven() {
+    use Decision::{Conforms, DoesNotConform, Undecided};
+    let symbol = "symbol = 'RONt'\nunit = 'um'\n";
+    for (limit, decision, values) in [
+        ("section = 'a'\nreference = 'LSCI'\nupper = 4.5", Conforms, vec![(Conforms, true)]),
+        ("section = 'a'\nreference = 'LSCI'\nupper = 4.4", Undecided, vec![(Undecided, true)]),
+        ("section = 'a'\nreference = 'LSCI'\nupper = 3.6", Undecided, vec![(Undecided, false)]),
+        ("section = 'a'\nreference = 'LSCI'\nupper = 3.4", DoesNotConform, vec![(DoesNotConform, false)]),
+        ("section = 'a'\nreference = 'LSCI'\nlower = 4.6", DoesNotConform, vec![(DoesNotConform, false)]),
+        ("section = 'a'\nlower = 3.0\nupper = 4.5", Conforms, vec![(Conforms, true), (Conforms, true)]),
+        ("section = 'a'\nupper = 4.4", Undecided, vec![(Undecided, true), (Conforms, true)]),
+        ("section = 'b'\nupper = 100.0", Undecided, vec![(Undecided, true)]),
+        ("section = 'b'\nupper = 1.0", Undecided, vec![(Undecided, false)]),
+    ] {
+        assert_eq!(limited(&format!("{symbol}{limit}")), [(decision, values, 0)], "{limit}");
+    }
+    assert_eq!(limited(&format!("{symbol}section = 'c'\nupper = 4.5")), [(Undecided, vec![], 1)]);
+}
+
+#[test]
+fn what_cannot_be_evaluated_is_refused_at_its_place() {
+    let key = |name: &str| Step::Key(name.into());
+    for (text, place, words) in [
+        ("filter_upr = [50, -1]", vec![key("filter_upr"), Step::Index(1)], "above 0"),
+        ("lambda_c_mm = 0.0", vec![key("lambda_c_mm")], "above 0 mm"),
+        ("lambda_s_mm = 0.0025", vec![key("lambda_s_mm")], "alone"),
+        ("lambda_c_mm = 0.8\nlambda_s_mm = 2.5", vec![key("lambda_s_mm")], "shorter than λc"),
+        ("references = []", vec![key("references")], "at least one"),
+    ] {
+        let fault = evaluate(text).unwrap_err();
+        assert!(fault.message.contains(words), "{fault}");
+        assert_eq!(fault.place, Place::Path(place), "{text}");
+    }
+    for (text, at, words) in [
+        ("symbol = 'RONtt'\nunit = 'um'\nupper = 1", "symbol", "did you mean `RONt`"),
+        ("symbol = 'Rz'\nunit = 'um'\nupper = 1", "symbol", "lambda_c_mm"),
+        ("symbol = 'RONt'\nunit = 'mm'\nupper = 1", "unit", "given in `um`"),
+        ("symbol = 'RONt'\nunit = 'um'\nreference = 'MICI'\nupper = 1", "reference", "`MZCI`"),
+        ("symbol = 'CYLt'\nunit = 'um'\nreference = 'LSCI'\nupper = 1", "reference", "`LSCY`"),
+        ("symbol = 'RONt'\nunit = 'um'\nfilter = '50'\nupper = 1", "filter", "`Gaussian 50 UPR`"),
+        ("symbol = 'RONt'\nunit = 'um'\nlower = 2\nupper = 1", "upper", "from lower = 2"),
+        ("symbol = 'RONt'\nunit = 'um'\nupper = inf", "upper", "finite"),
+    ] {
+        let limit: Limit = toml::from_str(text).unwrap();
+        let fault = limit.check(&Evaluate::default(), None).unwrap_err();
+        let said = format!("{fault}; {}", fault.help.clone().unwrap_or_default());
+        assert!(said.contains(words), "{said}");
+        assert_eq!(fault.place, Place::Path(vec![key(at)]), "{text}");
+    }
+    let none: Limit = toml::from_str("symbol = 'RONt'\nunit = 'um'").unwrap();
+    assert!(none.check(&Evaluate::default(), None).unwrap_err().message.contains("`upper`, `lower` or both"));
+}
