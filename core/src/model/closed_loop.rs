@@ -26,8 +26,6 @@ const OWN_SHARE: f64 = 0.8;
 const HELD_OUT_GAIN: f64 = 1e-3;
 /// No effect is this many times larger than its tolerance.
 const MOST: f64 = 100.0;
-/// Refits of a confounded set from where the one before came to.
-const HOLDING_PASSES: usize = 2;
 /// An effect of its usual size that would show with less than this many standard deviations is not seen.
 pub(super) const VISIBLE: f64 = 3.0;
 
@@ -38,13 +36,15 @@ pub struct Settings {
     pub effects: Option<Vec<String>>,
     /// Effects that are declared: applied with these values, and not fitted.
     pub known: Vec<Setting>,
+    /// Effects that are not looked for: what would show them cannot be trusted.
+    pub left_out: Vec<usize>,
     /// Most effects that may be added.
     pub max_added: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { effects: None, known: Vec::new(), max_added: 6 }
+        Self { effects: None, known: Vec::new(), left_out: Vec::new(), max_added: 6 }
     }
 }
 
@@ -139,8 +139,9 @@ impl<M: Model> Tracing<'_, M> {
     fn considered(&self) -> Vec<usize> {
         let chosen = |effect: &Effect| self.settings.effects.as_ref().is_none_or(|ids| ids.contains(&effect.id));
         let declared = |index: usize| self.settings.known.iter().any(|known| known.effect == index);
+        let wanted = |index: usize| !declared(index) && !self.settings.left_out.contains(&index);
         let effects = self.model.effects().iter().enumerate();
-        effects.filter(|(index, effect)| chosen(effect) && !declared(*index)).map(|(index, _)| index).collect()
+        effects.filter(|(index, effect)| chosen(effect) && wanted(*index)).map(|(index, _)| index).collect()
     }
 
     fn active(&self, effect: usize) -> bool {
@@ -162,16 +163,15 @@ impl<M: Model> Tracing<'_, M> {
             }
         }
         let fixed = self.settings.known.len();
-        let mut last = refit(model, settings, fixed, &[])?;
-        if self.found.iter().all(|found| found.members.len() < 2) {
-            return Ok(last);
+        let held = self.found.iter().any(|found| found.members.len() > 1);
+        let priors = if held { self.priors(model, &settings, &model.fit(&settings)?)? } else { Vec::new() };
+        let first = refit(model, settings, fixed, &priors)?;
+        if !held {
+            return Ok(first);
         }
-        // Results are not linear in all parameters: their distance is looked at from where a refit came to.
-        for _ in 0..HOLDING_PASSES {
-            let priors = self.priors(model, &last)?;
-            last = refit(model, last.settings, fixed, &priors)?;
-        }
-        Ok(last)
+        // Results are not linear in all parameters: their distance is looked at once more from where the refit came to.
+        let priors = self.priors(model, &first.settings, &first.fit)?;
+        refit(model, first.settings, fixed, &priors)
     }
 
     /// The effect of the lowest rank that earns its place, if any does.
@@ -209,7 +209,7 @@ impl<M: Model> Tracing<'_, M> {
             .collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
-        let held = self.priors(self.model, current).ok()?;
+        let held = self.priors(self.model, &current.settings, &current.fit).ok()?;
         let mut trials: Vec<(usize, Refit<M::Fit>, Evidence)> = Vec::new();
         for (effect, gain) in ranked.into_iter().take(SHORTLIST.0).filter(|(_, gain)| *gain >= promising) {
             let parameters = self.model.effects()[effect].parameters.len();
@@ -286,21 +286,21 @@ impl<M: Model> Tracing<'_, M> {
     /// Holds each confounded set where the results move least, as far as the data do not decide. Form without the set, the
     /// truth, and everything that the data allow between: the nearest of these to form without it is never farther from
     /// the truth than that is (Pythagoras). Where results do not move, the members' own sizes decide.
-    fn priors(&self, model: &M, current: &Refit<M::Fit>) -> Result<Vec<Prior>> {
-        let free = &current.settings[self.settings.known.len()..];
+    fn priors(&self, model: &M, settings: &[Setting], fit: &M::Fit) -> Result<Vec<Prior>> {
+        let free = &settings[self.settings.known.len()..];
         let mut priors = Vec::new();
         let (mut first, mut setting) = (0, 0);
         for found in &self.found {
-            let settings = setting..setting + found.members.len();
+            let members = setting..setting + found.members.len();
             let count: usize = found.alone.iter().map(Vec::len).sum();
             if found.members.len() > 1 {
-                let beside = free.iter().enumerate().filter(|(place, _)| !settings.contains(place));
-                let columns = beside.flat_map(|(_, other)| current.fit.signature(other.effect)).collect();
+                let beside = free.iter().enumerate().filter(|(place, _)| !members.contains(place));
+                let columns = beside.flat_map(|(_, other)| fit.signature(other.effect)).collect();
                 let without = model.fit(&found.others)?.results();
-                let set = ConfoundedSet::new(found, model.effects(), &free[settings.clone()], &current.fit, &without);
+                let set = ConfoundedSet::new(found, model.effects(), &free[members.clone()], fit, &without);
                 priors.extend(set.priors(&orthonormal(columns, &[]), first));
             }
-            (first, setting) = (first + count, settings.end);
+            (first, setting) = (first + count, members.end);
         }
         Ok(priors)
     }

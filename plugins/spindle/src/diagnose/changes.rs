@@ -23,6 +23,8 @@ const BLOCK: usize = 6;
 const CERTAIN: f64 = 4.0;
 /// Of a change in all channels, this share must be one sensor's.
 const OWN: f64 = 0.5;
+/// Between the blocks next to it, this share of the step must be there already: what wanders changes slowly.
+const SUDDEN: f64 = 0.6;
 /// The eccentricity has its own ways to change: form and motion begin here.
 const FIRST_ORDER: usize = 2;
 
@@ -66,15 +68,18 @@ fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[O
         }
     }
     let (whole, turn) = best?;
-    let alone = |channel: usize| -> (f64, f64) {
-        (FIRST_ORDER..turns.orders).fold((0.0, 0.0), |(step, wander), order| {
-            let row = weights.conditional(order, channel);
-            (step + series.stepped(order, turn, &row), wander + series.wandering(order, turn, &row))
-        })
+    let rows = |channel: usize| (FIRST_ORDER..turns.orders).map(move |order| (order, channel));
+    let alone = |channel: usize| -> f64 {
+        rows(channel).map(|(order, channel)| series.stepped(order, turn, &weights.conditional(order, channel))).sum()
     };
-    let (sensor, (step, wander)) =
-        (0..width).map(|channel| (channel, alone(channel))).max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    if step < CERTAIN * wander || step < OWN * whole {
+    let (sensor, step) = (0..width).map(|channel| (channel, alone(channel))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (mut wander, mut sudden) = (0.0, 0.0);
+    for (order, channel) in rows(sensor) {
+        let row = weights.conditional(order, channel);
+        wander += series.wandering(order, turn, &row);
+        sudden += series.sudden(order, turn, &row);
+    }
+    if step < CERTAIN * wander || step < OWN * whole || sudden < SUDDEN * step {
         return None;
     }
     let by = (0..turns.orders)
@@ -140,6 +145,16 @@ impl Series {
     fn stepped(&self, order: usize, turn: usize, row: &[Complex64]) -> f64 {
         let before: Complex64 = self.combined(order, row).take(turn).sum();
         before.norm_sqr() * (1.0 / turn as f64 + 1.0 / (self.turns - turn) as f64)
+    }
+
+    /// The same with the step between the blocks next to the turn for one of its factors.
+    fn sudden(&self, order: usize, turn: usize, row: &[Complex64]) -> f64 {
+        let values: Vec<Complex64> = self.combined(order, row).collect();
+        let length = BLOCK.min(turn).min(self.turns - turn);
+        let mean = |from: usize, to: usize| values[from..to].iter().sum::<Complex64>() / (to - from) as f64;
+        let near = mean(turn, turn + length) - mean(turn - length, turn);
+        let far = mean(turn, self.turns) - mean(0, turn);
+        (near * far.conj()).re * (turn * (self.turns - turn)) as f64 / self.turns as f64
     }
 
     /// What that would be by wandering alone: from means over blocks, each about the mean of its side.

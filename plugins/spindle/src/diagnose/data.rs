@@ -148,7 +148,6 @@ impl StationData {
                 creeping.take_out(&mut readings, sensor, all);
             }
         }
-        seen.changes.iter().for_each(|change| change.widen(&mut readings));
         let leaks = seen.lines.iter().map(|line| line.leak[if all { 2 } else { 0 }].clone()).collect();
         let creeps = seen.creeping.iter().enumerate().filter_map(|(sensor, creeping)| {
             let (creep, std) = creeping.filter(|creeping| creeping.certain)?.observed(all);
@@ -156,6 +155,7 @@ impl StationData {
         });
         let creeps = creeps.collect();
         smooth(&mut readings);
+        seen.changes.iter().for_each(|change| change.widen(&mut readings));
         let held_out = held_out.map(|station| Readings::gather(selection, layout, station)).transpose()?;
         let orders = 1..=readings.max_order;
         let weights: Option<Vec<_>> = orders.map(|order| whitening(&readings, order)).collect();

@@ -1,7 +1,6 @@
 //! Drift from the levels of the turns: what a sensor creeps over a capture, in all setups alike.
 
 use runout_core::{
-    Complex64,
     model::diagnosis::{Diagnosis, Estimated},
     profile::{Profile, Split},
     stage::Station,
@@ -39,24 +38,6 @@ pub struct Creeping {
 const TURNS_ALIKE: f64 = 4.0;
 /// Share of a variance that stays whatever is taken out of it.
 const LEAST_LEFT: f64 = 0.05;
-/// Correlations stay below this where a variance was made smaller.
-const MOST_ALIKE: f64 = 0.9;
-
-/// Limits a sensor's correlations with the others, so that the covariance stays one.
-fn keep_definite(matrix: &mut [Complex64], sensors: usize, sensor: usize) {
-    for other in (0..sensors).filter(|other| *other != sensor) {
-        let limit = MOST_ALIKE
-            * (matrix[sensor * sensors + sensor].re * matrix[other * sensors + other].re).max(0.0).sqrt()
-            / (sensors - 1) as f64;
-        for at in [sensor * sensors + other, other * sensors + sensor] {
-            let size = matrix[at].norm();
-            if size > limit {
-                matrix[at] *= limit / size;
-            }
-        }
-    }
-}
-
 /// A drift is certain above this many standard uncertainties of its rate.
 const CERTAIN: f64 = 6.0;
 
@@ -95,9 +76,14 @@ impl Creeping {
                 for order in 2..matrices.len() / (sensors * sensors) {
                     let matrix = &mut matrices[order * sensors * sensors..(order + 1) * sensors * sensors];
                     let leak = square / (std::f64::consts::PI * order as f64).powi(2);
-                    let entry = &mut matrix[sensor * sensors + sensor];
-                    entry.re = (entry.re - leak).max(LEAST_LEFT * entry.re);
-                    keep_definite(matrix, sensors, sensor);
+                    let variance = matrix[sensor * sensors + sensor].re;
+                    let left = (variance - leak).max(LEAST_LEFT * variance);
+                    // Row and column alike, so that it stays a covariance.
+                    let share = if variance > 0.0 { (left / variance).sqrt() } else { 1.0 };
+                    for other in 0..sensors {
+                        matrix[sensor * sensors + other] *= share;
+                        matrix[other * sensors + sensor] *= share;
+                    }
                 }
             }
         }

@@ -25,6 +25,7 @@ use crate::{
     layout::Layout,
     selection::Selection,
 };
+use changes::Change;
 use data::{Seen, Shared, StationData};
 pub use declared::DeclaredSpindle;
 pub use fit::SpindleFit;
@@ -146,12 +147,19 @@ pub fn diagnose(
     settings: &Settings,
 ) -> Result<StationDiagnosis> {
     let model = SpindleModel::new(selection, layout, second_order, effects, stations)?;
-    let closed = closed_loop::diagnose(&model, settings)?;
+    let changes: Vec<&Change> = model.traced.data.iter().flat_map(|station| &station.seen.changes).collect();
+    // What a sensor lacks in all setups cannot be told from what happened to it in one.
+    let slipped = |place: &data::Place| {
+        model.traced.kinds[place.kind].about().acts_on == ActsOn::Sensor
+            && changes.iter().any(|change| change.sensor == place.index)
+    };
+    let places = model.traced.places.iter().enumerate().filter(|(_, place)| slipped(place));
+    let left_out = places.map(|(index, _)| index).chain(settings.left_out.iter().copied()).collect();
+    let closed = closed_loop::diagnose(&model, &Settings { left_out, ..settings.clone() })?;
     let mut diagnosis = closed.diagnosis;
     drift::say_rates(&mut diagnosis, &model.traced);
     lines::say(&mut diagnosis, &model.traced, closed.after.lines());
-    let changes = model.traced.data.iter().flat_map(|station| &station.seen.changes);
-    let changes: Vec<Unexplained> = changes.map(|change| change.said(&model.traced.selection)).collect();
+    let changes: Vec<Unexplained> = changes.iter().map(|change| change.said(&model.traced.selection)).collect();
     if !changes.is_empty() {
         diagnosis.verdict = Verdict::Unexplained;
         diagnosis.unexplained.splice(..0, changes);
