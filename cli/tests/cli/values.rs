@@ -5,6 +5,7 @@ use serde_json::Value;
 use crate::folder::{Folder, RIG, pipeline};
 
 const SCENARIO: &str = r#"
+plugin = "spindle"
 seed = 5
 output = "shaft.h5"
 rig = "rig.toml"
