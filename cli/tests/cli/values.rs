@@ -31,6 +31,9 @@ rms_um = 0.05
 
 /// Peaks of a form of 4 µm rms are some 10 to 25 µm apart.
 const LIMITS: &str = r#"
+[surface]
+step_mm = 1
+
 [evaluate]
 values = ["roundness", "texture", "cylindricity", "areal"]
 references = ["MZCI", "LSCI"]
