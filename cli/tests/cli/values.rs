@@ -5,6 +5,7 @@ use serde_json::Value;
 use crate::folder::{Folder, RIG, pipeline};
 
 const SCENARIO: &str = r#"
+plugin = "spindle"
 seed = 5
 output = "shaft.h5"
 rig = "rig.toml"
@@ -30,6 +31,9 @@ rms_um = 0.05
 
 /// Peaks of a form of 4 µm rms are some 10 to 25 µm apart.
 const LIMITS: &str = r#"
+[surface]
+step_mm = 1
+
 [evaluate]
 values = ["roundness", "texture", "cylindricity", "areal"]
 references = ["MZCI", "LSCI"]

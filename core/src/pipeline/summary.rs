@@ -86,8 +86,8 @@ pub struct StationSummary {
     pub captures: Vec<CaptureSummary>,
     /// Form, section by section.
     pub sections: Vec<SectionSummary>,
-    /// The standards' values of the station as a whole.
-    pub values: Vec<Value>,
+    /// Error motion values of the axis; empty where no spread over the turns is known.
+    pub motion_values: Vec<Value>,
     /// Root mean square that the fit leaves of the readings, in µm; absent where nothing is redundant.
     pub residual_rms_um: Option<f64>,
     /// What the covariance of the averages lets expect of it, in µm.
@@ -253,7 +253,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
         z_mm: result.z_mm,
         captures: result.profiles.iter().map(|profile| capture_summary(profile, rig)).collect(),
         sections,
-        values: Vec::new(),
+        motion_values: Vec::new(),
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),
         chi2_per_dof: known(separation.residual.chi2_per_dof),

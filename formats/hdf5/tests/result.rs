@@ -65,7 +65,7 @@ pub fn summary() -> Summary {
             z_mm: 12.5,
             captures: Vec::new(),
             sections: Vec::new(),
-            values: Vec::new(),
+            motion_values: Vec::new(),
             residual_rms_um: None,
             expected_residual_rms_um: None,
             chi2_per_dof: None,

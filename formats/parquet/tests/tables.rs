@@ -275,7 +275,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         z_mm: 10.0,
         captures: Vec::new(),
         sections: vec![section],
-        values: vec![value("total", 1.5, None)],
+        motion_values: vec![value("total", 1.5, None)],
         residual_rms_um: None,
         expected_residual_rms_um: None,
         chi2_per_dof: None,

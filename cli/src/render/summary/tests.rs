@@ -59,7 +59,7 @@ fn summary(stations: usize) -> Summary {
             z_mm,
             captures: vec![capture("initial", 0), capture("reversed", index % 2)],
             sections: vec![section("a", 200.0 + z_mm), section("b", 230.0 + z_mm)],
-            values: Vec::new(),
+            motion_values: Vec::new(),
             residual_rms_um: Some(0.0066 + 1e-4 * index as f64),
             expected_residual_rms_um: Some(0.0065),
             chi2_per_dof: Some(1.02),

@@ -40,7 +40,7 @@ pub(super) fn placed<'a>(stations: &'a [StationSummary], part: Option<&'a PartSu
             all.extend(section.values.iter().map(|value| PlacedValue { station: name, section: id, z_mm, value }));
         }
         let z_mm = Some(station.z_mm);
-        all.extend(station.values.iter().map(|value| PlacedValue { station: name, section: None, z_mm, value }));
+        all.extend(station.motion_values.iter().map(|value| PlacedValue { station: name, section: None, z_mm, value }));
     }
     let of_part = part.iter().flat_map(|part| &part.values);
     all.extend(of_part.map(|value| PlacedValue { station: None, section: None, z_mm: None, value }));

@@ -210,7 +210,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
             section("a", vec![value("LSCI", 4.0, Some(0.25)), value("MZCI", 3.8, Some(0.25))]),
             section("b", vec![value("LSCI", 4.0, None)]),
         ],
-        values: Vec::new(),
+        motion_values: Vec::new(),
         residual_rms_um: None,
         expected_residual_rms_um: None,
         chi2_per_dof: None,
