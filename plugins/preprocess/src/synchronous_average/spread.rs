@@ -14,7 +14,7 @@ pub(super) struct Motion {
     weights: Vec<Vec<(usize, f64)>>,
     angles: usize,
     /// Of one turn, `[motion][angle]`.
-    motion: Vec<f64>,
+    values: Vec<f64>,
 }
 
 impl Motion {
@@ -26,21 +26,21 @@ impl Motion {
         let row = |(_, weights): &(Quantity, Vec<(usize, f64)>)| weights.iter().map(channel).collect();
         let weights: Option<Vec<Vec<(usize, f64)>>> = projection.rows.iter().map(row).collect();
         let weights = weights.filter(|rows| !rows.is_empty())?;
-        let motion = vec![0.0; weights.len() * angles];
-        Some(Self { projection: projection.clone(), weights, angles, motion })
+        let values = vec![0.0; weights.len() * angles];
+        Some(Self { projection: projection.clone(), weights, angles, values })
     }
 
     /// The motion of a turn, `[motion][angle]`, from its readings, `[channel][angle]`.
     pub(super) fn of_turn(&mut self, readings: &[f64]) -> &[f64] {
         let angles = self.angles;
-        for (target, weights) in self.motion.chunks_exact_mut(angles).zip(&self.weights) {
+        for (target, weights) in self.values.chunks_exact_mut(angles).zip(&self.weights) {
             target.fill(0.0);
             for (channel, weight) in weights {
                 let readings = &readings[channel * angles..(channel + 1) * angles];
                 target.iter_mut().zip(readings).for_each(|(to, reading)| *to += weight * reading);
             }
         }
-        &self.motion
+        &self.values
     }
 
     /// Extremes of no turn yet.

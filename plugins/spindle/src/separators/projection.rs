@@ -33,5 +33,5 @@ pub(super) fn projection(selection: &Selection, layout: &Layout, setup: usize) -
             (*motion, weights.map(|(reading, weight)| (selection.sensors[reading.sensor], weight.re)).collect())
         })
         .collect();
-    (!rows.is_empty()).then(|| Projection { rows, z_mm: layout.mean_z_mm, rotation: layout.direction })
+    (!rows.is_empty()).then_some(Projection { rows, z_mm: layout.mean_z_mm, rotation: layout.direction })
 }
