@@ -17,6 +17,7 @@ pub mod profile;
 pub mod provenance;
 pub mod rig;
 pub mod separation;
+pub mod spread;
 pub mod stage;
 pub mod straightness;
 pub mod surface;

@@ -3,6 +3,7 @@
 use crate::{
     Complex64,
     measurement::{DefectKind, Response, Trim},
+    spread::Spread,
 };
 
 /// What the turns of one capture say together: Re Σ cₙ e^{−inΦ} for each channel, Φ the spindle angle.
@@ -26,6 +27,8 @@ pub struct Profile {
     pub scatter: Option<Vec<Complex64>>,
     /// The same turns in parts, where asked for.
     pub split: Option<Split>,
+    /// How far the turns lie apart, where asked for and there are two.
+    pub spread: Option<Spread>,
     /// How many turns there were, and what became of them.
     pub turns: TurnCount,
     /// Mean speed over the turns used, where the sampling rate is known.
@@ -104,6 +107,7 @@ impl Split {
             covariance: part.covariance.clone(),
             scatter: part.scatter.clone(),
             split: None,
+            spread: None,
             turns: TurnCount { used: part.turns.len(), ..whole.turns.clone() },
             ..whole.clone()
         }

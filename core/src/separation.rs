@@ -118,6 +118,9 @@ pub struct Separation {
     pub estimate: Vec<Complex64>,
     /// Variance E|δ|² of each estimate `[order][unknown]`; NaN where not known.
     pub variance: Vec<f64>,
+    /// Covariance E[δ δᴴ] of the motions among `unknowns`, `[order][motion][motion]` from order 0; what cannot be told means
+    /// nothing. `None` where it is not known.
+    pub motion_covariance: Option<Vec<Complex64>>,
     /// Whether the layout can tell it, `[order][unknown]`.
     pub observable: Vec<bool>,
     /// Where x and y are the axis's displacement, in mm along the spindle: 0 where tilt is told, the sensors' plane

@@ -1,7 +1,8 @@
-//! The standards' values of a separated form.
+//! The standards' values of a separated form and of error motion.
 
 pub mod areal;
 pub mod cylindricity;
+pub mod error_motion;
 pub mod parameter;
 pub mod roundness;
 pub mod straightness;

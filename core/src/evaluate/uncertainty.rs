@@ -26,7 +26,7 @@ pub struct Uncertainty {
     /// Where the truth lies with 95 % probability. A peak-to-valley grows with noise; the interval takes that back, and so
     /// need not lie evenly about the value.
     pub interval_95: [f64; 2],
-    /// Draws of the Monte Carlo.
+    /// Draws of the Monte Carlo; 0 where none was needed.
     pub draws: usize,
 }
 

@@ -40,7 +40,14 @@ pub fn diagnose(pipeline: &Pipeline, observer: &dyn Observer) -> Result<Diagnosi
         (Source::Turns(recording), Route::Turns { conditioners, averager, model: Some(model), .. }) => {
             let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
             let hold_out = Some(pipeline.diagnose.hold_out.unwrap_or(HOLD_OUT));
-            let line = Line { rig, recording: &**recording, conditioners, averager: &**averager, hold_out };
+            let line = Line {
+                rig,
+                recording: &**recording,
+                conditioners,
+                averager: &**averager,
+                hold_out,
+                projections: Vec::new(),
+            };
             diagnose_turns(pipeline, &line, &**model, observer)
         }
         _ => Err(no_model(&pipeline.separator)),

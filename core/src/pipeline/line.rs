@@ -17,7 +17,8 @@ use crate::{
     provenance::Input,
     rig::Rig,
     separation::Separation,
-    stage::{Averager, Conditioner, Station, StationSeparator},
+    spread::Projection,
+    stage::{Averager, Conditioner, Station, StationSeparator, Wanted},
 };
 
 /// From recorded turns to the profiles of one station after the other.
@@ -28,6 +29,8 @@ pub struct Line<'a> {
     pub averager: &'a dyn Averager,
     /// Share of the turns that are averaged by themselves besides.
     pub hold_out: Option<f64>,
+    /// How motion follows from the readings of each setup, where the spread over the turns is wanted.
+    pub projections: Vec<Option<Projection>>,
 }
 
 impl Line<'_> {
@@ -102,7 +105,8 @@ impl Line<'_> {
         for conditioner in self.conditioners {
             stream = conditioner.attach(stream)?;
         }
-        self.averager.average_holding_out(stream, self.hold_out)
+        let projection = self.projections.get(setup).and_then(Option::as_ref);
+        self.averager.average_wanting(stream, Wanted { hold_out: self.hold_out, projection })
     }
 }
 

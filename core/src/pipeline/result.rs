@@ -37,6 +37,8 @@ pub struct StationResult {
     pub profiles: Vec<Profile>,
     /// The standards' values, section by section.
     pub values: Vec<Vec<Value>>,
+    /// Error motion values of the axis; empty where no spread over the turns is known.
+    pub motion_values: Vec<Value>,
     /// What the recording says is true.
     pub truth: Option<StationTruth>,
 }
@@ -69,7 +71,8 @@ pub(super) fn complete(
     truth: Option<StationTruth>,
     evaluation: Evaluation,
 ) -> StationResult {
-    let mut result = StationResult { station, z_mm, angles, separation, profiles, values: Vec::new(), truth };
+    let (values, motion_values) = (Vec::new(), Vec::new());
+    let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
     let sections = 0..result.separation.sections.len();
     let Evaluation { evaluate, radius_mm } = evaluation;
     result.values = sections.map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
@@ -142,6 +145,7 @@ mod tests {
             estimate,
             variance: vec![0.0; 8],
             observable: vec![true; 8],
+            motion_covariance: None,
             motion_z_mm: 100.0,
             residual: Residual::default(),
             warnings: Vec::new(),

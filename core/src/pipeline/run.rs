@@ -21,6 +21,10 @@ pub use super::{
 use crate::{
     Error, Result,
     atomic_file::{PendingFile, commit_all, resolved},
+    evaluate::{
+        Value,
+        error_motion::{self, ErrorMotion},
+    },
     provenance::{Input, Provenance, VERSION},
     rig::Rig,
     separation::Separation,
@@ -70,13 +74,24 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 .rig
                 .as_ref()
                 .ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
-            let line = Line { rig, recording: &**recording, conditioners, averager: &**averager, hold_out: None };
+            let wanted = pipeline.evaluate.has(Group::ErrorMotion);
+            let projection = |setup| separator.projection(setup).filter(|_| wanted);
+            let line = Line {
+                rig,
+                recording: &**recording,
+                conditioners,
+                averager: &**averager,
+                hold_out: None,
+                projections: (0..rig.setups.len()).map(projection).collect(),
+            };
             let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm };
             let work = |index, station: Station| {
                 let separation = separate(&**separator, &station)?;
                 let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
                 let truth = recording.truth(index)?;
-                Ok(complete(station.name, station.z_mm, angles, separation, station.profiles, truth, evaluation))
+                let profiles = station.profiles;
+                let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
+                Ok(StationResult { motion_values: error_motion_values(&result), ..result })
             };
             let inputs = line.run(threads, observer, work, |result| gathering.take(&result, Some(rig)))?;
             (inputs, gathering.build_surface(rig.part_radius_mm)?, recording.remarks())
@@ -91,6 +106,11 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
         _ => return Err(Error::new("run", &pipeline.title, "the loader gave what it did not declare")),
     };
     gathering.conclude(inputs, remarks, surface.as_ref(), None)
+}
+
+fn error_motion_values(result: &StationResult) -> Vec<Value> {
+    let StationResult { station, z_mm, angles, separation, profiles, .. } = result;
+    ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles }.values(&[error_motion::CENTRE])
 }
 
 /// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.

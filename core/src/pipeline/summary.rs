@@ -253,7 +253,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
         z_mm: result.z_mm,
         captures: result.profiles.iter().map(|profile| capture_summary(profile, rig)).collect(),
         sections,
-        motion_values: Vec::new(),
+        motion_values: result.motion_values.clone(),
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),
         chi2_per_dof: known(separation.residual.chi2_per_dof),

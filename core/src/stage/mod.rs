@@ -8,7 +8,7 @@ pub mod simulator;
 
 pub use exporter::{Export, Exporter, StraightnessExporter};
 pub use loader::{Loader, Source, SourceKind};
-pub use preprocessor::{Averager, Conditioner, Preprocessor};
+pub use preprocessor::{Averager, Conditioner, Preprocessor, Wanted};
 pub use separator::{
     Conclusion, PointModel, PointSeparator, Separator, Shape, Station, StationDiagnosis, StationModel,
     StationSeparator, TraceSeparator,

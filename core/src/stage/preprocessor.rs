@@ -4,6 +4,7 @@ use crate::{
     Result,
     measurement::{Capture, SampleStream},
     profile::Profile,
+    spread::Projection,
 };
 
 /// A preprocessor, by what it gives. A pipeline has any number of conditioners and then one averager.
@@ -23,24 +24,32 @@ pub trait Conditioner: Send + Sync {
     fn attach<'a>(&'a self, input: Box<dyn SampleStream + 'a>) -> Result<Box<dyn SampleStream + 'a>>;
 }
 
+/// What an averager is to give besides the average.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Wanted<'a> {
+    /// The last turns of this share (0 to 1) are averaged by themselves: [`Profile::split`].
+    pub hold_out: Option<f64>,
+    /// The spread of this motion over the turns is kept: [`Profile::spread`].
+    pub projection: Option<&'a Projection>,
+}
+
 /// Averages turns.
 pub trait Averager: Send + Sync {
     /// Highest order that its profiles hold.
     fn max_order(&self) -> usize;
 
-    /// Reads a stream to its end. With a share to hold out, the last turns of that share (0 to 1) are averaged by themselves
-    /// besides: [`Profile::split`].
+    /// Reads a stream to its end, for the average and what is wanted besides.
     ///
     /// # Errors
     /// When the source fails or too little of it can be used.
-    fn average_holding_out(&self, input: Box<dyn SampleStream + '_>, share: Option<f64>) -> Result<Profile>;
+    fn average_wanting(&self, input: Box<dyn SampleStream + '_>, wanted: Wanted) -> Result<Profile>;
 
     /// Reads a stream to its end.
     ///
     /// # Errors
     /// When the source fails or too little of it can be used.
     fn average(&self, input: Box<dyn SampleStream + '_>) -> Result<Profile> {
-        self.average_holding_out(input, None)
+        self.average_wanting(input, Wanted::default())
     }
 }
 

@@ -9,6 +9,7 @@ use crate::{
     profile::Profile,
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},
+    spread::Projection,
     straightness::Straightness,
     surface::Surface,
 };
@@ -44,6 +45,11 @@ pub trait StationSeparator: Send + Sync {
     /// # Errors
     /// When the profiles do not fit the rig.
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity>;
+
+    /// How motion of the axis follows from the readings of one setup (an index into the rig's); `None` where these tell none.
+    fn projection(&self, _setup: usize) -> Option<Projection> {
+        None
+    }
 
     /// Which effects the closed loop could find with its rig, in a campaign of usual size; `None` where the method has no
     /// model of effects.

@@ -26,12 +26,14 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
             estimate: entries().collect(),
             variance: vec![variance; width * orders],
             observable: entries().map(|value| !value.re.is_nan()).collect(),
+            motion_covariance: None,
             motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),
         },
         profiles: Vec::new(),
         values: Vec::new(),
+        motion_values: Vec::new(),
         truth: None,
     }
 }

@@ -41,12 +41,14 @@ pub fn station(name: &str) -> StationResult {
             ],
             variance: vec![0.0, 0.0, f64::NAN, 0.01, 0.04, 0.09],
             observable: vec![true, true, false, true, true, true],
+            motion_covariance: None,
             motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),
         },
         profiles: Vec::new(),
         values: Vec::new(),
+        motion_values: Vec::new(),
         truth: None,
     }
 }

@@ -53,12 +53,22 @@ fn station(index: usize, motion: bool) -> StationResult {
         variance: places().map(|(order, _)| if lost(order) { f64::NAN } else { 0.02 }).collect(),
         observable: places().map(|(order, _)| !lost(order)).collect(),
         unknowns,
+        motion_covariance: None,
         motion_z_mm: 0.0,
         residual: Residual::default(),
         warnings: Vec::new(),
     };
     let station = format!("s{index:02}");
-    StationResult { station, z_mm, angles: ANGLES, separation, profiles: Vec::new(), values: Vec::new(), truth: None }
+    StationResult {
+        station,
+        z_mm,
+        angles: ANGLES,
+        separation,
+        profiles: Vec::new(),
+        values: Vec::new(),
+        motion_values: Vec::new(),
+        truth: None,
+    }
 }
 
 fn summary() -> Summary {

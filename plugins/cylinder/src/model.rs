@@ -210,6 +210,7 @@ fn section(circle: &Circle, middle_mm: f64, missing: &[Missing], fit: &LinearFit
         observable: vec![true; orders],
         estimate,
         variance,
+        motion_covariance: None,
         motion_z_mm: 0.0,
         residual: Residual {
             rms_um: fit.remainder().rms,

@@ -244,6 +244,7 @@ impl LeastSquaresCylinder {
             observable: vec![true; fit.coefficients.len()],
             estimate: fit.coefficients,
             variance: fit.variance,
+            motion_covariance: None,
             motion_z_mm: 0.0,
             residual: Residual {
                 rms_um: fit.residual_rms_um,

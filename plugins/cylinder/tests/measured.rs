@@ -61,6 +61,7 @@ fn surface(separator: &LeastSquaresCylinder, points: &Points) -> Surface {
             separation,
             profiles: Vec::new(),
             values: Vec::new(),
+            motion_values: Vec::new(),
             truth: None,
         });
     }

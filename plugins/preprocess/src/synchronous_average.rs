@@ -12,6 +12,7 @@ mod outliers;
 mod resample;
 mod slow;
 mod split;
+mod spread;
 mod turns;
 mod window;
 
@@ -24,7 +25,7 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     profile::{Profile, TurnCount},
-    stage::{Averager, Preprocessor},
+    stage::{Averager, Preprocessor, Wanted},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -193,7 +194,7 @@ impl Averager for SynchronousAverage {
         fourier::max_order(self.config.samples_per_rev)
     }
 
-    fn average_holding_out(&self, mut input: Box<dyn SampleStream + '_>, share: Option<f64>) -> Result<Profile> {
+    fn average_wanting(&self, mut input: Box<dyn SampleStream + '_>, wanted: Wanted) -> Result<Profile> {
         let mut capture = input.capture().clone();
         Self::are_turns(&capture)?;
         let first_turn = capture.first_turn();
@@ -213,7 +214,7 @@ impl Averager for SynchronousAverage {
         // Before anything is read: with too few marks a single turn could be larger than memory.
         self.enough(&capture, &count, usable.len())?;
 
-        let mut resampling = Resampling::new(self, &capture, usable, share);
+        let mut resampling = Resampling::new(self, &capture, usable, wanted);
         let mut block = Block::default();
         while input.next_block(&mut block)? {
             resampling.take(&mut block);
@@ -250,6 +251,7 @@ impl Averager for SynchronousAverage {
             covariance: outcome.covariance,
             scatter: outcome.scatter,
             split: outcome.split,
+            spread: outcome.spread,
             turns: count,
             speed_rpm,
             responses: capture.responses,

@@ -14,11 +14,11 @@ use crate::effects::Alterations;
 
 /// A column adds to the rank when more than this of it (relative) lies outside the others' span. Rounding of
 /// e^{inθ} at order 10 000 is 1e-12; a sensor misplaced by a nanometre on 30 mm gives 3e-8.
-const RANK_TOLERANCE: f64 = 1e-9;
+pub(crate) const RANK_TOLERANCE: f64 = 1e-9;
 /// An unknown takes part in the null space above this share.
-const NULL_TOLERANCE: f64 = 1e-7;
+pub(crate) const NULL_TOLERANCE: f64 = 1e-7;
 /// Sines and cosines below this are those of a sensor that looks along the other axis.
-const ALONG_AXIS: f64 = 1e-9;
+pub(crate) const ALONG_AXIS: f64 = 1e-9;
 
 /// What each reading sees. Readings are ordered setup by setup, sensor by sensor.
 ///

@@ -119,6 +119,7 @@ impl<'a> Comparing<'a> {
             conditioners: self.conditioners,
             averager: self.averager,
             hold_out: None,
+            projections: Vec::new(),
         };
         let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref());
         let inputs = line.run(threads, observer, work, take)?;

@@ -32,6 +32,7 @@ fn station(z_mm: f64, waves: &[(usize, Complex64)], highest: usize, variance: f6
         estimate,
         variance: vec![variance; highest + 1],
         observable: (0..=highest).map(|order| !lost.contains(&order)).collect(),
+        motion_covariance: None,
         motion_z_mm: 0.0,
         residual: Residual::default(),
         warnings: Vec::new(),
@@ -43,6 +44,7 @@ fn station(z_mm: f64, waves: &[(usize, Complex64)], highest: usize, variance: f6
         separation,
         profiles: Vec::new(),
         values: Vec::new(),
+        motion_values: Vec::new(),
         truth: None,
     }
 }

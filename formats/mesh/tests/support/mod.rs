@@ -113,12 +113,14 @@ fn station() -> StationResult {
             variance: vec![f64::NAN; estimate.len()],
             observable: vec![true; estimate.len()],
             estimate,
+            motion_covariance: None,
             motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),
         },
         profiles: Vec::new(),
         values: Vec::new(),
+        motion_values: Vec::new(),
         truth: None,
     }
 }

@@ -14,7 +14,20 @@ const TOGETHER: usize = 16;
 /// `sigma` times the median distance in that channel.
 pub(super) struct Outliers {
     sigma: f64,
-    held: Vec<(Turn, Vec<Complex64>)>,
+    held: Vec<Held>,
+}
+
+/// A turn that is not judged yet.
+pub(super) struct Held {
+    turn: Turn,
+    harmonics: Vec<Complex64>,
+    motion: Vec<f64>,
+}
+
+impl Held {
+    pub(super) fn new(turn: Turn, harmonics: &[Complex64], motion: &[f64]) -> Self {
+        Self { turn, harmonics: harmonics.to_vec(), motion: motion.to_vec() }
+    }
 }
 
 /// What became of one turn.
@@ -30,8 +43,8 @@ impl Outliers {
     }
 
     /// Takes a turn; `judged` gets those that can now be told.
-    pub(super) fn add(&mut self, turn: Turn, harmonics: &[Complex64], means: &mut Means, judged: &mut Vec<Verdict>) {
-        self.held.push((turn, harmonics.to_vec()));
+    pub(super) fn add(&mut self, turn: Held, means: &mut Means, judged: &mut Vec<Verdict>) {
+        self.held.push(turn);
         if self.held.len() >= 2 * TOGETHER {
             self.judge(TOGETHER, means, judged);
         }
@@ -45,12 +58,12 @@ impl Outliers {
         let usual: Vec<f64> = (0..channels)
             .map(|channel| median(&mut distances.iter().map(|turn| turn[channel]).collect::<Vec<_>>()))
             .collect();
-        for ((turn, harmonics), distances) in together.into_iter().zip(distances) {
+        for (Held { turn, harmonics, motion }, distances) in together.into_iter().zip(distances) {
             let farthest = distances.iter().zip(&usual).map(|(distance, usual)| distance - self.sigma * usual);
             let outlier =
                 farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
             if outlier.is_none() {
-                means.add(turn.number, &harmonics);
+                means.add(turn.number, &harmonics, &motion);
             }
             judged.push(Verdict { turn, outlier: outlier.map(|(channel, _)| (channel, distances[channel])) });
         }
@@ -66,21 +79,21 @@ impl Outliers {
 const NOTHING_UM: f64 = 1e-9;
 
 /// `[turn][channel]`.
-fn distances_um(turns: &[(Turn, Vec<Complex64>)], channels: usize) -> Vec<Vec<f64>> {
+fn distances_um(turns: &[Held], channels: usize) -> Vec<Vec<f64>> {
     let mut squares = vec![vec![0.0; channels]; turns.len()];
-    let length = turns.first().map_or(0, |(_, harmonics)| harmonics.len());
+    let length = turns.first().map_or(0, |turn| turn.harmonics.len());
     let mut parts = vec![0.0; turns.len()];
     for at in 0..length {
         let mut middle = |part: fn(&Complex64) -> f64| {
             parts.clear();
-            parts.extend(turns.iter().map(|(_, harmonics)| part(&harmonics[at])));
+            parts.extend(turns.iter().map(|turn| part(&turn.harmonics[at])));
             median(&mut parts)
         };
         let middle = Complex64::new(middle(|value| value.re), middle(|value| value.im));
         // A harmonic's mean square over the turn is half of its amplitude's square; that of the level is all of it.
         let share = if at < channels { 1.0 } else { 0.5 };
-        for ((_, harmonics), squares) in turns.iter().zip(&mut squares) {
-            squares[at % channels] += share * (harmonics[at] - middle).norm_sqr();
+        for (turn, squares) in turns.iter().zip(&mut squares) {
+            squares[at % channels] += share * (turn.harmonics[at] - middle).norm_sqr();
         }
     }
     squares.iter_mut().flatten().for_each(|square| *square = square.sqrt());

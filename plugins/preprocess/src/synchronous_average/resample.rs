@@ -10,13 +10,16 @@ use runout_core::{
         lanes::in_lanes,
     },
     profile::{RejectedTurn, Rejection, Split},
+    spread::Spread,
+    stage::Wanted,
 };
 
 use super::{
     SynchronousAverage, encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
-    outliers::{Outliers, Verdict},
+    outliers::{Held, Outliers, Verdict},
     split::Means,
+    spread::Motion,
     turns::{ROUNDING, Turn},
     window::{CONTINUED, Window},
 };
@@ -27,6 +30,7 @@ pub(super) struct Outcome {
     pub covariance: Option<Vec<Complex64>>,
     pub scatter: Option<Vec<Complex64>>,
     pub split: Option<Split>,
+    pub spread: Option<Spread>,
     pub used: usize,
     /// Length of all turns used together.
     pub used_samples: f64,
@@ -50,6 +54,8 @@ pub(super) struct Resampling<'a> {
     harmonics: Vec<Complex64>,
     /// One turn's harmonics, `[order][channel]`.
     turn: Vec<Complex64>,
+    /// Motion of the axis in single turns, where wanted.
+    motion: Option<Motion>,
     means: Means,
     outliers: Option<Outliers>,
     used_samples: f64,
@@ -59,16 +65,12 @@ pub(super) struct Resampling<'a> {
 
 impl<'a> Resampling<'a> {
     /// `turns` are those that the marks allow, in order.
-    pub(super) fn new(
-        average: &'a SynchronousAverage,
-        capture: &'a Capture,
-        turns: Vec<Turn>,
-        held_out: Option<f64>,
-    ) -> Self {
+    pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>, wanted: Wanted) -> Self {
         let config = &average.config;
         let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
         let length = grid_length(&turns, config.samples_per_rev, capture.encoder);
         let planned = turns.len();
+        let motion = wanted.projection.and_then(|wanted| Motion::new(wanted, &capture.sensors, length));
         Self {
             kernel: &average.kernel,
             capture,
@@ -80,7 +82,8 @@ impl<'a> Resampling<'a> {
             fourier: Fourier::new(length),
             harmonics: vec![Complex64::ZERO; orders],
             turn: vec![Complex64::ZERO; orders * channels],
-            means: Means::new(orders, channels, planned, held_out),
+            means: Means::new(orders, channels, planned, wanted.hold_out, motion.as_ref().map(Motion::spread)),
+            motion,
             outliers: config.outlier_sigma.map(Outliers::new),
             used_samples: 0.0,
             rejected: Vec::new(),
@@ -136,6 +139,7 @@ impl<'a> Resampling<'a> {
             scatter: self.means.whole.scatter(),
             used: self.means.whole.turns(),
             split: self.means.split(),
+            spread: self.means.spread(),
             used_samples: self.used_samples,
             rejected: self.rejected,
             exact: self.exact,
@@ -178,14 +182,15 @@ impl<'a> Resampling<'a> {
         }
         self.exact &= exact;
         self.transform();
+        let motion = self.motion.as_mut().map_or(&[][..], |motion| motion.of_turn(&self.grid));
         match &mut self.outliers {
             None => {
-                self.means.add(turn.number, &self.turn);
+                self.means.add(turn.number, &self.turn, motion);
                 self.used_samples += turn.samples();
             }
             Some(outliers) => {
                 let mut judged = Vec::new();
-                outliers.add(turn, &self.turn, &mut self.means, &mut judged);
+                outliers.add(Held::new(turn, &self.turn, motion), &mut self.means, &mut judged);
                 self.sort(judged);
             }
         }

@@ -3,14 +3,16 @@
 use runout_core::{
     Complex64,
     profile::{Part, Split, TURN_ORDERS, Turns},
+    spread::Spread,
 };
 
-use super::mean::Mean;
+use super::{mean::Mean, spread::Extremes};
 
-/// The mean of all turns, and of parts of them.
+/// The mean of all turns, and of parts of them; how far turns lie apart.
 pub(super) struct Means {
     pub whole: Mean,
     parts: Option<Parts>,
+    extremes: Option<Extremes>,
 }
 
 struct Parts {
@@ -23,7 +25,13 @@ struct Parts {
 
 impl Means {
     /// For `planned` turns at most; the last ones of a share are held out.
-    pub fn new(orders: usize, channels: usize, planned: usize, held_out: Option<f64>) -> Self {
+    pub fn new(
+        orders: usize,
+        channels: usize,
+        planned: usize,
+        held_out: Option<f64>,
+        extremes: Option<Extremes>,
+    ) -> Self {
         let parts = held_out.filter(|_| planned >= 4).map(|share| {
             let last = ((share * planned as f64).round() as usize).clamp(2, planned - 2);
             let fitted = planned - last;
@@ -40,11 +48,11 @@ impl Means {
                 },
             }
         });
-        Self { whole: Mean::new(orders, channels, planned), parts }
+        Self { whole: Mean::new(orders, channels, planned), parts, extremes }
     }
 
-    /// Takes the harmonics, `[order][channel]`, of the turn of this number.
-    pub fn add(&mut self, number: usize, turn: &[Complex64]) {
+    /// Takes the harmonics, `[order][channel]`, and the motion of the turn of this number.
+    pub fn add(&mut self, number: usize, turn: &[Complex64], motion: &[f64]) {
         if let Some(Parts { fitted, fit, held_out, turns }) = &mut self.parts {
             let part = if self.whole.turns() < *fitted { fit } else { held_out };
             part.add(turn);
@@ -52,6 +60,14 @@ impl Means {
             turns.harmonics.extend(&turn[..turns.orders * turns.channels]);
         }
         self.whole.add(turn);
+        if let Some(extremes) = &mut self.extremes {
+            extremes.add(motion);
+        }
+    }
+
+    /// How far the turns lie apart, where wanted.
+    pub fn spread(&mut self) -> Option<Spread> {
+        self.extremes.take().and_then(Extremes::spread)
     }
 
     /// The parts; `None` where too few turns are left to fill them.

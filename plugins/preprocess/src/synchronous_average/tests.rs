@@ -7,6 +7,8 @@ use runout_core::{
     inspection::Inspection,
     measurement::{DefectKind, MemoryStream, Trim},
     profile::Rejection,
+    separation::Quantity,
+    spread::{Direction, Projection},
 };
 
 use super::*;
@@ -496,4 +498,70 @@ fn orders_above_half_a_turns_samples_are_not_there() {
         let said = profile.warnings.iter().any(|warning| warning.contains("hold no orders above"));
         assert_eq!(said, highest < runout_core::numerics::fourier::max_order(samples_per_rev));
     }
+}
+
+fn both_channels() -> Projection {
+    Projection { rows: vec![(Quantity::X, vec![(0, 1.0)]), (Quantity::Y, vec![(1, 1.0)])], z_mm: 0.0, rotation: -1.0 }
+}
+
+#[test]
+fn the_spread_is_that_of_the_turns_used() {
+    let (turns, length) = (40, 512);
+    let clean = turning(2, turns * length, 0.0, 512.0);
+    let mut random = scatter(5);
+    let mut data: Vec<Vec<f64>> =
+        clean.iter().map(|channel| channel.iter().map(|value| value + 0.1 * random()).collect()).collect();
+    // Far off in turn 21, no number in turn 8: neither may leave a trace.
+    data[1][21 * 512 + 100..21 * 512 + 180].iter_mut().for_each(|value| *value += 5.0);
+    data[0][8 * 512 + 7] = f64::NAN;
+    let used: Vec<usize> = (0..turns).filter(|turn| ![8, 21].contains(turn)).collect();
+    for outlier_sigma in [None, Some(3.0)] {
+        let projection = both_channels();
+        let wanted = Wanted { projection: Some(&projection), ..Wanted::default() };
+        let config = SynchronousAverageConfig { outlier_sigma, ..config(512) };
+        let input = Inspection::new(Box::new(stream(&data, marks(0.0, 512.0, turns + 1))));
+        let profile = averager(config).average_wanting(Box::new(input), wanted).unwrap();
+        let spread = profile.spread.unwrap();
+        assert_eq!((spread.angles, spread.turns), (length, profile.turns.used));
+        assert_eq!(spread.directions, [Direction::X, Direction::Y, Direction::Rotating]);
+        if outlier_sigma.is_none() {
+            assert_eq!(spread.turns, 39);
+            continue;
+        }
+        assert_eq!(spread.turns, used.len());
+        for direction in spread.directions.clone() {
+            let (low, high) = spread.in_direction(direction).unwrap();
+            for angle in 0..length {
+                let (sin, cos) = (TAU * angle as f64 / 512.0).sin_cos();
+                let motion = |turn: &usize| {
+                    let [x, y] = [0, 1].map(|channel: usize| data[channel][turn * length + angle]);
+                    match direction {
+                        Direction::X => x,
+                        Direction::Y => y,
+                        // Clockwise.
+                        _ => x * cos - y * sin,
+                    }
+                };
+                let mean = used.iter().map(motion).sum::<f64>() / used.len() as f64;
+                let lowest = used.iter().map(motion).fold(f64::INFINITY, f64::min) - mean;
+                let highest = used.iter().map(motion).fold(f64::NEG_INFINITY, f64::max) - mean;
+                // Rounding of sums over 38 values near 10.
+                assert!((low[angle] - lowest).abs() < 1e-13 && (high[angle] - highest).abs() < 1e-13);
+            }
+        }
+    }
+}
+
+#[test]
+fn no_spread_of_one_turn_or_without_its_sensor() {
+    let wanted_of = |projection: &Projection, turns: usize| {
+        let input = stream(&turning(2, turns * 512, 0.0, 512.0), marks(0.0, 512.0, turns + 1));
+        let config = SynchronousAverageConfig { min_turns: 1, ..config(512) };
+        let wanted = Wanted { projection: Some(projection), ..Wanted::default() };
+        averager(config).average_wanting(Box::new(input), wanted).unwrap().spread
+    };
+    assert!(wanted_of(&both_channels(), 2).is_some());
+    assert!(wanted_of(&both_channels(), 1).is_none());
+    let elsewhere = Projection { rows: vec![(Quantity::X, vec![(5, 1.0)])], ..both_channels() };
+    assert!(wanted_of(&elsewhere, 3).is_none());
 }

@@ -115,6 +115,7 @@ fn profile(selection: &Selection, layout: &Layout, setup: usize) -> Profile {
         scatter: Some(covariance.clone()),
         covariance: Some(covariance),
         split: None,
+        spread: None,
         turns: TurnCount { recorded: TURNS, used: TURNS, ..TurnCount::default() },
         speed_rpm: None,
         responses: Vec::new(),

@@ -12,6 +12,7 @@ use runout_core::{
     },
     rig::Rig,
     separation::{Assessment, Quantity, Sensitivity, Separation},
+    spread::Projection,
     stage::{Separator, Station, StationModel, StationSeparator, separator::require_rig},
 };
 use schemars::JsonSchema;
@@ -19,6 +20,7 @@ use serde::Deserialize;
 
 use super::{
     harmonic_least_squares::{Weighting, operators},
+    projection::projection,
     readings::Readings,
     solution::{Operators, OrderOperator, Solver},
 };
@@ -177,6 +179,10 @@ impl StationSeparator for ClosedFormSeparator {
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| self.operators(readings))
+    }
+
+    fn projection(&self, setup: usize) -> Option<Projection> {
+        projection(&self.selection, &self.layout, setup)
     }
 
     fn foresee(&self, effects: &EffectCatalogue) -> Option<Result<Foresight>> {

@@ -10,6 +10,7 @@ use runout_core::{
     },
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},
+    spread::Projection,
     stage::{Separator, Station, StationModel, StationSeparator, separator::require_rig},
 };
 use schemars::JsonSchema;
@@ -17,6 +18,7 @@ use serde::Deserialize;
 
 use super::{
     closed_form::{checked_gain, yes},
+    projection::projection,
     readings::Readings,
     solution::{Operators, OrderOperator, Solver},
     weights,
@@ -113,6 +115,10 @@ impl StationSeparator for HarmonicLeastSquares {
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
         self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting))
+    }
+
+    fn projection(&self, setup: usize) -> Option<Projection> {
+        projection(&self.selection, &self.layout, setup)
     }
 
     fn foresee(&self, effects: &EffectCatalogue) -> Option<Result<Foresight>> {

@@ -6,6 +6,7 @@ pub mod four_sensor_reversal;
 pub mod harmonic_least_squares;
 pub mod multi_step;
 mod one_direction;
+mod projection;
 mod readings;
 mod second_order;
 mod solution;

@@ -243,6 +243,9 @@ impl Solver<'_> {
         let mut values = vec![Complex64::ZERO; (readings.max_order + 1) * width];
         let mut variance = vec![0.0; values.len()];
         let mut observable = vec![true; values.len()];
+        let motions: Vec<usize> = (0..width).filter(|unknown| !layout.unknowns[*unknown].is_form()).collect();
+        let mut motion_covariance =
+            readings.covariance.as_ref().map(|_| vec![Complex64::ZERO; motions.len() * motions.len()]);
         for order in 1..=readings.max_order {
             let row = order * width..(order + 1) * width;
             let mut solved = estimate.values[row.clone()].to_vec();
@@ -255,15 +258,19 @@ impl Solver<'_> {
             let spread = readings.order_covariance(order).map(|covariance| {
                 let mut operator = self.order_operator(operators, order, count);
                 to_reference.apply(&mut operator);
-                variances(&operator, &covariance, count)
+                covariances(&operator, &covariance, count)
             });
+            if let (Some(spread), Some(joint)) = (&spread, &mut motion_covariance) {
+                let entry = |row: &usize, column: &usize| spread[row * width + column];
+                joint.extend(motions.iter().flat_map(|row| motions.iter().map(move |column| entry(row, column))));
+            }
             for unknown in 0..width {
                 let index = row.start + unknown;
                 observable[index] = told[unknown];
                 let lost = Complex64::new(f64::NAN, f64::NAN);
                 values[index] = if told[unknown] { solved[unknown] } else { lost };
                 variance[index] = match &spread {
-                    Some(spread) if told[unknown] => spread[unknown],
+                    Some(spread) if told[unknown] => spread[unknown * width + unknown].re.max(0.0),
                     _ => f64::NAN,
                 };
             }
@@ -278,6 +285,7 @@ impl Solver<'_> {
             estimate: values,
             variance,
             observable,
+            motion_covariance,
             motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
             warnings,
@@ -333,6 +341,23 @@ pub fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usize) -> V
         }
     }
     left
+}
+
+/// M·Σ·Mᴴ for M (`[row][reading]`), `[row][row]`.
+fn covariances(matrix: &[Complex64], covariance: &[Complex64], count: usize) -> Vec<Complex64> {
+    let rows = matrix.len() / count;
+    let mut found = vec![Complex64::ZERO; rows * rows];
+    for (row, entries) in matrix.chunks_exact(count).enumerate() {
+        let spread: Vec<Complex64> = (0..count)
+            .map(|column| (0..count).map(|inner| entries[inner] * covariance[inner * count + column]).sum())
+            .collect();
+        for (column, other) in matrix.chunks_exact(count).enumerate().take(row + 1) {
+            let value: Complex64 = spread.iter().zip(other).map(|(spread, other)| spread * other.conj()).sum();
+            found[column * rows + row] = value.conj();
+            found[row * rows + column] = value;
+        }
+    }
+    found
 }
 
 /// Diagonal of M·Σ·Mᴴ for M (`[row][reading]`).

@@ -1,5 +1,7 @@
 //! Simulated campaigns: the data come from the time-domain simulator, which shares no formula with the model.
 
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
 use std::path::Path;
 
 use runout_core::{
@@ -7,7 +9,7 @@ use runout_core::{
     measurement::{Recording, StationTruth},
     pipeline::registry::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
-    stage::{Preprocessor, Station},
+    stage::{Preprocessor, Station, Wanted},
 };
 use runout_preprocess::SynchronousAverageConfig;
 use runout_spindle::simulate::{self, SpindleConfig};
@@ -62,7 +64,7 @@ pub fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     };
     let profile = |setup| {
         let stream = Inspection::new(recording.open(0, setup).unwrap());
-        averager.average_holding_out(Box::new(stream), Some(0.2)).unwrap()
+        averager.average_wanting(Box::new(stream), Wanted { hold_out: Some(0.2), ..Wanted::default() }).unwrap()
     };
     let profiles = (0..rig.setups.len()).map(profile).collect();
     let station = Station { name: "s001".into(), z_mm: 0.0, profiles };

@@ -114,6 +114,7 @@ pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
         covariance: None,
         scatter: None,
         split: None,
+        spread: None,
         turns: TurnCount { recorded: 1, used: 1, ..TurnCount::default() },
         speed_rpm: None,
         responses: Vec::new(),

@@ -1,0 +1,207 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::{Complex64, profile::TurnCount, separation::Residual, spread::Projection};
+
+const ANGLES: usize = 720;
+const UNKNOWNS: [Quantity; 4] = [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY];
+
+/// Harmonics (order, coefficients of x, y, tilt about x and y of Re c e^{−inΦ}) at z = 0.
+fn separation(harmonics: &[(usize, [Complex64; 4])]) -> Separation {
+    let mut estimate = vec![Complex64::ZERO; 4 * 21];
+    for (order, values) in harmonics {
+        estimate[4 * order..4 * order + 4].copy_from_slice(values);
+    }
+    Separation {
+        sections: Vec::new(),
+        unknowns: UNKNOWNS.to_vec(),
+        variance: vec![f64::NAN; estimate.len()],
+        observable: vec![true; estimate.len()],
+        estimate,
+        motion_covariance: None,
+        motion_z_mm: 0.0,
+        residual: Residual::default(),
+        warnings: Vec::new(),
+    }
+}
+
+/// A capture whose turns lie between `low` and `high` in every direction.
+fn profile(rotation: f64, [low, high]: [f64; 2]) -> Profile {
+    let rows = UNKNOWNS.iter().enumerate().map(|(sensor, quantity)| (*quantity, vec![(sensor, 1.0)])).collect();
+    let length = Direction::ALL.len() * ANGLES;
+    let spread = Spread {
+        projection: Projection { rows, z_mm: 40.0, rotation },
+        directions: Direction::ALL.to_vec(),
+        angles: ANGLES,
+        turns: 60,
+        low: vec![low; length],
+        high: vec![high; length],
+    };
+    Profile {
+        object: "test".into(),
+        setup: 0,
+        sensors: Vec::new(),
+        samples_per_rev: ANGLES,
+        mean: Vec::new(),
+        covariance: None,
+        scatter: None,
+        split: None,
+        spread: Some(spread),
+        turns: TurnCount::default(),
+        speed_rpm: None,
+        responses: Vec::new(),
+        warnings: Vec::new(),
+    }
+}
+
+fn values(separation: &Separation, profiles: &[Profile], centre: Centre) -> impl Fn(&str) -> Value + use<> {
+    let station = ErrorMotion { station: "s", z_mm: 60.0, angles: ANGLES, separation, profiles };
+    let values = station.values(&[centre]);
+    move |symbol: &str| values.iter().find(|value| value.symbol == symbol).unwrap().clone()
+}
+
+const NONE: [Complex64; 4] = [Complex64::ZERO; 4];
+const LSC: Centre = Centre::Plot(Reference::LeastSquares);
+
+fn with(place: usize, value: f64) -> [Complex64; 4] {
+    let mut values = NONE;
+    values[place] = Complex64::from(value);
+    values
+}
+
+/// x = 2 cos 4Φ and a tilt about y of 5 cos 4Φ µrad, which 100 mm further is 0.5 µm of x: 5 µm peak to valley.
+#[test]
+fn total_holds_all_turns_about_the_synchronous_plot() {
+    let separation = separation(&[(4, [2.0, 0.0, 0.0, 5.0].map(Complex64::from)), (1, with(0, 3.0))]);
+    let profiles = [profile(1.0, [-0.1, 0.2]), profile(1.0, [-0.3, 0.1])];
+    for centre in Centre::ALL {
+        let value = values(&separation, &profiles, centre);
+        // 1e-4 µm: terms of motion²/base circle.
+        let near = |symbol: &str, expected: f64| {
+            let found = value(symbol);
+            assert!((found.value - expected).abs() < 1e-4, "{symbol} about {}: {found:?}", centre.symbol());
+        };
+        near("synchronous-radial-x", 5.0);
+        near("total-radial-x", 5.0 + 0.3 + 0.2);
+        near("asynchronous-radial-x", 0.4);
+        near("synchronous-radial-y", 0.0);
+        near("residual-synchronous-tilt-y", 10.0);
+        near("fundamental-radial", 6.0);
+        assert!(value("synchronous-radial-x").source.contains("z = 100 mm"));
+        assert_eq!(value("synchronous-radial-x").band_upr, [2, 20]);
+    }
+}
+
+/// 2/rev that turns with the spindle only moves the circle that a turning tool cuts; what turns against it at 1/rev makes
+/// that circle an ellipse.
+#[test]
+fn the_rotating_direction_sees_two_less_or_more() {
+    for rotation in [1.0, -1.0] {
+        let profiles = [profile(rotation, [-0.1, 0.1])];
+        // y = ±sin nΦ is Re(±i e^{−inΦ}).
+        let round = |amplitude: f64, sense: f64| {
+            [
+                Complex64::from(amplitude),
+                Complex64::new(0.0, sense * rotation * amplitude),
+                Complex64::ZERO,
+                Complex64::ZERO,
+            ]
+        };
+        let moved = separation(&[(2, round(1.5, 1.0))]);
+        for (centre, expected) in [(Centre::PolarChart, 3.0), (LSC, 0.0), (Centre::Plot(Reference::MinimumZone), 0.0)] {
+            let found = values(&moved, &profiles, centre)("synchronous-radial-rotating").value;
+            assert!((found - expected).abs() < 1e-4, "{found} about {}", centre.symbol());
+        }
+        let ellipse = separation(&[(1, round(0.7, -1.0))]);
+        let value = values(&ellipse, &profiles, LSC);
+        assert!((value("synchronous-radial-rotating").value - 1.4).abs() < 1e-12);
+        assert!((value("fundamental-radial").value - 1.4).abs() < 1e-12);
+        assert!(value("synchronous-radial-x").value < 1e-12, "1/rev is no part of a fixed direction");
+        assert_eq!(value("synchronous-radial-rotating").band_upr, [1, 20]);
+    }
+}
+
+/// An error that turns with the spindle at order n is one of order n − 1 only in the rotating direction.
+#[test]
+fn errors_of_x_and_y_go_together() {
+    let mut separation = separation(&[(5, with(0, 1.0))]);
+    let mut covariance = vec![Complex64::ZERO; 16 * 21];
+    let entry = |order: usize, row: usize, column: usize| (order * 4 + row) * 4 + column;
+    for (row, column, value) in
+        [(0, 0, Complex64::ONE), (1, 1, Complex64::ONE), (1, 0, Complex64::I), (0, 1, -Complex64::I)]
+    {
+        covariance[entry(5, row, column)] = 0.04 * value;
+    }
+    // Of x by itself at order 9: half of it is x² cos², a quarter of E|δ|² at each neighbour.
+    covariance[entry(9, 0, 0)] = Complex64::from(0.04);
+    separation.motion_covariance = Some(covariance);
+    let spread = profile(1.0, [0.0; 2]).spread.unwrap();
+    let plot = Synchronous::new(&separation, &spread.projection, Direction::Rotating, 0.0).unwrap();
+    for (order, variance) in plot.variance.iter().enumerate() {
+        let expected = match order {
+            4 => 0.04,
+            8 | 10 => 0.01,
+            _ => 0.0,
+        };
+        assert!((variance - expected).abs() < 1e-15, "order {order}: {variance}");
+    }
+    let fixed = Synchronous::new(&separation, &spread.projection, Direction::X, 0.0).unwrap();
+    assert_eq!((fixed.variance[5], fixed.variance[9]), (0.04, 0.04));
+    let known = values(&separation, &[profile(1.0, [-0.1, 0.1])], LSC)("synchronous-radial-x").uncertainty.unwrap();
+    // ½·(0.04 + 0.04) is the variance at an angle; a range has two ends.
+    assert!((0.1..0.4).contains(&known.std), "{known:?}");
+}
+
+#[test]
+fn what_is_lost_is_said_and_left_out() {
+    let mut lossy = separation(&[(1, with(0, 3.0)), (2, with(0, 1.0)), (3, with(0, 7.0)), (4, with(1, 1.0))]);
+    for (order, unknown) in [(1, 0), (3, 0), (4, 1)] {
+        lossy.estimate[4 * order + unknown] = Complex64::new(f64::NAN, f64::NAN);
+        lossy.observable[4 * order + unknown] = false;
+    }
+    let profiles = [profile(1.0, [-0.1, 0.1])];
+    let value = values(&lossy, &profiles, LSC);
+    assert!((value("synchronous-radial-x").value - 2.0).abs() < 1e-12);
+    assert_eq!(value("synchronous-radial-x").lost_orders, [3]);
+    assert_eq!(value("synchronous-radial-rotating").lost_orders, [1, 3, 4]);
+    let station = ErrorMotion { station: "s", z_mm: 0.0, angles: ANGLES, separation: &lossy, profiles: &profiles };
+    assert!(station.values(&[LSC]).iter().all(|value| value.symbol != "fundamental-radial"));
+    let mut without_y = lossy.clone();
+    without_y.observable.iter_mut().skip(1).step_by(4).for_each(|told| *told = false);
+    let station = ErrorMotion { separation: &without_y, ..station };
+    let symbols: Vec<String> = station.values(&[LSC]).into_iter().map(|value| value.symbol).collect();
+    assert!(!symbols.contains(&"synchronous-radial-y".into()) && symbols.contains(&"asynchronous-radial-y".into()));
+    assert!(ErrorMotion { profiles: &[], ..station }.values(&[LSC]).is_empty(), "no spread, no values");
+}
+
+#[test]
+fn setups_tell_the_uncertainty_of_a_range() {
+    assert_eq!(between_setups(&[1.0], 0.0), None);
+    // By hand: mean 1.1, standard deviation 0.1, t = 4.30 for 2 degrees of freedom, √(4/3).
+    let known = between_setups(&[1.0, 1.1, 1.2], 0.0).unwrap();
+    let half = 4.30 * 0.1 * (4.0_f64 / 3.0).sqrt();
+    assert!((known.std - 0.1).abs() < 1e-12);
+    assert!((known.interval_95[0] - (1.1 - half)).abs() < 1e-12 && (known.interval_95[1] - (1.1 + half)).abs() < 1e-12);
+}
+
+/// Where a plot ends up does not depend on where its circle was centred.
+#[test]
+fn centres_follow_a_displaced_plot() {
+    let angles = Angles::equal(ANGLES);
+    let mut points = Points::default();
+    let step = TAU / ANGLES as f64;
+    let plot: Vec<f64> = (0..ANGLES)
+        .map(|index| {
+            let angle = step * index as f64;
+            2.0 * angle.cos() - angle.sin() + 0.5 * (3.0 * angle).cos()
+        })
+        .collect();
+    for centre in Centre::ALL.into_iter().skip(1) {
+        let [x, y] = centre.of(&angles, &plot, &mut points).unwrap();
+        assert!((x - 2.0).abs() < 1e-3 && (y + 1.0).abs() < 1e-3, "{}: {x} {y}", centre.symbol());
+        let seen = seen_from([x, y], &angles, &plot);
+        assert!((ront_lsci_um(&seen) - 1.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,140 @@
+//! Motion of the axis in single turns: how it follows from their readings, and how far turns lie apart.
+//!
+//! Form and clamping add the same to a reading at an angle in every turn. In whatever combination of one setup's readings
+//! that gives motion, turns therefore differ by motion only, and by the sensors' noise and drift.
+
+use crate::separation::Quantity;
+
+/// A sensitive direction (ISO 230-7): where motion of the axis counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// Fixed, along x.
+    X,
+    /// Fixed, along y.
+    Y,
+    /// Turning with the spindle from x on: x·cos θ + y·sin θ.
+    Rotating,
+    /// Fixed: tilt about x.
+    TiltX,
+    /// Fixed: tilt about y.
+    TiltY,
+    /// Tilt towards the direction that turns with the spindle from x on: ε_y·cos θ − ε_x·sin θ.
+    RotatingTilt,
+}
+
+impl Direction {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Rotating, Self::TiltX, Self::TiltY, Self::RotatingTilt];
+
+    /// The motion that counts; with a second one and its factor, cos θ of the first and factor · sin θ of the second.
+    #[must_use]
+    pub fn parts(self) -> (Quantity, Option<(Quantity, f64)>) {
+        match self {
+            Self::X => (Quantity::X, None),
+            Self::Y => (Quantity::Y, None),
+            Self::Rotating => (Quantity::X, Some((Quantity::Y, 1.0))),
+            Self::TiltX => (Quantity::TiltX, None),
+            Self::TiltY => (Quantity::TiltY, None),
+            Self::RotatingTilt => (Quantity::TiltY, Some((Quantity::TiltX, -1.0))),
+        }
+    }
+
+    /// Whether it is one of tilt, in µrad; the others are in µm.
+    #[must_use]
+    pub fn is_tilt(self) -> bool {
+        matches!(self, Self::TiltX | Self::TiltY | Self::RotatingTilt)
+    }
+
+    /// Whether it turns with the spindle.
+    #[must_use]
+    pub fn rotates(self) -> bool {
+        self.parts().1.is_some()
+    }
+}
+
+/// How motion of the axis follows from the readings of one setup, but for what form and clamping add to every turn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Projection {
+    /// Motions that these sensors tell, each with the rig's sensors and their weights, µm or µrad per µm.
+    pub rows: Vec<(Quantity, Vec<(usize, f64)>)>,
+    /// Where x and y are taken, in mm along the spindle, before the station's position is added.
+    pub z_mm: f64,
+    /// θ over the spindle's angle: +1 where the part turns counter-clockwise, −1 where it turns clockwise.
+    pub rotation: f64,
+}
+
+/// How far the turns of one capture lie apart, on equal angles of the spindle from 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spread {
+    /// What motion was computed with.
+    pub projection: Projection,
+    /// Directions in which it was computed.
+    pub directions: Vec<Direction>,
+    /// Equal angles a turn.
+    pub angles: usize,
+    /// Turns.
+    pub turns: usize,
+    /// Lowest turn at an angle, less the mean of all, µm or µrad, `[direction][angle]`.
+    pub low: Vec<f64>,
+    /// Highest turn less the mean, likewise.
+    pub high: Vec<f64>,
+}
+
+impl Spread {
+    /// Lowest and highest turn less the mean, in one direction, by angle.
+    #[must_use]
+    pub fn in_direction(&self, direction: Direction) -> Option<(&[f64], &[f64])> {
+        let place = self.directions.iter().position(|known| *known == direction)?;
+        let range = place * self.angles..(place + 1) * self.angles;
+        Some((self.low.get(range.clone())?, self.high.get(range)?))
+    }
+
+    /// What noise of 1 µm in every sensor makes in a direction, at the angle where it makes most, in µm or µrad.
+    #[must_use]
+    pub fn noise_gain(&self, direction: Direction) -> f64 {
+        let weights = |wanted: Quantity| -> &[(usize, f64)] {
+            let row = self.projection.rows.iter().find(|(quantity, _)| *quantity == wanted);
+            row.map_or(&[], |(_, weights)| weights)
+        };
+        let dot = |one: Quantity, other: Quantity| -> f64 {
+            let same = |sensor: usize| weights(other).iter().filter(move |(found, _)| *found == sensor);
+            weights(one).iter().flat_map(|(sensor, a)| same(*sensor).map(move |(_, b)| a * b)).sum()
+        };
+        let (first, second) = direction.parts();
+        let Some((second, _)) = second else { return dot(first, first).sqrt() };
+        // Largest eigenvalue of the two rows' products.
+        let (a, b, c) = (dot(first, first), dot(second, second), dot(first, second));
+        (0.5 * (a + b) + (0.5 * (a - b)).hypot(c)).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_of_sensors_at_right_angles_and_of_three_at_equal_ones() {
+        let spread = |rows| Spread {
+            projection: Projection { rows, z_mm: 0.0, rotation: 1.0 },
+            directions: Vec::new(),
+            angles: 0,
+            turns: 2,
+            low: Vec::new(),
+            high: Vec::new(),
+        };
+        let square = spread(vec![(Quantity::X, vec![(0, 1.0)]), (Quantity::Y, vec![(1, 1.0)])]);
+        // 2/3 of each cosine: the least-squares inverse of three directions at 120°.
+        let row = |angles: [f64; 3]| {
+            let weight = |(sensor, degrees): (usize, f64)| (sensor, degrees.to_radians().cos() * 2.0 / 3.0);
+            angles.into_iter().enumerate().map(weight).collect()
+        };
+        let three = spread(vec![(Quantity::X, row([0.0, 120.0, 240.0])), (Quantity::Y, row([90.0, 30.0, 150.0]))]);
+        for direction in [Direction::X, Direction::Y, Direction::Rotating] {
+            assert!((square.noise_gain(direction) - 1.0).abs() < 1e-15);
+            assert!((three.noise_gain(direction) - (2.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        }
+        // Both sensors look along 45°: noise is largest there.
+        let both = spread(vec![(Quantity::X, vec![(0, 1.0)]), (Quantity::Y, vec![(0, 1.0)])]);
+        assert!((both.noise_gain(Direction::Rotating) - 2.0_f64.sqrt()).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,149 @@
+//! How far turns lie apart in what they say of the axis's motion: lowest and highest at each angle, in one pass.
+
+use std::f64::consts::TAU;
+
+use runout_core::{
+    separation::Quantity,
+    spread::{Direction, Projection, Spread},
+};
+
+/// Motion of the axis in one turn after the other.
+pub(super) struct Motion {
+    projection: Projection,
+    /// Channels and weights of each motion.
+    weights: Vec<Vec<(usize, f64)>>,
+    angles: usize,
+    /// Of one turn, `[motion][angle]`.
+    values: Vec<f64>,
+}
+
+impl Motion {
+    /// For turns on `angles` equal angles with these sensors; `None` where one that it takes is missing.
+    pub(super) fn new(projection: &Projection, sensors: &[usize], angles: usize) -> Option<Self> {
+        let channel = |(sensor, weight): &(usize, f64)| {
+            sensors.iter().position(|found| found == sensor).map(|channel| (channel, *weight))
+        };
+        let row = |(_, weights): &(Quantity, Vec<(usize, f64)>)| weights.iter().map(channel).collect();
+        let weights: Option<Vec<Vec<(usize, f64)>>> = projection.rows.iter().map(row).collect();
+        let weights = weights.filter(|rows| !rows.is_empty())?;
+        let values = vec![0.0; weights.len() * angles];
+        Some(Self { projection: projection.clone(), weights, angles, values })
+    }
+
+    /// The motion of a turn, `[motion][angle]`, from its readings, `[channel][angle]`.
+    pub(super) fn of_turn(&mut self, readings: &[f64]) -> &[f64] {
+        let angles = self.angles;
+        for (target, weights) in self.values.chunks_exact_mut(angles).zip(&self.weights) {
+            target.fill(0.0);
+            for (channel, weight) in weights {
+                let readings = &readings[channel * angles..(channel + 1) * angles];
+                target.iter_mut().zip(readings).for_each(|(to, reading)| *to += weight * reading);
+            }
+        }
+        &self.values
+    }
+
+    /// Extremes of no turn yet.
+    pub(super) fn spread(&self) -> Extremes {
+        let rows = &self.projection.rows;
+        let place = |wanted: Quantity| rows.iter().position(|(quantity, _)| *quantity == wanted);
+        let told = |direction: &Direction| {
+            let (first, second) = direction.parts();
+            Some(match second {
+                None => (*direction, place(first)?, None),
+                Some((second, factor)) => (*direction, place(first)?, Some((place(second)?, factor))),
+            })
+        };
+        let directions: Vec<Place> = Direction::ALL.iter().filter_map(told).collect();
+        let angle = |step: usize| self.projection.rotation * TAU * step as f64 / self.angles as f64;
+        let length = directions.len() * self.angles;
+        Extremes {
+            cos: (0..self.angles).map(|step| angle(step).cos()).collect(),
+            sin: (0..self.angles).map(|step| angle(step).sin()).collect(),
+            directions,
+            turns: 0,
+            low: vec![f64::INFINITY; length],
+            high: vec![f64::NEG_INFINITY; length],
+            sum: vec![0.0; rows.len() * self.angles],
+            projection: self.projection.clone(),
+        }
+    }
+}
+
+/// A direction, the motion that counts and with which factor another one.
+type Place = (Direction, usize, Option<(usize, f64)>);
+
+/// Lowest and highest turn at each angle, and the sum of all.
+pub(super) struct Extremes {
+    projection: Projection,
+    directions: Vec<Place>,
+    cos: Vec<f64>,
+    sin: Vec<f64>,
+    turns: usize,
+    /// `[direction][angle]`.
+    low: Vec<f64>,
+    high: Vec<f64>,
+    /// `[motion][angle]`.
+    sum: Vec<f64>,
+}
+
+impl Extremes {
+    /// Takes the motion of a turn, `[motion][angle]`.
+    pub(super) fn add(&mut self, motion: &[f64]) {
+        self.turns += 1;
+        self.sum.iter_mut().zip(motion).for_each(|(sum, value)| *sum += value);
+        let angles = self.cos.len();
+        let extremes = self.low.chunks_exact_mut(angles).zip(self.high.chunks_exact_mut(angles));
+        for ((_, first, second), (low, high)) in self.directions.iter().zip(extremes) {
+            let first = &motion[first * angles..(first + 1) * angles];
+            let extremes = low.iter_mut().zip(high);
+            // Written out, so that neither a branch nor the rules for what is no number stand in the loop.
+            let widen = |(low, high): (&mut f64, &mut f64), value: f64| {
+                *low = if value < *low { value } else { *low };
+                *high = if value > *high { value } else { *high };
+            };
+            match second {
+                None => extremes.zip(first).for_each(|(extremes, value)| widen(extremes, *value)),
+                Some((second, factor)) => {
+                    let second = &motion[second * angles..(second + 1) * angles];
+                    let turned = self.cos.iter().zip(&self.sin).zip(first.iter().zip(second));
+                    for (extremes, ((cos, sin), (first, second))) in extremes.zip(turned) {
+                        widen(extremes, cos * first + factor * sin * second);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Extremes about the mean; `None` below two turns.
+    pub(super) fn spread(mut self) -> Option<Spread> {
+        if self.turns < 2 {
+            return None;
+        }
+        let angles = self.cos.len();
+        let share = 1.0 / self.turns as f64;
+        let extremes = self.low.chunks_exact_mut(angles).zip(self.high.chunks_exact_mut(angles));
+        for ((_, first, second), (low, high)) in self.directions.iter().zip(extremes) {
+            let sum = |row: usize, angle: usize| self.sum[row * angles + angle];
+            for (angle, (low, high)) in low.iter_mut().zip(high).enumerate() {
+                let mean = share
+                    * match second {
+                        None => sum(*first, angle),
+                        Some((second, factor)) => {
+                            self.cos[angle] * sum(*first, angle) + factor * self.sin[angle] * sum(*second, angle)
+                        }
+                    };
+                *low -= mean;
+                *high -= mean;
+            }
+        }
+        Some(Spread {
+            projection: self.projection,
+            directions: self.directions.iter().map(|(direction, ..)| *direction).collect(),
+            angles,
+            turns: self.turns,
+            low: self.low,
+            high: self.high,
+        })
+    }
+}
