@@ -130,6 +130,7 @@ impl<'a> Resampling<'a> {
             outliers.judge_rest(&mut self.means, &mut judged);
             self.sort(judged);
         }
+        self.means.sum_up();
         Outcome {
             mean: self.means.whole.mean(),
             covariance: self.means.whole.covariance(),
@@ -177,7 +178,7 @@ impl<'a> Resampling<'a> {
             return;
         }
         self.exact &= exact;
-        self.transform();
+        self.transform(exact);
         match &mut self.outliers {
             None => {
                 self.means.add(turn.number, &self.turn);
@@ -199,18 +200,19 @@ impl<'a> Resampling<'a> {
     }
 
     /// Interpolates the turn at its positions and takes it apart into harmonics.
-    fn transform(&mut self) {
+    fn transform(&mut self, exact: bool) {
         let channels = self.capture.channels().max(1);
         let mut interpolation = Interpolation {
             kernel: self.kernel,
             frames: &self.window.frames,
             channels,
             positions: &self.positions,
+            exact,
             values: &mut self.grid,
         };
         in_lanes(channels, &mut interpolation);
-        for (channel, values) in self.grid.chunks_exact(self.positions.len()).enumerate() {
-            self.fourier.analyse(values.iter().copied(), &mut self.harmonics);
+        for (channel, values) in self.grid.chunks_exact_mut(self.positions.len()).enumerate() {
+            self.fourier.analyse_in_place(values, &mut self.harmonics);
             for (harmonic, turn) in self.harmonics.iter().zip(self.turn[channel..].iter_mut().step_by(channels)) {
                 // Profiles are Re Σ cₙ e^{−inΦ}.
                 *turn = harmonic.conj();
