@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-use super::run::Observer;
+use super::{overlap::read_ahead, run::Observer};
 use crate::{
     Error, Result,
     inspection::Inspection,
@@ -98,11 +98,14 @@ impl Line<'_> {
     }
 
     fn profile(&self, station: usize, setup: usize) -> Result<Profile> {
-        let mut stream: Box<dyn SampleStream + '_> = Box::new(Inspection::new(self.recording.open(station, setup)?));
-        for conditioner in self.conditioners {
-            stream = conditioner.attach(stream)?;
-        }
-        self.averager.average_holding_out(stream, self.hold_out)
+        let recorded = Box::new(Inspection::new(self.recording.open(station, setup)?));
+        read_ahead(recorded, |stream| {
+            let mut stream: Box<dyn SampleStream + '_> = stream;
+            for conditioner in self.conditioners {
+                stream = conditioner.attach(stream)?;
+            }
+            self.averager.average_holding_out(stream, self.hold_out)
+        })
     }
 }
 
