@@ -62,7 +62,7 @@ fn cubics(stretch: usize) -> [[f64; TAPS]; 4] {
     // Chebyshev's coefficients from the values at the zeros of the polynomial of degree 4.
     let mut chebyshev = [[0.0; TAPS]; 4];
     for node in 0..4 {
-        let angle = (node as f64 + 0.5) * std::f64::consts::FRAC_PI_4;
+        let angle = (f64::from(node) + 0.5) * std::f64::consts::FRAC_PI_4;
         let phase = (stretch as f64 + 0.5 * (1.0 + angle.cos())) / PHASES as f64;
         let raw: [f64; TAPS] = std::array::from_fn(|tap| weight(phase - (tap as f64 - (REACH - 1) as f64)));
         let sum: f64 = raw.iter().sum();
