@@ -76,12 +76,11 @@ def median(who, workers, value):
     return statistics.median(run[value] for run in found[who, workers])
 
 
-print(f"\n{stations} stations, {name} samples; median of {rounds} runs each, in turns\n")
-print("| workers | runout, s | its CPU, s | peers, s | peers / runout | runout, peak MiB | peers, peak MiB |")
-print("| --- | --- | --- | --- | --- | --- | --- |")
+rows = []
 for workers in WORKERS:
     ours, theirs = median(run_runout, workers, "seconds"), median(run_peers, workers, "seconds")
     cells = [
+        name,
         f"{workers}",
         f"{ours:.2f}",
         f"{median(run_runout, workers, 'busy'):.2f}",
@@ -90,11 +89,17 @@ for workers in WORKERS:
         f"{median(run_runout, workers, 'peak_mib'):.0f}",
         f"{median(run_peers, workers, 'peak_mib'):.0f}",
     ]
-    print(f"| {' | '.join(cells)} |")
+    rows.append(f"| {' | '.join(cells)} |")
+crowd = f"others kept {elsewhere:.1f} processors busy" if elsewhere > 0.3 else "nothing else ran"
+said = f"{stations} stations, {os.cpu_count()} processors, median of {rounds} rounds in turns; {crowd}"
+head = "| samples | workers | runout, s | its CPU, s | peers, s | peers / runout | runout, peak MiB | peers, peak MiB |"
+print("\n".join(["", said, "", head, "| --- | --- | --- | --- | --- | --- | --- | --- |", *rows]))
+# For `cargo xtask bench-peers`, which joins the tables.
+(scratch / f"table-{name}.md").write_text("\n".join([said, head, *rows]) + "\n")
 checked = answer(python("check.py", out / "result.h5"))
 theirs = found[run_peers, 1][-1]["form_error_um"]
 print(f"\nForm against the record's own, rms µm, median and worst station: runout {checked['form_error_um'][0]:.5f} "
       f"{checked['form_error_um'][1]:.5f}, peers {theirs[0]:.5f} {theirs[1]:.5f}.")
 print(f"Motion, worst station: runout x {checked['motion_error_um'][0]:.5f}, y {checked['motion_error_um'][1]:.5f}.")
 if elsewhere > 0.3:
-    print(f"\nOther programs kept {elsewhere:.1f} processors busy meanwhile: do not trust these times.")
+    print("\nOther programs kept the machine busy meanwhile: do not trust these times.")

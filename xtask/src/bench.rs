@@ -59,8 +59,64 @@ impl Wanted {
 
 /// Writes the record once, times both programs on it in turns and prints a table.
 pub fn campaign(words: &[&str]) -> Outcome {
-    let wanted = Wanted::read(words)?;
-    let Some(peers) = peers(&["record.py", "pipeline.py"]) else { return Ok(()) };
+    time_campaign(&Wanted::read(words)?).map(|_| ())
+}
+
+/// The same with both kinds of samples; the table goes where `benchmarks/README.md` shows it.
+pub fn all_peers(words: &[&str]) -> Outcome {
+    let wanted = Wanted { i16: true, ..Wanted::read(words)? };
+    if !time_campaign(&wanted)? {
+        return Ok(());
+    }
+    let tables: Vec<Table> = KINDS.iter().map(|kind| Table::read(&wanted.scratch, kind)).collect::<Outcome<_>>()?;
+    let Some(first) = tables.first() else { return Ok(()) };
+    let columns = first.head.matches('|').count().saturating_sub(1);
+    let rule = format!("|{}", " --- |".repeat(columns));
+    let mut lines: Vec<&str> = Vec::new();
+    for table in &tables {
+        lines.extend([table.said.as_str(), ""]);
+    }
+    lines.extend([first.head.as_str(), &rule]);
+    lines.extend(tables.iter().flat_map(|table| &table.rows).map(String::as_str));
+    let path = root().join("benchmarks/README.md");
+    let failure = |error: std::io::Error| format!("{}: {error}", path.display());
+    let text = std::fs::read_to_string(&path).map_err(failure)?;
+    let (Some((before, _)), Some((_, after))) = (text.split_once(BEGIN), text.split_once(END)) else {
+        return Err(format!("{} has no place {BEGIN} … {END}", path.display()));
+    };
+    std::fs::write(&path, format!("{before}{BEGIN}\n{}\n{END}{after}", lines.join("\n"))).map_err(failure)?;
+    say(&format!("wrote the table of {}", path.display()));
+    Ok(())
+}
+
+/// Kinds of samples.
+const KINDS: [&str; 2] = ["f64", "i16"];
+/// Around the table in `benchmarks/README.md`.
+const BEGIN: &str = "<!-- bench-peers -->";
+const END: &str = "<!-- /bench-peers -->";
+
+/// What `compare.py` found.
+struct Table {
+    said: String,
+    head: String,
+    rows: Vec<String>,
+}
+
+impl Table {
+    fn read(scratch: &Path, kind: &str) -> Outcome<Self> {
+        let path = scratch.join(format!("table-{kind}.md"));
+        let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let mut lines = text.lines().map(str::to_owned);
+        match (lines.next(), lines.next()) {
+            (Some(said), Some(head)) => Ok(Self { said, head, rows: lines.collect() }),
+            _ => Err(format!("{} holds no table", path.display())),
+        }
+    }
+}
+
+/// False where there are no peers.
+fn time_campaign(wanted: &Wanted) -> Outcome<bool> {
+    let Some(peers) = peers(&["record.py", "pipeline.py"]) else { return Ok(false) };
     let python = python(&CAMPAIGN)?;
     let script = |name: &str| {
         let mut command = Command::new(&python);
@@ -73,12 +129,12 @@ pub fn campaign(words: &[&str]) -> Outcome {
     write.args(wanted.i16.then_some("--i16"));
     run(&mut write)?;
     run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
-    for name in ["f64", "i16"].into_iter().take(if wanted.i16 { 2 } else { 1 }) {
+    for name in KINDS.into_iter().take(if wanted.i16 { 2 } else { 1 }) {
         let mut compare = script("compare.py");
         compare.arg(target().join("release/runout")).arg(&peers).arg(&wanted.scratch);
         run(compare.arg(wanted.rounds.to_string()).arg(name).arg(wanted.stations.to_string()))?;
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Times the reference circles of runout and of the peers on the same points.

@@ -21,6 +21,8 @@ cargo xtask COMMAND
   schemas       write schemas/ anew from the types
   bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]
                 time a campaign of 98 million samples beside the same work in NumPy and SciPy; 1.6 GB in target/bench
+  bench-peers [SCRATCH] [--stations K] [--rounds N]
+                the same with samples of 64 bits and of 16, and write the table into benchmarks/README.md
   bench-roundness
                 time reference circles of 2560 and 36 000 points beside SciPy and others
   areal-peers [RINGS POINTS ROUNDS]
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
         ["schemas"] => chores::schemas(),
         ["areal-peers", ref rest @ ..] => areal::peers(rest),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
+        ["bench-peers", ref rest @ ..] => bench::all_peers(rest),
         ["bench-roundness"] => bench::roundness(),
         ["studies", ref arguments @ ..] => chores::studies(arguments),
         _ => {

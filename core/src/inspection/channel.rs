@@ -249,30 +249,18 @@ pub(super) struct Look<'a> {
 impl LaneWork for Look<'_> {
     /// Nearly always a glance at the extremes of all frames is enough: no value that is not finite, at a limit, or
     /// equal to the one before (integers: to many before). Only where it is not, each channel is looked at sample by sample.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see LaneWork")]
     fn lanes<const C: usize>(&mut self, offset: usize) {
         let count = self.channels.len();
         let group = &mut self.channels[offset..offset + C];
         let frames = &self.block.samples[self.frames.start * count..self.frames.end * count];
-        let mut lowest = [f64::INFINITY; C];
-        let mut highest = [f64::NEG_INFINITY; C];
-        let mut finest = [f64::INFINITY; C];
-        let mut repeats: [f64; C] = std::array::from_fn(|lane| group[lane].same.repeats as f64);
-        let mut most = [0.0; C];
-        // 0 · value is 0 for finite values only.
-        let mut zero = [0.0; C];
-        let mut last: [f64; C] = std::array::from_fn(|lane| group[lane].last.unwrap_or(f64::NAN));
-        for frame in frames.chunks_exact(count) {
-            let value: [f64; C] = load(frame, offset);
-            for lane in 0..C {
-                let step = (value[lane] - last[lane]).abs();
-                lowest[lane] = if value[lane] < lowest[lane] { value[lane] } else { lowest[lane] };
-                highest[lane] = if value[lane] > highest[lane] { value[lane] } else { highest[lane] };
-                finest[lane] = if step > 0.0 && step < finest[lane] { step } else { finest[lane] };
-                repeats[lane] = if step == 0.0 { repeats[lane] + 1.0 } else { 0.0 };
-                most[lane] = if repeats[lane] > most[lane] { repeats[lane] } else { most[lane] };
-                zero[lane] += 0.0 * value[lane];
-            }
-            last = value;
+        let before: [f64; C] = std::array::from_fn(|lane| group[lane].last.unwrap_or(f64::NAN));
+        let Extremes { lowest, highest, finest, zero, last } = extremes(frames, count, offset, before);
+        let (mut finest, mut repeats, mut most) = (finest, [0.0; C], [0.0; C]);
+        if finest.contains(&0.0) {
+            repeats = std::array::from_fn(|lane| group[lane].same.repeats as f64);
+            (finest, most) = repetitions(frames, count, offset, before, &mut repeats);
         }
         let flat = matches!(self.rule, Rule::Flat { .. });
         // Fewer equal samples than these can be neither clipped nor stuck.
@@ -304,4 +292,80 @@ impl LaneWork for Look<'_> {
             };
         }
     }
+}
+
+/// What one glance over frames shows.
+struct Extremes<const C: usize> {
+    lowest: [f64; C],
+    highest: [f64; C],
+    /// Smallest change between two samples.
+    finest: [f64; C],
+    /// 0 · value is 0 for finite values only.
+    zero: [f64; C],
+    last: [f64; C],
+}
+
+/// One loop an operation, so that each becomes one of all lanes.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see LaneWork")]
+fn extremes<const C: usize>(frames: &[f64], channels: usize, offset: usize, before: [f64; C]) -> Extremes<C> {
+    let (mut lowest, mut highest) = ([f64::INFINITY; C], [f64::NEG_INFINITY; C]);
+    let (mut finest, mut zero, mut last) = ([f64::INFINITY; C], [0.0; C], before);
+    for frame in frames.chunks_exact(channels) {
+        let value: [f64; C] = load(frame, offset);
+        for lane in 0..C {
+            lowest[lane] = if value[lane] < lowest[lane] { value[lane] } else { lowest[lane] };
+        }
+        for lane in 0..C {
+            highest[lane] = if value[lane] > highest[lane] { value[lane] } else { highest[lane] };
+        }
+        for lane in 0..C {
+            last[lane] = (value[lane] - last[lane]).abs();
+        }
+        for lane in 0..C {
+            finest[lane] = if last[lane] < finest[lane] { last[lane] } else { finest[lane] };
+        }
+        for lane in 0..C {
+            zero[lane] += 0.0 * value[lane];
+        }
+        last = value;
+    }
+    Extremes { lowest, highest, finest, zero, last }
+}
+
+/// The smallest change that is none of 0, and the most equal samples in a row; `repeats` counts those at the end.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see LaneWork")]
+fn repetitions<const C: usize>(
+    frames: &[f64],
+    channels: usize,
+    offset: usize,
+    mut last: [f64; C],
+    repeats: &mut [f64; C],
+) -> ([f64; C], [f64; C]) {
+    let (mut finest, mut most) = ([f64::INFINITY; C], [0.0; C]);
+    for frame in frames.chunks_exact(channels) {
+        let value: [f64; C] = load(frame, offset);
+        let (mut step, mut change, mut longer) = ([0.0; C], [0.0; C], [0.0; C]);
+        for lane in 0..C {
+            step[lane] = (value[lane] - last[lane]).abs();
+        }
+        for lane in 0..C {
+            change[lane] = if step[lane] > 0.0 { step[lane] } else { f64::INFINITY };
+        }
+        for lane in 0..C {
+            finest[lane] = if change[lane] < finest[lane] { change[lane] } else { finest[lane] };
+        }
+        for lane in 0..C {
+            longer[lane] = repeats[lane] + 1.0;
+        }
+        for lane in 0..C {
+            repeats[lane] = if step[lane] == 0.0 { longer[lane] } else { 0.0 };
+        }
+        for lane in 0..C {
+            most[lane] = if repeats[lane] > most[lane] { repeats[lane] } else { most[lane] };
+        }
+        last = value;
+    }
+    (finest, most)
 }

@@ -1,10 +1,15 @@
 //! Harmonics of periodic signals on equally spaced angles.
 
-use std::sync::Arc;
+use std::{cell::RefCell, sync::Arc};
 
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::Complex64;
+
+thread_local! {
+    /// Keeps the plans that it has made: captures of one recording mostly ask for the same.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
 
 /// Transforms between one turn of equally spaced samples and its harmonics cₙ, signal = Re Σ cₙ e^{+inα}.
 ///
@@ -22,9 +27,8 @@ impl Fourier {
     /// Plans transforms of `length` samples, at least 2.
     #[must_use]
     pub fn new(length: usize) -> Self {
-        let mut planner = RealFftPlanner::new();
-        let forward = planner.plan_fft_forward(length);
-        let inverse = planner.plan_fft_inverse(length);
+        let (forward, inverse) =
+            PLANNER.with_borrow_mut(|planner| (planner.plan_fft_forward(length), planner.plan_fft_inverse(length)));
         let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
         Self {
             signal: forward.make_input_vec(),
@@ -38,7 +42,7 @@ impl Fourier {
     /// Samples a turn.
     #[must_use]
     pub fn length(&self) -> usize {
-        self.signal.len()
+        self.forward.len()
     }
 
     /// Highest order below Nyquist.
@@ -51,12 +55,21 @@ impl Fourier {
     ///
     /// `signal` yields [`length`](Self::length) samples; missing ones count as 0.
     pub fn analyse(&mut self, signal: impl IntoIterator<Item = f64>, harmonics: &mut [Complex64]) {
-        let length = self.signal.len();
         let mut samples = signal.into_iter();
-        self.signal.fill_with(|| samples.next().unwrap_or(0.0));
+        let mut own = std::mem::take(&mut self.signal);
+        own.fill_with(|| samples.next().unwrap_or(0.0));
+        self.analyse_in_place(&mut own, harmonics);
+        self.signal = own;
+    }
+
+    /// The same of [`length`](Self::length) samples, which are overwritten; all harmonics are 0 with another number.
+    pub fn analyse_in_place(&mut self, signal: &mut [f64], harmonics: &mut [Complex64]) {
+        let length = self.forward.len();
         let scratch = &mut self.scratch[..self.forward.get_scratch_len()];
-        // The buffers were made by the plan itself, so their lengths fit.
-        let _ = self.forward.process_with_scratch(&mut self.signal, &mut self.spectrum, scratch);
+        if self.forward.process_with_scratch(signal, &mut self.spectrum, scratch).is_err() {
+            harmonics.fill(Complex64::ZERO);
+            return;
+        }
         let scale = 2.0 / length as f64;
         let kept = harmonics.len().min(max_order(length) + 1);
         for (harmonic, bin) in harmonics.iter_mut().zip(&self.spectrum[..kept]) {

@@ -1,31 +1,62 @@
 //! Work on neighbouring channels side by side, so that the compiler can use vector registers.
+//!
+//! The program is compiled for any processor of its kind. What is done here is compiled twice, once for vectors of four
+//! numbers (AVX2), and the processor that it runs on decides. Only the width differs: no product and sum become one
+//! rounding, so that the results are the same to the last bit.
+
+#![allow(clippy::inline_always, reason = "what is not inlined is compiled for narrow registers")]
+
+use pulp::Arch;
+pub use pulp::NullaryFnOnce;
 
 /// Channels that are worked on at once, at most.
 const WIDEST: usize = 8;
 
 /// Work that is written once for any number of lanes.
 pub trait LaneWork {
-    /// Works on the channels `offset..offset + C`.
+    /// Works on the channels `offset..offset + C`. Mark it `#[inline(always)]`, and what it calls in its loops: what is
+    /// not inlined stays in narrow registers.
     fn lanes<const C: usize>(&mut self, offset: usize);
 }
 
 /// Does the work for all channels, in groups of at most 8.
 pub fn in_lanes(channels: usize, work: &mut impl LaneWork) {
-    for offset in (0..channels).step_by(WIDEST) {
-        match (channels - offset).min(WIDEST) {
-            1 => work.lanes::<1>(offset),
-            2 => work.lanes::<2>(offset),
-            3 => work.lanes::<3>(offset),
-            4 => work.lanes::<4>(offset),
-            5 => work.lanes::<5>(offset),
-            6 => work.lanes::<6>(offset),
-            7 => work.lanes::<7>(offset),
-            _ => work.lanes::<8>(offset),
+    vectorised(Groups { channels, work });
+}
+
+/// Calls what is `#[inline(always)]` in a function compiled for the widest vectors that the processor has.
+pub fn vectorised<W: NullaryFnOnce>(work: W) -> W::Output {
+    Arch::new().dispatch(work)
+}
+
+struct Groups<'a, W> {
+    channels: usize,
+    work: &'a mut W,
+}
+
+impl<W: LaneWork> NullaryFnOnce for Groups<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { channels, work } = self;
+        for offset in (0..channels).step_by(WIDEST) {
+            match (channels - offset).min(WIDEST) {
+                1 => work.lanes::<1>(offset),
+                2 => work.lanes::<2>(offset),
+                3 => work.lanes::<3>(offset),
+                4 => work.lanes::<4>(offset),
+                5 => work.lanes::<5>(offset),
+                6 => work.lanes::<6>(offset),
+                7 => work.lanes::<7>(offset),
+                _ => work.lanes::<8>(offset),
+            }
         }
     }
 }
 
 /// The lanes of one frame, all channels of one instant.
+#[inline(always)]
 #[must_use]
 pub fn load<const C: usize>(frame: &[f64], offset: usize) -> [f64; C] {
     let mut lanes = [0.0; C];
@@ -42,6 +73,34 @@ mod tests {
     impl LaneWork for Widths {
         fn lanes<const C: usize>(&mut self, offset: usize) {
             self.0.push((offset, C));
+        }
+    }
+
+    /// Products and sums that rounding tells apart from fused ones.
+    struct Recursion<'a>(&'a mut [f64], usize);
+
+    impl LaneWork for Recursion<'_> {
+        #[inline(always)]
+        fn lanes<const C: usize>(&mut self, offset: usize) {
+            let mut state = [0.3; C];
+            for frame in self.0.chunks_exact_mut(self.1) {
+                let value: [f64; C] = load(frame, offset);
+                for lane in 0..C {
+                    state[lane] = value[lane] * 1.7 - state[lane] * 0.9 + value[lane] * state[lane];
+                    frame[offset + lane] = state[lane];
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn wide_registers_change_no_bit() {
+        for channels in 1..=11 {
+            let frames: Vec<f64> = (0..500 * channels).map(|index| (index as f64).sin()).collect();
+            let (mut plain, mut wide) = (frames.clone(), frames);
+            Groups { channels, work: &mut Recursion(&mut plain, channels) }.call();
+            in_lanes(channels, &mut Recursion(&mut wide, channels));
+            assert!(plain.iter().zip(&wide).all(|(plain, wide)| plain.to_bits() == wide.to_bits()));
         }
     }
 

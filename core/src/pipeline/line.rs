@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-use super::run::Observer;
+use super::{overlap::read_ahead, run::Observer};
 use crate::{
     Error, Result,
     inspection::Inspection,
@@ -101,12 +101,15 @@ impl Line<'_> {
     }
 
     fn profile(&self, station: usize, setup: usize) -> Result<Profile> {
-        let mut stream: Box<dyn SampleStream + '_> = Box::new(Inspection::new(self.recording.open(station, setup)?));
-        for conditioner in self.conditioners {
-            stream = conditioner.attach(stream)?;
-        }
+        let recorded = Box::new(Inspection::new(self.recording.open(station, setup)?));
         let projection = self.projections.get(setup).and_then(Option::as_ref);
-        self.averager.average_wanting(stream, Wanted { hold_out: self.hold_out, projection })
+        read_ahead(recorded, |stream| {
+            let mut stream: Box<dyn SampleStream + '_> = stream;
+            for conditioner in self.conditioners {
+                stream = conditioner.attach(stream)?;
+            }
+            self.averager.average_wanting(stream, Wanted { hold_out: self.hold_out, projection })
+        })
     }
 }
 

@@ -8,6 +8,7 @@ pub mod effects;
 pub mod error;
 pub mod evaluate;
 mod line;
+mod overlap;
 pub mod registry;
 pub mod result;
 pub mod run;

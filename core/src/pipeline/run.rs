@@ -6,6 +6,7 @@ use super::{
     config::{Pipeline, Route},
     evaluate::{Evaluate, Group, add_areal, decide, part_summary},
     line::{Line, separate},
+    overlap::write_behind,
     result::{Evaluation, complete},
     summary::summarise,
     traces,
@@ -93,7 +94,10 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
                 Ok(StationResult { motion_values: error_motion_values(&result), ..result })
             };
-            let inputs = line.run(threads, observer, work, |result| gathering.take(&result, Some(rig)))?;
+            let inputs = write_behind(
+                |result| gathering.take(&result, Some(rig)),
+                |take| line.run(threads, observer, work, take),
+            )?;
             (inputs, gathering.build_surface(rig.part_radius_mm)?, recording.remarks())
         }
         (Source::Points(points), Route::Points { separator }) => {

@@ -75,7 +75,9 @@ struct Pass<'a> {
     direction: Direction,
 }
 
+#[allow(clippy::inline_always, reason = "see LaneWork")]
 impl LaneWork for Pass<'_> {
+    #[inline(always)]
     fn lanes<const C: usize>(&mut self, offset: usize) {
         let count = self.cascade.steps.len();
         // Two sections at a time keep the processor busy while each waits for its own state.
@@ -85,7 +87,9 @@ impl LaneWork for Pass<'_> {
     }
 }
 
+#[allow(clippy::inline_always, reason = "see LaneWork")]
 impl Pass<'_> {
+    #[inline(always)]
     fn sections<const C: usize, const S: usize>(&mut self, first: usize, offset: usize) {
         let channels = self.cascade.channels;
         let steps: [Step; S] = std::array::from_fn(|section| self.cascade.steps[first + section]);
@@ -93,22 +97,13 @@ impl Pass<'_> {
         let mut state: [[[f64; C]; 2]; S] = std::array::from_fn(|section| {
             std::array::from_fn(|term| load(&self.cascade.state[place(section, term)..], offset))
         });
-        let mut filter = |frame: &mut [f64]| {
-            let lanes = &mut frame[offset..offset + C];
-            let mut value: [f64; C] = load(lanes, 0);
-            for (step, state) in steps.iter().zip(&mut state) {
-                for lane in 0..C {
-                    let (input, [s0, s1]) = (value[lane], [state[0][lane], state[1][lane]]);
-                    value[lane] = step.b0 * input + s0;
-                    state[0][lane] = (step.p[0] * input + s1) - step.a[0] * s0;
-                    state[1][lane] = step.p[1] * input - step.a[1] * s0;
-                }
-            }
-            lanes.copy_from_slice(&value);
-        };
-        match self.direction {
-            Direction::Forward => self.frames.chunks_exact_mut(channels).for_each(&mut filter),
-            Direction::Backward => self.frames.chunks_exact_mut(channels).rev().for_each(&mut filter),
+        if channels == C {
+            // A distance between frames that the compiler knows spares the checks of every access.
+            let frames = self.frames.chunks_exact_mut(C);
+            run(frames, self.direction, &steps, &mut state);
+        } else {
+            let frames = self.frames.chunks_exact_mut(channels).map(|frame| &mut frame[offset..offset + C]);
+            run(frames, self.direction, &steps, &mut state);
         }
         for (section, state) in state.iter().enumerate() {
             for (term, lanes) in state.iter().enumerate() {
@@ -117,4 +112,49 @@ impl Pass<'_> {
             }
         }
     }
+}
+
+/// All instants of some channels through some sections.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see LaneWork")]
+fn run<'a, const C: usize, const S: usize>(
+    frames: impl DoubleEndedIterator<Item = &'a mut [f64]>,
+    direction: Direction,
+    steps: &[Step; S],
+    state: &mut [[[f64; C]; 2]; S],
+) {
+    // No closure: the compiler would not inline it.
+    match direction {
+        Direction::Forward => {
+            for frame in frames {
+                filter(steps, state, frame);
+            }
+        }
+        Direction::Backward => {
+            for frame in frames.rev() {
+                filter(steps, state, frame);
+            }
+        }
+    }
+}
+
+/// One instant of some channels through some sections.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see LaneWork")]
+fn filter<const C: usize, const S: usize>(steps: &[Step; S], state: &mut [[[f64; C]; 2]; S], lanes: &mut [f64]) {
+    let mut value: [f64; C] = load(lanes, 0);
+    for (step, state) in steps.iter().zip(state) {
+        let input = value;
+        for lane in 0..C {
+            value[lane] = step.b0 * input[lane] + state[0][lane];
+        }
+        let [first, second] = *state;
+        for lane in 0..C {
+            state[0][lane] = (step.p[0] * input[lane] + second[lane]) - step.a[0] * first[lane];
+        }
+        for lane in 0..C {
+            state[1][lane] = step.p[1] * input[lane] - step.a[1] * first[lane];
+        }
+    }
+    lanes.copy_from_slice(&value);
 }

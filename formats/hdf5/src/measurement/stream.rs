@@ -1,11 +1,14 @@
 //! The samples of one capture, block after block.
 
+use std::ops::Range;
+
 use hdf5_metno::{Dataset, H5Type};
 use ndarray::s;
 use runout_core::{
     Error, Result,
     encoder::EncoderScan,
     measurement::{Block, Capture, SampleStream},
+    numerics::lanes::{LaneWork, in_lanes},
     rig::Rig,
 };
 
@@ -15,8 +18,8 @@ use super::{
 };
 use crate::node::Place;
 
-/// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
-const BLOCK_SAMPLES: usize = 16_384;
+/// Instants in a block: four channels of f64 then take 256 KiB, of which a core's own cache holds two.
+const BLOCK_SAMPLES: usize = 8192;
 
 /// A block never takes more elements than this, even where the file's chunks are larger.
 const BLOCK_ELEMENTS: usize = 1 << 24;
@@ -105,19 +108,67 @@ impl Hdf5Stream {
         })
     }
 
-    fn fill<T: H5Type + Copy + Into<f64>>(&self, rows: std::ops::Range<usize>, to: &mut [f64]) -> Result<()> {
+    /// Rows as they are stored.
+    fn codes<T: H5Type>(&self, rows: &Range<usize>) -> Result<Vec<T>> {
         let columns = self.first_column..self.first_column + self.read_columns;
         let codes = self.dataset.read_slice_2d::<T, _>(s![rows.clone(), columns]).map_err(|error| {
             self.place.error(format!("samples {} to {}: {error}", rows.start, rows.end.saturating_sub(1)))
         })?;
-        let flat = codes.as_slice().ok_or_else(|| self.place.error("the samples came in another order"))?;
-        for (row, to) in flat.chunks_exact(self.read_columns).zip(to.chunks_exact_mut(self.columns.len())) {
-            for (value, column) in to.iter_mut().zip(&self.columns) {
-                let code: f64 = row[column.offset].into();
-                *value = code * column.gain + column.zero_um;
+        // A fresh array in the order of rows begins where its memory does.
+        let ordered = codes.is_standard_layout();
+        let (flat, _) = codes.into_raw_vec_and_offset();
+        if ordered { Ok(flat) } else { Err(self.place.error("the samples came in another order")) }
+    }
+
+    /// Rows in µm.
+    fn read<T: H5Type + Copy + Into<f64>>(&self, rows: &Range<usize>, to: &mut Vec<f64>) -> Result<()> {
+        let codes = self.codes::<T>(rows)?;
+        to.resize(rows.len() * self.columns.len(), 0.0);
+        let mut scaling = Scaling { codes: &codes, read_columns: self.read_columns, columns: &self.columns, to };
+        in_lanes(self.columns.len(), &mut scaling);
+        Ok(())
+    }
+
+    /// Whether what is stored is what is read.
+    fn is_plain(&self) -> bool {
+        let plain =
+            |(index, column): (usize, &Column)| column.offset == index && (column.gain, column.zero_um) == (1.0, 0.0);
+        self.columns.len() == self.read_columns && self.columns.iter().enumerate().all(plain)
+    }
+}
+
+/// Codes on their way to µm.
+struct Scaling<'a, T> {
+    /// `[row][column]`.
+    codes: &'a [T],
+    read_columns: usize,
+    columns: &'a [Column],
+    /// `[row][channel]`.
+    to: &'a mut [f64],
+}
+
+impl<T: Copy + Into<f64>> LaneWork for Scaling<'_, T> {
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see LaneWork")]
+    fn lanes<const C: usize>(&mut self, offset: usize) {
+        let columns: [&Column; C] = std::array::from_fn(|lane| &self.columns[offset + lane]);
+        let (gain, zero_um) = (columns.map(|column| column.gain), columns.map(|column| column.zero_um));
+        let first = columns[0].offset;
+        let side_by_side = columns.iter().enumerate().all(|(lane, column)| column.offset == first + lane);
+        let rows = self.codes.chunks_exact(self.read_columns).zip(self.to.chunks_exact_mut(self.columns.len()));
+        for (row, to) in rows {
+            let mut codes = [0.0; C];
+            if side_by_side {
+                for (code, stored) in codes.iter_mut().zip(&row[first..first + C]) {
+                    *code = (*stored).into();
+                }
+            } else {
+                codes = columns.map(|column| row[column.offset].into());
+            }
+            for (lane, to) in to[offset..offset + C].iter_mut().enumerate() {
+                *to = codes[lane] * gain[lane] + zero_um[lane];
             }
         }
-        Ok(())
     }
 }
 
@@ -133,12 +184,12 @@ impl SampleStream for Hdf5Stream {
         if rows.is_empty() {
             return Ok(false);
         }
-        block.samples.resize(rows.len() * self.columns.len(), 0.0);
         match self.kind {
-            SampleType::F64 => self.fill::<f64>(rows.clone(), &mut block.samples)?,
-            SampleType::F32 => self.fill::<f32>(rows.clone(), &mut block.samples)?,
-            SampleType::I16 => self.fill::<i16>(rows.clone(), &mut block.samples)?,
-            SampleType::I32 => self.fill::<i32>(rows.clone(), &mut block.samples)?,
+            SampleType::F64 if self.is_plain() => block.samples = self.codes(&rows)?,
+            SampleType::F64 => self.read::<f64>(&rows, &mut block.samples)?,
+            SampleType::F32 => self.read::<f32>(&rows, &mut block.samples)?,
+            SampleType::I16 => self.read::<i16>(&rows, &mut block.samples)?,
+            SampleType::I32 => self.read::<i32>(&rows, &mut block.samples)?,
         }
         if let Some((dataset, place, scan)) = &self.encoder {
             let angles = dataset.read_slice_1d::<f64, _>(s![rows.clone()]).map_err(|error| place.error(error))?;

@@ -18,7 +18,8 @@ pub(super) type Name = FixedUnicode<NAME_BYTES>;
 const NAME_BYTES: usize = 64;
 /// Rows of a chunk: 64 KiB of f64.
 const CHUNK_ROWS: usize = 8192;
-const DEFLATE: u8 = 4;
+/// Higher levels take several times as long for some percent less.
+const DEFLATE: u8 = 1;
 
 /// Quantity, name of its column, and what it is.
 pub(super) const MOTION: [(Quantity, &str, &str); 4] = [
@@ -44,8 +45,10 @@ impl<T: H5Type> Column<T> {
         // Rows come in order: only the last chunk is ever written again. The library's own cache keeps megabytes of
         // each column.
         let bytes = CHUNK_ROWS * size_of::<T>();
-        let builder =
-            group.new_dataset_builder().chunk(CHUNK_ROWS).shuffle().deflate(DEFLATE).chunk_cache(1, bytes, 1.0);
+        let builder = group.new_dataset_builder().chunk(CHUNK_ROWS);
+        // Of numbers, the first bytes are alike from row to row; names are alike as a whole.
+        let builder = if size_of::<T>() > size_of::<f64>() { builder } else { builder.shuffle() };
+        let builder = builder.deflate(DEFLATE).chunk_cache(1, bytes, 1.0);
         let dataset = builder.empty::<T>().shape(0..).create(name)?;
         node::put_text(&dataset, "unit", unit)?;
         node::put_text(&dataset, "meaning", meaning)?;

@@ -3,8 +3,10 @@
 //! The window's width puts the first zero of its spectrum half of Nyquist away: a signal below half of the recording's
 //! Nyquist frequency ([`PASS_BAND`]) is interpolated to 1e-7 of its amplitude, wherever the position; above,
 //! the interpolation weakens, to one half at Nyquist. (Kaiser, Schafer, IEEE Trans. ASSP 28(1), 1980: β from the
-//! transition's width.) Weights are tabulated at [`PHASES`] positions between two samples, each set scaled to the sum 1,
-//! and interpolated by cubics between them.
+//! transition's width.) Between two samples each weight is a cubic in each of [`PHASES`] stretches, interpolated at the
+//! zeros of a Chebyshev polynomial; at these, the weights are scaled to the sum 1.
+
+#![allow(clippy::inline_always, reason = "see LaneWork")]
 
 use runout_core::numerics::lanes::{LaneWork, load};
 
@@ -18,50 +20,67 @@ pub(super) const PASS_BAND: f64 = 0.5;
 pub(super) const ERROR: f64 = 1e-7;
 /// Shape of the window: √((π·REACH/2)² − π²) would put the zero exactly there.
 const BETA: f64 = 16.99;
-/// Between them, a cubic errs by 3/128·π⁴/5·PHASES⁻⁴ < 2e-9.
-const PHASES: usize = 128;
+/// In a stretch, a cubic errs by (π·PASS_BAND/PHASES)⁴/(4!·2⁷) < 2e-9 of a sine in the pass band.
+const PHASES: usize = 32;
 /// Nearer to a sample than this, a position is the sample's, which then passes unchanged.
 const ON_SAMPLE: f64 = 1e-9;
 
 /// The table of weights.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Kernel {
-    /// Weights of the samples −REACH+1 to REACH for the phases −1 to PHASES+1.
-    rows: Vec<[f64; TAPS]>,
+    /// `[stretch][power]`: weights of the samples −REACH+1 to REACH are polynomials in −1 to 1 across the stretch.
+    stretches: Vec<[[f64; TAPS]; 4]>,
 }
 
 impl Kernel {
     pub(super) fn new() -> Self {
-        let row = |index: usize| {
-            let phase = (index as f64 - 1.0) / PHASES as f64;
-            let raw: [f64; TAPS] = std::array::from_fn(|tap| weight(phase - (tap as f64 - (REACH - 1) as f64)));
-            let sum: f64 = raw.iter().sum();
-            raw.map(|weight| weight / sum)
-        };
-        Self { rows: (0..PHASES + 3).map(row).collect() }
+        Self { stretches: (0..PHASES).map(cubics).collect() }
     }
 
     /// Weights for a position `fraction` (0 to 1) behind the sample REACH−1.
+    #[inline(always)]
     fn weights(&self, fraction: f64) -> [f64; TAPS] {
+        if !(ON_SAMPLE..=1.0 - ON_SAMPLE).contains(&fraction) {
+            let mut weights = [0.0; TAPS];
+            weights[if fraction < 0.5 { REACH - 1 } else { REACH }] = 1.0;
+            return weights;
+        }
         let phase = fraction * PHASES as f64;
-        let row = (phase as usize).min(PHASES - 1);
-        let t = phase - row as f64;
-        // Lagrange's cubic through −1, 0, 1, 2.
-        let (before, after, behind) = (t + 1.0, t - 1.0, t - 2.0);
-        let share = [
-            -t * after * behind / 6.0,
-            0.5 * before * after * behind,
-            -0.5 * before * t * behind,
-            before * t * after / 6.0,
-        ];
+        let stretch = (phase as usize).min(PHASES - 1);
+        let across = 2.0 * (phase - stretch as f64) - 1.0;
+        let [c0, c1, c2, c3] = &self.stretches[stretch];
         let mut weights = [0.0; TAPS];
-        if let Some([a, b, c, d]) = self.rows.get(row..row + 4).and_then(|rows| rows.first_chunk::<4>()) {
-            for tap in 0..TAPS {
-                weights[tap] = (share[0] * a[tap] + share[1] * b[tap]) + (share[2] * c[tap] + share[3] * d[tap]);
-            }
+        for tap in 0..TAPS {
+            weights[tap] = c0[tap] + across * (c1[tap] + across * (c2[tap] + across * c3[tap]));
         }
         weights
     }
+}
+
+/// The weights' coefficients in one stretch.
+fn cubics(stretch: usize) -> [[f64; TAPS]; 4] {
+    // Chebyshev's coefficients from the values at the zeros of the polynomial of degree 4.
+    let mut chebyshev = [[0.0; TAPS]; 4];
+    for node in 0..4 {
+        let angle = (f64::from(node) + 0.5) * std::f64::consts::FRAC_PI_4;
+        let phase = (stretch as f64 + 0.5 * (1.0 + angle.cos())) / PHASES as f64;
+        let raw: [f64; TAPS] = std::array::from_fn(|tap| weight(phase - (tap as f64 - (REACH - 1) as f64)));
+        let sum: f64 = raw.iter().sum();
+        for (degree, coefficients) in chebyshev.iter_mut().enumerate() {
+            let share = if degree == 0 { 0.25 } else { 0.5 } * (degree as f64 * angle).cos();
+            for (coefficient, weight) in coefficients.iter_mut().zip(raw) {
+                *coefficient += share * weight / sum;
+            }
+        }
+    }
+    let mut powers = [[0.0; TAPS]; 4];
+    for tap in 0..TAPS {
+        let [a0, a1, a2, a3] = chebyshev.map(|coefficients| coefficients[tap]);
+        for (power, value) in powers.iter_mut().zip([a0 - a2, a1 - 3.0 * a3, 2.0 * a2, 4.0 * a3]) {
+            power[tap] = value;
+        }
+    }
+    powers
 }
 
 fn weight(distance: f64) -> f64 {
@@ -86,12 +105,16 @@ fn bessel_i0(x: f64) -> f64 {
 }
 
 /// The sample that a position of at least 0 is as good as on.
+#[inline(always)]
 pub(super) fn on_sample(position: f64) -> Option<usize> {
     // Not `round`: without a processor's own instruction for it, that is a call.
     let below = position as usize;
     let fraction = position - below as f64;
     if fraction < ON_SAMPLE { Some(below) } else { (fraction > 1.0 - ON_SAMPLE).then_some(below + 1) }
 }
+
+/// Positions whose weights are laid down before they are used, which then come from memory one by one.
+const TOGETHER: usize = 16;
 
 /// Interpolates all channels at many positions.
 pub(super) struct Interpolation<'a> {
@@ -101,31 +124,61 @@ pub(super) struct Interpolation<'a> {
     pub channels: usize,
     /// In frames; at least REACH frames lie on either side of each.
     pub positions: &'a [f64],
+    /// That all positions are on samples.
+    pub exact: bool,
     /// `[channel][position]`.
     pub values: &'a mut [f64],
 }
 
 impl LaneWork for Interpolation<'_> {
+    #[inline(always)]
     fn lanes<const C: usize>(&mut self, offset: usize) {
-        let (channels, count) = (self.channels, self.positions.len());
+        // A distance between frames that the compiler knows makes straight code of the sum.
+        match (self.exact, self.channels == C) {
+            (true, _) => self.take::<C>(offset),
+            (false, true) => self.interpolate::<C>(C, 0),
+            (false, false) => self.interpolate::<C>(self.channels, offset),
+        }
+    }
+}
+
+impl Interpolation<'_> {
+    /// Takes the samples as they are.
+    #[inline(always)]
+    fn take<const C: usize>(&mut self, offset: usize) {
+        let count = self.positions.len();
         for (at, position) in self.positions.iter().enumerate() {
-            let mut sum = [0.0; C];
-            if let Some(sample) = on_sample(*position) {
-                sum = load(&self.frames[sample * channels..], offset);
-            } else {
+            let frame: [f64; C] = load(&self.frames[(position + 0.5) as usize * self.channels..], offset);
+            for lane in 0..C {
+                self.values[(offset + lane) * count + at] = frame[lane];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn interpolate<const C: usize>(&mut self, channels: usize, offset: usize) {
+        let count = self.positions.len();
+        let mut taps = [(0, [0.0; TAPS]); TOGETHER];
+        for (group, positions) in self.positions.chunks(TOGETHER).enumerate() {
+            for (taps, position) in taps.iter_mut().zip(positions) {
                 let below = *position as usize;
-                let weights = self.kernel.weights(position - below as f64);
-                let first = below + 1 - REACH;
+                *taps = (below + 1 - REACH, self.kernel.weights(position - below as f64));
+            }
+            for (index, (first, weights)) in taps[..positions.len()].iter().enumerate() {
                 let window = &self.frames[first * channels..(first + TAPS) * channels];
-                for (frame, weight) in window.chunks_exact(channels).zip(weights) {
-                    let value: [f64; C] = load(frame, offset);
-                    for lane in 0..C {
-                        sum[lane] += weight * value[lane];
+                // Two sums, which need not wait for each other.
+                let mut sums = [[0.0; C]; 2];
+                for (pair, weights) in window.chunks_exact(2 * channels).zip(weights.chunks_exact(2)) {
+                    for half in 0..2 {
+                        let frame: [f64; C] = load(&pair[half * channels..(half + 1) * channels], offset);
+                        for lane in 0..C {
+                            sums[half][lane] += weights[half] * frame[lane];
+                        }
                     }
                 }
-            }
-            for (lane, sum) in sum.into_iter().enumerate() {
-                self.values[(offset + lane) * count + at] = sum;
+                for lane in 0..C {
+                    self.values[(offset + lane) * count + group * TOGETHER + index] = sums[0][lane] + sums[1][lane];
+                }
             }
         }
     }
@@ -170,9 +223,14 @@ mod tests {
                 frames: &frames,
                 channels,
                 positions: &positions,
+                exact: false,
                 values: &mut values,
             };
             in_lanes(channels, &mut interpolation);
+            let interpolated = interpolation.values.to_vec();
+            interpolation.exact = true;
+            in_lanes(channels, &mut interpolation);
+            assert_eq!(values, interpolated);
             for channel in 0..channels {
                 let expected = [10, 17, 29].map(|frame| frames[frame * channels + channel]);
                 assert_eq!(values[channel * 3..(channel + 1) * 3], expected);

@@ -1,35 +1,62 @@
 //! Mean over turns, and its covariance across channels, in one pass.
 
-use runout_core::Complex64;
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
 
-use super::slow::Slow;
+use runout_core::{
+    Complex64,
+    numerics::lanes::{NullaryFnOnce, load, vectorised},
+};
+
+use super::slow::{PHASES, Slow};
+
+/// Orders that are worked on at once.
+const LANES: usize = 4;
+/// Turns that are summed together at most: the sums are then read and written once for all of them.
+const TOGETHER: usize = 8;
+/// Memory that turns may take up which wait for others, in numbers.
+const WAITING: usize = 1 << 17;
 
 /// Sums over turns, taken from the first one: what is left is the turns' scatter, so that no digits are lost where the
 /// scatter is far below the signal.
+///
+/// Real and imaginary parts stand apart, in planes `[channel][re, im][order]`.
 pub(super) struct Mean {
     channels: usize,
+    orders: usize,
+    /// Length of a plane: the orders, and as many zeros as fill the last lanes.
+    plane: usize,
     turns: usize,
     /// The first turn, `[order][channel]`.
     pivot: Vec<Complex64>,
-    sum: Vec<Complex64>,
+    /// Turns less the pivot that are in no sum yet, a set of planes each, and the phases of each.
+    waiting: Vec<f64>,
+    phases: Vec<[f64; PHASES]>,
+    together: usize,
+    /// Σ d.
+    sum: Vec<f64>,
     slow: Slow,
-    /// Σ d dᴴ on and below the diagonal, `[order][row][column ≤ row]`.
-    products: Vec<Complex64>,
-    /// One order's distance from the pivot.
-    difference: Vec<Complex64>,
+    /// Σ d dᴴ on and below the diagonal, `[row][column ≤ row][re, im][order]`.
+    products: Vec<f64>,
 }
 
 impl Mean {
     /// For `planned` turns at most.
     pub(super) fn new(orders: usize, channels: usize, planned: usize) -> Self {
+        let plane = orders.next_multiple_of(LANES);
+        let values = 2 * channels * plane;
+        let together = (WAITING / values.max(1)).clamp(1, TOGETHER);
         Self {
             channels,
+            orders,
+            plane,
             turns: 0,
             pivot: Vec::new(),
-            sum: vec![Complex64::ZERO; orders * channels],
-            slow: Slow::new(orders * channels, planned),
-            products: vec![Complex64::ZERO; orders * triangle(channels)],
-            difference: vec![Complex64::ZERO; channels],
+            waiting: vec![0.0; together * values],
+            phases: Vec::with_capacity(together),
+            together,
+            sum: vec![0.0; values],
+            slow: Slow::new(values, planned),
+            products: vec![0.0; 2 * triangle(channels) * plane],
         }
     }
 
@@ -44,61 +71,43 @@ impl Mean {
     /// Takes one turn's harmonics, `[order][channel]`.
     pub(super) fn add(&mut self, turn: &[Complex64]) {
         self.turns += 1;
-        self.slow.begin_turn(self.turns - 1);
+        let phases = self.slow.phases(self.turns - 1);
         if self.pivot.is_empty() {
             self.pivot.extend_from_slice(turn);
             return;
         }
-        self.slow.add(turn, &self.pivot);
-        // A number of channels that the compiler knows makes straight code of the inner loops.
-        match self.channels {
-            1 => self.add_known::<1>(turn),
-            2 => self.add_known::<2>(turn),
-            3 => self.add_known::<3>(turn),
-            4 => self.add_known::<4>(turn),
-            5 => self.add_known::<5>(turn),
-            6 => self.add_known::<6>(turn),
-            7 => self.add_known::<7>(turn),
-            8 => self.add_known::<8>(turn),
-            channels => {
-                let mut difference = std::mem::take(&mut self.difference);
-                self.add_any(turn, channels, &mut difference);
-                self.difference = difference;
+        let first = self.phases.len() * self.sum.len();
+        let planes = &mut self.waiting[first..first + self.sum.len()];
+        let pairs = turn.chunks_exact(self.channels).zip(self.pivot.chunks_exact(self.channels));
+        for (order, (turn, pivot)) in pairs.enumerate() {
+            for (pair, (turn, pivot)) in planes.chunks_exact_mut(2 * self.plane).zip(turn.iter().zip(pivot)) {
+                pair[order] = turn.re - pivot.re;
+                pair[self.plane + order] = turn.im - pivot.im;
             }
+        }
+        self.phases.push(phases);
+        if self.phases.len() == self.together {
+            self.sum_up();
         }
     }
 
-    fn add_known<const C: usize>(&mut self, turn: &[Complex64]) {
-        self.add_any(turn, C, &mut [Complex64::ZERO; C]);
-    }
-
-    #[inline(always)]
-    #[allow(clippy::inline_always, reason = "the callers' constants are the point")]
-    fn add_any(&mut self, turn: &[Complex64], channels: usize, difference: &mut [Complex64]) {
-        let turn = turn.chunks_exact(channels).zip(self.pivot.chunks_exact(channels));
-        let sums = self.sum.chunks_exact_mut(channels).zip(self.products.chunks_exact_mut(triangle(channels)));
-        for ((turn, pivot), (sum, products)) in turn.zip(sums) {
-            let mut at = 0;
-            for row in 0..channels {
-                difference[row] = turn[row] - pivot[row];
-                sum[row] += difference[row];
-                for column in 0..=row {
-                    products[at] += difference[row] * difference[column].conj();
-                    at += 1;
-                }
-            }
-        }
+    /// Takes the turns that wait into the sums; to be called after the last one.
+    pub(super) fn sum_up(&mut self) {
+        vectorised(Summing(self));
+        self.phases.clear();
     }
 
     /// Mean over the turns, `[order][channel]`.
     pub(super) fn mean(&self) -> Vec<Complex64> {
         let scale = 1.0 / self.turns.max(1) as f64;
-        self.pivot.iter().zip(&self.sum).map(|(pivot, sum)| pivot + sum * scale).collect()
+        let places = (0..self.orders).flat_map(|order| (0..self.channels).map(move |channel| (order, channel)));
+        let means = self.pivot.iter().zip(places);
+        means.map(|(pivot, (order, channel))| pivot + at(&self.sum, self.plane, order, channel) * scale).collect()
     }
 
     /// Covariance of the mean, `[order][channel][channel]`; `None` below two turns. See [`Slow`].
     pub(super) fn covariance(&self) -> Option<Vec<Complex64>> {
-        self.slow.covariance(&self.sum, self.turns, self.channels).or_else(|| self.scatter())
+        self.slow.covariance(&self.sum, self.turns, self.orders, self.channels).or_else(|| self.scatter())
     }
 
     /// What the covariance of the mean would be with independent turns, 1/(T(T−1)) Σ (cₜ − mean)(cₜ − mean)ᴴ,
@@ -108,12 +117,13 @@ impl Mean {
             return None;
         }
         let (channels, turns) = (self.channels, self.turns as f64);
-        let mut covariance = vec![Complex64::ZERO; self.sum.len() * channels];
-        let orders = self.sum.chunks_exact(channels).zip(self.products.chunks_exact(triangle(channels)));
-        for ((sum, products), covariance) in orders.zip(covariance.chunks_exact_mut(channels * channels)) {
+        let mut covariance = vec![Complex64::ZERO; self.orders * channels * channels];
+        for (order, covariance) in covariance.chunks_exact_mut(channels * channels).enumerate() {
+            let sum = |channel| at(&self.sum, self.plane, order, channel);
             for row in 0..channels {
                 for column in 0..=row {
-                    let about_mean = products[triangle(row) + column] - sum[row] * sum[column].conj() / turns;
+                    let products = at(&self.products, self.plane, order, triangle(row) + column);
+                    let about_mean = products - sum(row) * sum(column).conj() / turns;
                     let value = about_mean / (turns * (turns - 1.0));
                     covariance[column * channels + row] = value.conj();
                     covariance[row * channels + column] = value;
@@ -122,6 +132,50 @@ impl Mean {
             }
         }
         Some(covariance)
+    }
+}
+
+/// A number of a pair of planes.
+pub(super) fn at(planes: &[f64], plane: usize, order: usize, pair: usize) -> Complex64 {
+    let re = 2 * pair * plane + order;
+    Complex64::new(planes[re], planes[re + plane])
+}
+
+/// The turns that wait, on their way into the sums.
+struct Summing<'a>(&'a mut Mean);
+
+impl NullaryFnOnce for Summing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Mean { channels, plane, waiting, phases, sum, slow, products, .. } = self.0;
+        let values = sum.len();
+        // A few orders of all turns at a time, which the first cache holds.
+        for order in (0..*plane).step_by(LANES) {
+            for first in (order..values).step_by(*plane) {
+                slow.add::<LANES>(first, sum, waiting, phases);
+            }
+            let mut pair = 0;
+            for row in 0..*channels {
+                for column in 0..=row {
+                    let [a, b] = [row, column].map(|channel| 2 * channel * *plane + order);
+                    let (re, im) = (2 * pair * *plane + order, (2 * pair + 1) * *plane + order);
+                    let mut product: [[f64; LANES]; 2] = [load(products, re), load(products, im)];
+                    for turn in waiting.chunks_exact(values).take(phases.len()) {
+                        let [a, b] =
+                            [a, b].map(|re| -> [[f64; LANES]; 2] { [load(turn, re), load(turn, re + *plane)] });
+                        for lane in 0..LANES {
+                            product[0][lane] += a[0][lane] * b[0][lane] + a[1][lane] * b[1][lane];
+                            product[1][lane] += a[1][lane] * b[0][lane] - a[0][lane] * b[1][lane];
+                        }
+                    }
+                    products[re..re + LANES].copy_from_slice(&product[0]);
+                    products[im..im + LANES].copy_from_slice(&product[1]);
+                    pair += 1;
+                }
+            }
+        }
     }
 }
 

@@ -133,6 +133,7 @@ impl<'a> Resampling<'a> {
             outliers.judge_rest(&mut self.means, &mut judged);
             self.sort(judged);
         }
+        self.means.sum_up();
         Outcome {
             mean: self.means.whole.mean(),
             covariance: self.means.whole.covariance(),
@@ -181,8 +182,9 @@ impl<'a> Resampling<'a> {
             return;
         }
         self.exact &= exact;
-        self.transform();
+        self.interpolate(exact);
         let motion = self.motion.as_mut().map_or(&[][..], |motion| motion.of_turn(&self.grid));
+        take_apart(&mut self.grid, &mut self.fourier, &mut self.harmonics, &mut self.turn);
         match &mut self.outliers {
             None => {
                 self.means.add(turn.number, &self.turn, motion);
@@ -203,23 +205,29 @@ impl<'a> Resampling<'a> {
         self.defects.iter().find(|defect| (defect.samples.end as f64) > first && (defect.samples.start as f64) < last)
     }
 
-    /// Interpolates the turn at its positions and takes it apart into harmonics.
-    fn transform(&mut self) {
+    /// Interpolates the turn at its positions.
+    fn interpolate(&mut self, exact: bool) {
         let channels = self.capture.channels().max(1);
         let mut interpolation = Interpolation {
             kernel: self.kernel,
             frames: &self.window.frames,
             channels,
             positions: &self.positions,
+            exact,
             values: &mut self.grid,
         };
         in_lanes(channels, &mut interpolation);
-        for (channel, values) in self.grid.chunks_exact(self.positions.len()).enumerate() {
-            self.fourier.analyse(values.iter().copied(), &mut self.harmonics);
-            for (harmonic, turn) in self.harmonics.iter().zip(self.turn[channel..].iter_mut().step_by(channels)) {
-                // Profiles are Re Σ cₙ e^{−inΦ}.
-                *turn = harmonic.conj();
-            }
+    }
+}
+
+/// Takes one turn on equal angles, `[channel][angle]`, apart into harmonics, `[order][channel]`; the angles' values are used up.
+fn take_apart(grid: &mut [f64], fourier: &mut Fourier, harmonics: &mut [Complex64], turn: &mut [Complex64]) {
+    let channels = turn.len() / harmonics.len();
+    for (channel, values) in grid.chunks_exact_mut(fourier.length()).enumerate() {
+        fourier.analyse_in_place(values, harmonics);
+        for (harmonic, turn) in harmonics.iter().zip(turn[channel..].iter_mut().step_by(channels)) {
+            // Profiles are Re Σ cₙ e^{−inΦ}.
+            *turn = harmonic.conj();
         }
     }
 }

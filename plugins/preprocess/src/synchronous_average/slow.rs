@@ -7,79 +7,112 @@
 //! at a frequency, from the frequencies beside it; Percival, Walden, *Spectral Analysis for Physical Applications*,
 //! 1993, section 6.)
 
-use std::f64::consts::TAU;
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
 
-use runout_core::Complex64;
+use std::{cell::RefCell, f64::consts::TAU};
+
+use runout_core::{Complex64, numerics::lanes::load};
 use rustfft::FftPlanner;
+
+use super::mean::at;
 
 /// Neighbours to each side. With covariances averaged over five orders they make 20 complex degrees of freedom.
 const NEIGHBOURS: usize = 2;
 
+/// cos and sin for each of them.
+pub(super) const PHASES: usize = 2 * NEIGHBOURS;
+
 /// Sums over turns times cos and sin of 2πkm/T, k = 1, 2, for the m-th of T turns.
 pub(super) struct Slow {
     planned: usize,
-    /// cos and sin of this turn, for each k.
-    phases: Vec<[f64; 2]>,
+    /// Neighbours to each side that there are.
+    neighbours: usize,
     /// Sum of the phases over the turns.
-    phase_sums: Vec<[f64; 2]>,
-    /// Sums of the turns less the pivot, `[k][cos, sin][order × channel]`.
-    sums: Vec<[Vec<Complex64>; 2]>,
+    phase_sums: [f64; PHASES],
+    /// Sums of the turns less the pivot, in planes as [`Mean`](super::mean::Mean) has them.
+    sums: [Vec<f64>; PHASES],
 }
 
 impl Slow {
-    /// For `planned` turns at most, each of `length` coefficients.
-    pub(super) fn new(length: usize, planned: usize) -> Self {
+    /// For `planned` turns at most, each of so many numbers.
+    pub(super) fn new(values: usize, planned: usize) -> Self {
         // Beyond half of the turns the same frequencies come again.
-        let count = NEIGHBOURS.min(planned.saturating_sub(1) / 2);
+        let neighbours = NEIGHBOURS.min(planned.saturating_sub(1) / 2);
         Self {
             planned,
-            phases: vec![[1.0, 0.0]; count],
-            phase_sums: vec![[0.0; 2]; count],
-            sums: vec![[vec![Complex64::ZERO; length], vec![Complex64::ZERO; length]]; count],
+            neighbours,
+            phase_sums: [0.0; PHASES],
+            sums: std::array::from_fn(|index| if index < 2 * neighbours { vec![0.0; values] } else { Vec::new() }),
         }
     }
 
-    /// Sets the phases of the m-th turn.
-    pub(super) fn begin_turn(&mut self, turn: usize) {
-        for (index, (phases, sums)) in self.phases.iter_mut().zip(&mut self.phase_sums).enumerate() {
-            let cycles = ((index + 1) * turn % self.planned) as f64 / self.planned as f64;
+    /// The phases of the m-th turn, which has to be taken in with them unless it is the pivot.
+    pub(super) fn phases(&mut self, turn: usize) -> [f64; PHASES] {
+        let mut phases = [0.0; PHASES];
+        for neighbour in 0..self.neighbours {
+            let cycles = ((neighbour + 1) * turn % self.planned) as f64 / self.planned as f64;
             let (sine, cosine) = (TAU * cycles).sin_cos();
-            *phases = [cosine, sine];
-            sums[0] += cosine;
-            sums[1] += sine;
+            phases[2 * neighbour..2 * neighbour + 2].copy_from_slice(&[cosine, sine]);
         }
+        self.phase_sums.iter_mut().zip(phases).for_each(|(sum, phase)| *sum += phase);
+        phases
     }
 
-    /// Takes one turn's coefficients, `[order][channel]`, less those of the pivot.
-    pub(super) fn add(&mut self, turn: &[Complex64], pivot: &[Complex64]) {
-        for (phases, sums) in self.phases.iter().zip(&mut self.sums) {
-            for (phase, sum) in phases.iter().zip(sums) {
-                for ((sum, turn), pivot) in sum.iter_mut().zip(turn).zip(pivot) {
-                    *sum += (turn - pivot) * *phase;
+    /// Takes the numbers `first..first + C` of several turns into the sums here, and into the plain `sum`.
+    #[inline(always)]
+    pub(super) fn add<const C: usize>(
+        &mut self,
+        first: usize,
+        sum: &mut [f64],
+        turns: &[f64],
+        phases: &[[f64; PHASES]],
+    ) {
+        let values = sum.len();
+        let mut plain: [f64; C] = load(sum, first);
+        let mut slow = [[0.0; C]; PHASES];
+        for (turn, phases) in turns.chunks_exact(values).zip(phases) {
+            let turn: [f64; C] = load(turn, first);
+            for lane in 0..C {
+                plain[lane] += turn[lane];
+            }
+            for (sum, phase) in slow.iter_mut().zip(phases) {
+                for lane in 0..C {
+                    sum[lane] += phase * turn[lane];
                 }
             }
         }
+        sum[first..first + C].copy_from_slice(&plain);
+        for (sums, slow) in self.sums[..2 * self.neighbours].iter_mut().zip(slow) {
+            sums[first..first + C].iter_mut().zip(slow).for_each(|(sum, slow)| *sum += slow);
+        }
     }
 
-    /// Covariance of the mean, `[order][channel][channel]`; `sum` is that of the turns less the pivot. `None` where there
-    /// are too few turns to have neighbours.
-    pub(super) fn covariance(&self, sum: &[Complex64], turns: usize, channels: usize) -> Option<Vec<Complex64>> {
-        if self.sums.is_empty() || turns < 3 {
+    /// Covariance of the mean, `[order][channel][channel]`; `sum` is that of the turns less the pivot, in planes. `None`
+    /// where there are too few turns to have neighbours.
+    pub(super) fn covariance(
+        &self,
+        sum: &[f64],
+        turns: usize,
+        orders: usize,
+        channels: usize,
+    ) -> Option<Vec<Complex64>> {
+        if self.neighbours == 0 || turns < 3 {
             return None;
         }
-        let orders = sum.len() / channels;
-        let mut covariance = vec![Complex64::ZERO; sum.len() * channels];
-        let scale = 1.0 / (2.0 * self.sums.len() as f64 * (turns * turns) as f64);
+        let plane = sum.len() / (2 * channels);
+        let mut covariance = vec![Complex64::ZERO; orders * channels * channels];
+        let scale = 1.0 / (2.0 * self.neighbours as f64 * (turns * turns) as f64);
         let mut record = Record::new(orders);
-        for (index, ([cosines, sines], phases)) in self.sums.iter().zip(&self.phase_sums).enumerate() {
-            let cycles = (index + 1) as f64 / self.planned as f64;
+        for neighbour in 0..self.neighbours {
+            let [cosine, sine] = [2 * neighbour, 2 * neighbour + 1];
+            let cycles = (neighbour + 1) as f64 / self.planned as f64;
             // Both neighbours, `[side][order × channel]`.
-            let mut sides = [vec![Complex64::ZERO; sum.len()], vec![Complex64::ZERO; sum.len()]];
+            let mut sides = [vec![Complex64::ZERO; orders * channels], vec![Complex64::ZERO; orders * channels]];
             for channel in 0..channels {
                 let about_mean = |order: usize| {
-                    let at = order * channels + channel;
-                    let mean = sum[at] / turns as f64;
-                    [cosines[at] - mean * phases[0], sines[at] - mean * phases[1]]
+                    let mean = at(sum, plane, order, channel) / turns as f64;
+                    [cosine, sine]
+                        .map(|index| at(&self.sums[index], plane, order, channel) - mean * self.phase_sums[index])
                 };
                 record.neighbours(about_mean, cycles, |order, neighbours| {
                     let at = order * channels + channel;
@@ -99,6 +132,11 @@ impl Slow {
     }
 }
 
+thread_local! {
+    /// Keeps the plans that it has made: captures of one recording mostly ask for the same.
+    static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
+}
+
 /// One channel's sums over turns as a function of angle, to take the phase on within the turns.
 struct Record {
     orders: usize,
@@ -111,8 +149,8 @@ struct Record {
 impl Record {
     fn new(orders: usize) -> Self {
         let length = (2 * orders + 2).next_power_of_two();
-        let mut planner = FftPlanner::new();
-        let (synthesis, analysis) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+        let (synthesis, analysis) =
+            PLANNER.with_borrow_mut(|planner| (planner.plan_fft_forward(length), planner.plan_fft_inverse(length)));
         let scratch = synthesis.get_inplace_scratch_len().max(analysis.get_inplace_scratch_len());
         Self {
             orders,

@@ -70,6 +70,12 @@ impl Means {
         self.extremes.take().and_then(Extremes::spread)
     }
 
+    /// To be called after the last turn.
+    pub fn sum_up(&mut self) {
+        let parts = self.parts.iter_mut().flat_map(|parts| [&mut parts.fit, &mut parts.held_out]);
+        parts.chain([&mut self.whole]).for_each(Mean::sum_up);
+    }
+
     /// The parts; `None` where too few turns are left to fill them.
     pub fn split(&self) -> Option<Split> {
         let parts = self.parts.as_ref().filter(|parts| parts.held_out.turns() > 0)?;
