@@ -97,6 +97,16 @@ fn profile_values_are_those_of_surfalize() {
         match one.symbol {
             // It has no Rsm, and takes Rdq by forward differences.
             "Rsm" => (),
+            // Where a whole section lies above the mean line, it adds the lowest point's distance; runout takes it off, so
+            // that Rz = Rp + Rv.
+            "Rv" => {
+                let mean = profile.iter().sum::<f64>() / profile.len() as f64;
+                let lowest = |section: &[f64]| section.iter().map(|height| height - mean).fold(f64::INFINITY, f64::min);
+                let depths: Vec<f64> = profile.chunks(profile.len() / 5).map(lowest).collect();
+                let over = |depth: fn(&f64) -> f64| depths.iter().map(depth).sum::<f64>() / depths.len() as f64;
+                assert_near("Rv", over(|lowest| lowest.abs()), golden.profile["Rv"], 1e-9);
+                assert_near("Rv", one.value, over(|lowest| -lowest), 1e-9);
+            }
             "Rdq" => {
                 let squares = profile.windows(2).map(|pair| (1e-3 * (pair[1] - pair[0]) / map.dx_mm()).powi(2));
                 let forward = (squares.sum::<f64>() / (profile.len() - 1) as f64).sqrt();
