@@ -25,8 +25,8 @@ const CERTAIN: f64 = 4.0;
 const OWN: f64 = 0.5;
 /// Between the blocks next to it, this share of the step must be there already: what wanders changes slowly.
 const SUDDEN: f64 = 0.6;
-/// A reading of which this share of the wandering goes with its level is not linear, or drifts.
-const WITH_LEVEL: f64 = 0.2;
+/// A level jumps where it changes this many times more than it does from turn to turn (median).
+const JUMP: f64 = 6.0;
 /// The eccentricity has its own ways to change: form and motion begin here.
 const FIRST_ORDER: usize = 2;
 
@@ -81,7 +81,7 @@ fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[O
         wander += series.wandering(order, turn, &row);
         sudden += series.sudden(order, turn, &row);
     }
-    if step < CERTAIN * wander || step < OWN * whole || sudden < SUDDEN * step || series.follows_level(turn, sensor) {
+    if step < CERTAIN * wander || step < OWN * whole || sudden < SUDDEN * step || !series.level_jumps(turn, sensor) {
         return None;
     }
     let by = (0..turns.orders)
@@ -159,26 +159,14 @@ impl Series {
         (near * far.conj()).re * (turn * (self.turns - turn)) as f64 / self.turns as f64
     }
 
-    /// Whether a channel's harmonics go with its level, before a turn and from it on, each about its mean.
-    fn follows_level(&self, turn: usize, channel: usize) -> bool {
-        let sides = [0..turn, turn..self.turns];
-        let series = |order: usize| -> Vec<Complex64> {
-            let about_mean = |side: &std::ops::Range<usize>| {
-                let mean = side.clone().map(|at| self.at(order, at)[channel]).sum::<Complex64>() / side.len() as f64;
-                side.clone().map(move |at| self.at(order, at)[channel] - mean).collect::<Vec<_>>()
-            };
-            sides.iter().flat_map(about_mean).collect()
-        };
-        let level = series(0);
-        let square = norm_sqr(&level);
-        let (mut with, mut whole) = (0.0, 0.0);
-        for order in FIRST_ORDER..self.orders {
-            let values = series(order);
-            let along: Complex64 = values.iter().zip(&level).map(|(value, level)| value * level.re).sum();
-            with += along.norm_sqr() / square.max(f64::MIN_POSITIVE);
-            whole += norm_sqr(&values);
-        }
-        with > WITH_LEVEL * whole
+    /// Whether a channel's level jumps at a turn, or in the one before or after: what slips comes to stand elsewhere.
+    fn level_jumps(&self, turn: usize, channel: usize) -> bool {
+        let mean = |from: usize| 0.5 * (self.at(0, from)[channel].re + self.at(0, from + 1)[channel].re);
+        let jump = |turn: usize| (mean(turn) - mean(turn - 2)).abs();
+        let mut all: Vec<f64> = (2..self.turns - 1).map(jump).collect();
+        let here = all[turn - 3..turn].iter().copied().fold(0.0, f64::max);
+        all.sort_by(f64::total_cmp);
+        here > JUMP * all[all.len() / 2]
     }
 
     /// What that would be by wandering alone: from means over blocks, each about the mean of its side.
