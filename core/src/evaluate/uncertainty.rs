@@ -35,7 +35,7 @@ pub struct Errors {
     amplitudes: Vec<f64>,
     random: ChaCha8Rng,
     /// The errors last drawn, before they are turned.
-    errors_um: Vec<f64>,
+    drawn_um: Vec<f64>,
     start: usize,
     turn: usize,
 }
@@ -54,7 +54,7 @@ impl Errors {
         let amplitudes: Vec<f64> = variance.iter().enumerate().map(amplitude).collect();
         let some = amplitudes.iter().any(|amplitude| *amplitude > 0.0);
         let random = ChaCha8Rng::seed_from_u64(seed);
-        some.then(|| Self { amplitudes, random, errors_um: Vec::new(), start: 0, turn: 0 })
+        some.then(|| Self { amplitudes, random, drawn_um: Vec::new(), start: 0, turn: 0 })
     }
 
     /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
@@ -67,11 +67,11 @@ impl Errors {
             };
             let harmonics: Vec<Complex64> =
                 self.amplitudes.iter().map(|amplitude| Complex64::new(part(*amplitude), part(*amplitude))).collect();
-            self.errors_um.clear();
-            self.errors_um.extend_from_slice(fourier.synthesise(harmonics));
+            self.drawn_um.clear();
+            self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
             self.start = self.random.random_range(0..length);
         }
-        let (head, tail) = self.errors_um.split_at((self.start + self.turn * length / TURNS_OF_A_DRAW) % length);
+        let (head, tail) = self.drawn_um.split_at((self.start + self.turn * length / TURNS_OF_A_DRAW) % length);
         self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
         drawn.clear();
         drawn.extend(form_um.iter().zip(tail.iter().chain(head)).map(|(form, error)| form + error));

@@ -107,7 +107,9 @@ impl System {
         let mut right = fit.remainder().residual.clone();
         let values: Vec<f64> = free.iter().flat_map(|setting| setting.values.iter().copied()).collect();
         for prior in priors {
-            columns.iter_mut().for_each(|column| column.push(0.0));
+            for column in &mut columns {
+                column.push(0.0);
+            }
             for (place, weight) in &prior.weights {
                 if let Some(entry) = columns.get_mut(*place).and_then(|column| column.last_mut()) {
                     *entry += firm * weight;

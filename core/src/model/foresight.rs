@@ -188,7 +188,9 @@ struct Columns {
 impl Columns {
     fn new(effect: &Effect, mut signature: Vec<Vec<f64>>) -> Self {
         for (column, parameter) in signature.iter_mut().zip(&effect.parameters) {
-            column.iter_mut().for_each(|entry| *entry *= parameter.tolerance);
+            for entry in column.iter_mut() {
+                *entry *= parameter.tolerance;
+            }
         }
         Self { name: effect.name(), basis: orthonormal(signature.clone(), &[]), sized: signature }
     }

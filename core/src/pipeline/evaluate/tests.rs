@@ -25,7 +25,9 @@ const EXACT_UM: f64 = 1.2e-3;
 /// A section at z with these waves (order, coefficient), orders to `highest`, each of one variance.
 fn station(z_mm: f64, waves: &[(usize, Complex64)], highest: usize, variance: f64, lost: &[usize]) -> StationResult {
     let mut estimate = vec![Complex64::ZERO; highest + 1];
-    waves.iter().for_each(|(order, value)| estimate[*order] = *value);
+    for (order, value) in waves {
+        estimate[*order] = *value;
+    }
     let separation = Separation {
         sections: vec![SectionAt { id: "a".into(), z_mm }],
         unknowns: vec![Quantity::Form(0)],
@@ -134,7 +136,9 @@ fn intervals_hold_the_truth() {
         let share = (0.5_f64 * variance).sqrt();
         let mut waves: Vec<(usize, Complex64)> =
             (2..=20).map(|order| (order, Complex64::new(share * normal(), share * normal()))).collect();
-        truth.iter().for_each(|(order, value)| waves[order - 2].1 += value);
+        for (order, value) in &truth {
+            waves[order - 2].1 += value;
+        }
         let [low, high] = of(&waves, variance).uncertainty.unwrap().interval_95;
         inside += usize::from(low <= expected && expected <= high);
     }
@@ -144,7 +148,9 @@ fn intervals_hold_the_truth() {
 
 fn part(stations: &[StationResult], placed: bool, text: &str) -> PartSummary {
     let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 360, step_mm: None });
-    stations.iter().for_each(|station| builder.add(station));
+    for station in stations.iter() {
+        builder.add(station);
+    }
     part_summary(builder.sections(), 360, &evaluate(text).unwrap(), RADIUS_MM, placed).unwrap()
 }
 
@@ -181,6 +187,7 @@ fn placed_sections_have_taper_bend_and_coaxiality() {
     assert!((value("STRt", "LSLI of generatrices") - 3.0).abs() < EXACT_UM);
 }
 
+#[allow(clippy::type_complexity, reason = "taken apart at once by the test")]
 fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
     let uncertainty =
         |std: f64, value: f64| Uncertainty { std, interval_95: [value - 2.0 * std, value + 2.0 * std], draws: 400 };

@@ -227,7 +227,9 @@ fn shape(tau: f64, turns: usize) -> Vec<f64> {
 
 fn about_mean(mut values: Vec<f64>) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter_mut().for_each(|value| *value -= mean);
+    for value in &mut values {
+        *value -= mean;
+    }
     values
 }
 
