@@ -148,7 +148,7 @@ fn intervals_hold_the_truth() {
 
 fn part(stations: &[StationResult], placed: bool, text: &str) -> PartSummary {
     let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 360, step_mm: None });
-    for station in stations.iter() {
+    for station in stations {
         builder.add(station);
     }
     part_summary(builder.sections(), 360, &evaluate(text).unwrap(), RADIUS_MM, placed).unwrap()
