@@ -148,10 +148,12 @@ pub fn diagnose(
 ) -> Result<StationDiagnosis> {
     let model = SpindleModel::new(selection, layout, second_order, effects, stations)?;
     let changes: Vec<&Change> = model.traced.data.iter().flat_map(|station| &station.seen.changes).collect();
-    // What a sensor lacks in all setups cannot be told from what happened to it in one.
+    // What a sensor or its neighbour lacks in all setups cannot be told from what happened to it in one.
+    let sensors = &model.traced.selection.rig.sensors;
+    let section = |sensor: usize| sensors.get(sensor).map(|sensor| sensor.section);
     let slipped = |place: &data::Place| {
         model.traced.kinds[place.kind].about().acts_on == ActsOn::Sensor
-            && changes.iter().any(|change| change.sensor == place.index)
+            && changes.iter().any(|change| section(change.sensor) == section(place.index))
     };
     let places = model.traced.places.iter().enumerate().filter(|(_, place)| slipped(place));
     let left_out = places.map(|(index, _)| index).chain(settings.left_out.iter().copied()).collect();
