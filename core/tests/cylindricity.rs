@@ -128,7 +128,7 @@ fn multipliers_prove_the_optimum() {
         let wall = Wall::random(seed);
         for reference in &Reference::ALL[1..] {
             if let Err(problem) = check(&wall, *reference) {
-                wrong.push(format!("{seed}, {}: {problem}", reference.symbol()));
+                wrong.push(format!("{seed}, {}: {problem}", reference.cylinder_symbol()));
             }
         }
     }
@@ -178,7 +178,7 @@ fn what_is_not_determined_is_not_given() {
     for reference in Reference::ALL {
         let values = points.values(&points.reference(reference).unwrap());
         // A perfect cylinder: rounding.
-        assert!(values.cylt_um < 1e-9, "{}: {values:?}", reference.symbol());
+        assert!(values.cylt_um < 1e-9, "{}: {values:?}", reference.cylinder_symbol());
     }
 }
 

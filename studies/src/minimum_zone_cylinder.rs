@@ -91,7 +91,9 @@ impl Wall {
         let points = Points::new(self.radius_mm, self.points.iter().copied());
         let width = |reference: Reference| {
             let found = points.reference(reference).map(|cylinder| points.values(&cylinder).cylt_um);
-            found.ok_or_else(|| Error::new("find", reference.symbol(), format!("{} determines none", self.name)))
+            found.ok_or_else(|| {
+                Error::new("find", reference.cylinder_symbol(), format!("{} determines none", self.name))
+            })
         };
         let lscy_um = width(Reference::LeastSquares)?;
         let start = Instant::now();

@@ -4,6 +4,7 @@ pub mod areal;
 pub mod cylindricity;
 pub mod error_motion;
 pub mod parameter;
+pub mod reference;
 pub mod roundness;
 pub mod straightness;
 pub mod texture;

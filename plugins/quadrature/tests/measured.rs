@@ -125,6 +125,7 @@ fn what_a_model_cannot_take_is_refused_before_it_runs() {
         Pipeline::from_sources(&sources, &registry).err().unwrap().to_string()
     };
     assert!(refused("diagnose.hold_out = 0.2").contains("group by group"));
+    assert!(refused("diagnose.hold_out = 2").contains("between 0 and 1"));
     assert!(refused("separate.blocks = 1").contains("blocks"));
     assert!(refused("diagnose.known = [{ effect = 'quadrature-offset', values = { sine = nan } }]").contains("finite"));
 }

@@ -7,38 +7,9 @@ mod lines;
 mod points;
 mod search;
 
+pub use super::reference::Reference;
 pub use lines::{Generatrices, MedianLine};
 pub use points::{Points, Section};
-
-/// What a wall is referred to (ISO 12180-1, reference cylinders).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Reference {
-    /// LSCY: the sum of squared distances to the cylinder, at right angles to it, is least.
-    LeastSquares,
-    /// MZCY: two coaxial cylinders that enclose the wall at the least distance; the reference is midway between.
-    MinimumZone,
-    /// MICY: the largest cylinder inside the wall.
-    MaximumInscribed,
-    /// MCCY: the smallest cylinder around the wall.
-    MinimumCircumscribed,
-}
-
-impl Reference {
-    /// All of them.
-    pub const ALL: [Self; 4] =
-        [Self::LeastSquares, Self::MinimumZone, Self::MaximumInscribed, Self::MinimumCircumscribed];
-
-    /// The standard's symbol.
-    #[must_use]
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::LeastSquares => "LSCY",
-            Self::MinimumZone => "MZCY",
-            Self::MaximumInscribed => "MICY",
-            Self::MinimumCircumscribed => "MCCY",
-        }
-    }
-}
 
 /// A reference cylinder.
 #[derive(Debug, Clone, PartialEq)]

@@ -20,43 +20,8 @@ mod least_squares;
 mod points;
 mod search;
 
+pub use super::reference::Reference;
 pub use points::{Angles, Points};
-use schemars::JsonSchema;
-use serde::Deserialize;
-
-/// What a profile is referred to (ISO 12181-1, reference circles).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, JsonSchema)]
-pub enum Reference {
-    /// LSCI: the sum of squared distances to the circle, at right angles to it, is least.
-    #[serde(rename = "LSCI")]
-    LeastSquares,
-    /// MZCI: two concentric circles that enclose the profile at the least distance; the reference is midway between.
-    #[serde(rename = "MZCI")]
-    MinimumZone,
-    /// MICI: the largest circle inside the profile.
-    #[serde(rename = "MICI")]
-    MaximumInscribed,
-    /// MCCI: the smallest circle around the profile.
-    #[serde(rename = "MCCI")]
-    MinimumCircumscribed,
-}
-
-impl Reference {
-    /// All of them.
-    pub const ALL: [Self; 4] =
-        [Self::LeastSquares, Self::MinimumZone, Self::MaximumInscribed, Self::MinimumCircumscribed];
-
-    /// The standard's symbol.
-    #[must_use]
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::LeastSquares => "LSCI",
-            Self::MinimumZone => "MZCI",
-            Self::MaximumInscribed => "MICI",
-            Self::MinimumCircumscribed => "MCCI",
-        }
-    }
-}
 
 /// A reference circle.
 #[derive(Debug, Clone, PartialEq)]

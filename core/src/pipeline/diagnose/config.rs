@@ -85,12 +85,12 @@ impl DiagnoseConfig {
     /// The first that cannot be, with its key.
     pub(crate) fn check(self, folder: &Path, kind: SourceKind, effects: &[Effect]) -> Result<Diagnose, Fault> {
         if let Some(share) = self.hold_out {
+            if !(share > 0.0 && share < 1.0) {
+                return Err(Fault::at("hold_out", format!("expected a share between 0 and 1, found {share}")));
+            }
             if matches!(kind, SourceKind::Points) {
                 let fault = Fault::at("hold_out", "measured points are left out group by group, not by a share");
                 return Err(fault.help("leave `hold_out` out"));
-            }
-            if !(share > 0.0 && share < 1.0) {
-                return Err(Fault::at("hold_out", format!("expected a share between 0 and 1, found {share}")));
             }
         }
         let chosen = match self.effects {

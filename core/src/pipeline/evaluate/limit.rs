@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluate, Group, PlacedValue, ascii_unit, part::cylinder};
+use super::{Evaluate, Group, PlacedValue, ascii_unit};
 use crate::{
     pipeline::error::{Fault, known_names},
     rig::Rig,
@@ -110,7 +110,7 @@ impl Limit {
         match &*self.symbol {
             "RONt" | "RONp" | "RONv" | "RONq" => known("reference", &self.reference, symbols(&|one| one.symbol()))?,
             "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
-                known("reference", &self.reference, symbols(&|one| cylinder(*one).symbol()))?;
+                known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;
             }
             _ => {}
         }

@@ -11,7 +11,7 @@ use crate::{
     evaluate::{
         Value, areal,
         cylindricity::{Generatrices, MedianLine, Points, Reference, Section, Values},
-        roundness::{self, Angles},
+        roundness::Angles,
         uncertainty::{DRAWS, Errors, monte_carlo_of, seed},
     },
     numerics::{
@@ -154,12 +154,11 @@ impl Wall {
         Self { angles, count, radius_mm, placed, rings, highest, lost }
     }
 
-    fn cylindricity(&self, filter: &Filter, circles: &[roundness::Reference]) -> Vec<Value> {
-        let references: Vec<Reference> = circles.iter().map(|circle| cylinder(*circle)).collect();
+    fn cylindricity(&self, filter: &Filter, references: &[Reference]) -> Vec<Value> {
         let mut labels = Vec::new();
-        for reference in &references {
+        for reference in references {
             let name = if self.placed { "" } else { " of centred sections" };
-            let name = format!("{}{name}", reference.symbol());
+            let name = format!("{}{name}", reference.cylinder_symbol());
             let cyl = |symbol, meaning: &str| {
                 Label::new(symbol, "µm", format!("ISO 12180-1:2011, {meaning} cylindricity deviation"), name.clone())
             };
@@ -172,7 +171,7 @@ impl Wall {
         let draws = POINTS_DRAWN / (self.rings.len() * self.count).max(1);
         self.evaluate(filter, labels, draws.clamp(FEWEST_DRAWS, DRAWS), |sections, found| {
             let points = Points::of_sections(self.radius_mm, sections);
-            for reference in &references {
+            for reference in references {
                 let about = points.reference(*reference).map(|cylinder| points.values(&cylinder));
                 let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
                 found.push(of(|values| values.cylt_um));
@@ -236,15 +235,5 @@ impl Wall {
             values(&sections, found);
         });
         labelled(labels, found, filter, self.highest, &self.lost, 1.0)
-    }
-}
-
-/// The cylinder that corresponds to a circle.
-pub(super) fn cylinder(circle: roundness::Reference) -> Reference {
-    match circle {
-        roundness::Reference::LeastSquares => Reference::LeastSquares,
-        roundness::Reference::MinimumZone => Reference::MinimumZone,
-        roundness::Reference::MaximumInscribed => Reference::MaximumInscribed,
-        roundness::Reference::MinimumCircumscribed => Reference::MinimumCircumscribed,
     }
 }
