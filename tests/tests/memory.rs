@@ -174,9 +174,10 @@ fn peak_memory_does_not_grow_with_stations() {
     let more = MANY - FEW;
     println!("counted: {} bytes with {FEW} stations, {} with {MANY}", few.counted, many.counted);
     let grown = many.counted.saturating_sub(few.counted);
-    assert!(grown < more * LEFT_BYTES, "{grown} bytes more with {more} stations more");
-    // A station's samples are far more than what it may leave; else this would show nothing.
-    const { assert!(STATION_BYTES > 20 * LEFT_BYTES) };
+    // Threads that read ahead and write behind meet as chance has it: of more stations, more meet at their worst.
+    assert!(grown < STATION_BYTES + more * LEFT_BYTES, "{grown} bytes more with {more} stations more");
+    // Samples that were kept would be far more than what is allowed; else this would show nothing.
+    const { assert!((MANY - FEW) * STATION_BYTES > 10 * (STATION_BYTES + (MANY - FEW) * LEFT_BYTES)) };
 
     if let (Some(few), Some(many)) = (few.resident, many.resident) {
         println!("resident: {few} bytes with {FEW} stations, {many} with {MANY}");
