@@ -4,9 +4,11 @@
 
 use std::{path::Path, process::ExitCode};
 
-use runout_core::{Result, atomic_file};
+use runout_core::{Error, Result, atomic_file};
 use runout_studies::{
-    averaging, blind, coverage, eccentricity,
+    averaging,
+    blind::{self, draw::Layout},
+    coverage, eccentricity,
     minimum_zone_cylinder::{self, Wall},
     scaling, straightness, surface as unrolled,
 };
@@ -14,8 +16,9 @@ use runout_studies::{
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
-       runout-studies blind [CAMPAIGNS [SEED [FILE]]]   what the closed loop says of campaigns that it knows nothing of
-       runout-studies blind-campaign INDEX [SEED]   one of them in full
+       runout-studies blind [CAMPAIGNS [SEED [FILE [LAYOUT]]]]   what the closed loop says of campaigns that it knows
+                                             nothing of; LAYOUT is four, six or reversed
+       runout-studies blind-campaign INDEX [SEED [LAYOUT]]   one of them in full
        runout-studies diagnose-scaling       time of a diagnosis over the number of stations
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
@@ -32,12 +35,13 @@ fn main() -> ExitCode {
         }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
-        ["blind", ref rest @ ..] if rest.len() <= 3 && numbers(rest).is_some() => {
-            let [campaigns, seed] = numbers(rest).unwrap_or_default();
-            blind(campaigns, seed, rest.get(2).copied())
+        ["blind", ref rest @ ..] if rest.len() <= 4 && sizes(rest, [240, 1]).is_some() => {
+            let [campaigns, seed] = sizes(rest, [240, 1]).unwrap_or_default();
+            layout(rest.get(3)).and_then(|only| blind(campaigns, seed, rest.get(2).copied(), only))
         }
-        ["blind-campaign", index] if index.parse::<u64>().is_ok() => blind_campaign(index, "1"),
-        ["blind-campaign", index, seed] if index.parse::<u64>().is_ok() => blind_campaign(index, seed),
+        ["blind-campaign", ref rest @ ..] if (1..=3).contains(&rest.len()) && sizes(rest, [0, 1]).is_some() => {
+            layout(rest.get(2)).and_then(|only| blind_campaign(sizes(rest, [0, 1]).unwrap_or_default(), only))
+        }
         ["diagnose-scaling"] => scaling::rows().map(|rows| println!("{}", scaling::table(&rows))),
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["straightness-traces", file] => straightness_traces(file),
@@ -82,9 +86,11 @@ fn coverage(campaigns: u64) -> Result<()> {
     Ok(())
 }
 
-/// Campaigns and seed, as far as they are given.
-fn numbers(words: &[&str]) -> Option<[u64; 2]> {
-    sizes(words, [240, 1])
+/// The layout of a word; none without one.
+fn layout(word: Option<&&str>) -> Result<Option<Layout>> {
+    let Some(word) = word else { return Ok(None) };
+    let found = Layout::ALL.into_iter().find(|layout| layout.word() == *word);
+    found.map(Some).ok_or_else(|| Error::new("read the arguments", *word, "expected four, six, reversed or paper"))
 }
 
 /// Two numbers, as far as they are given.
@@ -105,11 +111,12 @@ fn minimum_zone_cylinder(walls: u64, starts: usize) -> Result<()> {
     Ok(())
 }
 
-fn blind(campaigns: u64, seed: u64, file: Option<&str>) -> Result<()> {
+fn blind(campaigns: u64, seed: u64, file: Option<&str>, only: Option<Layout>) -> Result<()> {
     let start = std::time::Instant::now();
-    let judged = blind::campaigns(campaigns, seed)?;
+    let judged = blind::campaigns(campaigns, seed, only)?;
     let text = blind::report::report(&judged);
-    println!("{campaigns} campaigns of seed {seed}, simulated\n\n{text}");
+    let of = only.map(|layout| format!(", {}", layout.name())).unwrap_or_default();
+    println!("{campaigns} campaigns of seed {seed}{of}, simulated\n\n{text}");
     if let Some(path) = file {
         let path = atomic_file::write(path, text.as_bytes())?;
         println!("written: {}", path.display());
@@ -118,9 +125,8 @@ fn blind(campaigns: u64, seed: u64, file: Option<&str>) -> Result<()> {
     Ok(())
 }
 
-fn blind_campaign(index: &str, seed: &str) -> Result<()> {
-    let [index, seed] = [index, seed].map(|word| word.parse().unwrap_or_default());
-    let judged = blind::judge::judge(blind::draw::campaign(seed, index))?;
+fn blind_campaign([index, seed]: [u64; 2], only: Option<Layout>) -> Result<()> {
+    let judged = blind::judge::judge(blind::draw::campaign(seed, index, only))?;
     println!("{:?}: {}\n{:#?}", judged.campaign.rig, judged.planted(), judged.diagnosis);
     println!("{:#?}\n{:?}\n{:?}\n{}", judged.effects, judged.form, judged.failures(), judged.said());
     Ok(())

@@ -5,7 +5,7 @@ use runout_studies::blind::{self, draw::Kind};
 
 #[test]
 fn what_is_wrong_is_named_and_nothing_else() {
-    let all = blind::campaigns(12, 2).unwrap();
+    let all = blind::campaigns(12, 2, None).unwrap();
     println!("{}", blind::report::report(&all));
     for judged in &all {
         let place = format!("campaign {}: {}; said {}", judged.campaign.index, judged.planted(), judged.said());

@@ -8,7 +8,7 @@ use crate::{
     setup::{self, cargo},
 };
 
-/// Format, lints, tests.
+/// Format, lints, tests, and the demo with the program that the tests were built with.
 pub fn test(foreign_readers: bool) -> Outcome {
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
@@ -24,7 +24,8 @@ pub fn test(foreign_readers: bool) -> Outcome {
         foreign::equip(&mut tests)?;
     }
     run(&mut tests)?;
-    run(&mut cargo(&["test", "--workspace", "--doc", "--quiet"])?)
+    run(&mut cargo(&["test", "--workspace", "--doc", "--quiet"])?)?;
+    run_example(&target().join("debug/runout"))
 }
 
 /// Writes schemas/ anew.
@@ -36,18 +37,22 @@ pub fn schemas() -> Outcome {
 pub fn demo() -> Outcome {
     run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
     let program = target().join("release/runout");
+    run_example(&program)?;
+    let shown = program.strip_prefix(root()).unwrap_or(&program).display();
+    say(&format!("\nThe program is {shown}; meshes open in MeshLab and Blender, tables in Python."));
+    Ok(())
+}
+
+fn run_example(program: &Path) -> Outcome {
     let example = Path::new("examples/01-four-sensor");
     let scenario = example.join("scenario.toml");
     let campaign = example.join("shaft.h5");
     if newer(&campaign, &scenario) {
         say(&format!("the campaign is there: {}", campaign.display()));
     } else {
-        run(Command::new(&program).arg("simulate").arg(&scenario).arg("--out").arg(&campaign))?;
+        run(Command::new(program).arg("simulate").arg(&scenario).arg("--out").arg(&campaign))?;
     }
-    run(Command::new(&program).arg("run").arg(example.join("pipeline.toml")))?;
-    let shown = program.strip_prefix(root()).unwrap_or(&program).display();
-    say(&format!("\nThe program is {shown}; meshes open in MeshLab and Blender, tables in Python."));
-    Ok(())
+    run(Command::new(program).arg("run").arg(example.join("pipeline.toml")))
 }
 
 /// Prints the figures that the READMEs show.

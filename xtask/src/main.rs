@@ -16,7 +16,8 @@ cargo xtask COMMAND
 
   setup         find or bring what a build needs besides Rust: a C compiler, make, CMake 3.26 or newer
   demo          build runout, make the campaign of examples/01-four-sensor once, run its pipeline
-  test [--ci]   format, lints, tests; with --ci also files read by Python and Node, which it installs below target/
+  test [--ci]   format, lints, tests, and the demo with the tests' build; with --ci also files read by Python and
+                Node, which it installs below target/
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types
   bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]

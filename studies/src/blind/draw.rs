@@ -43,6 +43,17 @@ impl Layout {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Four, Self::Six, Self::Reversed, Self::Paper];
 
+    /// As a word of a command line.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Four => "four",
+            Self::Six => "six",
+            Self::Reversed => "reversed",
+            Self::Paper => "paper",
+        }
+    }
+
     /// In words.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -142,9 +153,9 @@ const KINDS: [Kind; 20] = {
     ]
 };
 
-/// Draws a campaign; the same seed and index give the same.
+/// Draws a campaign, of one layout or any; the same seed and index give the same.
 #[must_use]
-pub fn campaign(seed: u64, index: u64) -> Campaign {
+pub fn campaign(seed: u64, index: u64, only: Option<Layout>) -> Campaign {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(index);
     let mut draw = Draw { random };
@@ -165,12 +176,13 @@ pub fn campaign(seed: u64, index: u64) -> Campaign {
             vec![PAIRED[first], PAIRED[second]]
         }
     };
-    let rig = match ids[..] {
+    let drawn = match ids[..] {
         ["even-order-motion"] => Layout::Paper,
         // What the paper's layout assumes is the one thing that it is there for.
         [] => Layout::ALL[draw.below(7) % 4],
         _ => Layout::ALL[draw.below(3)],
     };
+    let rig = if drawn == Layout::Paper { drawn } else { only.unwrap_or(drawn) };
     let mut sound = draw.sound(rig, index, seed);
     let second_order = !ids.contains(&"second-order-geometry");
     if ids.contains(&"axial-motion") {

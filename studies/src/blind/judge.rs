@@ -206,6 +206,13 @@ impl Judged {
         }
         let alarm = if self.campaign.kind == Kind::Stranger { "blamed" } else { "false alarm" };
         failures.extend(self.false_alarms.iter().map(|name| format!("{alarm}: {name}")));
+        let [farther, stated] = [self.form.sound, self.form.stated].map(|other| self.form.after / other);
+        if self.told_apart() && self.effects.iter().any(|traced| traced.visible) && farther > 1.5 {
+            failures.push(format!("form {farther:.1} times as far off as the sound one"));
+        }
+        if self.campaign.kind != Kind::Stranger && stated > 2.0 {
+            failures.push(format!("form {stated:.1} times as far off as is stated"));
+        }
         let left = self.diagnosis.verdict == Verdict::Unexplained;
         if self.diagnosis.before.chi2_per_dof.is_none() {
             failures.push("the noise is not known".into());
@@ -219,6 +226,11 @@ impl Judged {
             _ => {}
         }
         failures
+    }
+
+    /// Whether the loop knows what was planted and the layout tells it from all else.
+    fn told_apart(&self) -> bool {
+        self.campaign.rig == Layout::Six && matches!(self.campaign.kind, Kind::Single | Kind::Pair)
     }
 
     /// What was planted, in words.

@@ -13,13 +13,14 @@ use std::sync::{
 
 use runout_core::{Error, Result};
 
+use draw::Layout;
 use judge::Judged;
 
-/// Diagnoses the first `count` campaigns of a seed, on as many threads as there are processors.
+/// Diagnoses the first `count` campaigns of a seed, of one layout or of all, on as many threads as there are processors.
 ///
 /// # Errors
 /// When a campaign cannot be simulated or diagnosed.
-pub fn campaigns(count: u64, seed: u64) -> Result<Vec<Judged>> {
+pub fn campaigns(count: u64, seed: u64, only: Option<Layout>) -> Result<Vec<Judged>> {
     let workers = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let next = AtomicU64::new(0);
     let judged = Mutex::new(Vec::new());
@@ -31,7 +32,7 @@ pub fn campaigns(count: u64, seed: u64) -> Result<Vec<Judged>> {
                 if index >= count {
                     return Ok(());
                 }
-                let one = judge::judge(draw::campaign(seed, index)).map_err(|error| {
+                let one = judge::judge(draw::campaign(seed, index, only)).map_err(|error| {
                     next.store(count, Ordering::Relaxed);
                     Error::new("diagnose", format!("campaign {index} of seed {seed}"), error)
                 })?;
