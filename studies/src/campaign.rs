@@ -27,6 +27,7 @@ pub fn four_sensors(setups: &[(f64, f64)]) -> RigConfig {
         sign: 1,
     };
     RigConfig {
+        interruptions: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![

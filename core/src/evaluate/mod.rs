@@ -3,6 +3,7 @@
 pub mod areal;
 pub mod cylindricity;
 pub mod error_motion;
+mod near;
 pub mod parameter;
 pub mod reference;
 pub mod roundness;

@@ -13,6 +13,8 @@ use crate::{Complex64, numerics::fourier::Fourier};
 
 /// Draws for each value: the 95 % interval's ends are then known to about a tenth of a standard uncertainty.
 pub const DRAWS: usize = 400;
+/// The largest error of a few hundred drawn profiles is about so many standard deviations.
+pub const LARGEST: f64 = 5.0;
 /// Draws from one transform, turned by equal steps from a random start.
 const TURNS_OF_A_DRAW: usize = 16;
 /// Share of the draws below the interval, and above it.
@@ -30,12 +32,23 @@ pub struct Uncertainty {
     pub draws: usize,
 }
 
+impl Uncertainty {
+    /// The same of a value that is larger by so much; an interval from 0 on stays one.
+    #[must_use]
+    pub fn moved(mut self, by: f64) -> Self {
+        let floor = if self.interval_95[0] >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        self.interval_95 = self.interval_95.map(|end| (end + by).max(floor));
+        self
+    }
+}
+
 /// Draws of the errors of a profile on equal angles.
 pub struct Errors {
     amplitudes: Vec<f64>,
     random: ChaCha8Rng,
     /// The errors last drawn, before they are turned.
     drawn_um: Vec<f64>,
+    largest_um: f64,
     start: usize,
     turn: usize,
 }
@@ -54,7 +67,19 @@ impl Errors {
         let amplitudes: Vec<f64> = variance.iter().enumerate().map(amplitude).collect();
         let some = amplitudes.iter().any(|amplitude| *amplitude > 0.0);
         let random = ChaCha8Rng::seed_from_u64(seed);
-        some.then(|| Self { amplitudes, random, drawn_um: Vec::new(), start: 0, turn: 0 })
+        some.then(|| Self { amplitudes, random, drawn_um: Vec::new(), largest_um: 0.0, start: 0, turn: 0 })
+    }
+
+    /// The standard deviation of an error at any one angle.
+    #[must_use]
+    pub fn std_um(&self) -> f64 {
+        self.amplitudes.iter().map(|amplitude| amplitude * amplitude).sum::<f64>().sqrt()
+    }
+
+    /// The largest error of the last draw.
+    #[must_use]
+    pub fn largest_um(&self) -> f64 {
+        self.largest_um
     }
 
     /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
@@ -69,6 +94,7 @@ impl Errors {
                 self.amplitudes.iter().map(|amplitude| Complex64::new(part(*amplitude), part(*amplitude))).collect();
             self.drawn_um.clear();
             self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
+            self.largest_um = self.drawn_um.iter().fold(0.0, |largest, error| error.abs().max(largest));
             self.start = self.random.random_range(0..length);
         }
         let (head, tail) = self.drawn_um.split_at((self.start + self.turn * length / TURNS_OF_A_DRAW) % length);

@@ -89,7 +89,7 @@ fn diagnose_turns(
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let complete = |separation, profiles, evaluate| {
-            let evaluation = Evaluation { evaluate, radius_mm: line.rig.part_radius_mm };
+            let evaluation = Evaluation { evaluate, radius_mm: line.rig.part_radius_mm, rig: Some(line.rig) };
             complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone(), evaluation)
         };
         let declared = complete(before, Vec::new(), &nothing);

@@ -7,7 +7,7 @@ use crate::{
     measurement::StationTruth,
     numerics::fourier::Fourier,
     profile::Profile,
-    rig::Rig,
+    rig::{Gaps, Rig},
     separation::{Assessment, Quantity, Separation, UM_PER_MM_URAD},
 };
 
@@ -33,6 +33,8 @@ pub struct StationResult {
     pub angles: usize,
     /// Form and motion.
     pub separation: Separation,
+    /// Of each section, the part angles at which it is interrupted; none where nothing is.
+    pub gaps: Vec<Gaps>,
     /// The averages that it came from; empty for measured points.
     pub profiles: Vec<Profile>,
     /// The standards' values, section by section.
@@ -45,20 +47,32 @@ pub struct StationResult {
 
 impl StationResult {
     /// One unknown on [`angles`](Self::angles) equal angles from 0: form over the part's, motion over the spindle's.
-    /// Orders that the layout cannot tell are left out.
+    /// Orders that the layout cannot tell are left out; where the part is interrupted, its form is NaN.
     #[must_use]
     pub fn over_angle(&self, unknown: usize) -> Vec<f64> {
-        let motion = !self.separation.unknowns[unknown].is_form();
-        let turned = |value: Complex64| if motion { value.conj() } else { value };
-        Fourier::new(self.angles).synthesise(self.separation.coefficients(unknown).map(turned)).to_vec()
+        let quantity = self.separation.unknowns[unknown];
+        let turned = |value: Complex64| if quantity.is_form() { value } else { value.conj() };
+        let mut values =
+            Fourier::new(self.angles).synthesise(self.separation.coefficients(unknown).map(turned)).to_vec();
+        if let Quantity::Form(section) = quantity {
+            self.gaps_of(section).blank(&mut values);
+        }
+        values
+    }
+
+    /// Where a section is interrupted.
+    #[must_use]
+    pub fn gaps_of(&self, section: usize) -> Gaps {
+        self.gaps.get(section).cloned().unwrap_or_default()
     }
 }
 
-/// Which of the standards' values a part of some nominal radius gets.
+/// Which of the standards' values a part of some nominal radius gets, and the rig that tells where it is interrupted.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evaluation<'a> {
     pub evaluate: &'a Evaluate,
     pub radius_mm: f64,
+    pub rig: Option<&'a Rig>,
 }
 
 /// Adds the standards' values to a separation.
@@ -72,9 +86,11 @@ pub(super) fn complete(
     evaluation: Evaluation,
 ) -> StationResult {
     let (values, motion_values) = (Vec::new(), Vec::new());
-    let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
+    let Evaluation { evaluate, radius_mm, rig } = evaluation;
+    let gaps_of = |rig: &Rig| separation.sections.iter().map(|section| rig.gaps_of(&section.id)).collect();
+    let gaps = rig.map(gaps_of).unwrap_or_default();
+    let mut result = StationResult { station, z_mm, angles, separation, gaps, profiles, values, motion_values, truth };
     let sections = 0..result.separation.sections.len();
-    let Evaluation { evaluate, radius_mm } = evaluation;
     result.values = sections.map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
     result
 }
@@ -151,7 +167,7 @@ mod tests {
             warnings: Vec::new(),
         };
         let truth = StationTruth { form_um: Vec::new(), motion: Some([2.0, -0.5, 2.0, 5.0].map(cosine)) };
-        let evaluation = Evaluation { evaluate: &Evaluate::nothing(), radius_mm: 30.0 };
+        let evaluation = Evaluation { evaluate: &Evaluate::nothing(), radius_mm: 30.0, rig: None };
         let result = complete("s1".into(), 0.0, 32, separation, Vec::new(), Some(truth), evaluation);
         for quantity in [Quantity::X, Quantity::Y] {
             // Rounding of transforms of values near 1.

@@ -24,10 +24,10 @@ use crate::{
     atomic_file::{PendingFile, commit_all, resolved},
     evaluate::{
         Value,
-        error_motion::{self, ErrorMotion},
+        error_motion::{Centre, ErrorMotion},
     },
     provenance::{Input, Provenance, VERSION},
-    rig::Rig,
+    rig::{Gaps, Rig},
     separation::Separation,
     stage::{Export, Source, Station},
     surface::{Surface, SurfaceBuilder},
@@ -85,14 +85,14 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 hold_out: None,
                 projections: (0..rig.setups.len()).map(projection).collect(),
             };
-            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm };
+            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
             let work = |index, station: Station| {
                 let separation = separate(&**separator, &station)?;
                 let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
                 let truth = recording.truth(index)?;
                 let profiles = station.profiles;
                 let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
-                Ok(StationResult { motion_values: error_motion_values(&result), ..result })
+                Ok(StationResult { motion_values: error_motion_values(&result, &pipeline.evaluate.centres), ..result })
             };
             let inputs = write_behind(
                 |result| gathering.take(&result, Some(rig)),
@@ -112,9 +112,9 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     gathering.conclude(inputs, remarks, surface.as_ref(), None)
 }
 
-fn error_motion_values(result: &StationResult) -> Vec<Value> {
+fn error_motion_values(result: &StationResult, centres: &[Centre]) -> Vec<Value> {
     let StationResult { station, z_mm, angles, separation, profiles, .. } = result;
-    ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles }.values(&[error_motion::CENTRE])
+    ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles }.values(centres)
 }
 
 /// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.
@@ -173,9 +173,15 @@ impl Gathering {
         if evaluate.has(Group::Cylindricity) || evaluate.has(Group::Areal) {
             self.summary.part = part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
         }
+        let mut interrupted: Vec<Gaps> = Vec::new();
+        for section in builder.sections() {
+            if !interrupted.contains(&section.gaps) {
+                interrupted.push(section.gaps.clone());
+            }
+        }
         let surface = self.wanted.then(|| builder.build(radius_mm)).transpose()?;
         if let (true, Some(surface)) = (evaluate.has(Group::Areal), &surface) {
-            add_areal(self.summary.part.get_or_insert_with(PartSummary::default), surface, evaluate)?;
+            add_areal(self.summary.part.get_or_insert_with(PartSummary::default), surface, &interrupted, evaluate)?;
         }
         self.summary.surface = surface.as_ref().map(|surface| SurfaceSummary {
             angles: surface.angles,
@@ -286,7 +292,8 @@ pub(super) fn take_sections(
     gathering: &mut Gathering,
 ) -> Result<()> {
     observer.begin(sections.len());
-    let (evaluation, angles) = (Evaluation { evaluate: &pipeline.evaluate, radius_mm }, pipeline.surface.angles);
+    let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None };
+    let angles = pipeline.surface.angles;
     for separation in sections {
         let (name, z_mm) =
             separation.sections.first().map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));

@@ -8,6 +8,7 @@ use crate::{
     Complex64, Error, Result,
     numerics::fourier::{Fourier, max_order},
     pipeline::run::StationResult,
+    rig::Gaps,
     separation::{Quantity, Separation},
 };
 
@@ -32,6 +33,7 @@ pub(crate) struct Section {
     pub(crate) id: String,
     pub(crate) station: String,
     pub(crate) z_mm: f64,
+    pub(crate) gaps: Gaps,
     pub(crate) orders: Vec<Option<Order>>,
 }
 
@@ -70,7 +72,8 @@ impl SurfaceBuilder {
             let fitting = max_order(self.config.angles) + 1;
             self.band_limited |= orders.iter().skip(fitting).flatten().any(|order| order.value != Complex64::ZERO);
             orders.truncate(fitting);
-            self.sections.push(Section { id: at.id.clone(), station: result.station.clone(), z_mm: at.z_mm, orders });
+            let (id, station, gaps) = (at.id.clone(), result.station.clone(), result.gaps_of(index));
+            self.sections.push(Section { id, station, z_mm: at.z_mm, gaps, orders });
         }
     }
 

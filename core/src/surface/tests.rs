@@ -31,6 +31,7 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
             residual: Residual::default(),
             warnings: Vec::new(),
         },
+        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),

@@ -18,6 +18,7 @@ pub fn rig() -> Rig {
     let sensor = |id: &str, sign| SensorConfig { id: id.into(), angle_deg: 0.0, z_mm: 0.0, section: id.into(), sign };
     let setup = |id: &str| SetupConfig { id: id.into(), part_deg: 0.0, sensors_deg: 0.0 };
     let config = RigConfig {
+        interruptions: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![sensor("S1", 1), sensor("S2", -1)],

@@ -46,6 +46,7 @@ pub fn station(name: &str) -> StationResult {
             residual: Residual::default(),
             warnings: Vec::new(),
         },
+        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),

@@ -64,6 +64,7 @@ fn station(index: usize, motion: bool) -> StationResult {
         z_mm,
         angles: ANGLES,
         separation,
+        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),

@@ -59,6 +59,7 @@ fn surface(separator: &LeastSquaresCylinder, points: &Points) -> Surface {
             z_mm: separation.sections[0].z_mm,
             angles: 720,
             separation,
+            gaps: Vec::new(),
             profiles: Vec::new(),
             values: Vec::new(),
             motion_values: Vec::new(),

@@ -3,8 +3,10 @@
 //! Each turn, from one index mark to the next or through one turn of the encoder, is interpolated on equal angles
 //! ([`kernel`]), fine enough that nothing the recording can hold folds onto a kept order, and transformed. Of its
 //! harmonics, those that `samples_per_rev` equal angles can hold are kept: leaving out the rest is the anti-alias
-//! filter. Their mean, and its covariance across channels ([`slow`]), are accumulated in one pass ([`mean`]).
+//! filter. Their mean, and its covariance across channels ([`slow`]), are accumulated in one pass ([`mean`]). Where the
+//! part's surface is interrupted, each turn is bridged before ([`bridge`]).
 
+mod bridge;
 mod encoder;
 mod kernel;
 mod mean;
@@ -25,6 +27,7 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     profile::{Profile, TurnCount},
+    rig::Rig,
     stage::{Averager, Preprocessor, Wanted},
 };
 use schemars::JsonSchema;
@@ -76,7 +79,7 @@ impl StageConfig for SynchronousAverageConfig {
     const NAME: &'static str = "synchronous-average";
     const ABOUT: &'static str = "averages turns on equal angles, one harmonic at a time, with their covariance";
 
-    fn check(self, _context: &Context) -> std::result::Result<Preprocessor, Fault> {
+    fn check(self, context: &Context) -> std::result::Result<Preprocessor, Fault> {
         let expect = |good: bool, key: &str, expected: &str, found: &dyn std::fmt::Display| {
             if good { Ok(()) } else { Err(Fault::at(key, format!("expected {expected}, found {found}"))) }
         };
@@ -90,7 +93,8 @@ impl StageConfig for SynchronousAverageConfig {
         if let Some(sigma) = self.outlier_sigma {
             expect(sigma > 1.0 && sigma.is_finite(), "outlier_sigma", "a factor above 1", &sigma)?;
         }
-        Ok(Preprocessor::Averager(Box::new(SynchronousAverage { config: self, kernel: Kernel::new() })))
+        let rig = context.rig.filter(|rig| rig.gaps.iter().any(|gaps| !gaps.is_empty())).cloned();
+        Ok(Preprocessor::Averager(Box::new(SynchronousAverage { config: self, kernel: Kernel::new(), rig })))
     }
 }
 
@@ -99,6 +103,8 @@ impl StageConfig for SynchronousAverageConfig {
 pub struct SynchronousAverage {
     config: SynchronousAverageConfig,
     kernel: Kernel,
+    /// Where the part's surface is interrupted somewhere.
+    rig: Option<Rig>,
 }
 
 impl SynchronousAverage {

@@ -2,12 +2,14 @@
 //!
 //! The cylinders belong to the points (R + r)(cos θ, sin θ) at z themselves, at right angles to the tilted axis.
 
+mod disturbed;
 mod least_squares;
 mod lines;
 mod points;
 mod search;
 
 pub use super::reference::Reference;
+pub use disturbed::Disturbed;
 pub use lines::{Generatrices, MedianLine};
 pub use points::{Points, Section};
 

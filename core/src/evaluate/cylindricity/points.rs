@@ -52,7 +52,7 @@ impl Points {
         Self::of(radius_mm, points)
     }
 
-    fn of(radius_mm: f64, points: Vec<((f64, f64), f64, f64)>) -> Self {
+    pub(super) fn of(radius_mm: f64, points: Vec<((f64, f64), f64, f64)>) -> Self {
         let radius = 1e3 * radius_mm;
         let there = |z: f64, form: f64| z.is_finite() && form.is_finite();
         let heights = points.iter().filter(|(_, z, form)| there(*z, *form)).map(|(_, z, _)| *z);

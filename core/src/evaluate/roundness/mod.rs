@@ -16,11 +16,13 @@
 //! ```
 
 mod circumscribed;
+mod disturbed;
 mod least_squares;
 mod points;
 mod search;
 
 pub use super::reference::Reference;
+pub use disturbed::Disturbed;
 pub use points::{Angles, Points};
 
 /// A reference circle.

@@ -35,6 +35,12 @@ impl Angles {
     pub fn is_empty(&self) -> bool {
         self.cos.is_empty()
     }
+
+    /// Those of some points.
+    pub(super) fn select(&self, points: &[usize]) -> Self {
+        let [cos, sin] = [&self.cos, &self.sin].map(|all| points.iter().map(|point| all[*point]).collect());
+        Self { cos, sin }
+    }
 }
 
 /// From angles in rad.

@@ -116,12 +116,14 @@ impl Texture {
 }
 
 /// Arithmetic mean deviation Ra in µm: the mean absolute deviation of the unfiltered circumferential profile about its
-/// mean line, as Qiao, Xu, Zhao (2024) compute it. It is not ISO 21920-2's Ra, which is taken after λs and λc.
+/// mean line, as Qiao, Xu, Zhao (2024) compute it. It is not ISO 21920-2's Ra, which is taken after λs and λc. Missing
+/// points (NaN) are left out.
 #[must_use]
 pub fn ra_um(form_um: &[f64]) -> f64 {
-    let count = form_um.len() as f64;
-    let mean = form_um.iter().sum::<f64>() / count;
-    form_um.iter().map(|value| (value - mean).abs()).sum::<f64>() / count
+    let there = || form_um.iter().filter(|value| !value.is_nan());
+    let count = there().count() as f64;
+    let mean = there().sum::<f64>() / count;
+    there().map(|value| (value - mean).abs()).sum::<f64>() / count
 }
 
 #[cfg(test)]

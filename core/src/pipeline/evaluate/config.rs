@@ -8,7 +8,12 @@ use super::{
     limit::Limit,
 };
 use crate::{
-    evaluate::{areal, roundness::Reference, texture},
+    evaluate::{
+        areal,
+        error_motion::{self, Centre},
+        roundness::Reference,
+        texture,
+    },
     pipeline::error::Fault,
 };
 
@@ -29,13 +34,43 @@ pub struct EvaluateConfig {
     pub lambda_c_mm: Option<f64>,
     /// λs, the shortest, in mm.
     pub lambda_s_mm: Option<f64>,
+    /// Centres of polar plots that error motion values are about; without it LSC.
+    pub centres: Option<Vec<CentreConfig>>,
+}
+
+/// A centre of a polar plot (ISO 230-7) as it stands in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "UPPERCASE")]
+pub enum CentreConfig {
+    /// The centre of the polar chart.
+    Pc,
+    /// Least squares.
+    Lsc,
+    /// Minimum zone; other texts call it MRS.
+    Mzc,
+    /// Maximum inscribed circle.
+    Mic,
+    /// Minimum circumscribed circle.
+    Mcc,
+}
+
+impl From<CentreConfig> for Centre {
+    fn from(centre: CentreConfig) -> Self {
+        match centre {
+            CentreConfig::Pc => Self::PolarChart,
+            CentreConfig::Lsc => Self::Plot(Reference::LeastSquares),
+            CentreConfig::Mzc => Self::Plot(Reference::MinimumZone),
+            CentreConfig::Mic => Self::Plot(Reference::MaximumInscribed),
+            CentreConfig::Mcc => Self::Plot(Reference::MinimumCircumscribed),
+        }
+    }
 }
 
 /// Values that belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Group {
-    /// RONt about each reference, RONp, RONv, RONq about LSCI, of each section.
+    /// RONt about each reference; RONp, RONv, RONq and the steepest slope dr/dθ about LSCI; of each section.
     Roundness,
     /// Ra of each section's unfiltered profile; with λc the values of ISO 21920-2.
     Texture,
@@ -55,6 +90,7 @@ pub struct Evaluate {
     filter_upr: Option<Vec<f64>>,
     pub(super) lambda_c_mm: Option<f64>,
     pub(super) lambda_s_mm: Option<f64>,
+    pub(in crate::pipeline) centres: Vec<Centre>,
     limits: Vec<Limit>,
 }
 
@@ -66,6 +102,7 @@ impl Default for Evaluate {
             filter_upr: None,
             lambda_c_mm: None,
             lambda_s_mm: None,
+            centres: vec![error_motion::CENTRE],
             limits: Vec::new(),
         }
     }
@@ -107,6 +144,9 @@ impl EvaluateConfig {
         if matches!(&self.references, Some(references) if references.is_empty()) {
             return Err(Fault::at("references", "expected at least one of LSCI, MZCI, MICI, MCCI"));
         }
+        if matches!(&self.centres, Some(centres) if centres.is_empty()) {
+            return Err(Fault::at("centres", "expected at least one of PC, LSC, MZC, MIC, MCC"));
+        }
         let usual = Evaluate::default();
         Ok(Evaluate {
             groups: self.values.unwrap_or(usual.groups),
@@ -114,6 +154,9 @@ impl EvaluateConfig {
             filter_upr: self.filter_upr.map(once_each),
             lambda_c_mm: self.lambda_c_mm,
             lambda_s_mm: self.lambda_s_mm,
+            centres: self
+                .centres
+                .map_or(usual.centres, |centres| once_each(centres.into_iter().map(Centre::from).collect())),
             limits: Vec::new(),
         })
     }
@@ -182,6 +225,7 @@ impl Evaluate {
         let mut symbols = Vec::new();
         if self.has(Group::Roundness) {
             symbols.extend(["RONt", "RONp", "RONv", "RONq"].map(|symbol| (symbol, "µm")));
+            symbols.push(("dr/dtheta", "µm/°"));
         }
         if self.has(Group::Texture) {
             symbols.push(("Ra", "µm"));

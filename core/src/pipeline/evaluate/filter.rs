@@ -47,6 +47,11 @@ impl Filter {
         [low.min(high), high]
     }
 
+    /// The highest order that it passes, of those up to `highest`.
+    pub fn highest(&self, highest: usize) -> usize {
+        (0..=highest).rev().find(|order| self.band.weight(*order) >= MATTERS).unwrap_or(0)
+    }
+
     /// Those of the lost orders that it would pass.
     pub fn lost(&self, lost: &[usize]) -> Vec<usize> {
         lost.iter().copied().filter(|order| self.band.weight(*order) >= MATTERS).collect()

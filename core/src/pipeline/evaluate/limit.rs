@@ -108,7 +108,9 @@ impl Limit {
             evaluate.references.iter().map(|reference| of(reference).to_owned()).collect()
         };
         match &*self.symbol {
-            "RONt" | "RONp" | "RONv" | "RONq" => known("reference", &self.reference, symbols(&|one| one.symbol()))?,
+            "RONt" | "RONp" | "RONv" | "RONq" | "dr/dtheta" => {
+                known("reference", &self.reference, symbols(&|one| one.symbol()))?
+            }
             "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
                 known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;
             }

@@ -10,15 +10,16 @@ use crate::{
     Complex64, Result,
     evaluate::{
         Value, areal,
-        cylindricity::{Generatrices, MedianLine, Points, Reference, Section, Values},
+        cylindricity::{Disturbed, Generatrices, MedianLine, Points, Reference, Section, Values},
         roundness::Angles,
-        uncertainty::{DRAWS, Errors, monte_carlo_of, seed},
+        uncertainty::{DRAWS, Errors, LARGEST, monte_carlo_of, seed},
     },
     numerics::{
         filter::areal_gaussian,
         fourier::{Fourier, max_order},
         height_map::HeightMap,
     },
+    rig::Gaps,
     surface::{self, Surface},
 };
 
@@ -84,12 +85,16 @@ const CENTRED: &str = "every section is centred, without its 1/rev, and has the 
     not given, and CYLt holds none of them";
 
 /// Adds ISO 25178-2's values of the unrolled surface, without its least-squares cylinder and filtered by λs and λc; where it
-/// comes from sections with lost orders, these are in no value.
+/// comes from sections with lost orders, these are in no value. Angles at which a section is interrupted are left out
+/// along the whole part.
 ///
 /// # Errors
 /// When the rings are not at equal distances.
-pub fn add_areal(part: &mut PartSummary, surface: &Surface, evaluate: &Evaluate) -> Result<()> {
-    let mut map = areal::without_cylinder(&HeightMap::unrolled(surface)?)?;
+pub fn add_areal(part: &mut PartSummary, surface: &Surface, interrupted: &[Gaps], evaluate: &Evaluate) -> Result<()> {
+    let whole = HeightMap::unrolled(surface)?;
+    let mut there = whole.heights_um().to_vec();
+    there.chunks_mut(surface.angles).for_each(|ring| interrupted.iter().for_each(|gaps| gaps.blank(ring)));
+    let mut map = areal::without_cylinder(&whole.with(there))?;
     if let Some(shortest) = evaluate.lambda_s_mm {
         map = map.with(areal_gaussian(&map, shortest));
     }
@@ -129,6 +134,7 @@ struct Ring {
     z_mm: f64,
     harmonics: Vec<Complex64>,
     variance: Vec<f64>,
+    gaps: Gaps,
     seed: u64,
 }
 
@@ -146,6 +152,7 @@ impl Wall {
                 z_mm: section.z_mm,
                 harmonics: known().map(|known| known.map_or(Complex64::ZERO, |known| known.value)).collect(),
                 variance: known().map(|known| known.map_or(f64::NAN, |known| known.variance)).collect(),
+                gaps: section.gaps.clone(),
                 seed: seed(&[&section.station, &section.id]),
             }
         });
@@ -169,10 +176,24 @@ impl Wall {
             }
         }
         let draws = POINTS_DRAWN / (self.rings.len() * self.count).max(1);
-        self.evaluate(filter, labels, draws.clamp(FEWEST_DRAWS, DRAWS), |sections, found| {
-            let points = Points::of_sections(self.radius_mm, sections);
-            for reference in references {
-                let about = points.reference(*reference).map(|cylinder| points.values(&cylinder));
+        let usual_um =
+            self.errors(filter).map(|errors| LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max));
+        let mut disturbed: Vec<Option<Disturbed>> = Vec::new();
+        self.evaluate(filter, labels, draws.clamp(FEWEST_DRAWS, DRAWS), |sections, largest_um, found| {
+            let points = largest_um.is_none().then(|| Points::of_sections(self.radius_mm, sections));
+            for (index, reference) in references.iter().enumerate() {
+                let about = match (largest_um, &points) {
+                    (None, Some(points)) => {
+                        let prepare =
+                            |usual_um| Disturbed::new(*reference, sections, self.radius_mm, usual_um, !self.placed);
+                        disturbed.push(usual_um.and_then(prepare));
+                        points.reference(*reference).map(|cylinder| points.values(&cylinder))
+                    }
+                    _ => {
+                        let prepared = disturbed.get(index).and_then(Option::as_ref);
+                        prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))
+                    }
+                };
                 let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
                 found.push(of(|values| values.cylt_um));
                 if *reference == Reference::LeastSquares {
@@ -195,7 +216,7 @@ impl Wall {
             Label::new("STRt", "µm", "ISO 12780-1:2011, of the median line, a diameter", "LSLI of the median line"),
             Label::new("coaxiality", "µm", coaxiality, "LSCY"),
         ];
-        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, |sections, found| {
+        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, |sections, _, found| {
             let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
             let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
             let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
@@ -207,33 +228,50 @@ impl Wall {
         })
     }
 
+    /// Errors of each section; a wall of which some sections have no known error has none either.
+    fn errors(&self, filter: &Filter) -> Option<Vec<Errors>> {
+        let lowest = if self.placed { 0 } else { 2 };
+        let each = self.rings.iter().map(|ring| Errors::new(&filter.variance(&ring.variance), lowest, ring.seed));
+        each.collect()
+    }
+
+    /// Share of the wall that is there.
+    fn coverage(&self) -> f64 {
+        let each = self.rings.iter().map(|ring| ring.gaps.coverage(self.count));
+        each.sum::<f64>() / self.rings.len().max(1) as f64
+    }
+
+    /// Everything that is computed from one filtered wall. `values` gets its sections and, of a drawn one, its largest error.
     fn evaluate(
         &self,
         filter: &Filter,
         labels: Vec<Label>,
         draws: usize,
-        mut values: impl FnMut(&[Section], &mut Vec<f64>),
+        mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<Value> {
         let mut fourier = Fourier::new(self.count);
-        let lowest = if self.placed { 0 } else { 2 };
-        let forms: Vec<Vec<f64>> =
-            self.rings.iter().map(|ring| fourier.synthesise(filter.harmonics(&ring.harmonics)).to_vec()).collect();
-        let errors = self.rings.iter().map(|ring| Errors::new(&filter.variance(&ring.variance), lowest, ring.seed));
-        // A wall of which some sections have no known error has none either.
-        let mut errors: Vec<Errors> = errors.collect::<Option<_>>().unwrap_or_default();
+        let forms = self.rings.iter().map(|ring| {
+            let mut form_um = fourier.synthesise(filter.harmonics(&ring.harmonics)).to_vec();
+            ring.gaps.blank(&mut form_um);
+            form_um
+        });
+        let forms: Vec<Vec<f64>> = forms.collect();
+        let mut errors = self.errors(filter).unwrap_or_default();
         let draws = if errors.is_empty() { 0 } else { draws };
         let mut drawn = forms.clone();
         let found = monte_carlo_of(draws, |disturbed, found| {
+            let mut largest_um = disturbed.then_some(0.0);
             if disturbed {
                 for ((errors, form), drawn) in errors.iter_mut().zip(&forms).zip(&mut drawn) {
                     errors.draw(&mut fourier, form, drawn);
+                    largest_um = largest_um.map(|largest_um| errors.largest_um().max(largest_um));
                 }
             }
             let sections = self.rings.iter().zip(&drawn);
             let sections: Vec<Section> =
                 sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles: &self.angles, form_um }).collect();
-            values(&sections, found);
+            values(&sections, largest_um, found);
         });
-        labelled(labels, found, filter, self.highest, &self.lost, 1.0)
+        labelled(labels, found, filter, self.highest, &self.lost, self.coverage())
     }
 }

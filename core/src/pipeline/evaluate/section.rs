@@ -5,12 +5,13 @@ use crate::{
     Complex64,
     evaluate::{
         Value,
-        roundness::{Angles, Points, Reference, Values},
+        roundness::{Angles, Disturbed, Points, Reference, Values},
         texture::{self, Settings},
-        uncertainty::{DRAWS, Errors, monte_carlo_of, seed},
+        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
     },
     numerics::fourier::Fourier,
     pipeline::result::StationResult,
+    rig::Gaps,
     separation::Quantity,
 };
 
@@ -29,6 +30,15 @@ pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluat
     values
 }
 
+/// The largest |dr/dθ| of a profile on equal angles, by central differences over three points; NaN where no point has
+/// both neighbours.
+fn steepest_um_per_deg(profile_um: &[f64]) -> f64 {
+    let count = profile_um.len();
+    let slope = |point: usize| profile_um[(point + 1) % count] - profile_um[(point + count - 1) % count];
+    let steepest = (0..count).map(|point| slope(point).abs()).fold(f64::NAN, f64::max);
+    steepest * count as f64 / 720.0
+}
+
 /// One section's form without level and centring, which are no form deviation also where the method knows them.
 struct Form {
     harmonics: Vec<Complex64>,
@@ -37,6 +47,7 @@ struct Form {
     lost: Vec<usize>,
     angles: usize,
     radius_mm: f64,
+    gaps: Gaps,
     seed: u64,
 }
 
@@ -54,32 +65,47 @@ impl Form {
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
             angles: result.angles,
             radius_mm,
+            gaps: result.gaps_of(section),
             seed: seed(&[&result.station, id]),
         })
     }
 
-    /// Everything that is computed from one filtered profile, from one set of draws.
+    /// Everything that is computed from one filtered profile on equal angles, with what so many draws of its errors make of
+    /// it. `values` gets a profile and, of a drawn one, its largest error.
     fn evaluate(
         &self,
         filter: &Filter,
-        labels: Vec<Label>,
-        mut values: impl FnMut(&[f64], &mut Vec<f64>),
-    ) -> Vec<Value> {
-        if labels.is_empty() {
-            return Vec::new();
-        }
-        let mut fourier = Fourier::new(self.angles);
-        let form_um = fourier.synthesise(filter.harmonics(&self.harmonics)).to_vec();
-        let mut errors = Errors::new(&filter.variance(&self.variance), 2, self.seed);
-        let draws = if errors.is_some() { DRAWS } else { 0 };
+        angles: usize,
+        draws: usize,
+        mut values: impl FnMut(&[f64], Option<f64>, &mut Vec<f64>),
+    ) -> Vec<(f64, Option<Uncertainty>)> {
+        let mut fourier = Fourier::new(angles);
+        let form_um = self.profile(filter, &mut fourier);
+        let mut errors = self.errors(filter);
+        let draws = if errors.is_some() { draws } else { 0 };
         let mut drawn = form_um.clone();
-        let found = monte_carlo_of(draws, |disturbed, found| {
+        monte_carlo_of(draws, |disturbed, found| {
+            let mut largest = None;
             if let (true, Some(errors)) = (disturbed, &mut errors) {
                 errors.draw(&mut fourier, &form_um, &mut drawn);
+                largest = Some(errors.largest_um());
             }
-            values(&drawn, found);
-        });
-        labelled(labels, found, filter, self.highest, &self.lost, 1.0)
+            values(&drawn, largest, found);
+        })
+    }
+
+    fn profile(&self, filter: &Filter, fourier: &mut Fourier) -> Vec<f64> {
+        let mut form_um = fourier.synthesise(filter.harmonics(&self.harmonics)).to_vec();
+        self.gaps.blank(&mut form_um);
+        form_um
+    }
+
+    fn errors(&self, filter: &Filter) -> Option<Errors> {
+        Errors::new(&filter.variance(&self.variance), 2, self.seed)
+    }
+
+    fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {
+        labelled(labels, found, filter, self.highest, &self.lost, self.gaps.coverage(self.angles))
     }
 
     fn round(&self, filter: &Filter, references: &[Reference], papers_ra: bool) -> Vec<Value> {
@@ -92,34 +118,38 @@ impl Form {
             if *reference == Reference::LeastSquares {
                 labels.extend([ron("RONp", "peak-to-reference"), ron("RONv", "reference-to-valley")]);
                 labels.push(ron("RONq", "root mean square"));
+                let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
+                labels.push(Label::new("dr/dtheta", "µm/°", steepest, reference.symbol()));
             }
         }
         if papers_ra {
             let source = "Qiao, Xu, Zhao 2024: unfiltered circumferential profile";
             labels.push(Label::new("Ra", "µm", source, "mean line"));
         }
-        let angles = Angles::equal(self.angles);
-        let mut points = Points::default();
-        self.evaluate(filter, labels, |profile_um, found| {
-            if !references.is_empty() {
-                points.set_profile(&angles, profile_um, self.radius_mm);
-            }
-            for reference in references {
-                let about = points.reference(*reference).map(|circle| points.values(&circle));
-                let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
-                found.push(of(|values| values.ront_um));
-                if *reference == Reference::LeastSquares {
-                    found.extend([
-                        of(|values| values.ronp_um),
-                        of(|values| values.ronv_um),
-                        of(|values| values.ronq_um),
-                    ]);
+        if labels.is_empty() {
+            return Vec::new();
+        }
+        let on_angles = |angles: usize, draws: usize| {
+            let at = Angles::equal(angles);
+            let mut circles = Circles::new(self, filter, &at, references, draws > 0);
+            self.evaluate(filter, angles, draws, |profile_um, largest_um, found| {
+                circles.values(profile_um, largest_um, found);
+                if papers_ra {
+                    found.push(texture::ra_um(profile_um));
                 }
-            }
-            if papers_ra {
-                found.push(texture::ra_um(profile_um));
-            }
-        })
+            })
+        };
+        let fewer = (POINTS_A_WAVE * filter.highest(self.highest)).next_power_of_two();
+        let found = if fewer < self.angles {
+            let drawn = on_angles(fewer, DRAWS);
+            let found = on_angles(self.angles, 0).into_iter().zip(drawn);
+            let moved =
+                found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
+            moved.collect()
+        } else {
+            on_angles(self.angles, DRAWS)
+        };
+        self.labelled(labels, found, filter)
     }
 
     fn texture(&self, filter: &Filter, lambda_c_mm: f64) -> Vec<Value> {
@@ -127,9 +157,67 @@ impl Form {
             Label::new(symbol, unit, format!("ISO 21920-2:2021, {clause}"), "mean line")
         };
         let settings = Settings { section_mm: Some(lambda_c_mm), ..Settings::default() };
-        self.evaluate(filter, texture::PARAMETERS.iter().map(label).collect(), |profile_um, found| {
+        let found = self.evaluate(filter, self.angles, DRAWS, |profile_um, _, found| {
             let texture = texture::around(profile_um, self.radius_mm, &settings);
             found.extend(texture.parameters().iter().map(|parameter| parameter.value));
-        })
+        });
+        self.labelled(texture::PARAMETERS.iter().map(label).collect(), found, filter)
+    }
+}
+
+/// Angles on which errors are drawn, per wave of the highest order: where a value's error is sought, not the value.
+const POINTS_A_WAVE: usize = 6;
+
+/// One section's values about its reference circles.
+struct Circles<'a> {
+    angles: &'a Angles,
+    radius_mm: f64,
+    references: &'a [Reference],
+    points: Points,
+    /// Of each reference, where its errors are drawn.
+    disturbed: Vec<Option<Disturbed<'a>>>,
+}
+
+impl<'a> Circles<'a> {
+    fn new(form: &Form, filter: &Filter, angles: &'a Angles, references: &'a [Reference], drawn: bool) -> Self {
+        let errors = form.errors(filter).filter(|_| drawn);
+        let disturbed = errors.iter().flat_map(|errors| {
+            let profile_um = form.profile(filter, &mut Fourier::new(angles.len()));
+            let usual_um = LARGEST * errors.std_um();
+            let about =
+                move |reference: &Reference| Disturbed::new(*reference, angles, &profile_um, form.radius_mm, usual_um);
+            references.iter().map(about)
+        });
+        Self {
+            angles,
+            radius_mm: form.radius_mm,
+            references,
+            points: Points::default(),
+            disturbed: disturbed.collect(),
+        }
+    }
+
+    fn values(&mut self, profile_um: &[f64], largest_um: Option<f64>, found: &mut Vec<f64>) {
+        if largest_um.is_none() && !self.references.is_empty() {
+            self.points.set_profile(self.angles, profile_um, self.radius_mm);
+        }
+        for (index, reference) in self.references.iter().enumerate() {
+            let about = match (largest_um, self.disturbed.get_mut(index)) {
+                (Some(largest_um), Some(disturbed)) => {
+                    disturbed.as_mut().and_then(|disturbed| disturbed.values(profile_um, largest_um))
+                }
+                _ => self.points.reference(*reference).map(|circle| self.points.values(&circle)),
+            };
+            let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+            found.push(of(|values| values.ront_um));
+            if *reference == Reference::LeastSquares {
+                found.extend([
+                    of(|values| values.ronp_um),
+                    of(|values| values.ronv_um),
+                    of(|values| values.ronq_um),
+                    steepest_um_per_deg(profile_um),
+                ]);
+            }
+        }
     }
 }

@@ -14,6 +14,7 @@ use crate::{
         result::StationResult,
         summary::{SectionSummary, StationSummary},
     },
+    rig::Gaps,
     separation::{Quantity, Residual, SectionAt, Separation},
     surface::{SurfaceBuilder, SurfaceConfig},
 };
@@ -44,6 +45,7 @@ fn station(z_mm: f64, waves: &[(usize, Complex64)], highest: usize, variance: f6
         z_mm,
         angles: 720,
         separation,
+        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),
@@ -84,9 +86,30 @@ fn three_lobes_have_the_values_of_their_amplitude() {
         let found = find(&values, symbol, "LSCI", "none").value;
         assert!((found - expected).abs() < EXACT_UM, "{symbol} {found}");
     }
+    // |d/dα 2·cos 3α| is at most 6 µm a radian; differences over 1° lose 3·(1.5°)²/6 of it, 0.03 %.
+    let steepest = find(&values, "dr/dtheta", "LSCI", "none");
+    assert!((steepest.value - 6.0_f64.to_radians()).abs() < 1e-4, "{}", steepest.value);
+    assert_eq!(steepest.unit, "um/deg");
     // 720 angles miss the mean of a rectified wave by (π·3/720)²/3.
     assert!((find(&values, "Ra", "mean line", "none").value - 4.0 / PI).abs() < 1e-4);
     assert_eq!(values.iter().filter(|value| value.symbol == "Ra").count(), 1);
+}
+
+#[test]
+fn an_interruption_is_in_no_value_and_each_says_so() {
+    // 2 µm of two lobes: without their two hills, what is left is from −2 µm to 2·cos 60° about a circle that fits it less well.
+    let mut result = station(0.0, &[lobes(2, 2.0)], 60, 1e-8, &[]);
+    let mut gaps = Gaps::default();
+    gaps.add(-30_f64.to_radians(), 60_f64.to_radians());
+    gaps.add(150_f64.to_radians(), 60_f64.to_radians());
+    result.gaps = vec![gaps];
+    let evaluate = evaluate("references = ['LSCI', 'MCCI']\nfilter_upr = []").unwrap();
+    let values = section_values(&result, 0, &evaluate, RADIUS_MM);
+    assert!(values.iter().all(|value| (value.coverage - 2.0 / 3.0).abs() < 5e-3 && value.uncertainty.is_some()));
+    for reference in ["LSCI", "MCCI"] {
+        let ront = find(&values, "RONt", reference, "none").value;
+        assert!((ront - 3.0).abs() < 0.02, "{reference}: {ront}");
+    }
 }
 
 #[test]

@@ -118,6 +118,7 @@ fn station() -> StationResult {
             residual: Residual::default(),
             warnings: Vec::new(),
         },
+        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),

@@ -15,7 +15,9 @@ use runout_core::{
 };
 
 use super::{
-    SynchronousAverage, encoder,
+    SynchronousAverage,
+    bridge::Bridges,
+    encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
     outliers::{Held, Outliers, Verdict},
     split::Means,
@@ -49,6 +51,8 @@ pub(super) struct Resampling<'a> {
     positions: Vec<f64>,
     /// One turn on equal angles, `[channel][angle]`.
     grid: Vec<f64>,
+    /// Where channels look into an interruption of the surface.
+    bridges: Bridges,
     fourier: Fourier,
     /// One channel's harmonics.
     harmonics: Vec<Complex64>,
@@ -79,6 +83,7 @@ impl<'a> Resampling<'a> {
             defects: Vec::new(),
             positions: Vec::with_capacity(length),
             grid: vec![0.0; length * channels],
+            bridges: Bridges::new(average.rig.as_ref(), capture, length),
             fourier: Fourier::new(length),
             harmonics: vec![Complex64::ZERO; orders],
             turn: vec![Complex64::ZERO; orders * channels],
@@ -183,6 +188,7 @@ impl<'a> Resampling<'a> {
         }
         self.exact &= exact;
         self.interpolate(exact);
+        self.bridges.cross(&mut self.grid);
         let motion = self.motion.as_mut().map_or(&[][..], |motion| motion.of_turn(&self.grid));
         take_apart(&mut self.grid, &mut self.fourier, &mut self.harmonics, &mut self.turn);
         match &mut self.outliers {
@@ -202,7 +208,12 @@ impl<'a> Resampling<'a> {
     fn defect(&self, turn: &Turn, exact: bool) -> Option<&Defect> {
         let reach = if exact { 0.0 } else { REACH as f64 };
         let (first, last) = (turn.start.round() - reach, turn.end.round() + reach);
-        self.defects.iter().find(|defect| (defect.samples.end as f64) > first && (defect.samples.start as f64) < last)
+        let matters = |defect: &&Defect| {
+            let samples = [defect.samples.start, defect.samples.end].map(|sample| sample as f64);
+            let [from, to] = samples.map(|sample| (sample - turn.start) / turn.samples());
+            samples[1] > first && samples[0] < last && !self.bridges.span(defect.channel, from, to)
+        };
+        self.defects.iter().find(matters)
     }
 
     /// Interpolates the turn at its positions.

@@ -185,6 +185,9 @@ pub struct FormConfig {
     /// the scenario. Its orders 2 to `max_order` are taken.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured: Option<PathBuf>,
+    /// Grooves along the part.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub keyways: Vec<Keyway>,
 }
 
 impl Default for FormConfig {
@@ -197,8 +200,21 @@ impl Default for FormConfig {
             wavelength_mm: 200.0,
             harmonics: Vec::new(),
             measured: None,
+            keyways: Vec::new(),
         }
     }
+}
+
+/// A groove along the whole part: readings are lower by its depth while a sensor's line lies in it.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Keyway {
+    /// The part's own angle at which it begins, in degrees.
+    pub from_deg: f64,
+    /// The angle at which it ends, in degrees; with `from_deg` above, it passes through 0.
+    pub to_deg: f64,
+    /// In µm.
+    pub depth_um: f64,
 }
 
 /// amplitude · cos(order·α + phase + twist·z), α the part's angle.

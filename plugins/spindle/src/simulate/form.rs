@@ -15,6 +15,15 @@ use super::{
 #[derive(Debug, Clone)]
 pub(super) struct Form {
     bands: Vec<Band>,
+    grooves: Vec<Groove>,
+}
+
+/// A keyway: where it begins and how wide it is, in turns of the part.
+#[derive(Debug, Clone, Copy)]
+struct Groove {
+    from: f64,
+    width: f64,
+    depth_um: f64,
 }
 
 /// Harmonics whose phase advances along z at one rate.
@@ -41,7 +50,17 @@ impl Form {
         if config.measured.is_some() {
             return Err(Fault::at("measured", "a file is read where a scenario is checked, not here"));
         }
-        let mut form = Self { bands: Vec::new() };
+        let mut form = Self { bands: Vec::new(), grooves: Vec::new() };
+        for (index, keyway) in config.keyways.iter().enumerate() {
+            let checked = || {
+                check::finite("from_deg", keyway.from_deg)?;
+                check::finite("to_deg", keyway.to_deg)?;
+                check::finite("depth_um", keyway.depth_um)
+            };
+            checked().map_err(|fault| fault.under_item("keyways", index))?;
+            let [from, to] = [keyway.from_deg, keyway.to_deg].map(|angle_deg| angle_deg / 360.0);
+            form.grooves.push(Groove { from, width: (to - from).rem_euclid(1.0), depth_um: keyway.depth_um });
+        }
         if config.rms_um > 0.0 {
             check::order("max_order", config.max_order, 2, orders)?;
             form.draw(config, seed);
@@ -115,6 +134,18 @@ impl Form {
                 }
             }
         }
+    }
+
+    /// Whether there are grooves.
+    pub fn is_grooved(&self) -> bool {
+        !self.grooves.is_empty()
+    }
+
+    /// How deep the grooves are where the part's angle is that of a number, in µm.
+    pub fn groove_um(&self, toward: Complex64) -> f64 {
+        let turn = toward.arg() / TAU;
+        let here = self.grooves.iter().filter(|groove| (turn - groove.from).rem_euclid(1.0) <= groove.width);
+        here.map(|groove| groove.depth_um).sum()
     }
 
     /// One more than the highest order.

@@ -219,14 +219,20 @@ impl Looking<'_> {
             (along[lane], across[lane]) = (centre.re, centre.im);
         }
         let sight = Sight { toward, along, across };
-        match &instants.axial_um {
+        let mut seen = match &instants.axial_um {
             None => meet(world, self.harmonics.as_slice(), &sight),
             Some(axial_um) => {
                 // The part has moved up by a: the sensor sees what was at z − a.
                 world.form.fill(&axial_um.map(|axial_um| self.z_mm - 1e-3 * axial_um), &mut self.moved);
                 meet(world, self.moved.as_slice(), &sight)
             }
+        };
+        if world.form.is_grooved() {
+            for (lane, seen) in seen.iter_mut().enumerate() {
+                *seen -= world.form.groove_um(Complex64::new(sight.toward.re[lane], sight.toward.im[lane]));
+            }
         }
+        seen
     }
 }
 

@@ -25,6 +25,7 @@ pub fn campaign(seed: u64, effects: &str) -> SpindleConfig {
     };
     let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
     let rig = RigConfig {
+        interruptions: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![

@@ -28,6 +28,7 @@ pub fn rig(sensors: &[(f64, f64, &str)], setups: &[(f64, f64)]) -> Rig {
         sensors_deg: *sensors_deg,
     });
     let config = RigConfig {
+        interruptions: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: sensors.collect(),

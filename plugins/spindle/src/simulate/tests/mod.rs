@@ -28,6 +28,7 @@ fn setup(id: &str, part_deg: f64, sensors_deg: f64) -> SetupConfig {
 /// Two sensors in each of two sections, part turned between two setups.
 fn rig() -> RigConfig {
     RigConfig {
+        interruptions: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![

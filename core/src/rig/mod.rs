@@ -1,9 +1,13 @@
 //! The rig: where the sensors look, and how part and sensors stand in each setup.
 
+mod gaps;
+
 use std::collections::HashSet;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use gaps::Gaps;
 
 use crate::pipeline::error::Fault;
 
@@ -42,6 +46,22 @@ pub struct RigConfig {
     pub sensors: Vec<SensorConfig>,
     /// The setups: how the part was clamped and where the sensors stood, one recording each.
     pub setups: Vec<SetupConfig>,
+    /// Where the surface is interrupted: a keyway, a cross hole. Readings there are bridged, and no value is taken there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub interruptions: Vec<InterruptionConfig>,
+}
+
+/// One interruption as it stands in a file: from one part angle on, counter-clockwise, to another.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InterruptionConfig {
+    /// The part's own angle at which it begins, in degrees.
+    pub from_deg: f64,
+    /// The angle at which it ends, in degrees; with `from_deg` above, it passes through 0.
+    pub to_deg: f64,
+    /// Ids of the sections that it crosses; without it, all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sections: Option<Vec<String>>,
 }
 
 /// One sensor as it stands in a file.
@@ -103,6 +123,8 @@ pub struct Rig {
     pub setups: Vec<Setup>,
     /// Section ids in order of first appearance.
     pub sections: Vec<String>,
+    /// Of each section, the part angles at which it is interrupted.
+    pub gaps: Vec<Gaps>,
 }
 
 /// A displacement sensor.
@@ -213,9 +235,54 @@ impl RigConfig {
                 sensors_rad: setup.sensors_deg.to_radians(),
             });
         }
-        Ok(Rig { part_radius_mm: self.part_radius_mm, rotation: self.rotation, sensors, setups, sections })
+        let gaps = gaps_of(&self.interruptions, &sections)?;
+        Ok(Rig { part_radius_mm: self.part_radius_mm, rotation: self.rotation, sensors, setups, sections, gaps })
     }
 }
+
+/// Of each section, where it is interrupted.
+fn gaps_of(interruptions: &[InterruptionConfig], sections: &[String]) -> Result<Vec<Gaps>, Fault> {
+    let mut gaps = vec![Gaps::default(); sections.len()];
+    for (index, interruption) in interruptions.iter().enumerate() {
+        let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("interruptions", index);
+        let [from, to] =
+            [("from_deg", interruption.from_deg), ("to_deg", interruption.to_deg)].map(|(key, angle_deg)| {
+                let known = angle_deg.is_finite().then_some(angle_deg);
+                known.ok_or_else(|| {
+                    fault(key, format!("the angle must be a finite number of degrees, found {angle_deg}"))
+                })
+            });
+        let length_deg = (to? - from?).rem_euclid(360.0);
+        if !(length_deg > 0.0 && length_deg <= MOST_INTERRUPTED_DEG) {
+            let message = format!("expected at most {MOST_INTERRUPTED_DEG}° from `from_deg` on, found {length_deg}°");
+            return Err(fault("to_deg", message));
+        }
+        for (section, gaps) in sections.iter().zip(&mut gaps) {
+            if interruption.sections.as_ref().is_none_or(|named| named.contains(section)) {
+                gaps.add(interruption.from_deg.to_radians(), length_deg.to_radians());
+            }
+        }
+        if let Some(unknown) = interruption.sections.iter().flatten().find(|named| !sections.contains(named)) {
+            return Err(fault(
+                "sections",
+                format!("there is no section `{unknown}`; there are {}", sections.join(", ")),
+            ));
+        }
+    }
+    match gaps.iter().position(|gaps| gaps.coverage(ANGLES_LOOKED_AT) < LEAST_LEFT) {
+        None => Ok(gaps),
+        Some(section) => Err(Fault::at(
+            "interruptions",
+            format!("they leave less than half of section `{}`, too little to bridge them", sections[section]),
+        )),
+    }
+}
+
+/// Longer interruptions leave too little to bridge them by, in degrees.
+const MOST_INTERRUPTED_DEG: f64 = 120.0;
+/// Share of a circle that has to be there.
+const LEAST_LEFT: f64 = 0.5;
+const ANGLES_LOOKED_AT: usize = 3600;
 
 /// Two sensors nearer than this along z look at the same circle: a tenth of a usual spot size.
 const SAME_SECTION_MM: f64 = 0.1;
@@ -225,6 +292,24 @@ impl Rig {
     #[must_use]
     pub fn section_z_mm(&self, section: usize) -> f64 {
         self.sensors.iter().find(|sensor| sensor.section == section).map_or(0.0, |sensor| sensor.z_mm)
+    }
+
+    /// Where a section is interrupted, by part angle; nowhere if there is no such section.
+    #[must_use]
+    pub fn gaps_of(&self, section: &str) -> Gaps {
+        let index = self.sections.iter().position(|id| id == section);
+        index.and_then(|index| self.gaps.get(index)).cloned().unwrap_or_default()
+    }
+
+    /// Where a sensor looks into an interruption in a setup, by the spindle's angle Φ: α = θ′ − direction·Φ − β.
+    #[must_use]
+    pub fn gaps_seen(&self, setup: usize, sensor: usize) -> Gaps {
+        let (Some(setup), Some(sensor)) = (self.setups.get(setup), self.sensors.get(sensor)) else {
+            return Gaps::default();
+        };
+        let direction = self.rotation.direction();
+        let origin = direction * (sensor.angle_rad + setup.sensors_rad - setup.part_rad);
+        self.gaps.get(sensor.section).map_or_else(Gaps::default, |gaps| gaps.seen_from(origin, -direction))
     }
 
     /// Index of a setup by its id.

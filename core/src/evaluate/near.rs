@@ -1,0 +1,81 @@
+//! Profiles and walls whose errors are drawn again and again: only points that may come to touch are looked at.
+//!
+//! Between points and the same points with errors of at most e, about references whose centres are c apart, no deviation
+//! changes by more than e + |c|. A reference through the points that were near the ends before is therefore that of all points
+//! where the others were further away than that; where they were not, all have to be looked at.
+
+/// Points within this many times the usual largest error of the ends are looked at.
+const MARGIN: f64 = 4.0;
+const LANES: usize = 8;
+
+/// The points that may come to touch.
+#[derive(Debug, Clone)]
+pub(super) struct Near {
+    /// Their places, ascending.
+    pub points: Vec<usize>,
+    /// Lowest and highest deviation from the nominal radius.
+    ends_um: [f64; 2],
+    margin_um: f64,
+}
+
+impl Near {
+    /// From deviations about a reference whose radius exceeds the nominal one by `level_um`; missing points are NaN.
+    /// `usual_um` is about the largest error of a draw.
+    pub fn new(deviations_um: &[f64], level_um: f64, usual_um: f64) -> Self {
+        let Course { low, high, .. } = Course::of(deviations_um.iter().copied());
+        let margin_um = MARGIN * usual_um;
+        let is_near = |point: &usize| {
+            let deviation = deviations_um[*point];
+            deviation < low + margin_um || deviation > high - margin_um
+        };
+        let points = (0..deviations_um.len()).filter(is_near).collect();
+        Self { points, ends_um: [low + level_um, high + level_um], margin_um }
+    }
+
+    /// Whether no other point can touch: the ends are now there, the centre has moved by so much, no error is larger.
+    pub fn suffice(&self, ends_um: [f64; 2], moved_um: f64, largest_um: f64) -> bool {
+        let nearer = (ends_um[0] - self.ends_um[0]).max(self.ends_um[1] - ends_um[1]).max(0.0);
+        nearer + moved_um + largest_um <= self.margin_um
+    }
+}
+
+/// What deviations come to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course {
+    pub low: f64,
+    pub high: f64,
+    /// Root mean square.
+    pub rms: f64,
+}
+
+impl Course {
+    /// Missing values are NaN.
+    pub fn of(deviations: impl Iterator<Item = f64>) -> Self {
+        let (mut low, mut high, mut squares, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
+        for deviation in deviations.filter(|deviation| !deviation.is_nan()) {
+            (low, high) = (low.min(deviation), high.max(deviation));
+            squares += deviation * deviation;
+            count += 1;
+        }
+        Self { low, high, rms: (squares / f64::from(count)).sqrt() }
+    }
+
+    /// Of drawn values less what they are above their deviations; none is missing.
+    pub fn less(drawn: &[f64], offset: &[f64]) -> Self {
+        // Lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
+        let (mut low, mut high, mut squares) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES], [0.0; LANES]);
+        for (drawn, offset) in drawn.chunks(LANES).zip(offset.chunks(LANES)) {
+            for (lane, (drawn, offset)) in drawn.iter().zip(offset).enumerate() {
+                let deviation = drawn - offset;
+                low[lane] = if deviation < low[lane] { deviation } else { low[lane] };
+                high[lane] = if deviation > high[lane] { deviation } else { high[lane] };
+                squares[lane] += deviation * deviation;
+            }
+        }
+        Self {
+            low: low.into_iter().fold(f64::INFINITY, f64::min),
+            high: high.into_iter().fold(f64::NEG_INFINITY, f64::max),
+            rms: (squares.iter().sum::<f64>() / drawn.len() as f64).sqrt(),
+        }
+    }
+}
