@@ -17,6 +17,9 @@ pub struct Profile {
     pub sensors: Vec<usize>,
     /// Equal angles per turn on which the turns were averaged.
     pub samples_per_rev: usize,
+    /// Equal angles on which each turn was taken apart into harmonics: what does not close over the turn folds at half of
+    /// them.
+    pub turn_angles: usize,
     /// Mean over the turns, µm, `[order][channel]`, orders 0..=`max_order`.
     pub mean: Vec<Complex64>,
     /// Covariance of that mean across channels, µm², `[order][channel][channel]`, E[δ δᴴ]; `None` below two turns. It

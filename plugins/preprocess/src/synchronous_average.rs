@@ -253,6 +253,7 @@ impl Averager for SynchronousAverage {
             setup: capture.setup,
             sensors: capture.sensors,
             samples_per_rev: self.config.samples_per_rev,
+            turn_angles: outcome.turn_angles,
             mean: outcome.mean,
             covariance: outcome.covariance,
             scatter: outcome.scatter,

@@ -40,6 +40,7 @@ fn profile(rotation: f64, [low, high]: [f64; 2]) -> Profile {
         high: vec![high; length],
     };
     Profile {
+        turn_angles: 512,
         object: "test".into(),
         setup: 0,
         sensors: Vec::new(),

@@ -28,6 +28,8 @@ use super::{
 
 /// What the samples of a capture gave.
 pub(super) struct Outcome {
+    /// Equal angles on which the turns were taken apart.
+    pub turn_angles: usize,
     pub mean: Vec<Complex64>,
     pub covariance: Option<Vec<Complex64>>,
     pub scatter: Option<Vec<Complex64>>,
@@ -140,6 +142,7 @@ impl<'a> Resampling<'a> {
         }
         self.means.sum_up();
         Outcome {
+            turn_angles: self.fourier.length(),
             mean: self.means.whole.mean(),
             covariance: self.means.whole.covariance(),
             scatter: self.means.whole.scatter(),

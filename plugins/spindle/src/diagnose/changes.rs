@@ -59,7 +59,7 @@ fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[O
     if count < FEWEST || turns.orders <= FIRST_ORDER {
         return None;
     }
-    let series = Series::new(turns, channels, creeping);
+    let series = Series::new(turns, channels, creeping, profile.turn_angles);
     let weights = series.weights()?;
     // Sums of squares between the turns before and after, and of what wanders: in units of the turns' scatter.
     let mut best: Option<(f64, usize)> = None;
@@ -99,7 +99,7 @@ struct Series {
 }
 
 impl Series {
-    fn new(turns: &Turns, channels: &[usize], creeping: &[Option<Creeping>]) -> Self {
+    fn new(turns: &Turns, channels: &[usize], creeping: &[Option<Creeping>], angles: usize) -> Self {
         let (count, width) = (turns.count(), channels.len());
         let mut values = Vec::with_capacity(turns.orders * count * width);
         for order in 0..turns.orders {
@@ -108,7 +108,7 @@ impl Series {
                 values.extend(channels.iter().zip(creeping).map(|(channel, creeping)| {
                     // A drift is no change for good.
                     let creep_um = creeping.filter(|known| known.certain).map_or(0.0, |known| known.in_turn(turn));
-                    turns.at(turn, order, *channel) - creep_um * creep(order)
+                    turns.at(turn, order, *channel) - creep_um * creep(order, angles)
                 }));
             }
             for channel in 0..width {

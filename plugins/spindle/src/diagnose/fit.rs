@@ -86,7 +86,7 @@ impl SpindleFit {
     fn predicted(&self, station: usize) -> Predicted<'_> {
         let solved = &self.stations[station];
         let readings = &solved.corrected;
-        Predicted::new(&self.layout, &self.alterations, readings.samples_per_rev, &solved.estimate, &readings.mean)
+        Predicted::new(&self.layout, &self.alterations, &solved.estimate, readings)
     }
 
     fn partials(&self, effect: usize, station: usize) -> Vec<Vec<Complex64>> {
@@ -121,7 +121,7 @@ impl Solved {
         for leak in alterations.lines.iter().filter_map(|line| data.leaks.get(*line)) {
             corrected.mean.iter_mut().zip(leak).for_each(|(mean, leak)| *mean -= leak);
         }
-        alterations.correct(layout, &mut corrected.mean, corrected.samples_per_rev);
+        alterations.correct(layout, &mut corrected);
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.
         let weights: Vec<Vec<Complex64>> =
@@ -166,7 +166,7 @@ fn axial(
     if alterations.axial_um.is_empty() && !moved {
         return;
     }
-    let predicted = Predicted::new(layout, alterations, readings.samples_per_rev, estimate, &readings.mean);
+    let predicted = Predicted::new(layout, alterations, estimate, readings);
     if !alterations.axial_um.is_empty() {
         let along = predicted.curves(
             &predicted.along_z,
@@ -240,7 +240,7 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
             held.mean.iter_mut().zip(&line.leak[1]).for_each(|(mean, leak)| *mean -= leak);
         }
     }
-    later.correct(layout, &mut held.mean, held.samples_per_rev);
+    later.correct(layout, &mut held);
     let count = held.count;
     for order in 1..=held.max_order.min(solved.corrected.max_order) {
         let at = order * count..(order + 1) * count;

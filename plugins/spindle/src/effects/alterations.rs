@@ -6,7 +6,7 @@ use runout_core::{Complex64, numerics::fourier::Fourier};
 
 use crate::{
     layout::Layout,
-    separators::{OVERSAMPLING, interpolate},
+    separators::{OVERSAMPLING, Readings, interpolate},
 };
 
 /// Everything that effects change, at its declared value until one does.
@@ -134,14 +134,16 @@ impl Alterations {
 
     /// Takes averaged readings (`[order][reading]`, orders from 0) back to displacements: creep, gain and
     /// low-pass, characteristic, angle.
-    pub fn correct(&self, layout: &Layout, mean: &mut [Complex64], samples_per_rev: usize) {
+    pub(crate) fn correct(&self, layout: &Layout, readings: &mut Readings) {
         let count = layout.readings.len();
-        let mut curve = Curve::new(samples_per_rev);
+        let mut curve = Curve::new(readings.samples_per_rev);
+        let (mean, turn_angles) = (&mut readings.mean, &readings.turn_angles);
         for (index, reading) in layout.readings.iter().enumerate() {
             let sensor = &self.sensors[reading.sensor];
+            let angles = turn_angles.get(reading.setup).copied().unwrap_or_default();
             for (order, row) in mean.chunks_exact_mut(count).enumerate() {
                 let value = &mut row[index];
-                *value -= sensor.creep_um * sensor.creep_share * creep(order);
+                *value -= sensor.creep_um * sensor.creep_share * creep(order, angles);
                 *value /= sensor.response(order);
             }
             let curved = sensor.quadratic_per_um != 0.0 || sensor.cubic_per_um2 != 0.0;
@@ -207,10 +209,16 @@ impl SensorAlteration {
     }
 }
 
-/// Harmonic of Φ/2π − ½ over a turn, of Re Σ c e^{−inΦ}: −(1/π) Σ sin(nΦ)/n.
+/// Harmonic of Φ/2π − ½ over a turn, of Re Σ c e^{−inΦ}, taken at L equal angles from 0: −(1 + i·cot(πn/L))/L. Many angles make
+/// it −i/(πn), the saw-tooth's; few fold its higher orders onto all others, as if the first of them were read too low by half
+/// of the step.
 #[must_use]
-pub fn creep(order: usize) -> Complex64 {
-    if order == 0 { Complex64::ZERO } else { Complex64::new(0.0, -1.0 / (std::f64::consts::PI * order as f64)) }
+pub fn creep(order: usize, angles: usize) -> Complex64 {
+    if order == 0 || angles < 2 * order {
+        return Complex64::ZERO;
+    }
+    let count = angles as f64;
+    -Complex64::new(1.0, (std::f64::consts::PI * order as f64 / count).tan().recip()) / count
 }
 
 /// One reading over the turn, for what is not linear in its harmonics.

@@ -5,7 +5,7 @@ use runout_core::{Complex64, separation::Quantity};
 use super::alterations::{Alterations, Curve};
 use crate::{
     layout::{FirstOrder, Layout, UM_PER_MM_URAD},
-    separators::Estimate,
+    separators::{Estimate, Readings},
 };
 
 /// Harmonics of Re Σ c e^{−inΦ}, `[order][reading]` from order 0, of what each reading is made of.
@@ -16,6 +16,8 @@ pub struct Predicted<'a> {
     pub alterations: &'a Alterations,
     /// Equal angles a turn.
     pub samples_per_rev: usize,
+    /// In each setup, the equal angles on which single turns were taken apart.
+    pub turn_angles: &'a [usize],
     /// Form and eccentricity, in µm.
     pub part: Vec<Complex64>,
     /// Motion along the sensor, in µm.
@@ -31,25 +33,25 @@ pub struct Predicted<'a> {
 }
 
 impl<'a> Predicted<'a> {
-    /// From a solution; `readings` are displacements.
+    /// From a solution; `displacements` are the readings taken back to them.
     #[must_use]
     pub(crate) fn new(
         layout: &'a Layout,
         alterations: &'a Alterations,
-        samples_per_rev: usize,
         estimate: &Estimate,
-        readings: &[Complex64],
+        displacements: &'a Readings,
     ) -> Self {
-        let count = layout.readings.len();
+        let (count, readings) = (layout.readings.len(), &displacements.mean);
         let mut predicted = Self {
             layout,
             alterations,
-            samples_per_rev,
+            samples_per_rev: displacements.samples_per_rev,
+            turn_angles: &displacements.turn_angles,
             part: vec![Complex64::ZERO; readings.len()],
             along: vec![Complex64::ZERO; readings.len()],
             across: vec![Complex64::ZERO; readings.len()],
             tilt: vec![Complex64::ZERO; readings.len()],
-            readings: readings.to_vec(),
+            readings: readings.clone(),
             along_z: vec![Complex64::ZERO; readings.len()],
         };
         let position = |wanted: Quantity| layout.unknowns.iter().position(|known| *known == wanted);
@@ -102,6 +104,13 @@ impl<'a> Predicted<'a> {
     #[must_use]
     pub fn nothing(&self) -> Vec<Complex64> {
         vec![Complex64::ZERO; self.readings.len()]
+    }
+
+    /// The equal angles on which the turns behind a place in the arrays were taken apart.
+    #[must_use]
+    pub fn turn_angles_of(&self, at: usize) -> usize {
+        let reading = &self.layout.readings[at % self.layout.readings.len()];
+        self.turn_angles.get(reading.setup).copied().unwrap_or_default()
     }
 
     /// A partial from each harmonic of some readings: `value` gets the order and the place in the arrays.

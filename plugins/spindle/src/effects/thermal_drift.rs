@@ -1,5 +1,5 @@
 //! `thermal-drift`: a reading creeps by rate·τ·(1 − e^{−t/τ}) in each capture. Over the averaged turn it rises by a mean
-//! creep s, a saw-tooth: ∂/∂s = Φ/2π − ½. Rate and τ follow from the levels of the turns (`diagnose/drift.rs`).
+//! creep s, a saw-tooth: ∂/∂s = Φ/2π − ½ (`creep`). Rate and τ follow from the levels of the turns (`diagnose/drift.rs`).
 
 use runout_core::Complex64;
 
@@ -25,7 +25,8 @@ impl SpindleEffect for ThermalDrift {
 
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let gain = 1.0 + predicted.alterations.sensors[target].gain;
-        vec![predicted.each(|reading| reading.sensor == target, |order, _| creep(order) / gain)]
+        let value = |order, at| creep(order, predicted.turn_angles_of(at)) / gain;
+        vec![predicted.each(|reading| reading.sensor == target, value)]
     }
 
     fn creep_partials(&self, target: usize, sensor: usize) -> Vec<f64> {

@@ -111,6 +111,7 @@ fn profile(selection: &Selection, layout: &Layout, setup: usize) -> Profile {
         setup: selection.setups[setup],
         sensors: selection.sensors.clone(),
         samples_per_rev: ANGLES,
+        turn_angles: ANGLES,
         mean: vec![Complex64::ZERO; (MAX_ORDER + 1) * sensors],
         scatter: Some(covariance.clone()),
         covariance: Some(covariance),

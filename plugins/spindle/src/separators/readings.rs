@@ -13,6 +13,8 @@ pub struct Readings {
     pub max_order: usize,
     /// Equal angles a turn on which the profiles were averaged.
     pub samples_per_rev: usize,
+    /// In each setup, the equal angles on which single turns were taken apart.
+    pub turn_angles: Vec<usize>,
     /// Coefficients in µm, `[order][reading]`, orders from 0.
     pub mean: Vec<Complex64>,
     /// Covariance of `mean` in µm², one matrix `[order][channel][channel]` a setup, channels in the rig's order.
@@ -76,6 +78,7 @@ impl Readings {
             count: layout.readings.len(),
             max_order,
             samples_per_rev,
+            turn_angles: ordered.iter().map(|(profile, _)| profile.turn_angles).collect(),
             mean,
             covariance: matrices(|profile| profile.covariance.as_ref()),
             scatter: matrices(|profile| profile.scatter.as_ref()),

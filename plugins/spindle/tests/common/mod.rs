@@ -107,6 +107,7 @@ pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
         }
     }
     Profile {
+        turn_angles: 512,
         object: format!("test/k{setup}"),
         setup,
         sensors: (0..channels.len()).collect(),
