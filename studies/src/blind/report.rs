@@ -114,7 +114,7 @@ fn strangers(all: &[Judged]) -> String {
 
 fn form(all: &[Judged]) -> String {
     let mut text = String::from(
-        "| form, campaigns with visible effects | campaigns | error before / sound: median, 95 % | after / sound: median, 95 % | after / before: largest | error / stated: median, 95 % |\n\
+        "| form, campaigns with visible effects | campaigns | error before / sound: median, 95 % | after / sound: median, 95 % | after / before: largest | error / stated, all planted visible: median, 95 % |\n\
          | --- | --- | --- | --- | --- | --- |\n",
     );
     for rig in Layout::ALL {
@@ -123,7 +123,9 @@ fn form(all: &[Judged]) -> String {
                 && matches!(judged.campaign.kind, Kind::Single | Kind::Pair)
                 && judged.effects.iter().any(|traced| traced.visible)
         });
-        let forms: Vec<_> = these.map(|judged| judged.form).collect();
+        // What a layout is blind to is in no stated uncertainty: the diagnosis says its bias per unit instead.
+        let seen = |judged: &Judged| judged.effects.iter().all(|traced| traced.visible);
+        let (forms, seen): (Vec<_>, Vec<bool>) = these.map(|judged| (judged.form, seen(judged))).unzip();
         if forms.is_empty() {
             continue;
         }
@@ -136,7 +138,7 @@ fn form(all: &[Judged]) -> String {
         let before = sorted(&|index| forms[index].before / forms[index].sound);
         let after = sorted(&|index| forms[index].after / forms[index].sound);
         let gain = sorted(&|index| forms[index].after / forms[index].before);
-        let stated = sorted(&|index| forms[index].after / forms[index].stated);
+        let stated = sorted(&|index| if seen[index] { forms[index].after / forms[index].stated } else { f64::NAN });
         line(
             &mut text,
             format_args!(
