@@ -95,6 +95,9 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     if !at_the_floor(current.fit.remainder()) && tracing.drop_the_least_bad() {
         current = tracing.refit_found(model, &current.settings)?;
     }
+    if above_chance(current.fit.remainder()) && tracing.drop_partial(current.fit.remainder()) {
+        current = tracing.refit_found(model, &current.settings)?;
+    }
     let held_out = [declared.remainder().held_out_rms, current.fit.remainder().held_out_rms];
     let current = tracing.refit_found(model.whole(), &current.settings)?;
     let left = at_the_floor(current.fit.remainder());
@@ -342,13 +345,22 @@ impl<M: Model> Tracing<'_, M> {
 
     /// Takes back the effects that took only a part of what something unknown does. Says whether there were any.
     fn drop_the_least_bad(&mut self) -> bool {
-        let excess = |remainder: &Remainder| (remainder.chi2_per_dof() - 1.0).max(0.0);
-        let (kept, dropped): (Vec<Found>, Vec<Found>) = std::mem::take(&mut self.found)
-            .into_iter()
-            .partition(|found| excess(&found.after) <= (1.0 - OWN_SHARE) * excess(&found.before));
+        self.keep(|found| excess(&found.after) <= (1.0 - OWN_SHARE) * excess(&found.before))
+    }
+
+    /// Takes back the effects beside which what is left in the end is no small part, though it may be noise: a small stranger
+    /// lets the least bad effect take a part, a small effect leaves nothing.
+    fn drop_partial(&mut self, last: &Remainder) -> bool {
+        let left = excess(last);
+        self.keep(|found| left <= (1.0 - OWN_SHARE) * excess(&found.before))
+    }
+
+    /// Takes back the others. Says whether there were any.
+    fn keep(&mut self, is_kept: impl Fn(&Found) -> bool) -> bool {
+        let (kept, dropped): (Vec<Found>, Vec<Found>) = std::mem::take(&mut self.found).into_iter().partition(is_kept);
         for found in &dropped {
             let reason = format!(
-                "it takes away a part only (χ² per degree of freedom {:.1} → {:.1}) of something that stays unexplained",
+                "it takes away a part only (χ² per degree of freedom {:.2} → {:.2}) of something that stays unexplained",
                 found.before.chi2_per_dof(),
                 found.after.chi2_per_dof()
             );
@@ -363,10 +375,24 @@ fn is(refused: &Refused, effect: &Effect) -> bool {
     refused.effect == effect.id && refused.targets.iter().eq(&effect.target)
 }
 
-/// Whether noise may be all that is left: χ² per degree of freedom has the variance 2/dof.
+/// χ² per degree of freedom above what noise leaves.
+fn excess(remainder: &Remainder) -> f64 {
+    (remainder.chi2_per_dof() - 1.0).max(0.0)
+}
+
+/// What chance may make of χ² per degree of freedom: its variance is 2/dof.
+fn chance(remainder: &Remainder) -> f64 {
+    1.0 + 3.0 * (2.0 / remainder.dof.max(1) as f64).sqrt()
+}
+
+/// Whether noise may be all that is left.
 fn at_the_floor(remainder: &Remainder) -> bool {
-    let chance = 1.0 + 3.0 * (2.0 / remainder.dof.max(1) as f64).sqrt();
-    !remainder.noise_is_known() || remainder.chi2_per_dof() <= FLOOR_CHI2.max(chance)
+    !remainder.noise_is_known() || remainder.chi2_per_dof() <= FLOOR_CHI2.max(chance(remainder))
+}
+
+/// Whether more is left than chance makes of noise whose covariance is known well.
+fn above_chance(remainder: &Remainder) -> bool {
+    remainder.noise_is_known() && remainder.chi2_per_dof() > chance(remainder)
 }
 
 fn worse(before: f64, after: f64) -> bool {
