@@ -109,7 +109,7 @@ impl Limit {
         };
         match &*self.symbol {
             "RONt" | "RONp" | "RONv" | "RONq" | "dr/dtheta" => {
-                known("reference", &self.reference, symbols(&|one| one.symbol()))?
+                known("reference", &self.reference, symbols(&|one| one.symbol()))?;
             }
             "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
                 known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;

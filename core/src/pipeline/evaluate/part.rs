@@ -182,17 +182,14 @@ impl Wall {
         self.evaluate(filter, labels, draws.clamp(FEWEST_DRAWS, DRAWS), |sections, largest_um, found| {
             let points = largest_um.is_none().then(|| Points::of_sections(self.radius_mm, sections));
             for (index, reference) in references.iter().enumerate() {
-                let about = match (largest_um, &points) {
-                    (None, Some(points)) => {
-                        let prepare =
-                            |usual_um| Disturbed::new(*reference, sections, self.radius_mm, usual_um, !self.placed);
-                        disturbed.push(usual_um.and_then(prepare));
-                        points.reference(*reference).map(|cylinder| points.values(&cylinder))
-                    }
-                    _ => {
-                        let prepared = disturbed.get(index).and_then(Option::as_ref);
-                        prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))
-                    }
+                let about = if let (None, Some(points)) = (largest_um, &points) {
+                    let prepare =
+                        |usual_um| Disturbed::new(*reference, sections, self.radius_mm, usual_um, !self.placed);
+                    disturbed.push(usual_um.and_then(prepare));
+                    points.reference(*reference).map(|cylinder| points.values(&cylinder))
+                } else {
+                    let prepared = disturbed.get(index).and_then(Option::as_ref);
+                    prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))
                 };
                 let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
                 found.push(of(|values| values.cylt_um));

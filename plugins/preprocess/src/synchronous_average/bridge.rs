@@ -79,7 +79,9 @@ impl Bridge {
                 }
             }
             let norm = over_those_there(&missing, &course, &course).sqrt();
-            course.iter_mut().for_each(|value| *value /= norm);
+            for value in &mut course {
+                *value /= norm;
+            }
             courses.push(course);
         }
         Some(Self { gaps, missing, runs, courses })
