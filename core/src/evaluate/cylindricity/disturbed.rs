@@ -83,7 +83,7 @@ impl Disturbed {
             (*direction, *z_mm, form_um.copied().unwrap_or(f64::NAN))
         });
         let points = Points::of(self.radius_mm, near.collect());
-        let cylinder = points.reference(self.reference)?;
+        let cylinder = points.reference_near(self.reference, &self.cylinder)?;
         let values = points.values(&cylinder);
         let ends = [cylinder.deviation_um - values.cylv_um, cylinder.deviation_um + values.cylp_um];
         self.near.suffice(ends, self.moved_um(&cylinder), largest_um).then_some(values)

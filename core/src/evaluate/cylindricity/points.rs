@@ -108,8 +108,23 @@ impl Points {
         let (axis, deviation) = least_squares::axis(self)?;
         match reference {
             Reference::LeastSquares => Some(self.about(axis, deviation, vec![])),
-            Reference::MinimumZone => search::search::<6>(self, axis, reference),
-            _ => search::search::<5>(self, axis, reference),
+            _ => self.downhill(reference, axis),
+        }
+    }
+
+    /// MZCY, MICY or MCCY, reached downhill from the axis of a cylinder nearby.
+    pub(super) fn reference_near(&self, reference: Reference, near: &Cylinder) -> Option<Cylinder> {
+        let lean = [near.slope_x_urad, near.slope_y_urad].map(|slope| 1e-6 * slope * self.half_um);
+        let up = 1e-3 * (self.middle_mm - near.z_mm);
+        let at = [near.x_um + near.slope_x_urad * up, near.y_um + near.slope_y_urad * up];
+        let determined = self.half_um > 0.0 && self.half_um.is_finite();
+        determined.then(|| self.downhill(reference, [at[0], at[1], lean[0], lean[1]]))?
+    }
+
+    fn downhill(&self, reference: Reference, start: Axis) -> Option<Cylinder> {
+        match reference {
+            Reference::MinimumZone => search::search::<6>(self, start, reference),
+            _ => search::search::<5>(self, start, reference),
         }
     }
 
