@@ -245,6 +245,7 @@ impl Averager for SynchronousAverage {
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
         if let Some(speed_rpm) = speed_rpm {
             in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
         }

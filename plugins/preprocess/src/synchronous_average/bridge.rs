@@ -34,6 +34,17 @@ impl Bridges {
         }
     }
 
+    /// What bridging does not know, where anything is bridged.
+    pub fn warning(&self) -> Option<String> {
+        let bridges = || self.channels.iter().flatten();
+        let longest_deg = bridges().map(|bridge| bridge.gaps.longest_rad().to_degrees()).fold(0.0, f64::max);
+        let orders = bridges().map(|bridge| bridge.courses.len() / 2).min()?;
+        Some(format!(
+            "readings are bridged over up to {longest_deg:.1}° of each turn, where the part is interrupted: what the axis does there \
+             above order {orders} is not known, nor in any stated uncertainty"
+        ))
+    }
+
     /// Whether a bridge of a channel spans everything between two parts of a turn.
     pub fn span(&self, channel: usize, from_turn: f64, to_turn: f64) -> bool {
         let bridge = self.channels.get(channel).and_then(Option::as_ref);

@@ -39,6 +39,8 @@ pub(super) struct Outcome {
     /// Length of all turns used together.
     pub used_samples: f64,
     pub rejected: Vec<RejectedTurn>,
+    /// What is not known where readings are bridged.
+    pub bridged: Option<String>,
     /// All positions lay on samples: nothing was interpolated.
     pub exact: bool,
 }
@@ -151,6 +153,7 @@ impl<'a> Resampling<'a> {
             spread: self.means.spread(),
             used_samples: self.used_samples,
             rejected: self.rejected,
+            bridged: self.bridges.warning(),
             exact: self.exact,
         }
     }
