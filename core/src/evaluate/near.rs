@@ -44,20 +44,40 @@ impl Near {
 pub(super) struct Course {
     pub low: f64,
     pub high: f64,
-    /// Root mean square.
-    pub rms: f64,
+    /// Sum of squares.
+    pub squares: f64,
+    /// How many there are.
+    pub points: usize,
 }
 
 impl Course {
-    /// Missing values are NaN.
+    /// Missing values are NaN, and so are the ends where nothing is there.
     pub fn of(deviations: impl Iterator<Item = f64>) -> Self {
-        let (mut low, mut high, mut squares, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
+        let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
         for deviation in deviations.filter(|deviation| !deviation.is_nan()) {
             (low, high) = (low.min(deviation), high.max(deviation));
             squares += deviation * deviation;
-            count += 1;
+            points += 1;
         }
-        Self { low, high, rms: (squares / f64::from(count)).sqrt() }
+        if points == 0 {
+            (low, high) = (f64::NAN, f64::NAN);
+        }
+        Self { low, high, squares, points }
+    }
+
+    /// Of two parts together.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+            squares: self.squares + other.squares,
+            points: self.points + other.points,
+        }
+    }
+
+    /// Root mean square.
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.points as f64).sqrt()
     }
 
     /// Of drawn values less what they are above their deviations; none is missing.
@@ -75,7 +95,8 @@ impl Course {
         Self {
             low: low.into_iter().fold(f64::INFINITY, f64::min),
             high: high.into_iter().fold(f64::NEG_INFINITY, f64::max),
-            rms: (squares.iter().sum::<f64>() / drawn.len() as f64).sqrt(),
+            squares: squares.iter().sum(),
+            points: drawn.len(),
         }
     }
 }

@@ -58,22 +58,14 @@ impl Disturbed {
     #[must_use]
     pub fn values(&self, drawn: &[Section], largest_um: f64) -> Option<Values> {
         match self.reference {
-            Reference::LeastSquares if !self.offset_um.is_empty() => Some(self.about_lscy(drawn)),
+            Reference::LeastSquares if !self.offset_um.is_empty() => {
+                let each = drawn.iter().zip(&self.offset_um);
+                let each = each.map(|(section, offset)| Course::less(section.form_um, offset));
+                each.reduce(Course::and).map(Values::from)
+            }
             Reference::LeastSquares => self.of_all(drawn),
             _ => self.of_near(drawn, largest_um).or_else(|| self.of_all(drawn)),
         }
-    }
-
-    fn about_lscy(&self, drawn: &[Section]) -> Values {
-        let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
-        for (section, offset) in drawn.iter().zip(&self.offset_um) {
-            let course = Course::less(section.form_um, offset);
-            (low, high) = (low.min(course.low), high.max(course.high));
-            squares += course.rms * course.rms * offset.len() as f64;
-            points += offset.len();
-        }
-        let (cylp_um, cylv_um) = (high.max(0.0), (-low).max(0.0));
-        Values { cylt_um: high - low, cylp_um, cylv_um, cylq_um: (squares / points as f64).sqrt(), points }
     }
 
     /// From the points looked at; `None` where others could touch.

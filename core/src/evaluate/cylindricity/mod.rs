@@ -8,6 +8,7 @@ mod lines;
 mod points;
 mod search;
 
+use super::near::Course;
 pub use super::reference::Reference;
 pub use disturbed::Disturbed;
 pub use lines::{Generatrices, MedianLine};
@@ -62,4 +63,16 @@ pub struct Values {
     pub cylq_um: f64,
     /// Points that are there.
     pub points: usize,
+}
+
+impl From<Course> for Values {
+    fn from(course: Course) -> Self {
+        Self {
+            cylt_um: course.high - course.low,
+            cylp_um: course.high.max(0.0),
+            cylv_um: (-course.low).max(0.0),
+            cylq_um: course.rms(),
+            points: course.points,
+        }
+    }
 }

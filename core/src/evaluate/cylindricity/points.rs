@@ -1,7 +1,7 @@
 //! The points of a wall, and what they are about an axis.
 
 use super::{Cylinder, Reference, Values, least_squares, search};
-use crate::evaluate::roundness::Angles;
+use crate::evaluate::{near::Course, roundness::Angles};
 
 /// One circle of a wall.
 #[derive(Debug, Clone, Copy)]
@@ -142,17 +142,7 @@ impl Points {
     /// CYLt, CYLp, CYLv and CYLq about a cylinder; NaN where no point is there.
     #[must_use]
     pub fn values(&self, cylinder: &Cylinder) -> Values {
-        let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
-        for deviation in self.deviations_um(cylinder).filter(|deviation| !deviation.is_nan()) {
-            (low, high) = (low.min(deviation), high.max(deviation));
-            squares += deviation * deviation;
-            points += 1;
-        }
-        if points == 0 {
-            (low, high) = (f64::NAN, f64::NAN);
-        }
-        let cylq_um = (squares / points as f64).sqrt();
-        Values { cylt_um: high - low, cylp_um: high.max(0.0), cylv_um: (-low).max(0.0), cylq_um, points }
+        Course::of(self.deviations_um(cylinder)).into()
     }
 
     /// Distance from an axis less R.

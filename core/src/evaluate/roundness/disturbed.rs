@@ -55,16 +55,12 @@ impl<'a> Disturbed<'a> {
     /// points looked at.
     pub fn values(&mut self, drawn_um: &[f64], largest_um: f64) -> Option<Values> {
         match self.reference {
-            Reference::LeastSquares if self.offset_um.len() == drawn_um.len() => Some(self.about_lsci(drawn_um)),
+            Reference::LeastSquares if self.offset_um.len() == drawn_um.len() => {
+                Some(Course::less(drawn_um, &self.offset_um).into())
+            }
             Reference::LeastSquares => self.of_all(drawn_um),
             _ => self.of_near(drawn_um, largest_um).or_else(|| self.of_all(drawn_um)),
         }
-    }
-
-    fn about_lsci(&self, drawn_um: &[f64]) -> Values {
-        let Course { low, high, rms } = Course::less(drawn_um, &self.offset_um);
-        let (ronp_um, ronv_um) = (high.max(0.0), (-low).max(0.0));
-        Values { ront_um: high - low, ronp_um, ronv_um, ronq_um: rms, points: drawn_um.len() }
     }
 
     /// From the points looked at; `None` where others could touch.

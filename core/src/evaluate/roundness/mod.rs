@@ -21,6 +21,7 @@ mod least_squares;
 mod points;
 mod search;
 
+use super::near::Course;
 pub use super::reference::Reference;
 pub use disturbed::Disturbed;
 pub use points::{Angles, Points};
@@ -56,6 +57,18 @@ pub struct Values {
     pub ronq_um: f64,
     /// Points that are there.
     pub points: usize,
+}
+
+impl From<Course> for Values {
+    fn from(course: Course) -> Self {
+        Self {
+            ront_um: course.high - course.low,
+            ronp_um: course.high.max(0.0),
+            ronv_um: (-course.low).max(0.0),
+            ronq_um: course.rms(),
+            points: course.points,
+        }
+    }
 }
 
 /// Peak-to-valley deviation RONt about the least-squares reference circle LSCI (ISO 12181-1), in µm.

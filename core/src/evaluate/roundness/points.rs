@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Circle, Reference, Values, circumscribed, least_squares, search};
-use crate::numerics::cloud::Cloud;
+use crate::{evaluate::near::Course, numerics::cloud::Cloud};
 
 /// Directions of a profile's points, to be kept and used for many profiles.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,17 +169,7 @@ impl Points {
     /// RONt, RONp, RONv and RONq about a circle; NaN where no point is there.
     #[must_use]
     pub fn values(&self, circle: &Circle) -> Values {
-        let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
-        for deviation in self.deviations_um(circle).filter(|deviation| !deviation.is_nan()) {
-            (low, high) = (low.min(deviation), high.max(deviation));
-            squares += deviation * deviation;
-            points += 1;
-        }
-        if points == 0 {
-            (low, high) = (f64::NAN, f64::NAN);
-        }
-        let ronq_um = (squares / points as f64).sqrt();
-        Values { ront_um: high - low, ronp_um: high.max(0.0), ronv_um: (-low).max(0.0), ronq_um, points }
+        Course::of(self.deviations_um(circle)).into()
     }
 
     /// |c|²/2R, which all heights over a centre lack to (ρ² − R²)/2R.

@@ -120,11 +120,11 @@ impl Texture {
 /// points (NaN) are left out.
 #[must_use]
 pub fn ra_um(form_um: &[f64]) -> f64 {
-    let sum = in_lanes(form_um, |value| value);
+    let sum = sum_of(form_um, |value| value);
     if sum.is_finite() {
         let count = form_um.len() as f64;
         let mean = sum / count;
-        return in_lanes(form_um, |value| (value - mean).abs()) / count;
+        return sum_of(form_um, |value| (value - mean).abs()) / count;
     }
     let there = || form_um.iter().filter(|value| !value.is_nan());
     let count = there().count() as f64;
@@ -132,8 +132,8 @@ pub fn ra_um(form_um: &[f64]) -> f64 {
     there().map(|value| (value - mean).abs()).sum::<f64>() / count
 }
 
-/// A sum in lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
-fn in_lanes(values: &[f64], term: impl Fn(f64) -> f64) -> f64 {
+/// A sum over lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
+fn sum_of(values: &[f64], term: impl Fn(f64) -> f64) -> f64 {
     let mut sums = [0.0; 8];
     for chunk in values.chunks(8) {
         for (sum, value) in sums.iter_mut().zip(chunk) {
