@@ -163,6 +163,22 @@ fn a_stranger_stays_unexplained() {
     assert!(after <= 1.001 * before);
 }
 
+/// Play in one channel, large enough to see and small enough for an effect to take half of it.
+#[test]
+fn a_small_stranger_is_blamed_on_nothing() {
+    for (seed, play_um) in [(31, 0.02), (32, 0.03), (33, 0.04), (34, 0.05)] {
+        let effect = format!(r#"[{{"plugin":"backlash","targets":["S2"],"play_um":{play_um}}}]"#);
+        let (found, [before, after]) = diagnosed(&campaign(seed, &effect));
+        let diagnosis = &found.diagnosis;
+        let [declared, last] = [&diagnosis.before, &diagnosis.after].map(|level| level.chi2_per_dof.unwrap());
+        println!(
+            "simulated, a play of {play_um} µm: χ² {declared:.2} → {last:.2}, {:?}, form error {before:.4} → {after:.4} µm",
+            diagnosis.verdict
+        );
+        assert!(diagnosis.added.is_empty(), "{:?}", diagnosis.added);
+    }
+}
+
 /// A probe that slips in the middle of a setup is no sensor's gain: the turns tell, and nothing is blamed.
 #[test]
 fn a_probe_that_slips_within_a_setup_is_said_to_have() {

@@ -258,3 +258,23 @@ impl Curve {
         found.into_iter().map(|value| value.conj()).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the transform of the ramp itself, as the average makes it of every turn.
+    #[test]
+    fn a_creep_is_what_a_ramp_at_equal_angles_is_taken_apart_into() {
+        for angles in [64, 90, 512] {
+            let mut found = vec![Complex64::ZERO; angles / 2];
+            Fourier::new(angles).analyse((0..angles).map(|angle| angle as f64 / angles as f64 - 0.5), &mut found);
+            for (order, value) in found.iter().enumerate().skip(1) {
+                // Rounding of a sum of that many numbers below 1.
+                assert!((value.conj() - creep(order, angles)).norm() < 1e-14, "order {order} of {angles}");
+            }
+        }
+        let saw_tooth = Complex64::new(0.0, -1.0 / (7.0 * std::f64::consts::PI));
+        assert!((creep(7, 1_000_000) - saw_tooth).norm() < 2e-6);
+    }
+}
