@@ -1,10 +1,12 @@
 //! Work on neighbouring channels side by side, so that the compiler can use vector registers.
 //!
 //! The program is compiled for any processor of its kind. What is done here is compiled twice, once for vectors of four
-//! numbers (AVX2), and the processor that it runs on decides. Only the width differs: no product and sum become one
-//! rounding, so that the results are the same to the last bit.
+//! numbers (AVX2), and the processor that it runs on decides. Only the width differs, and the results are the same to the
+//! last bit; but in what asks for it ([`fused`]), a product and a sum become one rounding where the processor can do so.
 
 #![allow(clippy::inline_always, reason = "what is not inlined is compiled for narrow registers")]
+
+use std::marker::PhantomData;
 
 use pulp::Arch;
 pub use pulp::NullaryFnOnce;
@@ -27,6 +29,62 @@ pub fn in_lanes(channels: usize, work: &mut impl LaneWork) {
 /// Calls what is `#[inline(always)]` in a function compiled for the widest vectors that the processor has.
 pub fn vectorised<W: NullaryFnOnce>(work: W) -> W::Output {
     Arch::new().dispatch(work)
+}
+
+/// How a product and a sum are taken.
+pub trait Arithmetic {
+    /// a·b + c.
+    fn mul_add(a: f64, b: f64, c: f64) -> f64;
+}
+
+/// Rounded once: for processors that have this.
+pub enum Fused {}
+
+/// Rounded twice.
+pub enum Separate {}
+
+impl Arithmetic for Fused {
+    #[inline(always)]
+    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+}
+
+impl Arithmetic for Separate {
+    #[inline(always)]
+    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+}
+
+/// Work that is nearly all products and sums. Results differ between processors by rounding.
+pub trait FusedWork {
+    /// Does the work. Mark it `#[inline(always)]`, and what it calls in its loops.
+    fn call<A: Arithmetic>(self);
+}
+
+/// Does the work in a function compiled for the widest vectors that the processor has, with fused products and sums where
+/// it has them.
+pub fn fused(work: impl FusedWork) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v3) = pulp::x86::V3::try_new() {
+        return v3.vectorize(Calling(work, PhantomData::<Fused>));
+    }
+    if cfg!(target_arch = "aarch64") {
+        return vectorised(Calling(work, PhantomData::<Fused>));
+    }
+    vectorised(Calling(work, PhantomData::<Separate>));
+}
+
+struct Calling<W, A>(W, PhantomData<A>);
+
+impl<W: FusedWork, A: Arithmetic> NullaryFnOnce for Calling<W, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.call::<A>();
+    }
 }
 
 struct Groups<'a, W> {

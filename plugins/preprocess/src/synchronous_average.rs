@@ -1,10 +1,11 @@
-//! Synchronous average: every turn is resampled in angle and taken apart into harmonics; the harmonics are averaged.
+//! Synchronous average: every turn is resampled in angle; the turns are averaged and taken apart into harmonics.
 //!
 //! Each turn, from one index mark to the next or through one turn of the encoder, is interpolated on equal angles
-//! ([`kernel`]), fine enough that nothing the recording can hold folds onto a kept order, and transformed. Of its
-//! harmonics, those that `samples_per_rev` equal angles can hold are kept: leaving out the rest is the anti-alias
-//! filter. Their mean, and its covariance across channels ([`slow`]), are accumulated in one pass ([`mean`]). Where the
-//! part's surface is interrupted, each turn is bridged before ([`bridge`]).
+//! ([`kernel`]), fine enough that nothing the recording can hold folds onto a kept order. Sums over the turns, for their
+//! mean and its covariance across channels ([`slow`]), are accumulated in one pass ([`mean`]) and then transformed. Of the
+//! harmonics, those that `samples_per_rev` equal angles can hold are kept: leaving out the rest is the anti-alias filter.
+//! Some turns are transformed by themselves, for their scatter ([`scatter`]). Where the part's surface is interrupted, each
+//! turn is bridged before ([`bridge`]).
 
 mod bridge;
 mod encoder;
@@ -12,6 +13,7 @@ mod kernel;
 mod mean;
 mod outliers;
 mod resample;
+mod scatter;
 mod slow;
 mod split;
 mod spread;

@@ -3,12 +3,15 @@
 //! The window's width puts the first zero of its spectrum half of Nyquist away: a signal below half of the recording's
 //! Nyquist frequency ([`PASS_BAND`]) is interpolated to 1e-7 of its amplitude, wherever the position; above,
 //! the interpolation weakens, to one half at Nyquist. (Kaiser, Schafer, IEEE Trans. ASSP 28(1), 1980: β from the
-//! transition's width.) Between two samples each weight is a cubic in each of [`PHASES`] stretches, interpolated at the
+//! transition's width.) Between two samples each weight is a cubic in each of [`STRETCHES`] stretches, interpolated at the
 //! zeros of a Chebyshev polynomial; at these, the weights are scaled to the sum 1.
+//!
+//! Positions about one sample apart, as those of a turn on as many angles as it has samples, share a stretch with their
+//! neighbours: [`TOGETHER`] of them are worked on side by side.
 
-#![allow(clippy::inline_always, reason = "see LaneWork")]
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
 
-use runout_core::numerics::lanes::{LaneWork, load};
+use runout_core::numerics::lanes::{Arithmetic, FusedWork, load};
 
 /// Samples on either side of a position that its value is made of.
 pub(super) const REACH: usize = 11;
@@ -20,67 +23,67 @@ pub(super) const PASS_BAND: f64 = 0.5;
 pub(super) const ERROR: f64 = 1e-7;
 /// Shape of the window: √((π·REACH/2)² − π²) would put the zero exactly there.
 const BETA: f64 = 16.99;
-/// In a stretch, a cubic errs by (π·PASS_BAND/PHASES)⁴/(4!·2⁷) < 2e-9 of a sine in the pass band.
-const PHASES: usize = 32;
-/// Nearer to a sample than this, a position is the sample's, which then passes unchanged.
+/// In a stretch, a cubic errs by (π·PASS_BAND/STRETCHES)⁴/(4!·2⁷) < 2e-9 of a sine in the pass band.
+const STRETCHES: usize = 32;
+/// How far a cubic serves, in halves of its stretch: its error grows as Chebyshev's polynomial T₄, to 24 times as much.
+const SERVES: f64 = 1.5;
+/// Nearer to a sample than this, a position is as good as on it.
 const ON_SAMPLE: f64 = 1e-9;
+
+/// The weights of the samples −REACH+1 to REACH in a stretch, `[tap][power]`: polynomials in −1 to 1 across it.
+type Stretch = [[f64; 4]; TAPS];
 
 /// The table of weights.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Kernel {
-    /// `[stretch][power]`: weights of the samples −REACH+1 to REACH are polynomials in −1 to 1 across the stretch.
-    stretches: Vec<[[f64; TAPS]; 4]>,
+    stretches: Vec<Stretch>,
+}
+
+/// A position's place in the table.
+struct Place<'a> {
+    stretch: &'a Stretch,
+    /// The middle of the stretch, in samples.
+    middle: f64,
 }
 
 impl Kernel {
     pub(super) fn new() -> Self {
-        Self { stretches: (0..PHASES).map(cubics).collect() }
+        Self { stretches: (0..STRETCHES).map(cubics).collect() }
     }
 
-    /// Weights for a position `fraction` (0 to 1) behind the sample REACH−1.
+    /// The stretch of a position that is `fraction` (0 to 1) behind a sample.
     #[inline(always)]
-    fn weights(&self, fraction: f64) -> [f64; TAPS] {
-        if !(ON_SAMPLE..=1.0 - ON_SAMPLE).contains(&fraction) {
-            let mut weights = [0.0; TAPS];
-            weights[if fraction < 0.5 { REACH - 1 } else { REACH }] = 1.0;
-            return weights;
-        }
-        let phase = fraction * PHASES as f64;
-        let stretch = (phase as usize).min(PHASES - 1);
-        let across = 2.0 * (phase - stretch as f64) - 1.0;
-        let [c0, c1, c2, c3] = &self.stretches[stretch];
-        let mut weights = [0.0; TAPS];
-        for tap in 0..TAPS {
-            weights[tap] = c0[tap] + across * (c1[tap] + across * (c2[tap] + across * c3[tap]));
-        }
-        weights
+    fn place(&self, fraction: f64) -> Place<'_> {
+        let index = ((fraction * STRETCHES as f64) as i64 as usize).min(STRETCHES - 1);
+        Place { stretch: &self.stretches[index], middle: (index as f64 + 0.5) / STRETCHES as f64 }
+    }
+}
+
+impl Place<'_> {
+    /// What the polynomials take.
+    #[inline(always)]
+    fn across(&self, fraction: f64) -> f64 {
+        (fraction - self.middle) * (2 * STRETCHES) as f64
     }
 }
 
 /// The weights' coefficients in one stretch.
-fn cubics(stretch: usize) -> [[f64; TAPS]; 4] {
+fn cubics(index: usize) -> Stretch {
     // Chebyshev's coefficients from the values at the zeros of the polynomial of degree 4.
-    let mut chebyshev = [[0.0; TAPS]; 4];
+    let mut chebyshev = [[0.0; 4]; TAPS];
     for node in 0..4 {
         let angle = (f64::from(node) + 0.5) * std::f64::consts::FRAC_PI_4;
-        let phase = (stretch as f64 + 0.5 * (1.0 + angle.cos())) / PHASES as f64;
-        let raw: [f64; TAPS] = std::array::from_fn(|tap| weight(phase - (tap as f64 - (REACH - 1) as f64)));
+        let fraction = (index as f64 + 0.5 * (1.0 + angle.cos())) / STRETCHES as f64;
+        let raw: [f64; TAPS] = std::array::from_fn(|tap| weight(fraction - (tap as f64 - (REACH - 1) as f64)));
         let sum: f64 = raw.iter().sum();
-        for (degree, coefficients) in chebyshev.iter_mut().enumerate() {
-            let share = if degree == 0 { 0.25 } else { 0.5 } * (degree as f64 * angle).cos();
-            for (coefficient, weight) in coefficients.iter_mut().zip(raw) {
+        for (coefficients, weight) in chebyshev.iter_mut().zip(raw) {
+            for (degree, coefficient) in coefficients.iter_mut().enumerate() {
+                let share = if degree == 0 { 0.25 } else { 0.5 } * (degree as f64 * angle).cos();
                 *coefficient += share * weight / sum;
             }
         }
     }
-    let mut powers = [[0.0; TAPS]; 4];
-    for tap in 0..TAPS {
-        let [a0, a1, a2, a3] = chebyshev.map(|coefficients| coefficients[tap]);
-        for (power, value) in powers.iter_mut().zip([a0 - a2, a1 - 3.0 * a3, 2.0 * a2, 4.0 * a3]) {
-            power[tap] = value;
-        }
-    }
-    powers
+    chebyshev.map(|[a0, a1, a2, a3]| [a0 - a2, a1 - 3.0 * a3, 2.0 * a2, 4.0 * a3])
 }
 
 fn weight(distance: f64) -> f64 {
@@ -113,16 +116,19 @@ pub(super) fn on_sample(position: f64) -> Option<usize> {
     if fraction < ON_SAMPLE { Some(below) } else { (fraction > 1.0 - ON_SAMPLE).then_some(below + 1) }
 }
 
-/// Positions whose weights are laid down before they are used, which then come from memory one by one.
-const TOGETHER: usize = 16;
+/// Positions that are worked on side by side.
+const TOGETHER: usize = 8;
+/// Samples that these see.
+const SEEN: usize = TAPS + TOGETHER - 1;
+/// Channels that are worked on side by side, at most: their sums fill the registers.
+const CHANNELS: usize = 4;
 
 /// Interpolates all channels at many positions.
 pub(super) struct Interpolation<'a> {
     pub kernel: &'a Kernel,
-    /// `[frame][channel]`.
-    pub frames: &'a [f64],
-    pub channels: usize,
-    /// In frames; at least REACH frames lie on either side of each.
+    /// Samples, `[channel][sample]`.
+    pub samples: &'a [Vec<f64>],
+    /// At least REACH samples lie on either side of each.
     pub positions: &'a [f64],
     /// That all positions are on samples.
     pub exact: bool,
@@ -130,110 +136,184 @@ pub(super) struct Interpolation<'a> {
     pub values: &'a mut [f64],
 }
 
-impl LaneWork for Interpolation<'_> {
+impl FusedWork for Interpolation<'_> {
     #[inline(always)]
-    fn lanes<const C: usize>(&mut self, offset: usize) {
-        // A distance between frames that the compiler knows makes straight code of the sum.
-        match (self.exact, self.channels == C) {
-            (true, _) => self.take::<C>(offset),
-            (false, true) => self.interpolate::<C>(C, 0),
-            (false, false) => self.interpolate::<C>(self.channels, offset),
+    fn call<A: Arithmetic>(mut self) {
+        if self.exact {
+            return self.take();
+        }
+        for first in (0..self.samples.len()).step_by(CHANNELS) {
+            match self.samples.len() - first {
+                1 => self.channels::<A, 1>(first),
+                2 => self.channels::<A, 2>(first),
+                3 => self.channels::<A, 3>(first),
+                _ => self.channels::<A, CHANNELS>(first),
+            }
         }
     }
 }
 
 impl Interpolation<'_> {
     /// Takes the samples as they are.
-    #[inline(always)]
-    fn take<const C: usize>(&mut self, offset: usize) {
-        let count = self.positions.len();
-        for (at, position) in self.positions.iter().enumerate() {
-            let frame: [f64; C] = load(&self.frames[(position + 0.5) as usize * self.channels..], offset);
-            for lane in 0..C {
-                self.values[(offset + lane) * count + at] = frame[lane];
+    fn take(&mut self) {
+        for (samples, values) in self.samples.iter().zip(self.values.chunks_exact_mut(self.positions.len())) {
+            for (value, position) in values.iter_mut().zip(self.positions) {
+                *value = samples[(position + 0.5) as usize];
             }
         }
     }
 
+    /// Some channels from `first`.
     #[inline(always)]
-    fn interpolate<const C: usize>(&mut self, channels: usize, offset: usize) {
+    fn channels<A: Arithmetic, const C: usize>(&mut self, first: usize) {
+        let samples: [&[f64]; C] = std::array::from_fn(|channel| &self.samples[first + channel][..]);
         let count = self.positions.len();
-        let mut taps = [(0, [0.0; TAPS]); TOGETHER];
-        for (group, positions) in self.positions.chunks(TOGETHER).enumerate() {
-            for (taps, position) in taps.iter_mut().zip(positions) {
-                let below = *position as usize;
-                *taps = (below + 1 - REACH, self.kernel.weights(position - below as f64));
-            }
-            for (index, (first, weights)) in taps[..positions.len()].iter().enumerate() {
-                let window = &self.frames[first * channels..(first + TAPS) * channels];
-                // Two sums, which need not wait for each other.
-                let mut sums = [[0.0; C]; 2];
-                for (pair, weights) in window.chunks_exact(2 * channels).zip(weights.chunks_exact(2)) {
-                    for half in 0..2 {
-                        let frame: [f64; C] = load(&pair[half * channels..(half + 1) * channels], offset);
-                        for lane in 0..C {
-                            sums[half][lane] += weights[half] * frame[lane];
-                        }
+        let values = &mut self.values[first * count..(first + C) * count];
+        let mut done = 0;
+        for positions in self.positions.chunks(TOGETHER) {
+            let together = positions.try_into().ok();
+            if let Some(found) = together.and_then(|positions| several::<A, C>(self.kernel, samples, positions)) {
+                for (values, found) in values.chunks_exact_mut(count).zip(found) {
+                    values[done..done + TOGETHER].copy_from_slice(&found);
+                }
+            } else {
+                for (index, position) in positions.iter().enumerate() {
+                    let found = single::<A, C>(self.kernel, samples, *position);
+                    for (values, found) in values.chunks_exact_mut(count).zip(found) {
+                        values[done + index] = found;
                     }
                 }
-                for lane in 0..C {
-                    self.values[(offset + lane) * count + group * TOGETHER + index] = sums[0][lane] + sums[1][lane];
-                }
             }
+            done += positions.len();
         }
     }
 }
 
+/// The values at positions that are about one sample apart, `[channel][position]`; `None` where they are not.
+#[inline(always)]
+fn several<A: Arithmetic, const C: usize>(
+    kernel: &Kernel,
+    samples: [&[f64]; C],
+    positions: &[f64; TOGETHER],
+) -> Option<[[f64; TOGETHER]; C]> {
+    let below = positions[0].floor();
+    // Behind one sample after the other: a little less than 0 or more than 1 of a sample serves as well.
+    let fraction = |index: usize| positions[index] - below - index as f64;
+    let place = kernel.place(fraction(TOGETHER / 2).clamp(0.0, 1.0));
+    let mut across = [0.0; TOGETHER];
+    let mut farthest = 0.0_f64;
+    for (index, across) in across.iter_mut().enumerate() {
+        *across = place.across(fraction(index));
+        farthest = if across.abs() > farthest { across.abs() } else { farthest };
+    }
+    if farthest > SERVES {
+        return None;
+    }
+    let first = (below as i64 as usize + 1).checked_sub(REACH)?;
+    let mut seen = [&[0.0; SEEN]; C];
+    for (seen, samples) in seen.iter_mut().zip(samples) {
+        *seen = samples.get(first..first + SEEN)?.try_into().ok()?;
+    }
+    let mut sums = [[0.0; TOGETHER]; C];
+    for (tap, [c0, c1, c2, c3]) in place.stretch.iter().enumerate() {
+        let mut weights = [*c3; TOGETHER];
+        for coefficient in [c2, c1, c0] {
+            for (weight, across) in weights.iter_mut().zip(across) {
+                *weight = A::mul_add(*weight, across, *coefficient);
+            }
+        }
+        for (sums, seen) in sums.iter_mut().zip(seen) {
+            let seen: [f64; TOGETHER] = load(seen, tap);
+            for lane in 0..TOGETHER {
+                sums[lane] = A::mul_add(weights[lane], seen[lane], sums[lane]);
+            }
+        }
+    }
+    Some(sums)
+}
+
+/// The value at any position, of each channel.
+#[inline(always)]
+fn single<A: Arithmetic, const C: usize>(kernel: &Kernel, samples: [&[f64]; C], position: f64) -> [f64; C] {
+    let below = position as usize;
+    let fraction = position - below as f64;
+    let place = kernel.place(fraction);
+    let across = place.across(fraction);
+    let seen = samples.map(|samples| &samples[below + 1 - REACH..][..TAPS]);
+    let mut sums = [0.0; C];
+    for (tap, [c0, c1, c2, c3]) in place.stretch.iter().enumerate() {
+        let weight = A::mul_add(A::mul_add(A::mul_add(*c3, across, *c2), across, *c1), across, *c0);
+        for (sum, seen) in sums.iter_mut().zip(seen) {
+            *sum = A::mul_add(weight, seen[tap], *sum);
+        }
+    }
+    sums
+}
+
 #[cfg(test)]
 mod tests {
-    use runout_core::{Complex64, numerics::lanes::in_lanes};
+    use runout_core::numerics::lanes::{Fused, Separate, fused};
 
     use super::*;
 
-    /// Every frequency of the pass band, every position between two samples.
+    fn interpolate<A: Arithmetic>(samples: &[Vec<f64>], positions: &[f64], exact: bool) -> Vec<f64> {
+        let mut values = vec![0.0; samples.len() * positions.len()];
+        let kernel = Kernel::new();
+        Interpolation { kernel: &kernel, samples, positions, exact, values: &mut values }.call::<A>();
+        values
+    }
+
+    /// Every frequency of the pass band, every position between two samples; steps for which positions go together, and
+    /// for which they do not.
     #[test]
     fn sines_in_the_pass_band_are_met_to_the_stated_error() {
-        let kernel = Kernel::new();
-        let mut worst = 0.0_f64;
-        for step in 0..=100 {
-            let omega = std::f64::consts::PI * PASS_BAND * f64::from(step) / 100.0;
-            for part in 0..997 {
-                let fraction = f64::from(part) / 997.0;
-                let found: Complex64 = kernel
-                    .weights(fraction)
-                    .iter()
-                    .enumerate()
-                    .map(|(tap, weight)| weight * Complex64::cis(omega * (tap as f64 - (REACH - 1) as f64)))
-                    .sum();
-                worst = worst.max((found - Complex64::cis(omega * fraction)).norm());
+        for step in [1.0 - 1.5e-3, 0.999_99, 1.001, 0.9, 5.0 / 3.0] {
+            let positions: Vec<f64> = (0..3000).map(|index| 20.3 + step * f64::from(index)).collect();
+            let mut worst = 0.0_f64;
+            for part in 0..=100 {
+                let omega = std::f64::consts::PI * PASS_BAND * f64::from(part) / 100.0;
+                let wave = |position: f64| [(omega * position).cos(), (omega * position).sin()];
+                let samples: [Vec<f64>; 2] =
+                    std::array::from_fn(|half| (0..5100).map(|sample| wave(f64::from(sample))[half]).collect());
+                let values = interpolate::<Separate>(&samples, &positions, false);
+                for (index, position) in positions.iter().enumerate() {
+                    let [cosine, sine] = wave(*position);
+                    worst = worst.max((values[index] - cosine).hypot(values[positions.len() + index] - sine));
+                }
             }
+            assert!(worst < ERROR, "{step}: {worst:e}");
         }
-        assert!(worst < ERROR, "{worst:e}");
     }
 
     #[test]
-    fn positions_on_samples_take_them_unchanged_in_any_number_of_channels() {
-        let kernel = Kernel::new();
-        for channels in [1, 3, 8, 11] {
-            let frames: Vec<f64> = (0..40 * channels).map(|index| (index as f64).sqrt()).collect();
-            let positions = [10.0, 17.0 + 1e-10, 29.0 - 1e-10];
-            let mut values = vec![0.0; 3 * channels];
-            let mut interpolation = Interpolation {
-                kernel: &kernel,
-                frames: &frames,
-                channels,
-                positions: &positions,
-                exact: false,
-                values: &mut values,
-            };
-            in_lanes(channels, &mut interpolation);
-            let interpolated = interpolation.values.to_vec();
-            interpolation.exact = true;
-            in_lanes(channels, &mut interpolation);
-            assert_eq!(values, interpolated);
-            for channel in 0..channels {
-                let expected = [10, 17, 29].map(|frame| frames[frame * channels + channel]);
-                assert_eq!(values[channel * 3..(channel + 1) * 3], expected);
+    fn positions_on_samples_take_them_unchanged() {
+        let samples: Vec<Vec<f64>> =
+            (0..3).map(|channel| (0..40).map(|index| f64::from(index * 3 + channel).sqrt()).collect()).collect();
+        let values = interpolate::<Separate>(&samples, &[10.0, 17.0 + 1e-10, 29.0 - 1e-10], true);
+        for (values, samples) in values.chunks_exact(3).zip(&samples) {
+            assert_eq!(values, [10, 17, 29].map(|sample| samples[sample]));
+        }
+    }
+
+    #[test]
+    fn any_number_of_channels_is_met_alike_however_it_rounds() {
+        let channel = |channel: usize| (0..120).map(|index| ((index * 7 + channel * 31) % 23) as f64).collect();
+        let samples: Vec<Vec<f64>> = (0..11).map(channel).collect();
+        for step in [1.0001, 0.93] {
+            let positions: Vec<f64> = (0..83).map(|index| 12.4 + step * f64::from(index)).collect();
+            let alone: Vec<f64> = samples
+                .iter()
+                .flat_map(|channel| interpolate::<Separate>(std::slice::from_ref(channel), &positions, false))
+                .collect();
+            assert_eq!(interpolate::<Separate>(&samples, &positions, false), alone);
+            let mut values = vec![0.0; alone.len()];
+            let kernel = Kernel::new();
+            let (samples, positions) = (&samples[..], &positions[..]);
+            fused(Interpolation { kernel: &kernel, samples, positions, exact: false, values: &mut values });
+            let rounded_once = interpolate::<Fused>(samples, positions, false);
+            for ((value, once), alone) in values.iter().zip(&rounded_once).zip(&alone) {
+                // 1e-13: rounding of 22 products of values near 20.
+                assert!((value - alone).abs() < 1e-13 && (once - alone).abs() < 1e-13, "{value} {once} {alone}");
             }
         }
     }

@@ -7,27 +7,25 @@ use super::{split::Means, turns::Turn};
 /// Turns that are looked at together, at least: enough for a median, few enough to drift little and to be kept.
 const TOGETHER: usize = 16;
 
-/// Holds the harmonics of a few turns back until it can be said which of them are outliers.
+/// Holds a few turns back until it can be said which of them are outliers.
 ///
 /// The distance of a turn in a channel is the root mean square over the turn of what separates it from the median turn
 /// (the median of real and of imaginary part, harmonic by harmonic). A turn is an outlier where this is more than
 /// `sigma` times the median distance in that channel.
 pub(super) struct Outliers {
     sigma: f64,
+    channels: usize,
     held: Vec<Held>,
 }
 
 /// A turn that is not judged yet.
 pub(super) struct Held {
-    turn: Turn,
-    harmonics: Vec<Complex64>,
-    motion: Vec<f64>,
-}
-
-impl Held {
-    pub(super) fn new(turn: Turn, harmonics: &[Complex64], motion: &[f64]) -> Self {
-        Self { turn, harmonics: harmonics.to_vec(), motion: motion.to_vec() }
-    }
+    pub turn: Turn,
+    /// `[channel][angle]`.
+    pub readings: Vec<f64>,
+    /// `[order][channel]`.
+    pub harmonics: Vec<Complex64>,
+    pub motion: Vec<f64>,
 }
 
 /// What became of one turn.
@@ -38,8 +36,8 @@ pub(super) struct Verdict {
 }
 
 impl Outliers {
-    pub(super) fn new(sigma: f64) -> Self {
-        Self { sigma, held: Vec::new() }
+    pub(super) fn new(sigma: f64, channels: usize) -> Self {
+        Self { sigma, channels, held: Vec::new() }
     }
 
     /// Takes a turn; `judged` gets those that can now be told.
@@ -53,16 +51,17 @@ impl Outliers {
     /// Judges the first `count` turns held, or all that there are.
     pub(super) fn judge(&mut self, count: usize, means: &mut Means, judged: &mut Vec<Verdict>) {
         let together: Vec<_> = self.held.drain(..count.min(self.held.len())).collect();
-        let channels = means.whole.channels();
+        let channels = self.channels;
         let distances = distances_um(&together, channels);
         let usual: Vec<f64> = (0..channels)
             .map(|channel| median(&mut distances.iter().map(|turn| turn[channel]).collect::<Vec<_>>()))
             .collect();
-        for (Held { turn, harmonics, motion }, distances) in together.into_iter().zip(distances) {
+        for (Held { turn, readings, harmonics, motion }, distances) in together.into_iter().zip(distances) {
             let farthest = distances.iter().zip(&usual).map(|(distance, usual)| distance - self.sigma * usual);
             let outlier =
                 farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
             if outlier.is_none() {
+                means.next().copy_from_slice(&readings);
                 means.add(turn.number, &harmonics, &motion);
             }
             judged.push(Verdict { turn, outlier: outlier.map(|(channel, _)| (channel, distances[channel])) });

@@ -5,10 +5,7 @@ use std::collections::VecDeque;
 use runout_core::{
     Complex64,
     measurement::{Block, Capture, Defect},
-    numerics::{
-        fourier::{Fourier, max_order},
-        lanes::in_lanes,
-    },
+    numerics::{fourier::max_order, lanes::fused},
     profile::{RejectedTurn, Rejection, Split},
     spread::Spread,
     stage::Wanted,
@@ -19,6 +16,8 @@ use super::{
     bridge::Bridges,
     encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
+    mean::{Analysis, Size},
+    orders_held,
     outliers::{Held, Outliers, Verdict},
     split::Means,
     spread::Motion,
@@ -53,15 +52,13 @@ pub(super) struct Resampling<'a> {
     window: Window,
     defects: Vec<Defect>,
     positions: Vec<f64>,
-    /// One turn on equal angles, `[channel][angle]`.
-    grid: Vec<f64>,
+    /// Equal angles of a turn.
+    angles: usize,
     /// Where channels look into an interruption of the surface.
     bridges: Bridges,
-    fourier: Fourier,
-    /// One channel's harmonics.
-    harmonics: Vec<Complex64>,
+    analysis: Analysis,
     /// One turn's harmonics, `[order][channel]`.
-    turn: Vec<Complex64>,
+    harmonics: Vec<Complex64>,
     /// Motion of the axis in single turns, where wanted.
     motion: Option<Motion>,
     means: Means,
@@ -76,24 +73,23 @@ impl<'a> Resampling<'a> {
     pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>, wanted: Wanted) -> Self {
         let config = &average.config;
         let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
-        let length = grid_length(&turns, config.samples_per_rev, capture.encoder);
-        let planned = turns.len();
-        let motion = wanted.projection.and_then(|wanted| Motion::new(wanted, &capture.sensors, length));
+        let angles = angles(&turns, config.samples_per_rev, capture.encoder);
+        let (size, planned) = (Size { channels, angles, orders }, turns.len());
+        let motion = wanted.projection.and_then(|wanted| Motion::new(wanted, &capture.sensors, angles));
         Self {
             kernel: &average.kernel,
             capture,
             turns: turns.into(),
             window: Window::new(channels),
             defects: Vec::new(),
-            positions: Vec::with_capacity(length),
-            grid: vec![0.0; length * channels],
-            bridges: Bridges::new(average.rig.as_ref(), capture, length),
-            fourier: Fourier::new(length),
-            harmonics: vec![Complex64::ZERO; orders],
-            turn: vec![Complex64::ZERO; orders * channels],
-            means: Means::new(orders, channels, planned, wanted.hold_out, motion.as_ref().map(Motion::spread)),
+            positions: Vec::with_capacity(angles),
+            angles,
+            bridges: Bridges::new(average.rig.as_ref(), capture, angles),
+            analysis: Analysis::new(angles, orders),
+            harmonics: vec![Complex64::ZERO; orders * channels],
+            means: Means::new(size, planned, wanted.hold_out, motion.as_ref().map(Motion::spread)),
             motion,
-            outliers: config.outlier_sigma.map(Outliers::new),
+            outliers: config.outlier_sigma.map(|sigma| Outliers::new(sigma, channels)),
             used_samples: 0.0,
             rejected: Vec::new(),
             exact: true,
@@ -144,7 +140,7 @@ impl<'a> Resampling<'a> {
         }
         self.means.sum_up();
         Outcome {
-            turn_angles: self.fourier.length(),
+            turn_angles: self.angles,
             mean: self.means.whole.mean(),
             covariance: self.means.whole.covariance(),
             scatter: self.means.whole.scatter(),
@@ -170,7 +166,7 @@ impl<'a> Resampling<'a> {
 
     /// Works on one turn, whose frames are all in the window.
     fn turn(&mut self, turn: Turn) {
-        let length = self.fourier.length();
+        let length = self.angles;
         let (start, end) = (self.window.position(turn.start), self.window.position(turn.end));
         if self.capture.encoder {
             let steady = self.window.angle_rev.len() == self.window.len()
@@ -193,18 +189,34 @@ impl<'a> Resampling<'a> {
             return;
         }
         self.exact &= exact;
-        self.interpolate(exact);
-        self.bridges.cross(&mut self.grid);
-        let motion = self.motion.as_mut().map_or(&[][..], |motion| motion.of_turn(&self.grid));
-        take_apart(&mut self.grid, &mut self.fourier, &mut self.harmonics, &mut self.turn);
+        let looked_at = self.outliers.is_some() || self.means.looks_at_next();
+        let readings = self.means.next();
+        fused(Interpolation {
+            kernel: self.kernel,
+            samples: &self.window.samples,
+            positions: &self.positions,
+            exact,
+            values: readings,
+        });
+        self.bridges.cross(readings);
+        let motion = self.motion.as_mut().map_or(&[][..], |motion| motion.of_turn(readings));
+        if looked_at {
+            self.analysis.take_apart(readings, &mut self.harmonics);
+        }
         match &mut self.outliers {
             None => {
-                self.means.add(turn.number, &self.turn, motion);
+                self.means.add(turn.number, &self.harmonics, motion);
                 self.used_samples += turn.samples();
             }
             Some(outliers) => {
+                let held = Held {
+                    turn,
+                    readings: readings.to_vec(),
+                    harmonics: self.harmonics.clone(),
+                    motion: motion.to_vec(),
+                };
                 let mut judged = Vec::new();
-                outliers.add(Held::new(turn, &self.turn, motion), &mut self.means, &mut judged);
+                outliers.add(held, &mut self.means, &mut judged);
                 self.sort(judged);
             }
         }
@@ -221,32 +233,6 @@ impl<'a> Resampling<'a> {
         };
         self.defects.iter().find(matters)
     }
-
-    /// Interpolates the turn at its positions.
-    fn interpolate(&mut self, exact: bool) {
-        let channels = self.capture.channels().max(1);
-        let mut interpolation = Interpolation {
-            kernel: self.kernel,
-            frames: &self.window.frames,
-            channels,
-            positions: &self.positions,
-            exact,
-            values: &mut self.grid,
-        };
-        in_lanes(channels, &mut interpolation);
-    }
-}
-
-/// Takes one turn on equal angles, `[channel][angle]`, apart into harmonics, `[order][channel]`; the angles' values are used up.
-fn take_apart(grid: &mut [f64], fourier: &mut Fourier, harmonics: &mut [Complex64], turn: &mut [Complex64]) {
-    let channels = turn.len() / harmonics.len();
-    for (channel, values) in grid.chunks_exact_mut(fourier.length()).enumerate() {
-        fourier.analyse_in_place(values, harmonics);
-        for (harmonic, turn) in harmonics.iter().zip(turn[channel..].iter_mut().step_by(channels)) {
-            // Profiles are Re Σ cₙ e^{−inΦ}.
-            *turn = harmonic.conj();
-        }
-    }
 }
 
 /// Place in the window of the first frame that a turn needs.
@@ -261,12 +247,13 @@ fn behind(turn: &Turn) -> usize {
 
 /// Equal angles on which turns are interpolated.
 ///
-/// Where every turn is the same whole multiple of `samples_per_rev` samples and begins at a sample, the samples
-/// themselves. Otherwise the shortest good length for a transform at which the highest order that a turn's samples can
-/// hold, half of them, folds to above the highest order that is kept.
-fn grid_length(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> usize {
+/// Where every turn is the same whole number of samples and begins at a sample, the samples themselves. Otherwise about as
+/// many as a turn has samples: neighbouring angles then lie alike between the samples around them, which interpolation is
+/// quick for. And enough that the highest order that a turn's samples can hold, half of them, folds to above the highest
+/// order that is kept.
+fn angles(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> usize {
     let longest = turns.iter().map(Turn::samples).fold(0.0, f64::max);
-    if let Some(length) = on_sample(longest).filter(|length| *length > 0 && length % samples_per_rev == 0) {
+    if let Some(length) = on_sample(longest).filter(|length| *length > 0) {
         let whole = |turn: &Turn| on_sample(turn.start).is_some() && on_sample(turn.samples()) == Some(length);
         if turns.iter().all(whole) {
             return length;
@@ -274,8 +261,10 @@ fn grid_length(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> usize {
     }
     // Within a turn the encoder tells of faster and slower stretches: where it is slow, samples lie closer.
     let densest = if encoder { 1.25 * longest } else { longest };
-    let needed = (0.5 * densest) as usize + max_order(samples_per_rev) + 1;
-    (needed.next_multiple_of(2)..).step_by(2).find(|length| is_smooth(*length)).unwrap_or(needed)
+    let needed = (0.5 * densest) as usize + max_order(samples_per_rev).min(orders_held(densest)) + 1;
+    let fewest = needed.max(longest as usize).next_multiple_of(2);
+    // Within a thousandth for the sake of a transform's good length.
+    (fewest..=fewest + fewest / 1000).step_by(2).find(|length| is_smooth(*length)).unwrap_or(fewest)
 }
 
 /// Whether 2, 3 and 5 are its only prime factors, which transforms are quick for.

@@ -14,7 +14,7 @@ use std::{cell::RefCell, f64::consts::TAU};
 use runout_core::{Complex64, numerics::lanes::load};
 use rustfft::FftPlanner;
 
-use super::mean::at;
+use super::mean::Size;
 
 /// Neighbours to each side. With covariances averaged over five orders they make 20 complex degrees of freedom.
 const NEIGHBOURS: usize = 2;
@@ -29,12 +29,12 @@ pub(super) struct Slow {
     neighbours: usize,
     /// Sum of the phases over the turns.
     phase_sums: [f64; PHASES],
-    /// Sums of the turns less the pivot, in planes as [`Mean`](super::mean::Mean) has them.
+    /// Sums of the turns less the pivot, `[channel][angle]`.
     sums: [Vec<f64>; PHASES],
 }
 
 impl Slow {
-    /// For `planned` turns at most, each of so many numbers.
+    /// For `planned` turns at most, each of so many readings.
     pub(super) fn new(values: usize, planned: usize) -> Self {
         // Beyond half of the turns the same frequencies come again.
         let neighbours = NEIGHBOURS.min(planned.saturating_sub(1) / 2);
@@ -46,7 +46,7 @@ impl Slow {
         }
     }
 
-    /// The phases of the m-th turn, which has to be taken in with them unless it is the pivot.
+    /// The phases of the m-th turn, which has to be taken in with them.
     pub(super) fn phases(&mut self, turn: usize) -> [f64; PHASES] {
         let mut phases = [0.0; PHASES];
         for neighbour in 0..self.neighbours {
@@ -58,21 +58,23 @@ impl Slow {
         phases
     }
 
-    /// Takes the numbers `first..first + C` of several turns into the sums here, and into the plain `sum`.
+    /// Takes the readings `first..first + C` of several turns, less the pivot, into the sums here and into the plain `sum`.
     #[inline(always)]
     pub(super) fn add<const C: usize>(
         &mut self,
         first: usize,
+        pivot: &[f64],
         sum: &mut [f64],
         turns: &[f64],
         phases: &[[f64; PHASES]],
     ) {
-        let values = sum.len();
+        let pivot: [f64; C] = load(pivot, first);
         let mut plain: [f64; C] = load(sum, first);
         let mut slow = [[0.0; C]; PHASES];
-        for (turn, phases) in turns.chunks_exact(values).zip(phases) {
-            let turn: [f64; C] = load(turn, first);
+        for (turn, phases) in turns.chunks_exact(sum.len()).zip(phases) {
+            let mut turn: [f64; C] = load(turn, first);
             for lane in 0..C {
+                turn[lane] -= pivot[lane];
                 plain[lane] += turn[lane];
             }
             for (sum, phase) in slow.iter_mut().zip(phases) {
@@ -87,37 +89,42 @@ impl Slow {
         }
     }
 
-    /// Covariance of the mean, `[order][channel][channel]`; `sum` is that of the turns less the pivot, in planes. `None`
-    /// where there are too few turns to have neighbours.
-    pub(super) fn covariance(
-        &self,
-        sum: &[f64],
-        turns: usize,
-        orders: usize,
-        channels: usize,
-    ) -> Option<Vec<Complex64>> {
+    /// Covariance of the mean, `[order][channel][channel]`; `sum` is that of the turns less the pivot. `None` where there
+    /// are too few turns to have neighbours.
+    ///
+    /// Between the marks the phase goes on: with Uₖ(Φ) = Σ e^{−2πikm/T} u_m(Φ), the record's transforms at n + k/T and
+    /// n − k/T are those of Uₖ e^{−ikΦ/T} at n and −n, as u real makes U₋ₖ its conjugate.
+    pub(super) fn covariance(&self, sum: &[f64], turns: usize, size: Size) -> Option<Vec<Complex64>> {
         if self.neighbours == 0 || turns < 3 {
             return None;
         }
-        let plane = sum.len() / (2 * channels);
+        let Size { channels, angles, orders } = size;
         let mut covariance = vec![Complex64::ZERO; orders * channels * channels];
         let scale = 1.0 / (2.0 * self.neighbours as f64 * (turns * turns) as f64);
-        let mut record = Record::new(orders);
+        let transform = PLANNER.with_borrow_mut(|planner| planner.plan_fft_inverse(angles));
+        let mut scratch = vec![Complex64::ZERO; transform.get_inplace_scratch_len()];
+        let mut signal = vec![Complex64::ZERO; angles];
         for neighbour in 0..self.neighbours {
             let [cosine, sine] = [2 * neighbour, 2 * neighbour + 1];
-            let cycles = (neighbour + 1) as f64 / self.planned as f64;
+            let step = Complex64::cis(-TAU * (neighbour + 1) as f64 / (self.planned * angles) as f64);
             // Both neighbours, `[side][order × channel]`.
             let mut sides = [vec![Complex64::ZERO; orders * channels], vec![Complex64::ZERO; orders * channels]];
             for channel in 0..channels {
-                let about_mean = |order: usize| {
-                    let mean = at(sum, plane, order, channel) / turns as f64;
-                    [cosine, sine]
-                        .map(|index| at(&self.sums[index], plane, order, channel) - mean * self.phase_sums[index])
-                };
-                record.neighbours(about_mean, cycles, |order, neighbours| {
-                    let at = order * channels + channel;
-                    sides.iter_mut().zip(neighbours).for_each(|(side, value)| side[at] = value);
-                });
+                let range = channel * angles..(channel + 1) * angles;
+                let sums = self.sums[cosine][range.clone()].iter().zip(&self.sums[sine][range.clone()]);
+                let mut phase = Complex64::from(1.0 / angles as f64);
+                for (value, (sum, (in_phase, quadrature))) in signal.iter_mut().zip(sum[range].iter().zip(sums)) {
+                    let mean = sum / turns as f64;
+                    let [re, im] = [(in_phase, cosine), (quadrature, sine)].map(|(s, i)| s - mean * self.phase_sums[i]);
+                    *value = Complex64::new(re, -im) * phase;
+                    phase *= step;
+                }
+                transform.process_with_scratch(&mut signal, &mut scratch);
+                for order in 0..orders.min(angles) {
+                    let scale = if order == 0 { 1.0 } else { 2.0 };
+                    sides[0][order * channels + channel] = scale * signal[order];
+                    sides[1][order * channels + channel] = scale * signal[(angles - order) % angles].conj();
+                }
             }
             for side in &sides {
                 let each = side.chunks_exact(channels).zip(covariance.chunks_exact_mut(channels * channels));
@@ -135,67 +142,4 @@ impl Slow {
 thread_local! {
     /// Keeps the plans that it has made: captures of one recording mostly ask for the same.
     static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
-}
-
-/// One channel's sums over turns as a function of angle, to take the phase on within the turns.
-struct Record {
-    orders: usize,
-    signal: Vec<Complex64>,
-    scratch: Vec<Complex64>,
-    synthesis: std::sync::Arc<dyn rustfft::Fft<f64>>,
-    analysis: std::sync::Arc<dyn rustfft::Fft<f64>>,
-}
-
-impl Record {
-    fn new(orders: usize) -> Self {
-        let length = (2 * orders + 2).next_power_of_two();
-        let (synthesis, analysis) =
-            PLANNER.with_borrow_mut(|planner| (planner.plan_fft_forward(length), planner.plan_fft_inverse(length)));
-        let scratch = synthesis.get_inplace_scratch_len().max(analysis.get_inplace_scratch_len());
-        Self {
-            orders,
-            signal: vec![Complex64::ZERO; length],
-            scratch: vec![Complex64::ZERO; scratch],
-            synthesis,
-            analysis,
-        }
-    }
-
-    /// The record's transform at n + k/T and n − k/T, from Σ cₙ(m) cos 2πkm/T and Σ cₙ(m) sin 2πkm/T.
-    ///
-    /// Between the marks the phase goes on: with Uₖ(Φ) = Σ e^{−2πikm/T} u_m(Φ), the transform is that of Uₖ e^{−ikΦ/T},
-    /// and u real makes U₋ₖ its conjugate.
-    fn neighbours(
-        &mut self,
-        sums: impl Fn(usize) -> [Complex64; 2],
-        cycles: f64,
-        mut take: impl FnMut(usize, [Complex64; 2]),
-    ) {
-        let length = self.signal.len();
-        self.signal.fill(Complex64::ZERO);
-        for order in 0..self.orders {
-            let [cosine, sine] = sums(order);
-            let (below, above) = (cosine - Complex64::I * sine, cosine + Complex64::I * sine);
-            if order == 0 {
-                self.signal[0] = below;
-            } else {
-                self.signal[order] = 0.5 * below;
-                self.signal[length - order] = 0.5 * above.conj();
-            }
-        }
-        self.synthesis.process_with_scratch(&mut self.signal, &mut self.scratch);
-        let step = Complex64::cis(-TAU * cycles / length as f64);
-        let mut phase = Complex64::new(1.0 / length as f64, 0.0);
-        for value in &mut self.signal {
-            *value *= phase;
-            phase *= step;
-        }
-        self.analysis.process_with_scratch(&mut self.signal, &mut self.scratch);
-        for order in 0..self.orders {
-            let below = self.signal[order];
-            let above = self.signal[(length - order) % length].conj();
-            let scale = if order == 0 { 1.0 } else { 2.0 };
-            take(order, [scale * below, scale * above]);
-        }
-    }
 }

@@ -6,13 +6,31 @@ use runout_core::{
     spread::Spread,
 };
 
-use super::{mean::Mean, spread::Extremes};
+use super::{
+    mean::{Mean, Size},
+    spread::Extremes,
+};
+
+/// Turns that are summed together at most: the sums are then read and written once for all of them.
+const TOGETHER: usize = 4;
+/// Memory that turns may take up which wait for others, in numbers.
+const WAITING: usize = 1 << 17;
+/// Turns a channel whose harmonics are looked at, at least, where there are as many: what weights ask for.
+const LOOKED_AT_A_CHANNEL: usize = 10;
 
 /// The mean of all turns, and of parts of them; how far turns lie apart.
 pub(super) struct Means {
     pub whole: Mean,
     parts: Option<Parts>,
     extremes: Option<Extremes>,
+    /// Readings of the turns that are in no sum yet, `[turn][channel][angle]`, with room for the next one.
+    waiting: Vec<f64>,
+    /// Readings of one turn.
+    readings: usize,
+    /// Turns that are in no sum yet.
+    pending: usize,
+    /// Of so many turns, one is looked at.
+    stride: usize,
 }
 
 struct Parts {
@@ -25,55 +43,94 @@ struct Parts {
 
 impl Means {
     /// For `planned` turns at most; the last ones of a share are held out.
-    pub fn new(
-        orders: usize,
-        channels: usize,
-        planned: usize,
-        held_out: Option<f64>,
-        extremes: Option<Extremes>,
-    ) -> Self {
+    pub fn new(size: Size, planned: usize, held_out: Option<f64>, extremes: Option<Extremes>) -> Self {
         let parts = held_out.filter(|_| planned >= 4).map(|share| {
             let last = ((share * planned as f64).round() as usize).clamp(2, planned - 2);
             let fitted = planned - last;
-            let kept = orders.min(TURN_ORDERS);
+            let kept = size.orders.min(TURN_ORDERS);
             Parts {
                 fitted,
-                fit: Mean::new(orders, channels, fitted),
-                held_out: Mean::new(orders, channels, last),
+                fit: Mean::new(size, fitted),
+                held_out: Mean::new(size, last),
                 turns: Turns {
                     numbers: Vec::with_capacity(planned),
                     orders: kept,
-                    channels,
-                    harmonics: Vec::with_capacity(planned * kept * channels),
+                    channels: size.channels,
+                    harmonics: Vec::with_capacity(planned * kept * size.channels),
                 },
             }
         });
-        Self { whole: Mean::new(orders, channels, planned), parts, extremes }
+        let stride = if parts.is_some() { 1 } else { planned / (LOOKED_AT_A_CHANNEL * size.channels) };
+        let readings = size.readings();
+        let together = (WAITING / readings.max(1)).clamp(1, TOGETHER);
+        Self {
+            whole: Mean::new(size, planned),
+            parts,
+            extremes,
+            waiting: vec![0.0; together * readings],
+            readings,
+            pending: 0,
+            stride: stride.max(1),
+        }
     }
 
-    /// Takes the harmonics, `[order][channel]`, and the motion of the turn of this number.
-    pub fn add(&mut self, number: usize, turn: &[Complex64], motion: &[f64]) {
-        if let Some(Parts { fitted, fit, held_out, turns }) = &mut self.parts {
-            let part = if self.whole.turns() < *fitted { fit } else { held_out };
-            part.add(turn);
-            turns.numbers.push(number);
-            turns.harmonics.extend(&turn[..turns.orders * turns.channels]);
+    /// Turns taken.
+    pub fn turns(&self) -> usize {
+        self.whole.turns() + self.pending
+    }
+
+    /// Where the next turn's readings are to be put, `[channel][angle]`.
+    pub fn next(&mut self) -> &mut [f64] {
+        &mut self.waiting[self.pending * self.readings..][..self.readings]
+    }
+
+    /// Whether the harmonics of the next turn are looked at.
+    pub fn looks_at_next(&self) -> bool {
+        self.turns().is_multiple_of(self.stride)
+    }
+
+    /// Takes the turn of this number, whose readings are where the [next](Self::next) turn's are to be, with its
+    /// harmonics, `[order][channel]`, and its motion.
+    pub fn add(&mut self, number: usize, harmonics: &[Complex64], motion: &[f64]) {
+        let looked_at = self.looks_at_next();
+        let taken = self.turns();
+        self.pending += 1;
+        if looked_at {
+            self.whole.look_at(harmonics);
         }
-        self.whole.add(turn);
+        let mut full = self.pending * self.readings == self.waiting.len();
+        if let Some(Parts { fitted, fit, held_out, turns }) = &mut self.parts {
+            let part = if taken < *fitted { fit } else { held_out };
+            part.look_at(harmonics);
+            turns.numbers.push(number);
+            turns.harmonics.extend(&harmonics[..turns.orders * turns.channels]);
+            full |= taken + 1 == *fitted;
+        }
         if let Some(extremes) = &mut self.extremes {
             extremes.add(motion);
         }
+        if full {
+            self.sum_up();
+        }
+    }
+
+    /// Takes the turns that wait into the sums; to be called after the last one.
+    pub fn sum_up(&mut self) {
+        let turns = &self.waiting[..self.pending * self.readings];
+        if turns.is_empty() {
+            return;
+        }
+        if let Some(Parts { fitted, fit, held_out, .. }) = &mut self.parts {
+            let part = if self.whole.turns() < *fitted { fit } else { held_out };
+            part.add(turns);
+        }
+        self.whole.add(turns);
+        self.pending = 0;
     }
 
     /// How far the turns lie apart, where wanted.
     pub fn spread(&mut self) -> Option<Spread> {
         self.extremes.take().and_then(Extremes::spread)
-    }
-
-    /// To be called after the last turn.
-    pub fn sum_up(&mut self) {
-        let parts = self.parts.iter_mut().flat_map(|parts| [&mut parts.fit, &mut parts.held_out]);
-        parts.chain([&mut self.whole]).for_each(Mean::sum_up);
     }
 
     /// The parts; `None` where too few turns are left to fill them.

@@ -1,44 +1,49 @@
-//! The frames around the turn that is next.
+//! The samples around the turn that is next.
 
-use runout_core::measurement::Block;
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
+
+use runout_core::{
+    measurement::Block,
+    numerics::lanes::{LaneWork, in_lanes, load},
+};
 
 use super::kernel::REACH;
 
-/// Frames of the continuation at either end of the capture: the kernel's reach, and a cubic through the encoder's angles.
+/// Samples of the continuation at either end of the capture: the kernel's reach, and a cubic through the encoder's angles.
 pub(super) const CONTINUED: usize = REACH + 2;
 
 /// A stretch of the capture, continued at the capture's ends by an odd reflection, 2x₀ − xₖ.
 ///
 /// The continuation carries level and slope on, which is all that the outermost positions of the first and the last turn
-/// ask of it. Places are counted from its first frame, [`CONTINUED`] before the capture's.
+/// ask of it. Places are counted from its first sample, [`CONTINUED`] before the capture's.
 pub(super) struct Window {
-    channels: usize,
-    /// Place of the first frame.
+    /// Place of the first sample.
     start: usize,
-    pub frames: Vec<f64>,
+    /// `[channel][sample]`.
+    pub samples: Vec<Vec<f64>>,
     pub angle_rev: Vec<f64>,
 }
 
 impl Window {
     pub(super) fn new(channels: usize) -> Self {
-        Self { channels, start: CONTINUED, frames: Vec::new(), angle_rev: Vec::new() }
+        Self { start: CONTINUED, samples: vec![Vec::new(); channels], angle_rev: Vec::new() }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.frames.len() / self.channels
+        self.samples.first().map_or(0, Vec::len)
     }
 
-    /// Place of the first frame.
+    /// Place of the first sample.
     pub(super) fn start(&self) -> usize {
         self.start
     }
 
-    /// Place behind the last frame.
+    /// Place behind the last sample.
     pub(super) fn end(&self) -> usize {
         self.start + self.len()
     }
 
-    /// A sample position of the capture, counted from the first frame.
+    /// A sample position of the capture, counted from the first sample.
     pub(super) fn position(&self, sample: f64) -> f64 {
         // The difference of the two places is exact, so that large positions lose no digits.
         sample - (self.start as f64 - CONTINUED as f64)
@@ -46,54 +51,80 @@ impl Window {
 
     /// Takes a block, and forgets what lies before the place `needed`.
     pub(super) fn take(&mut self, block: &Block, needed: usize) {
-        if self.frames.is_empty() {
+        if self.len() == 0 {
             self.start = block.start as usize + CONTINUED;
         }
-        self.frames.extend_from_slice(&block.samples);
-        self.angle_rev.extend_from_slice(&block.angle_rev);
         let surplus = needed.saturating_sub(self.start).min(self.len());
         // Moving the rest to the front is worth while only where it is the smaller part.
         if 2 * surplus >= self.len() {
-            self.frames.drain(..surplus * self.channels);
+            for samples in &mut self.samples {
+                samples.drain(..surplus);
+            }
             self.angle_rev.drain(..surplus.min(self.angle_rev.len()));
             self.start += surplus;
         }
+        let (channels, kept) = (self.samples.len(), self.len());
+        for samples in &mut self.samples {
+            samples.resize(kept + block.samples.len() / channels, 0.0);
+        }
+        in_lanes(channels, &mut Parting { frames: &block.samples, samples: &mut self.samples, kept });
+        self.angle_rev.extend_from_slice(&block.angle_rev);
     }
 
-    /// Puts the continuation before the capture's first frame, once there are enough to reflect.
+    /// Puts the continuation before the capture's first sample, once there are enough to reflect.
     pub(super) fn continue_before(&mut self) {
         if self.start == CONTINUED && self.len() > CONTINUED {
-            let before = reflected(&self.frames[..(CONTINUED + 1) * self.channels], self.channels);
-            self.frames.splice(..0, before.into_iter().rev().flatten());
-            if let Some(angles) = self.angle_rev.get(..=CONTINUED) {
-                let before = reflected(angles, 1);
-                self.angle_rev.splice(..0, before.into_iter().rev().flatten());
+            for course in self.courses() {
+                let continuation: Vec<f64> = reflected(course[0], &course[1..=CONTINUED]).rev().collect();
+                course.splice(..0, continuation);
             }
             self.start = 0;
         }
     }
 
-    /// Puts the continuation behind the capture's last frame.
+    /// Puts the continuation behind the capture's last sample.
     pub(super) fn continue_behind(&mut self) {
-        if self.len() > CONTINUED {
-            let behind = reflected(&last(&self.frames, self.channels), self.channels);
-            self.frames.extend(behind.into_iter().flatten());
-            if self.angle_rev.len() > CONTINUED {
-                let behind = reflected(&last(&self.angle_rev, 1), 1);
-                self.angle_rev.extend(behind.into_iter().flatten());
+        for course in self.courses() {
+            if let [.., edge] = course[..] {
+                let inner = course.len() - 1;
+                let continuation: Vec<f64> = reflected(edge, &course[inner - CONTINUED..inner]).rev().collect();
+                course.extend(continuation);
+            }
+        }
+    }
+
+    /// All that can be reflected.
+    fn courses(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        let courses = self.samples.iter_mut().chain([&mut self.angle_rev]);
+        courses.filter(|course| course.len() > CONTINUED)
+    }
+}
+
+/// Frames on their way into the channels' samples, behind those kept.
+struct Parting<'a> {
+    frames: &'a [f64],
+    samples: &'a mut [Vec<f64>],
+    kept: usize,
+}
+
+impl LaneWork for Parting<'_> {
+    #[inline(always)]
+    fn lanes<const C: usize>(&mut self, offset: usize) {
+        let channels = self.samples.len();
+        let mut targets: [&mut [f64]; C] = std::array::from_fn(|_| &mut [][..]);
+        for (target, samples) in targets.iter_mut().zip(&mut self.samples[offset..offset + C]) {
+            *target = &mut samples[self.kept..];
+        }
+        for (index, frame) in self.frames.chunks_exact(channels).enumerate() {
+            let frame: [f64; C] = load(frame, offset);
+            for (target, value) in targets.iter_mut().zip(frame) {
+                target[index] = value;
             }
         }
     }
 }
 
-/// The last frame and those before it, backwards.
-fn last(frames: &[f64], channels: usize) -> Vec<f64> {
-    frames.rchunks_exact(channels).take(CONTINUED + 1).flatten().copied().collect()
-}
-
-/// All frames but the first, reflected at that one.
-fn reflected(frames: &[f64], channels: usize) -> Vec<Vec<f64>> {
-    let (edge, others) = frames.split_at(channels);
-    let reflect = |frame: &[f64]| edge.iter().zip(frame).map(|(edge, value)| 2.0 * edge - value).collect();
-    others.chunks_exact(channels).map(reflect).collect()
+/// Values reflected at one of them, 2x₀ − xₖ.
+fn reflected(edge: f64, values: &[f64]) -> impl DoubleEndedIterator<Item = f64> + '_ {
+    values.iter().map(move |value| 2.0 * edge - value)
 }

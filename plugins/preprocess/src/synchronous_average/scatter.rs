@@ -1,0 +1,130 @@
+//! Covariance of single turns across channels, one harmonic at a time, in one pass.
+
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
+
+use runout_core::{
+    Complex64,
+    numerics::lanes::{NullaryFnOnce, load, vectorised},
+};
+
+/// Orders that are worked on at once.
+const LANES: usize = 4;
+
+/// Sums and products over turns, taken from the first one: what is left is the turns' scatter, so that no digits are lost
+/// where the scatter is far below the signal.
+///
+/// Real and imaginary parts stand apart, in planes `[channel][re, im][order]`.
+pub(super) struct Scatter {
+    channels: usize,
+    orders: usize,
+    /// Length of a plane: the orders, and as many zeros as fill the last lanes.
+    plane: usize,
+    turns: usize,
+    /// The first turn, `[order][channel]`.
+    pivot: Vec<Complex64>,
+    /// The turn under work less the pivot, d.
+    turn: Vec<f64>,
+    /// Σ d.
+    sum: Vec<f64>,
+    /// Σ d dᴴ on and below the diagonal, `[row][column ≤ row][re, im][order]`.
+    products: Vec<f64>,
+}
+
+impl Scatter {
+    pub(super) fn new(orders: usize, channels: usize) -> Self {
+        let plane = orders.next_multiple_of(LANES);
+        let values = 2 * channels * plane;
+        Self {
+            channels,
+            orders,
+            plane,
+            turns: 0,
+            pivot: Vec::new(),
+            turn: vec![0.0; values],
+            sum: vec![0.0; values],
+            products: vec![0.0; 2 * triangle(channels) * plane],
+        }
+    }
+
+    /// Takes one turn's harmonics, `[order][channel]`.
+    pub(super) fn add(&mut self, turn: &[Complex64]) {
+        self.turns += 1;
+        if self.pivot.is_empty() {
+            self.pivot.extend_from_slice(turn);
+            return;
+        }
+        let (channels, plane) = (self.channels, self.plane);
+        for (channel, planes) in self.turn.chunks_exact_mut(2 * plane).enumerate() {
+            let (re, im) = planes.split_at_mut(plane);
+            let pairs = turn[channel..].iter().step_by(channels).zip(self.pivot[channel..].iter().step_by(channels));
+            for ((turn, pivot), (re, im)) in pairs.zip(re.iter_mut().zip(im)) {
+                *re = turn.re - pivot.re;
+                *im = turn.im - pivot.im;
+            }
+        }
+        vectorised(Summing(self));
+    }
+
+    /// 1/(T−1) Σ (cₜ − mean)(cₜ − mean)ᴴ, `[order][channel][channel]`; `None` below two turns.
+    pub(super) fn covariance(&self) -> Option<Vec<Complex64>> {
+        if self.turns < 2 {
+            return None;
+        }
+        let (channels, turns) = (self.channels, self.turns as f64);
+        let mut covariance = vec![Complex64::ZERO; self.orders * channels * channels];
+        for (order, covariance) in covariance.chunks_exact_mut(channels * channels).enumerate() {
+            let sum = |channel| self.at(&self.sum, order, channel);
+            for row in 0..channels {
+                for column in 0..=row {
+                    let products = self.at(&self.products, order, triangle(row) + column);
+                    let value = (products - sum(row) * sum(column).conj() / turns) / (turns - 1.0);
+                    covariance[column * channels + row] = value.conj();
+                    covariance[row * channels + column] = value;
+                }
+                covariance[row * channels + row].im = 0.0;
+            }
+        }
+        Some(covariance)
+    }
+
+    /// A number of a pair of planes.
+    fn at(&self, planes: &[f64], order: usize, pair: usize) -> Complex64 {
+        let re = 2 * pair * self.plane + order;
+        Complex64::new(planes[re], planes[re + self.plane])
+    }
+}
+
+/// A turn on its way into the sums.
+struct Summing<'a>(&'a mut Scatter);
+
+impl NullaryFnOnce for Summing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Scatter { channels, plane, turn, sum, products, .. } = self.0;
+        for (sum, value) in sum.iter_mut().zip(&*turn) {
+            *sum += value;
+        }
+        let mut products = products.chunks_exact_mut(2 * *plane);
+        for row in 0..*channels {
+            for column in 0..=row {
+                let Some((re, im)) = products.next().map(|pair| pair.split_at_mut(*plane)) else { return };
+                let [a, b] = [row, column].map(|channel| turn[2 * channel * *plane..][..2 * *plane].split_at(*plane));
+                for first in (0..*plane).step_by(LANES) {
+                    let [a_re, a_im, b_re, b_im] = [a.0, a.1, b.0, b.1].map(|part| load::<LANES>(part, first));
+                    let (re, im) = (&mut re[first..first + LANES], &mut im[first..first + LANES]);
+                    for lane in 0..LANES {
+                        re[lane] += a_re[lane] * b_re[lane] + a_im[lane] * b_im[lane];
+                        im[lane] += a_im[lane] * b_re[lane] - a_re[lane] * b_im[lane];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Entries on and below the diagonal of a square matrix.
+fn triangle(size: usize) -> usize {
+    size * (size + 1) / 2
+}
