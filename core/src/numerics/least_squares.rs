@@ -90,21 +90,35 @@ impl PivotedQr {
     #[must_use]
     pub fn operator(&self, weights: Option<&[Complex64]>) -> Vec<Complex64> {
         let (rows, cols) = (self.rows, self.cols);
+        // Qᴴ·W, `[row][row]`, all columns side by side.
+        let mut work = weights.map_or_else(|| identity(rows), <[Complex64]>::to_vec);
+        let mut dots = vec![Complex64::ZERO; rows];
+        for (step, (lead, tau)) in self.reflectors.iter().enumerate() {
+            let reflector = |row: usize| if row == step { *lead } else { self.factors[row * cols + step] };
+            dots.fill(Complex64::ZERO);
+            for (row, source) in work.chunks_exact(rows).enumerate().skip(step) {
+                let factor = reflector(row).conj() * *tau;
+                dots.iter_mut().zip(source).for_each(|(dot, value)| *dot += factor * value);
+            }
+            for (row, target) in work.chunks_exact_mut(rows).enumerate().skip(step) {
+                let factor = reflector(row);
+                target.iter_mut().zip(&dots).for_each(|(value, dot)| *value -= factor * dot);
+            }
+        }
+        // R⁻¹ of the first rows.
         let mut operator = vec![Complex64::ZERO; cols * rows];
-        let mut column = vec![Complex64::ZERO; rows];
-        for source in 0..rows {
-            if let Some(weights) = weights {
-                column.iter_mut().zip(weights.iter().skip(source).step_by(rows)).for_each(|(to, from)| *to = *from);
-            } else {
-                column.fill(Complex64::ZERO);
-                column[source] = Complex64::ONE;
+        for row in (0..self.rank).rev() {
+            let (above, below) = work.split_at_mut((row + 1) * rows);
+            let solved = &mut above[row * rows..];
+            for (col, other) in (row + 1..self.rank).zip(below.chunks_exact(rows)) {
+                let factor = self.factors[row * cols + col];
+                solved.iter_mut().zip(other).for_each(|(value, other)| *value -= factor * other);
             }
-            self.apply_adjoint(&mut column);
-            self.back_substitute(&mut column);
-            for (position, value) in column[..self.rank].iter().enumerate() {
-                let col = self.pivots[position];
-                operator[col * rows + source] = value * self.scale[col];
-            }
+            let inverse = self.factors[row * cols + row].inv();
+            solved.iter_mut().for_each(|value| *value *= inverse);
+            let col = self.pivots[row];
+            let target = &mut operator[col * rows..(col + 1) * rows];
+            target.iter_mut().zip(solved).for_each(|(to, value)| *to = *value * self.scale[col]);
         }
         operator
     }
@@ -158,20 +172,6 @@ impl PivotedQr {
         observable
     }
 
-    fn apply_adjoint(&self, column: &mut [Complex64]) {
-        for (step, (lead, tau)) in self.reflectors.iter().enumerate() {
-            let mut dot = lead.conj() * column[step];
-            for row in step + 1..self.rows {
-                dot += self.factors[row * self.cols + step].conj() * column[row];
-            }
-            let dot = dot * *tau;
-            column[step] -= lead * dot;
-            for row in step + 1..self.rows {
-                column[row] -= self.factors[row * self.cols + step] * dot;
-            }
-        }
-    }
-
     fn back_substitute(&self, column: &mut [Complex64]) {
         for row in (0..self.rank).rev() {
             let mut value = column[row];
@@ -181,6 +181,12 @@ impl PivotedQr {
             column[row] = value / self.factors[row * self.cols + row];
         }
     }
+}
+
+fn identity(size: usize) -> Vec<Complex64> {
+    let mut identity = vec![Complex64::ZERO; size * size];
+    identity.iter_mut().step_by(size + 1).for_each(|entry| *entry = Complex64::ONE);
+    identity
 }
 
 /// Lower Cholesky factor L (`[row][col]`) of a Hermitian matrix, L·Lᴴ; `None` where it is not positive definite.

@@ -1,6 +1,6 @@
 //! The layout of a rig: which combination of form and motion each sensor reads in each setup, one order at a time.
 
-use std::f64::consts::FRAC_PI_2;
+use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 pub use runout_core::separation::UM_PER_MM_URAD;
 use runout_core::{
@@ -10,7 +10,10 @@ use runout_core::{
     separation::{Assessment, OrderAssessment, Quantity},
 };
 
-use crate::effects::Alterations;
+use crate::{
+    effects::Alterations,
+    systems::{System, Systems},
+};
 
 /// A column adds to the rank when more than this of it (relative) lies outside the others' span. Rounding of
 /// e^{inθ} at order 10 000 is 1e-12; a sensor misplaced by a nanometre on 30 mm gives 3e-8.
@@ -41,6 +44,7 @@ pub struct Layout {
     sections: Vec<usize>,
     setups: usize,
     odd_motion: bool,
+    systems: Systems,
 }
 
 /// One sensor in one setup.
@@ -125,13 +129,14 @@ impl Layout {
             sections,
             setups: rig.setups.len(),
             odd_motion,
+            systems: Systems::default(),
         }
     }
 
     /// The same layout, with a limit on the noise that an order may carry.
     #[must_use]
     pub fn limited_to(self, max_noise_gain: f64) -> Self {
-        Self { max_noise_gain, ..self }
+        Self { max_noise_gain, systems: Systems::default(), ..self }
     }
 
     /// Places of the forms among the unknowns.
@@ -237,6 +242,12 @@ impl Layout {
                 .collect::<Vec<_>>()
         };
         self.readings.iter().flat_map(row).collect()
+    }
+
+    /// The equations of an order from 1; worked out once.
+    #[must_use]
+    pub fn system(&self, order: usize) -> Arc<System> {
+        self.systems.of(self, order)
     }
 
     /// Factors one order's matrix, rows weighted where `weights` (`[reading][reading]`) is given.

@@ -7,6 +7,7 @@ pub mod plan;
 pub mod selection;
 pub mod separators;
 pub mod simulate;
+pub mod systems;
 
 use runout_core::pipeline::{Registry, registry::Plugin};
 use separators::{

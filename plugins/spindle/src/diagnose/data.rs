@@ -15,7 +15,7 @@ use crate::{
     layout::Layout,
     selection::Selection,
     separators::{
-        Readings, apply, harmonic_least_squares::order_operators, leftover, product, smooth, variances, whitening,
+        Readings, apply, expected_weighted_squares, harmonic_least_squares::order_operators, smooth, whitening,
     },
 };
 
@@ -198,10 +198,9 @@ fn floor(layout: &Layout, readings: &Readings, weights: &[Vec<Complex64>]) -> Ve
     for order in 1..=readings.max_order {
         let operator = &operators[order - 1];
         let dof = count - operator.rank;
-        let Some(covariance) = readings.order_covariance(order).filter(|_| dof > 0) else { continue };
-        let matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
-        let left = product(&weights[order - 1], &leftover(&matrix, &operator.operator, count), count);
-        sums[order - 1] = variances(&left, &covariance, count).iter().sum();
+        let Some(spread) = readings.spread(order).filter(|_| dof > 0) else { continue };
+        let system = layout.system(order);
+        sums[order - 1] = expected_weighted_squares(&system, &operator.operator, &weights[order - 1], &spread);
         dofs[order - 1] = dof as f64;
     }
     let mean = |from: usize, to: usize| {

@@ -138,8 +138,8 @@ impl Solved {
         let count = corrected.count;
         let whitened = (1..=max_order)
             .map(|order| {
-                let matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
-                let left = leftover(&matrix, &operators.orders[order - 1].operator, count);
+                let system = layout.system(order);
+                let left = leftover(&system.matrix, &operators.orders[order - 1].operator, count);
                 let mut left = product(&weights[order - 1], &left, count);
                 // A real degree of freedom has half of a complex one's square.
                 let scale = std::f64::consts::SQRT_2 / data.floor_std(order);
@@ -245,9 +245,9 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
     for order in 1..=held.max_order.min(solved.corrected.max_order) {
         let at = order * count..(order + 1) * count;
         let operator = &solved.operators.orders[order - 1].operator;
-        let matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
+        let system = layout.system(order);
         let solution = apply(operator, &solved.linear[at.clone()]);
-        let predicted = apply(&matrix, &solution);
+        let predicted = apply(&system.matrix, &solution);
         let beyond = solved.corrected.mean[at.clone()].iter().zip(&solved.linear[at.clone()]).map(|(a, b)| a - b);
         let left: Vec<Complex64> = held.mean[at]
             .iter()

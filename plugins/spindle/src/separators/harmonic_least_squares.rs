@@ -17,6 +17,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
+    algebra::weigh,
     closed_form::{checked_gain, yes},
     projection::projection,
     readings::Readings,
@@ -142,7 +143,7 @@ pub fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> 
     };
     Operators {
         orders: order_operators(layout, readings.max_order, weights.as_deref()),
-        observable: (1..=readings.max_order).map(|order| layout.observable(order)).collect(),
+        observable: (1..=readings.max_order).map(|order| layout.system(order).observable.clone()).collect(),
         weights,
     }
 }
@@ -150,24 +151,14 @@ pub fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> 
 /// Least-squares operators of orders from 1, with W of each order where readings are weighted.
 #[must_use]
 pub fn order_operators(layout: &Layout, max_order: usize, weights: Option<&[Vec<Complex64>]>) -> Vec<OrderOperator> {
-    let count = layout.readings.len();
     let solve = |order: usize| {
-        let (columns, matrix) = if order == 1 {
-            (layout.first_order_unknowns().len(), layout.first_order_matrix())
-        } else {
-            (layout.unknowns.len(), layout.matrix(order))
-        };
+        let system = layout.system(order);
+        let (columns, matrix) = (system.columns, &system.matrix);
         let Some(weights) = weights.map(|weights| &weights[order - 1]) else {
-            let qr = layout.factor_matrix(columns, &matrix);
+            let qr = layout.factor_matrix(columns, matrix);
             return OrderOperator { operator: qr.operator(None), rank: qr.rank() };
         };
-        let mut weighted = vec![Complex64::ZERO; matrix.len()];
-        for (row, target) in weighted.chunks_exact_mut(columns).enumerate() {
-            for (source, weight) in weights[row * count..(row + 1) * count].iter().enumerate() {
-                let from = &matrix[source * columns..(source + 1) * columns];
-                target.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
-            }
-        }
+        let weighted = weigh(weights, matrix, columns);
         let qr = layout.factor_matrix(columns, &weighted);
         OrderOperator { operator: qr.operator(Some(weights)), rank: qr.rank() }
     };

@@ -1,5 +1,6 @@
 //! Separators: each gives one linear operator an order; solving, second-order geometry and uncertainty are shared.
 
+mod algebra;
 pub mod closed_form;
 pub mod donaldson_reversal;
 pub mod four_sensor_reversal;
@@ -14,7 +15,8 @@ mod swapped_setups;
 pub mod three_point;
 mod weights;
 
+pub(crate) use algebra::{apply, expected_weighted_squares, leftover, product};
 pub(crate) use readings::Readings;
 pub(crate) use second_order::{OVERSAMPLING, interpolate};
-pub(crate) use solution::{Estimate, Operators, Solver, apply, leftover, product, variances};
+pub(crate) use solution::{Estimate, Operators, Solver};
 pub(crate) use weights::{smooth, whitening};

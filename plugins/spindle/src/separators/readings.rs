@@ -106,19 +106,47 @@ impl Readings {
         &self.mean[order * self.count..(order + 1) * self.count]
     }
 
-    /// Covariance of one order across all readings, `[reading][reading]`: setups are independent of each other.
+    /// Covariance of one order's readings, where it is known.
     #[must_use]
-    pub fn order_covariance(&self, order: usize) -> Option<Vec<Complex64>> {
+    pub fn spread(&self, order: usize) -> Option<Spread<'_>> {
         let setups = self.covariance.as_ref()?;
         let sensors = self.count / setups.len();
-        let mut joined = vec![Complex64::ZERO; self.count * self.count];
-        for (setup, matrices) in setups.iter().enumerate() {
-            let matrix = &matrices[order * sensors * sensors..(order + 1) * sensors * sensors];
-            for row in 0..sensors {
-                let start = (setup * sensors + row) * self.count + setup * sensors;
-                joined[start..start + sensors].copy_from_slice(&matrix[row * sensors..(row + 1) * sensors]);
+        let block = sensors * sensors;
+        Some(Spread::new(sensors, setups.iter().map(|orders| &orders[order * block..(order + 1) * block]).collect()))
+    }
+}
+
+/// Covariance Σ of one order's readings: setups are independent of each other.
+pub struct Spread<'a> {
+    sensors: usize,
+    /// `[sensor][sensor]` of each setup.
+    setups: Vec<&'a [Complex64]>,
+}
+
+impl<'a> Spread<'a> {
+    /// From the matrices of the setups, `[sensor][sensor]`.
+    #[must_use]
+    pub fn new(sensors: usize, setups: Vec<&'a [Complex64]>) -> Self {
+        Self { sensors, setups }
+    }
+
+    /// tr Σ.
+    #[must_use]
+    pub fn trace(&self) -> f64 {
+        self.setups.iter().flat_map(|block| block.iter().step_by(self.sensors + 1)).map(|entry| entry.re).sum()
+    }
+
+    /// M·Σ for M, both `[row][reading]`.
+    #[must_use]
+    pub fn times(&self, matrix: &[Complex64]) -> Vec<Complex64> {
+        let sensors = self.sensors;
+        let mut product = vec![Complex64::ZERO; matrix.len()];
+        let rows = matrix.chunks_exact(sensors).zip(product.chunks_exact_mut(sensors));
+        for ((row, target), block) in rows.zip(self.setups.iter().cycle()) {
+            for (entry, source) in row.iter().zip(block.chunks_exact(sensors)) {
+                target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
             }
         }
-        Some(joined)
+        product
     }
 }

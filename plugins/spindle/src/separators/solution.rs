@@ -7,7 +7,12 @@ use runout_core::{
     stage::Station,
 };
 
-use super::{readings::Readings, second_order::SecondOrder, swapped_setups, weights};
+use super::{
+    algebra::{apply, expected_squares, expected_weighted_squares, times_adjoint},
+    readings::Readings,
+    second_order::SecondOrder,
+    swapped_setups, weights,
+};
 use crate::{
     layout::{FirstOrder, Layout},
     selection::Selection,
@@ -194,17 +199,18 @@ impl Solver<'_> {
                 continue;
             }
             dof += count - rank;
-            let matrix = if order == 1 { self.layout.first_order_matrix() } else { self.layout.matrix(order) };
-            let left = leftover(&matrix, operator, count);
-            let residual = apply(&left, &linear[order * count..(order + 1) * count]);
+            let system = self.layout.system(order);
+            let recorded = &linear[order * count..(order + 1) * count];
+            let fitted = apply(&system.matrix, &apply(operator, recorded));
+            let residual: Vec<Complex64> =
+                recorded.iter().zip(fitted).map(|(recorded, fitted)| recorded - fitted).collect();
             squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
-            match readings.order_covariance(order) {
-                Some(covariance) => {
-                    expected += variances(&left, &covariance, count).iter().sum::<f64>();
+            match readings.spread(order) {
+                Some(spread) => {
+                    expected += expected_squares(&system, operator, &spread);
                     if let Some(weights) = operators.weights.as_ref().map(|weights| &weights[order - 1]) {
                         weighted += apply(weights, &residual).iter().map(Complex64::norm_sqr).sum::<f64>();
-                        let left = product(weights, &left, count);
-                        weighted_expected += variances(&left, &covariance, count).iter().sum::<f64>();
+                        weighted_expected += expected_weighted_squares(&system, operator, weights, &spread);
                     }
                 }
                 None => known = false,
@@ -255,10 +261,10 @@ impl Solver<'_> {
                 let forms = layout.unknowns.iter().zip(&mut solved).filter(|(unknown, _)| unknown.is_form());
                 forms.for_each(|(_, form)| *form = form.conj());
             }
-            let spread = readings.order_covariance(order).map(|covariance| {
+            let spread = readings.spread(order).map(|spread| {
                 let mut operator = self.order_operator(operators, order, count);
                 to_reference.apply(&mut operator);
-                covariances(&operator, &covariance, count)
+                times_adjoint(&spread.times(&operator), &operator, count)
             });
             if let (Some(spread), Some(joint)) = (&spread, &mut motion_covariance) {
                 let entry = |row: &usize, column: &usize| spread[row * width + column];
@@ -309,66 +315,4 @@ impl Solver<'_> {
         let width = self.layout.unknowns.len();
         (0..width).flat_map(|unknown| columns.iter().map(move |column| column[unknown])).collect()
     }
-}
-
-/// Matrix (`[row][col]`) times vector.
-pub fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
-    matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
-}
-
-/// Product of two square matrices.
-pub fn product(left: &[Complex64], right: &[Complex64], size: usize) -> Vec<Complex64> {
-    let mut product = vec![Complex64::ZERO; size * size];
-    for (row, target) in left.chunks_exact(size).zip(product.chunks_exact_mut(size)) {
-        for (factor, source) in row.iter().zip(right.chunks_exact(size)) {
-            target.iter_mut().zip(source).for_each(|(to, from)| *to += factor * from);
-        }
-    }
-    product
-}
-
-/// I − A·P, `[reading][reading]`.
-pub fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usize) -> Vec<Complex64> {
-    let width = operator.len() / count;
-    let mut left = vec![Complex64::ZERO; count * count];
-    for row in 0..count {
-        left[row * count + row] = Complex64::ONE;
-        for unknown in 0..width {
-            let entry = matrix[row * width + unknown];
-            for col in 0..count {
-                left[row * count + col] -= entry * operator[unknown * count + col];
-            }
-        }
-    }
-    left
-}
-
-/// M·Σ·Mᴴ for M (`[row][reading]`), `[row][row]`.
-fn covariances(matrix: &[Complex64], covariance: &[Complex64], count: usize) -> Vec<Complex64> {
-    let rows = matrix.len() / count;
-    let mut found = vec![Complex64::ZERO; rows * rows];
-    for (row, entries) in matrix.chunks_exact(count).enumerate() {
-        let spread: Vec<Complex64> = (0..count)
-            .map(|column| (0..count).map(|inner| entries[inner] * covariance[inner * count + column]).sum())
-            .collect();
-        for (column, other) in matrix.chunks_exact(count).enumerate().take(row + 1) {
-            let value: Complex64 = spread.iter().zip(other).map(|(spread, other)| spread * other.conj()).sum();
-            found[column * rows + row] = value.conj();
-            found[row * rows + column] = value;
-        }
-    }
-    found
-}
-
-/// Diagonal of M·Σ·Mᴴ for M (`[row][reading]`).
-pub fn variances(matrix: &[Complex64], covariance: &[Complex64], count: usize) -> Vec<f64> {
-    matrix
-        .chunks_exact(count)
-        .map(|row| {
-            let spread = |col: usize| -> Complex64 {
-                (0..count).map(|inner| row[inner] * covariance[inner * count + col]).sum()
-            };
-            (0..count).map(|col| (spread(col) * row[col].conj()).re).sum::<f64>().max(0.0)
-        })
-        .collect()
 }

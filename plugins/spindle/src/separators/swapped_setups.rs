@@ -3,8 +3,9 @@
 use runout_core::{Complex64, rig::Rig};
 
 use super::{
+    algebra::{apply, leftover},
     readings::Readings,
-    solution::{Operators, apply, leftover},
+    solution::Operators,
 };
 use crate::layout::Layout;
 

@@ -1,0 +1,54 @@
+//! The equations of single orders, worked out once: every station of a run asks for the same.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use runout_core::Complex64;
+
+use crate::layout::Layout;
+
+/// Orders that are kept, from 1: with 10 000 orders and eight sensors in three setups a few megabytes.
+const KEPT: usize = 10_000;
+
+/// The equations of one order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct System {
+    /// Unknowns: at order 1, [its own](Layout::first_order_unknowns).
+    pub columns: usize,
+    /// `[reading][unknown]`.
+    pub matrix: Vec<Complex64>,
+    /// Whether each of the layout's unknowns can be told.
+    pub observable: Vec<bool>,
+}
+
+/// Those that were asked for. A copy begins empty, as copies are made to be changed.
+#[derive(Debug, Default)]
+pub(crate) struct Systems(Mutex<Vec<Arc<System>>>);
+
+impl Clone for Systems {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl Systems {
+    /// The equations of an order from 1.
+    pub(crate) fn of(&self, layout: &Layout, order: usize) -> Arc<System> {
+        let work_out = |order: usize| {
+            let (columns, matrix) = if order == 1 {
+                (layout.first_order_unknowns().len(), layout.first_order_matrix())
+            } else {
+                (layout.unknowns.len(), layout.matrix(order))
+            };
+            Arc::new(System { columns, matrix, observable: layout.observable(order) })
+        };
+        if order > KEPT {
+            return work_out(order);
+        }
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        while known.len() < order {
+            let next = known.len() + 1;
+            known.push(work_out(next));
+        }
+        Arc::clone(&known[order - 1])
+    }
+}
