@@ -3,6 +3,7 @@
 mod capture;
 mod coding;
 pub mod loader;
+mod rows;
 pub mod samples;
 mod stream;
 mod truth;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use bytemuck::Pod;
 use hdf5_metno::{Dataset, H5Type};
 use ndarray::s;
 use runout_core::{
@@ -14,12 +15,13 @@ use runout_core::{
 
 use super::{
     capture::{CaptureSource, Phase},
+    rows::Rows,
     samples::SampleType,
 };
 use crate::node::Place;
 
-/// Instants in a block: four channels of f64 then take 256 KiB, of which a core's own cache holds two.
-const BLOCK_SAMPLES: usize = 8192;
+/// Instants in a block: four channels of f64 then take 512 KiB, and threads meet seldom.
+const BLOCK_SAMPLES: usize = 16384;
 
 /// A block never takes more elements than this, even where the file's chunks are larger.
 const BLOCK_ELEMENTS: usize = 1 << 24;
@@ -36,12 +38,11 @@ struct Column {
 /// An opened capture.
 pub(super) struct Hdf5Stream {
     capture: Capture,
-    dataset: Dataset,
-    place: Place,
+    rows: Rows,
     kind: SampleType,
-    first_column: usize,
     read_columns: usize,
     columns: Vec<Column>,
+    is_plain: bool,
     encoder: Option<(Dataset, Place, EncoderScan)>,
     block_samples: usize,
     next: usize,
@@ -92,48 +93,38 @@ impl Hdf5Stream {
             (Phase::Angle(dataset, place), Some(scan)) => Some((dataset, place, scan)),
             _ => None,
         };
-        let read_columns = last_column + 1 - first_column;
+        let read = first_column..last_column + 1;
+        let plain =
+            |(index, column): (usize, &Column)| column.offset == index && (column.gain, column.zero_um) == (1.0, 0.0);
+        let block_samples = block_samples(source.dataset.chunk().as_deref(), read.len());
+        let rows = match stored.kind {
+            SampleType::F64 => Rows::new::<f64>,
+            SampleType::F32 => Rows::new::<f32>,
+            SampleType::I16 => Rows::new::<i16>,
+            SampleType::I32 => Rows::new::<i32>,
+        };
         Ok(Self {
-            block_samples: block_samples(source.dataset.chunk().as_deref(), read_columns),
+            block_samples,
             samples: stored.samples,
             kind: stored.kind,
             capture,
-            dataset: source.dataset,
-            place: source.samples_place,
-            first_column,
-            read_columns,
+            rows: rows(source.dataset, source.samples_place, read.clone())?,
+            read_columns: read.len(),
+            is_plain: columns.len() == read.len() && columns.iter().enumerate().all(plain),
             columns,
             encoder,
             next: 0,
         })
     }
 
-    /// Rows as they are stored.
-    fn codes<T: H5Type>(&self, rows: &Range<usize>) -> Result<Vec<T>> {
-        let columns = self.first_column..self.first_column + self.read_columns;
-        let codes = self.dataset.read_slice_2d::<T, _>(s![rows.clone(), columns]).map_err(|error| {
-            self.place.error(format!("samples {} to {}: {error}", rows.start, rows.end.saturating_sub(1)))
-        })?;
-        // A fresh array in the order of rows begins where its memory does.
-        let ordered = codes.is_standard_layout();
-        let (flat, _) = codes.into_raw_vec_and_offset();
-        if ordered { Ok(flat) } else { Err(self.place.error("the samples came in another order")) }
-    }
-
     /// Rows in µm.
-    fn read<T: H5Type + Copy + Into<f64>>(&self, rows: &Range<usize>, to: &mut Vec<f64>) -> Result<()> {
-        let codes = self.codes::<T>(rows)?;
+    fn read<T: H5Type + Pod + Into<f64>>(&mut self, rows: &Range<usize>, to: &mut Vec<f64>) -> Result<()> {
+        let mut codes = Vec::<T>::new();
+        self.rows.read(rows, &mut codes)?;
         to.resize(rows.len() * self.columns.len(), 0.0);
         let mut scaling = Scaling { codes: &codes, read_columns: self.read_columns, columns: &self.columns, to };
         in_lanes(self.columns.len(), &mut scaling);
         Ok(())
-    }
-
-    /// Whether what is stored is what is read.
-    fn is_plain(&self) -> bool {
-        let plain =
-            |(index, column): (usize, &Column)| column.offset == index && (column.gain, column.zero_um) == (1.0, 0.0);
-        self.columns.len() == self.read_columns && self.columns.iter().enumerate().all(plain)
     }
 }
 
@@ -178,6 +169,8 @@ impl SampleStream for Hdf5Stream {
     }
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
+        // Not cleared: what is read over needs no zeros.
+        let mut samples = std::mem::take(&mut block.samples);
         block.clear();
         block.start = self.next as u64;
         let rows = self.next..self.samples.min(self.next + self.block_samples);
@@ -185,12 +178,13 @@ impl SampleStream for Hdf5Stream {
             return Ok(false);
         }
         match self.kind {
-            SampleType::F64 if self.is_plain() => block.samples = self.codes(&rows)?,
-            SampleType::F64 => self.read::<f64>(&rows, &mut block.samples)?,
-            SampleType::F32 => self.read::<f32>(&rows, &mut block.samples)?,
-            SampleType::I16 => self.read::<i16>(&rows, &mut block.samples)?,
-            SampleType::I32 => self.read::<i32>(&rows, &mut block.samples)?,
+            SampleType::F64 if self.is_plain => self.rows.read(&rows, &mut samples)?,
+            SampleType::F64 => self.read::<f64>(&rows, &mut samples)?,
+            SampleType::F32 => self.read::<f32>(&rows, &mut samples)?,
+            SampleType::I16 => self.read::<i16>(&rows, &mut samples)?,
+            SampleType::I32 => self.read::<i32>(&rows, &mut samples)?,
         }
+        block.samples = samples;
         if let Some((dataset, place, scan)) = &self.encoder {
             let angles = dataset.read_slice_1d::<f64, _>(s![rows.clone()]).map_err(|error| place.error(error))?;
             block.angle_rev.extend(angles.iter().map(|angle_deg| scan.turns(*angle_deg)));

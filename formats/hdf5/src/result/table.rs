@@ -12,6 +12,8 @@ use runout_core::{
 
 use crate::node;
 
+use Contents::{Measured, Repeated};
+
 /// A name in a table.
 pub(super) type Name = FixedUnicode<NAME_BYTES>;
 /// Longest name in UTF-8: names that repeat on every row compress to nothing only at a fixed length.
@@ -34,6 +36,15 @@ pub(super) fn name(text: &str) -> Result<Name> {
     text.parse().map_err(|_| format!("a name must be of at most {NAME_BYTES} bytes without NUL: `{text}`").into())
 }
 
+/// What stands in a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Contents {
+    /// The same again and again, which packs to little.
+    Repeated,
+    /// Measured numbers: packing takes longer than all the work on a station, and saves a tenth.
+    Measured,
+}
+
 struct Column<T> {
     dataset: Dataset,
     rows: usize,
@@ -41,14 +52,17 @@ struct Column<T> {
 }
 
 impl<T: H5Type> Column<T> {
-    fn create(group: &Group, name: &str, unit: &str, meaning: &str) -> Result<Self> {
+    fn create(group: &Group, name: &str, unit: &str, contents: Contents, meaning: &str) -> Result<Self> {
         // Rows come in order: only the last chunk is ever written again. The library's own cache keeps megabytes of
         // each column.
         let bytes = CHUNK_ROWS * size_of::<T>();
-        let builder = group.new_dataset_builder().chunk(CHUNK_ROWS);
-        // Of numbers, the first bytes are alike from row to row; names are alike as a whole.
-        let builder = if size_of::<T>() > size_of::<f64>() { builder } else { builder.shuffle() };
-        let builder = builder.deflate(DEFLATE).chunk_cache(1, bytes, 1.0);
+        let builder = group.new_dataset_builder().chunk(CHUNK_ROWS).chunk_cache(1, bytes, 1.0);
+        let builder = match contents {
+            Contents::Measured => builder,
+            // Of numbers, the first bytes are alike from row to row; names are alike as a whole.
+            Contents::Repeated if size_of::<T>() > size_of::<f64>() => builder.deflate(DEFLATE),
+            Contents::Repeated => builder.shuffle().deflate(DEFLATE),
+        };
         let dataset = builder.empty::<T>().shape(0..).create(name)?;
         node::put_text(&dataset, "unit", unit)?;
         node::put_text(&dataset, "meaning", meaning)?;
@@ -94,17 +108,18 @@ impl FormTable {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("form")?;
         Ok(Self {
-            section: Column::create(&group, "section", "", "id of the section")?,
-            station: Column::create(&group, "station", "", STATION)?,
-            z_mm: Column::create(&group, "z_mm", "mm", "place of the section along the axis")?,
-            angle_deg: Column::create(&group, "angle_deg", "deg", "the part's own angle")?,
+            section: Column::create(&group, "section", "", Repeated, "id of the section")?,
+            station: Column::create(&group, "station", "", Repeated, STATION)?,
+            z_mm: Column::create(&group, "z_mm", "mm", Repeated, "place of the section along the axis")?,
+            angle_deg: Column::create(&group, "angle_deg", "deg", Repeated, "the part's own angle")?,
             form_um: Column::create(
                 &group,
                 "form_um",
                 "um",
+                Measured,
                 "deviation of the section's form, outward positive; orders that are lost are left out",
             )?,
-            std_um: Column::create(&group, "std_um", "um", &std_of("form_um"))?,
+            std_um: Column::create(&group, "std_um", "um", Repeated, &std_of("form_um"))?,
         })
     }
 
@@ -139,13 +154,13 @@ impl MotionTable {
         let group = file.create_group("motion")?;
         let pair = |(quantity, name, what): &(Quantity, &str, &str)| {
             let meaning = format!("{what}; orders that are lost are left out; NaN where it was not solved for");
-            let value = Column::create(&group, name, quantity.unit(), &meaning)?;
-            let std = Column::create(&group, &format!("std_{name}"), quantity.unit(), &std_of(name))?;
+            let value = Column::create(&group, name, quantity.unit(), Measured, &meaning)?;
+            let std = Column::create(&group, &format!("std_{name}"), quantity.unit(), Repeated, &std_of(name))?;
             Ok([value, std])
         };
         Ok(Self {
-            station: Column::create(&group, "station", "", STATION)?,
-            angle_deg: Column::create(&group, "angle_deg", "deg", "the spindle's angle")?,
+            station: Column::create(&group, "station", "", Repeated, STATION)?,
+            angle_deg: Column::create(&group, "angle_deg", "deg", Repeated, "the spindle's angle")?,
             motions: MOTION.iter().map(pair).collect::<Result<_>>()?,
         })
     }
@@ -192,19 +207,26 @@ impl HarmonicsTable {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("harmonics")?;
         Ok(Self {
-            quantity: Column::create(&group, "quantity", "", "form, x, y, tilt_x or tilt_y")?,
-            section: Column::create(&group, "section", "", "id of the section; empty for motion")?,
-            station: Column::create(&group, "station", "", STATION)?,
-            order: Column::create(&group, "order", "1/rev", "undulations per revolution")?,
-            re: Column::create(&group, "re", MIXED, "real part of c; NaN where the layout cannot tell it")?,
-            im: Column::create(&group, "im", MIXED, "imaginary part of c; NaN where the layout cannot tell it")?,
+            quantity: Column::create(&group, "quantity", "", Repeated, "form, x, y, tilt_x or tilt_y")?,
+            section: Column::create(&group, "section", "", Repeated, "id of the section; empty for motion")?,
+            station: Column::create(&group, "station", "", Repeated, STATION)?,
+            order: Column::create(&group, "order", "1/rev", Repeated, "undulations per revolution")?,
+            re: Column::create(&group, "re", MIXED, Measured, "real part of c; NaN where the layout cannot tell it")?,
+            im: Column::create(
+                &group,
+                "im",
+                MIXED,
+                Measured,
+                "imaginary part of c; NaN where the layout cannot tell it",
+            )?,
             std: Column::create(
                 &group,
                 "std",
                 MIXED,
+                Measured,
                 "sqrt(E|delta|^2) of the complex coefficient c, both parts together, from the scatter; NaN if not known",
             )?,
-            observable: Column::create(&group, "observable", "", "whether the layout can tell this order")?,
+            observable: Column::create(&group, "observable", "", Repeated, "whether the layout can tell this order")?,
         })
     }
 
@@ -251,7 +273,7 @@ mod tests {
     fn a_column_caches_its_last_chunk_and_no_more() {
         let folder = tempfile::tempdir().unwrap();
         let file = File::create(folder.path().join("table.h5")).unwrap();
-        let mut column = Column::<f64>::create(&file, "z_mm", "mm", "").unwrap();
+        let mut column = Column::<f64>::create(&file, "z_mm", "mm", Repeated, "").unwrap();
         let rows: Vec<f64> = (0..3 * CHUNK_ROWS + 7).map(|row| row as f64).collect();
         for some in rows.chunks(1000) {
             column.append(some).unwrap();
