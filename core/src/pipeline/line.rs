@@ -8,7 +8,10 @@ use std::{
     },
 };
 
-use super::{overlap::read_ahead, run::Observer};
+use super::{
+    overlap::{Ahead, read_ahead},
+    run::Observer,
+};
 use crate::{
     Error, Result,
     inspection::Inspection,
@@ -54,31 +57,36 @@ impl Line<'_> {
         let failed = AtomicBool::new(false);
         let turnstile = Mutex::new((0_usize, Ok(()), take));
         let turned = Condvar::new();
+        let setups = self.rig.setups.len();
         let worker = || {
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(key) = stations.get(index) else { return };
-                let result = if failed.load(Ordering::Relaxed) {
-                    None
-                } else {
-                    Some(self.station(index, key).and_then(|station| work(index, station)))
-                };
-                let guard = turnstile.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut guard =
-                    turned.wait_while(guard, |(turn, _, _)| *turn != index).unwrap_or_else(PoisonError::into_inner);
-                let (turn, outcome, take) = &mut *guard;
-                *turn += 1;
-                if let (Some(result), Ok(())) = (result, &outcome) {
-                    *outcome = result.and_then(take);
-                    if outcome.is_err() {
-                        failed.store(true, Ordering::Relaxed);
-                    } else {
-                        observer.station(&key.name);
+            let claimed = std::iter::from_fn(|| {
+                let more = !failed.load(Ordering::Relaxed);
+                more.then(|| next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < stations.len())
+            });
+            let captures = claimed
+                .flat_map(|station| (0..setups).map(move |setup| (station, setup)))
+                .map(|(station, setup)| (station, self.recorded(station, setup)));
+            read_ahead(captures, |ahead| {
+                while let Some(index) = ahead.coming() {
+                    let key = &stations[index];
+                    let result = self.station(key, ahead).and_then(|station| work(index, station));
+                    let guard = turnstile.lock().unwrap_or_else(PoisonError::into_inner);
+                    let mut guard =
+                        turned.wait_while(guard, |(turn, _, _)| *turn != index).unwrap_or_else(PoisonError::into_inner);
+                    let (turn, outcome, take) = &mut *guard;
+                    *turn += 1;
+                    if outcome.is_ok() {
+                        *outcome = result.and_then(take);
+                        if outcome.is_err() {
+                            failed.store(true, Ordering::Relaxed);
+                        } else {
+                            observer.station(&key.name);
+                        }
                     }
+                    drop(guard);
+                    turned.notify_all();
                 }
-                drop(guard);
-                turned.notify_all();
-            }
+            });
         };
         let inputs = std::thread::scope(|scope| {
             let checksums =
@@ -94,22 +102,31 @@ impl Line<'_> {
         inputs.unwrap_or_else(|_| Err(Error::new("checksum", "the inputs", "the thread that read them stopped")))
     }
 
-    fn station(&self, index: usize, key: &StationKey) -> Result<Station> {
-        let profiles: Result<Vec<Profile>> =
-            (0..self.rig.setups.len()).map(|setup| self.profile(index, setup)).collect();
+    /// A capture as it is read: every sample is looked at before anything else touches it.
+    fn recorded(&self, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
+        Ok(Box::new(Inspection::new(self.recording.open(station, setup)?)))
+    }
+
+    /// Takes all of a station's captures, also behind one that failed.
+    fn station(&self, key: &StationKey, ahead: &mut Ahead<usize>) -> Result<Station> {
+        let mut profiles = Ok(Vec::with_capacity(self.rig.setups.len()));
+        for setup in 0..self.rig.setups.len() {
+            let capture = ahead.open();
+            profiles = profiles.and_then(|mut profiles: Vec<Profile>| {
+                profiles.push(self.profile(Box::new(capture?), setup)?);
+                Ok(profiles)
+            });
+        }
         Ok(Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? })
     }
 
-    fn profile(&self, station: usize, setup: usize) -> Result<Profile> {
-        let recorded = Box::new(Inspection::new(self.recording.open(station, setup)?));
+    fn profile(&self, recorded: Box<dyn SampleStream + '_>, setup: usize) -> Result<Profile> {
         let projection = self.projections.get(setup).and_then(Option::as_ref);
-        read_ahead(recorded, |stream| {
-            let mut stream: Box<dyn SampleStream + '_> = stream;
-            for conditioner in self.conditioners {
-                stream = conditioner.attach(stream)?;
-            }
-            self.averager.average_wanting(stream, Wanted { hold_out: self.hold_out, projection })
-        })
+        let mut stream = recorded;
+        for conditioner in self.conditioners {
+            stream = conditioner.attach(stream)?;
+        }
+        self.averager.average_wanting(stream, Wanted { hold_out: self.hold_out, projection })
     }
 }
 

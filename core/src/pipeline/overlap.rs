@@ -1,4 +1,5 @@
-//! What the work does not wait for: blocks are read ahead of it, results written behind it, each by a thread of its own.
+//! What the work does not wait for: captures are read ahead of it, results written behind it, each by a thread of its
+//! own.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel, sync_channel},
@@ -10,57 +11,107 @@ use crate::{
     measurement::{Block, Capture, SampleStream},
 };
 
-/// Blocks that were read and wait.
-const AHEAD: usize = 1;
+/// Blocks that were read and wait: what a station's captures take while the one before is separated.
+const AHEAD: usize = 4;
 /// Results that wait to be written.
 const BEHIND: usize = 1;
 
-/// Does `work` on a stream whose blocks are read ahead.
-pub(super) fn read_ahead<R>(
-    mut input: Box<dyn SampleStream + '_>,
-    work: impl FnOnce(Box<dyn SampleStream>) -> Result<R>,
-) -> Result<R> {
-    let capture = input.capture().clone();
-    let (sender, blocks) = sync_channel(AHEAD);
+/// An opened capture, and what it belongs to.
+pub(super) type Opened<'a, K> = (K, Result<Box<dyn SampleStream + 'a>>);
+
+/// Does `work` on captures that are read ahead, one after the other: also beyond the end of the one that is worked on.
+pub(super) fn read_ahead<'a, K: Copy + Send, R>(
+    captures: impl Iterator<Item = Opened<'a, K>> + Send,
+    work: impl FnOnce(&mut Ahead<K>) -> R,
+) -> R {
+    let (sender, pieces) = sync_channel(AHEAD);
     let (used, spare) = channel::<Block>();
     thread::scope(|scope| {
         scope.spawn(move || {
-            loop {
-                let mut block = spare.try_recv().unwrap_or_default();
-                let next = input.next_block(&mut block).map(|more| more.then_some(block));
-                let last = !matches!(next, Ok(Some(_)));
-                // Nobody takes it where the work has failed.
-                if sender.send(next).is_err() || last {
-                    return;
+            // A piece that nobody takes: the work has ended.
+            let _ = captures.into_iter().try_for_each(|(key, opened)| {
+                let mut stream = match opened {
+                    Ok(stream) => stream,
+                    Err(error) => return sender.send(Piece::Begin(key, Err(error))),
+                };
+                sender.send(Piece::Begin(key, Ok(stream.capture().clone())))?;
+                loop {
+                    let mut block = spare.try_recv().unwrap_or_default();
+                    let next = stream.next_block(&mut block).map(|more| more.then_some(block));
+                    let last = !matches!(next, Ok(Some(_)));
+                    sender.send(Piece::Next(next))?;
+                    if last {
+                        return Ok(());
+                    }
                 }
-            }
+            });
         });
-        work(Box::new(Ahead { capture, blocks, used }))
+        work(&mut Ahead { pieces, used, begun: None })
     })
 }
 
-/// A stream whose blocks another thread reads.
-struct Ahead {
-    capture: Capture,
-    /// `None` is the end.
-    blocks: Receiver<Result<Option<Block>>>,
-    /// Blocks whose memory may be used again.
-    used: Sender<Block>,
+/// What the reading thread hands on.
+enum Piece<K> {
+    Begin(K, Result<Capture>),
+    /// `None` is the end of a capture.
+    Next(Result<Option<Block>>),
 }
 
-impl SampleStream for Ahead {
+/// Captures that another thread reads.
+pub(super) struct Ahead<K> {
+    pieces: Receiver<Piece<K>>,
+    /// Blocks whose memory may be used again.
+    used: Sender<Block>,
+    /// The capture that comes next, where it is known.
+    begun: Option<(K, Result<Capture>)>,
+}
+
+impl<K: Copy> Ahead<K> {
+    /// What the next capture belongs to; `None` behind the last one. What is left of the one before is passed over.
+    pub(super) fn coming(&mut self) -> Option<K> {
+        while self.begun.is_none() {
+            if let Piece::Begin(key, capture) = self.pieces.recv().ok()? {
+                self.begun = Some((key, capture));
+            }
+        }
+        self.begun.as_ref().map(|(key, _)| *key)
+    }
+
+    /// Opens the next capture.
+    pub(super) fn open(&mut self) -> Result<Reading<'_, K>> {
+        self.coming();
+        let none = || Err(Error::new("read", "the recording", "the thread that reads it stopped"));
+        let capture = self.begun.take().map_or_else(none, |(_, capture)| capture)?;
+        Ok(Reading { capture, ahead: self, ended: false })
+    }
+}
+
+/// A capture whose blocks another thread reads.
+pub(super) struct Reading<'a, K> {
+    capture: Capture,
+    ahead: &'a mut Ahead<K>,
+    ended: bool,
+}
+
+impl<K: Copy + Send> SampleStream for Reading<'_, K> {
     fn capture(&self) -> &Capture {
         &self.capture
     }
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
-        // Behind the end, the thread is gone.
-        let next = self.blocks.recv().unwrap_or(Ok(None))?;
-        let more = next.is_some();
+        let next = match self.ended {
+            true => None,
+            // A stream that failed, or a thread that is gone, has no more.
+            false => match self.ahead.pieces.recv() {
+                Ok(Piece::Next(next)) => next.inspect_err(|_| self.ended = true)?,
+                _ => None,
+            },
+        };
+        self.ended = next.is_none();
         let emptied = std::mem::replace(block, next.unwrap_or_default());
-        // The same.
-        let _ = self.used.send(emptied);
-        Ok(more)
+        // Nobody takes it behind the last capture.
+        let _ = self.ahead.used.send(emptied);
+        Ok(!self.ended)
     }
 }
 
@@ -132,7 +183,7 @@ mod tests {
         Box::new(Counting { capture, next: 0, last, fails })
     }
 
-    fn count(mut stream: Box<dyn SampleStream>) -> Result<Vec<f64>> {
+    fn count(mut stream: impl SampleStream) -> Result<Vec<f64>> {
         let (mut found, mut block) = (Vec::new(), Block::default());
         while stream.next_block(&mut block)? {
             assert_eq!(block.start as usize, found.len());
@@ -144,14 +195,33 @@ mod tests {
 
     #[test]
     fn blocks_come_in_order_and_end_as_the_input_does() {
-        assert_eq!(read_ahead(counting(100, false), count).unwrap(), (0..100).map(f64::from).collect::<Vec<_>>());
-        assert!(read_ahead(counting(100, true), count).unwrap_err().to_string().contains("gone"));
+        let captures = [(7, Ok(counting(100, false))), (8, Ok(counting(0, false))), (9, Ok(counting(100, true)))];
+        read_ahead(captures.into_iter(), |ahead| {
+            assert_eq!(ahead.coming(), Some(7));
+            assert_eq!(count(ahead.open().unwrap()).unwrap(), (0..100).map(f64::from).collect::<Vec<_>>());
+            assert!(count(ahead.open().unwrap()).unwrap().is_empty());
+            assert_eq!(ahead.coming(), Some(9));
+            assert!(count(ahead.open().unwrap()).unwrap_err().to_string().contains("gone"));
+            assert_eq!(ahead.coming(), None);
+        });
+    }
+
+    #[test]
+    fn captures_that_were_not_opened_or_not_read_to_their_end_are_passed_over() {
+        let missing = Err(Error::new("open", "it", "missing"));
+        let captures = [(1, Ok(counting(100, false))), (2, missing), (3, Ok(counting(20, false)))];
+        read_ahead(captures.into_iter(), |ahead| {
+            assert!(ahead.open().unwrap().next_block(&mut Block::default()).unwrap());
+            assert!(ahead.open().err().unwrap().to_string().contains("missing"));
+            assert_eq!(count(ahead.open().unwrap()).unwrap().len(), 20);
+            assert!(ahead.open().is_err(), "there is none");
+        });
     }
 
     #[test]
     fn work_that_stops_early_stops_the_reading() {
-        let first = read_ahead(counting(u64::MAX, false), |mut stream| stream.next_block(&mut Block::default()));
-        assert!(first.unwrap());
+        let endless = std::iter::repeat_with(|| ((), Ok(counting(u64::MAX, false))));
+        assert!(read_ahead(endless, |ahead| ahead.open()?.next_block(&mut Block::default())).unwrap());
     }
 
     #[test]
