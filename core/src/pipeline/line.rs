@@ -102,9 +102,10 @@ impl Line<'_> {
         inputs.unwrap_or_else(|_| Err(Error::new("checksum", "the inputs", "the thread that read them stopped")))
     }
 
-    /// A capture as it is read: every sample is looked at before anything else touches it.
+    /// A capture as it is read and conditioned; every sample is looked at before anything else touches it.
     fn recorded(&self, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
-        Ok(Box::new(Inspection::new(self.recording.open(station, setup)?)))
+        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::new(self.recording.open(station, setup)?));
+        self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))
     }
 
     /// Takes all of a station's captures, also behind one that failed.
@@ -112,21 +113,14 @@ impl Line<'_> {
         let mut profiles = Ok(Vec::with_capacity(self.rig.setups.len()));
         for setup in 0..self.rig.setups.len() {
             let capture = ahead.open();
+            let projection = self.projections.get(setup).and_then(Option::as_ref);
+            let wanted = Wanted { hold_out: self.hold_out, projection };
             profiles = profiles.and_then(|mut profiles: Vec<Profile>| {
-                profiles.push(self.profile(Box::new(capture?), setup)?);
+                profiles.push(self.averager.average_wanting(Box::new(capture?), wanted)?);
                 Ok(profiles)
             });
         }
         Ok(Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? })
-    }
-
-    fn profile(&self, recorded: Box<dyn SampleStream + '_>, setup: usize) -> Result<Profile> {
-        let projection = self.projections.get(setup).and_then(Option::as_ref);
-        let mut stream = recorded;
-        for conditioner in self.conditioners {
-            stream = conditioner.attach(stream)?;
-        }
-        self.averager.average_wanting(stream, Wanted { hold_out: self.hold_out, projection })
     }
 }
 

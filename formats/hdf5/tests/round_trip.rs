@@ -9,7 +9,7 @@ use crate::double::{Memory, TURN, load, message, noise, read, rig, write};
 fn floats_of_64_bits_come_back_to_the_bit_and_stations_by_z() {
     let (folder, rig) = (tempfile::tempdir().unwrap(), rig());
     // More than two blocks a capture, and stations out of order.
-    let memory = Memory::new(&rig, &[("upper", 20.0), ("lower", -5.0)], 40_000, false);
+    let memory = Memory::new(&rig, &[("upper", 20.0), ("lower", -5.0)], 80_000, false);
     for deflate in [None, Some(0), Some(4)] {
         let path = folder.path().join(format!("{deflate:?}.h5"));
         let mut heard = Vec::new();

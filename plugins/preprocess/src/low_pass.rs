@@ -107,11 +107,13 @@ impl Conditioner for LowPass {
             capture,
             pad: 3 * (self.order + 1),
             lookahead,
+            piece: PIECE.max(PIECE_LOOKAHEADS * lookahead),
             spread: settling_samples(&sections, DEFECT_SHARE) as u64,
             forward: Cascade::new(&sections, channels),
             backward: Cascade::new(&sections, channels),
             raw: Block::default(),
             held: Block::default(),
+            next: Block::default(),
             tail: Vec::new(),
             scratch: Vec::new(),
             stage: Stage::Gathering,
@@ -143,13 +145,17 @@ struct LowPassStream<'a> {
     /// Frames of the continuation at each end.
     pad: usize,
     lookahead: usize,
+    /// Frames that are handed on at once, at least.
+    piece: usize,
     /// Samples by which a bad range grows at each end.
     spread: u64,
     forward: Cascade,
     backward: Cascade,
     raw: Block,
-    /// Filtered forward (unless still gathering), not handed on.
+    /// Filtered forward (unless still gathering), to be handed on.
     held: Block,
+    /// Filtered forward, behind it.
+    next: Block,
     /// The last unfiltered frames, for the continuation after the last.
     tail: Vec<f64>,
     scratch: Vec<f64>,
@@ -161,27 +167,23 @@ impl LowPassStream<'_> {
         self.capture.channels()
     }
 
-    /// Takes a block from the input.
+    /// Takes the block in `raw`.
     fn take(&mut self) {
         let channels = self.channels();
-        if self.held.samples.is_empty() {
-            self.held.start = self.raw.start;
-        }
         let kept = (self.pad + 1) * channels;
         let new = &self.raw.samples[self.raw.samples.len().saturating_sub(kept)..];
         self.tail.drain(..(self.tail.len() + new.len()).saturating_sub(kept).min(self.tail.len()));
         self.tail.extend_from_slice(new);
 
-        let unfiltered = self.held.samples.len();
-        self.held.samples.extend_from_slice(&self.raw.samples);
-        self.held.angle_rev.extend_from_slice(&self.raw.angle_rev);
+        // A bad sample behind what is handed on may spoil its end: it is said with it.
         let spread = self.spread;
         self.held.defects.extend(self.raw.defects.drain(..).map(|defect| Defect {
             samples: defect.samples.start.saturating_sub(spread)..defect.samples.end.saturating_add(spread),
             ..defect
         }));
-        match self.stage {
-            Stage::Gathering if self.held.samples.len() >= kept => {
+        if self.stage == Stage::Gathering {
+            join(&mut self.held, &mut self.raw);
+            if self.held.samples.len() >= kept {
                 self.scratch.clear();
                 reflect(&self.held.samples[..kept], channels, End::First, &mut self.scratch);
                 self.forward.settle(&self.scratch[..channels]);
@@ -189,24 +191,23 @@ impl LowPassStream<'_> {
                 self.forward.run(&mut self.held.samples, Direction::Forward);
                 self.stage = Stage::Running;
             }
-            Stage::Gathering => {}
-            _ => self.forward.run(&mut self.held.samples[unfiltered..], Direction::Forward),
+        } else {
+            self.forward.run(&mut self.raw.samples, Direction::Forward);
+            let full = self.held.samples.len() >= self.piece * channels;
+            join(if full { &mut self.next } else { &mut self.held }, &mut self.raw);
         }
     }
 
-    /// Filters the first `frames` held backward, beginning at the last one held, and hands them on.
-    fn hand_on(&mut self, frames: usize, block: &mut Block) {
-        let values = frames * self.channels();
-        std::mem::swap(block, &mut self.held);
-        self.held.clear();
-        self.held.start = block.start + frames as u64;
-        self.held.samples.extend_from_slice(&block.samples[values..]);
-        self.held.angle_rev.extend(block.angle_rev.drain(frames.min(block.angle_rev.len())..));
-        block.samples.truncate(values);
+    /// Filters what is held backward, beginning in what comes behind it, and hands it on.
+    fn hand_on(&mut self, block: &mut Block) {
+        let lookahead = self.lookahead * self.channels();
         self.scratch.clear();
-        self.scratch.extend_from_slice(&self.held.samples);
+        self.scratch.extend_from_slice(&self.next.samples[..lookahead]);
         self.backward_over_scratch();
-        self.backward.run(&mut block.samples, Direction::Backward);
+        self.backward.run(&mut self.held.samples, Direction::Backward);
+        std::mem::swap(block, &mut self.held);
+        std::mem::swap(&mut self.held, &mut self.next);
+        self.next.clear();
     }
 
     /// Runs the backward pass from its beginning over what is in `scratch`, for its state only.
@@ -229,10 +230,24 @@ impl LowPassStream<'_> {
         reflect(&self.tail, channels, End::Last, &mut self.scratch);
         self.forward.run(&mut self.scratch, Direction::Forward);
         self.backward_over_scratch();
+        join(&mut self.held, &mut self.next);
         self.backward.run(&mut self.held.samples, Direction::Backward);
         std::mem::swap(block, &mut self.held);
         self.held.clear();
         Ok(!block.samples.is_empty())
+    }
+}
+
+/// Puts a block behind another one, and leaves it empty.
+fn join(first: &mut Block, second: &mut Block) {
+    if first.samples.is_empty() {
+        second.defects.append(&mut first.defects);
+        std::mem::swap(first, second);
+        second.clear();
+    } else {
+        first.samples.append(&mut second.samples);
+        first.angle_rev.append(&mut second.angle_rev);
+        first.defects.append(&mut second.defects);
     }
 }
 
@@ -267,11 +282,10 @@ impl SampleStream for LowPassStream<'_> {
         if self.channels() == 0 {
             return self.input.next_block(block);
         }
-        let piece = PIECE.max(PIECE_LOOKAHEADS * self.lookahead);
         while self.stage != Stage::Done {
-            let frames = self.held.samples.len() / self.channels();
-            if self.stage == Stage::Running && frames >= piece + self.lookahead {
-                self.hand_on(frames - self.lookahead, block);
+            let behind = self.next.samples.len() / self.channels();
+            if behind > 0 && behind >= self.lookahead {
+                self.hand_on(block);
                 return Ok(true);
             }
             self.raw.clear();

@@ -20,8 +20,8 @@ use super::{
 };
 use crate::node::Place;
 
-/// Instants in a block: four channels of f64 then take 512 KiB, and threads meet seldom.
-const BLOCK_SAMPLES: usize = 16384;
+/// Instants in a block: four channels of f64 then take 1 MiB, and threads meet seldom.
+const BLOCK_SAMPLES: usize = 32768;
 
 /// A block never takes more elements than this, even where the file's chunks are larger.
 const BLOCK_ELEMENTS: usize = 1 << 24;

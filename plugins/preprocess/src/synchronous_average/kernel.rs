@@ -127,7 +127,7 @@ const CHANNELS: usize = 4;
 pub(super) struct Interpolation<'a> {
     pub kernel: &'a Kernel,
     /// Samples, `[channel][sample]`.
-    pub samples: &'a [Vec<f64>],
+    pub samples: &'a [&'a [f64]],
     /// At least REACH samples lie on either side of each.
     pub positions: &'a [f64],
     /// That all positions are on samples.
@@ -166,7 +166,7 @@ impl Interpolation<'_> {
     /// Some channels from `first`.
     #[inline(always)]
     fn channels<A: Arithmetic, const C: usize>(&mut self, first: usize) {
-        let samples: [&[f64]; C] = std::array::from_fn(|channel| &self.samples[first + channel][..]);
+        let samples: [&[f64]; C] = std::array::from_fn(|channel| self.samples[first + channel]);
         let count = self.positions.len();
         let values = &mut self.values[first * count..(first + C) * count];
         let mut done = 0;
@@ -256,10 +256,14 @@ mod tests {
 
     use super::*;
 
+    fn slices(samples: &[Vec<f64>]) -> Vec<&[f64]> {
+        samples.iter().map(Vec::as_slice).collect()
+    }
+
     fn interpolate<A: Arithmetic>(samples: &[Vec<f64>], positions: &[f64], exact: bool) -> Vec<f64> {
         let mut values = vec![0.0; samples.len() * positions.len()];
-        let kernel = Kernel::new();
-        Interpolation { kernel: &kernel, samples, positions, exact, values: &mut values }.call::<A>();
+        let (kernel, samples) = (Kernel::new(), slices(samples));
+        Interpolation { kernel: &kernel, samples: &samples, positions, exact, values: &mut values }.call::<A>();
         values
     }
 
@@ -308,9 +312,15 @@ mod tests {
             assert_eq!(interpolate::<Separate>(&samples, &positions, false), alone);
             let mut values = vec![0.0; alone.len()];
             let kernel = Kernel::new();
-            let (samples, positions) = (&samples[..], &positions[..]);
-            fused(Interpolation { kernel: &kernel, samples, positions, exact: false, values: &mut values });
-            let rounded_once = interpolate::<Fused>(samples, positions, false);
+            let work = Interpolation {
+                kernel: &kernel,
+                samples: &slices(&samples),
+                positions: &positions,
+                exact: false,
+                values: &mut values,
+            };
+            fused(work);
+            let rounded_once = interpolate::<Fused>(&samples, &positions, false);
             for ((value, once), alone) in values.iter().zip(&rounded_once).zip(&alone) {
                 // 1e-13: rounding of 22 products of values near 20.
                 assert!((value - alone).abs() < 1e-13 && (once - alone).abs() < 1e-13, "{value} {once} {alone}");

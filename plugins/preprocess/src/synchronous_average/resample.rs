@@ -193,7 +193,7 @@ impl<'a> Resampling<'a> {
         let readings = self.means.next();
         fused(Interpolation {
             kernel: self.kernel,
-            samples: &self.window.samples,
+            samples: &self.window.channels(),
             positions: &self.positions,
             exact,
             values: readings,

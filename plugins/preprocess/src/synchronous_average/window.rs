@@ -19,18 +19,24 @@ pub(super) const CONTINUED: usize = REACH + 2;
 pub(super) struct Window {
     /// Place of the first sample.
     start: usize,
-    /// `[channel][sample]`.
-    pub samples: Vec<Vec<f64>>,
+    /// `[channel][sample]`, with room for more behind the first `length`.
+    samples: Vec<Vec<f64>>,
+    length: usize,
     pub angle_rev: Vec<f64>,
 }
 
 impl Window {
     pub(super) fn new(channels: usize) -> Self {
-        Self { start: CONTINUED, samples: vec![Vec::new(); channels], angle_rev: Vec::new() }
+        Self { start: CONTINUED, samples: vec![Vec::new(); channels], length: 0, angle_rev: Vec::new() }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.samples.first().map_or(0, Vec::len)
+        self.length
+    }
+
+    /// The samples of each channel.
+    pub(super) fn channels(&self) -> Vec<&[f64]> {
+        self.samples.iter().map(|samples| &samples[..self.length]).collect()
     }
 
     /// Place of the first sample.
@@ -58,14 +64,17 @@ impl Window {
         // Moving the rest to the front is worth while only where it is the smaller part.
         if 2 * surplus >= self.len() {
             for samples in &mut self.samples {
-                samples.drain(..surplus);
+                samples.copy_within(surplus..self.length, 0);
             }
+            self.length -= surplus;
             self.angle_rev.drain(..surplus.min(self.angle_rev.len()));
             self.start += surplus;
         }
-        let (channels, kept) = (self.samples.len(), self.len());
+        let (channels, kept) = (self.samples.len(), self.length);
+        self.length += block.samples.len() / channels;
         for samples in &mut self.samples {
-            samples.resize(kept + block.samples.len() / channels, 0.0);
+            // Only ever longer: what is written over needs no zeros.
+            samples.resize(samples.len().max(self.length), 0.0);
         }
         in_lanes(channels, &mut Parting { frames: &block.samples, samples: &mut self.samples, kept });
         self.angle_rev.extend_from_slice(&block.angle_rev);
@@ -78,25 +87,30 @@ impl Window {
                 let continuation: Vec<f64> = reflected(course[0], &course[1..=CONTINUED]).rev().collect();
                 course.splice(..0, continuation);
             }
+            self.length += CONTINUED;
             self.start = 0;
         }
     }
 
     /// Puts the continuation behind the capture's last sample.
     pub(super) fn continue_behind(&mut self) {
-        for course in self.courses() {
-            if let [.., edge] = course[..] {
+        if self.len() > CONTINUED {
+            for course in self.courses() {
                 let inner = course.len() - 1;
-                let continuation: Vec<f64> = reflected(edge, &course[inner - CONTINUED..inner]).rev().collect();
+                let continuation: Vec<f64> =
+                    reflected(course[inner], &course[inner - CONTINUED..inner]).rev().collect();
                 course.extend(continuation);
             }
+            self.length += CONTINUED;
         }
     }
 
-    /// All that can be reflected.
+    /// All that can be reflected, as long as the window.
     fn courses(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
-        let courses = self.samples.iter_mut().chain([&mut self.angle_rev]);
-        courses.filter(|course| course.len() > CONTINUED)
+        for samples in &mut self.samples {
+            samples.truncate(self.length);
+        }
+        self.samples.iter_mut().chain([&mut self.angle_rev].into_iter().filter(|angle_rev| angle_rev.len() > CONTINUED))
     }
 }
 

@@ -200,7 +200,8 @@ fn floor(layout: &Layout, readings: &Readings, weights: &[Vec<Complex64>]) -> Ve
         let dof = count - operator.rank;
         let Some(spread) = readings.spread(order).filter(|_| dof > 0) else { continue };
         let system = layout.system(order);
-        sums[order - 1] = expected_weighted_squares(&system, &operator.operator, &weights[order - 1], &spread);
+        sums[order - 1] =
+            expected_weighted_squares(&system, &weights[order - 1], &spread, &spread.times(&operator.operator));
         dofs[order - 1] = dof as f64;
     }
     let mean = |from: usize, to: usize| {

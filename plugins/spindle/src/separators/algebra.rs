@@ -45,11 +45,10 @@ fn dot(b: &[Complex64], a: &[Complex64]) -> Complex64 {
     a.iter().zip(b).map(|(a, b)| a * b.conj()).sum()
 }
 
-/// Mean of |residual|² where the readings' noise has the covariance Σ: the trace of (I − A·P)·Σ·(I − A·P)ᴴ.
-pub fn expected_squares(system: &System, operator: &[Complex64], spread: &Spread<'_>) -> f64 {
+/// Mean of |residual|² where the readings' noise has the covariance Σ: the trace of (I − A·P)·Σ·(I − A·P)ᴴ. `passed` is P·Σ.
+pub fn expected_squares(system: &System, operator: &[Complex64], spread: &Spread<'_>, passed: &[Complex64]) -> f64 {
     let count = system.matrix.len() / system.columns;
     // Cheaper than the product: tr Σ − 2 Re tr(PΣ·A) + tr(AᴴA·PΣPᴴ).
-    let passed = spread.times(operator);
     let mut squares = spread.trace();
     for (unknown, row) in passed.chunks_exact(count).enumerate() {
         let column = || system.matrix.iter().skip(unknown).step_by(system.columns);
@@ -67,15 +66,14 @@ pub fn expected_squares(system: &System, operator: &[Complex64], spread: &Spread
 /// W·(I − A·P)·Σ·(I − A·P)ᴴ·Wᴴ.
 pub fn expected_weighted_squares(
     system: &System,
-    operator: &[Complex64],
     weights: &[Complex64],
     spread: &Spread<'_>,
+    passed: &[Complex64],
 ) -> f64 {
     let count = system.matrix.len() / system.columns;
     // W·A·P is the projector on the columns of W·A, times W, which leaves tr(WΣWᴴ) − Re tr(PΣ·WᴴW·A).
     let weighted = trace(weights, &spread.times(weights), count);
     let normal = weighted_normal(weights, &system.matrix, system.columns);
-    let passed = spread.times(operator);
     let fitted: f64 = (passed.chunks_exact(count).enumerate())
         .flat_map(|(unknown, row)| row.iter().zip(normal.iter().skip(unknown).step_by(system.columns)))
         .map(|(passed, entry)| (passed * entry).re)
@@ -170,9 +168,10 @@ mod tests {
             assert_eq!(qr.rank(), if deficient { 2 } else { 3 });
             let operator = qr.operator(Some(&weights));
             let left = leftover(&matrix, &operator, COUNT);
-            let (found, expected) = (expected_squares(&system, &operator, &spread), squares(&left, &spread));
+            let (found, expected) =
+                (expected_squares(&system, &operator, &spread, &spread.times(&operator)), squares(&left, &spread));
             assert!((found / expected - 1.0).abs() < 1e-10, "{found} {expected}");
-            let found = expected_weighted_squares(&system, &operator, &weights, &spread);
+            let found = expected_weighted_squares(&system, &weights, &spread, &spread.times(&operator));
             let expected = squares(&product(&weights, &left, COUNT), &spread);
             assert!((found / expected - 1.0).abs() < 1e-10, "{found} {expected}");
         }

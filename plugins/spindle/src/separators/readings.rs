@@ -143,7 +143,9 @@ impl<'a> Spread<'a> {
         let mut product = vec![Complex64::ZERO; matrix.len()];
         let rows = matrix.chunks_exact(sensors).zip(product.chunks_exact_mut(sensors));
         for ((row, target), block) in rows.zip(self.setups.iter().cycle()) {
-            for (entry, source) in row.iter().zip(block.chunks_exact(sensors)) {
+            // A matrix of weights is 0 from one setup to another.
+            let there = row.iter().zip(block.chunks_exact(sensors)).filter(|(entry, _)| **entry != Complex64::ZERO);
+            for (entry, source) in there {
                 target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
             }
         }

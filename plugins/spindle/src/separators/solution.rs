@@ -207,10 +207,11 @@ impl Solver<'_> {
             squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
             match readings.spread(order) {
                 Some(spread) => {
-                    expected += expected_squares(&system, operator, &spread);
+                    let passed = spread.times(operator);
+                    expected += expected_squares(&system, operator, &spread, &passed);
                     if let Some(weights) = operators.weights.as_ref().map(|weights| &weights[order - 1]) {
                         weighted += apply(weights, &residual).iter().map(Complex64::norm_sqr).sum::<f64>();
-                        weighted_expected += expected_weighted_squares(&system, operator, weights, &spread);
+                        weighted_expected += expected_weighted_squares(&system, weights, &spread, &passed);
                     }
                 }
                 None => known = false,
