@@ -28,9 +28,9 @@ def answer(command):
     return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
-def run_runout(threads):
+def run_runout(threads, *settings):
     """Wall and processor seconds of the whole process, and its peak memory in MiB."""
-    command = [runout, "run", str(here / "pipeline.toml"), "--threads", str(threads)]
+    command = [runout, "run", str(here / "pipeline.toml"), "--threads", str(threads), *settings]
     for key, value in (
         ("load.path", f"{scratch}/record-{name}-{stations}.h5"),
         ("export.0.path", out),
@@ -45,6 +45,12 @@ def run_runout(threads):
     if process.returncode != 0:
         sys.exit(f"{' '.join(command)} failed ({process.returncode})")
     return {"seconds": seconds, "busy": usage.ru_utime + usage.ru_stime, "peak_mib": usage.ru_maxrss / 1024}
+
+
+def run_values(threads):
+    """The same, and the standards' values with their uncertainty, as a run gives them unless told otherwise."""
+    everything = 'evaluate.values=["roundness", "cylindricity", "texture"]'
+    return run_runout(threads, "--set", everything)
 
 
 def run_peers(processes):
@@ -62,7 +68,7 @@ def own():
     return used.user + used.system + used.children_user + used.children_system
 
 
-found = {(who, workers): [] for who in (run_runout, run_peers) for workers in WORKERS}
+found = {(who, workers): [] for who in (run_runout, run_values, run_peers) for workers in WORKERS}
 for who, workers in found:
     who(workers)  # files into the page cache, programs into memory
 began, elsewhere = time.perf_counter(), busy() - own()
@@ -86,14 +92,18 @@ for workers in WORKERS:
         f"{median(run_runout, workers, 'busy'):.2f}",
         f"{theirs:.2f}",
         f"{theirs / ours:.2f}",
+        f"{median(run_values, workers, 'seconds'):.2f}",
         f"{median(run_runout, workers, 'peak_mib'):.0f}",
         f"{median(run_peers, workers, 'peak_mib'):.0f}",
     ]
     rows.append(f"| {' | '.join(cells)} |")
 crowd = f"others kept {elsewhere:.1f} processors busy" if elsewhere > 0.3 else "nothing else ran"
 said = f"{stations} stations, {os.cpu_count()} processors, median of {rounds} rounds in turns; {crowd}"
-head = "| samples | workers | runout, s | its CPU, s | peers, s | peers / runout | runout, peak MiB | peers, peak MiB |"
-print("\n".join(["", said, "", head, "| --- | --- | --- | --- | --- | --- | --- | --- |", *rows]))
+head = (
+    "| samples | workers | runout, s | its CPU, s | peers, s | peers / runout | runout with values, s "
+    "| runout, peak MiB | peers, peak MiB |"
+)
+print("\n".join(["", said, "", head, "| --- " * 9 + "|", *rows]))
 # For `cargo xtask bench-peers`, which joins the tables.
 (scratch / f"table-{name}.md").write_text("\n".join([said, head, *rows]) + "\n")
 checked = answer(python("check.py", out / "result.h5"))

@@ -74,7 +74,9 @@ pub fn all_peers(words: &[&str]) -> Outcome {
     let rule = format!("|{}", " --- |".repeat(columns));
     let mut lines: Vec<&str> = Vec::new();
     for table in &tables {
-        lines.extend([table.said.as_str(), ""]);
+        if !lines.contains(&table.said.as_str()) {
+            lines.extend([table.said.as_str(), ""]);
+        }
     }
     lines.extend([first.head.as_str(), &rule]);
     lines.extend(tables.iter().flat_map(|table| &table.rows).map(String::as_str));

@@ -115,7 +115,9 @@ impl PivotedQr {
                 solved.iter_mut().zip(other).for_each(|(value, other)| *value -= factor * other);
             }
             let inverse = self.factors[row * cols + row].inv();
-            solved.iter_mut().for_each(|value| *value *= inverse);
+            for value in solved.iter_mut() {
+                *value *= inverse;
+            }
             let col = self.pivots[row];
             let target = &mut operator[col * rows..(col + 1) * rows];
             target.iter_mut().zip(solved).for_each(|(to, value)| *to = *value * self.scale[col]);

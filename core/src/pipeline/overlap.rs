@@ -2,7 +2,7 @@
 //! own.
 
 use std::{
-    sync::mpsc::{Receiver, Sender, channel, sync_channel},
+    sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel},
     thread,
 };
 
@@ -28,26 +28,38 @@ pub(super) fn read_ahead<'a, K: Copy + Send, R>(
     let (used, spare) = channel::<Block>();
     thread::scope(|scope| {
         scope.spawn(move || {
-            // A piece that nobody takes: the work has ended.
-            let _ = captures.into_iter().try_for_each(|(key, opened)| {
-                let mut stream = match opened {
-                    Ok(stream) => stream,
-                    Err(error) => return sender.send(Piece::Begin(key, Err(error))),
-                };
-                sender.send(Piece::Begin(key, Ok(stream.capture().clone())))?;
-                loop {
-                    let mut block = spare.try_recv().unwrap_or_default();
-                    let next = stream.next_block(&mut block).map(|more| more.then_some(block));
-                    let last = !matches!(next, Ok(Some(_)));
-                    sender.send(Piece::Next(next))?;
-                    if last {
-                        return Ok(());
-                    }
+            for (key, opened) in captures {
+                // A piece that nobody takes: the work has ended.
+                if hand_on(key, opened, &sender, &spare).is_none() {
+                    return;
                 }
-            });
+            }
         });
         work(&mut Ahead { pieces, used, begun: None })
     })
+}
+
+/// Hands on all of a capture; `None` where nobody takes it.
+fn hand_on<K>(
+    key: K,
+    opened: Result<Box<dyn SampleStream + '_>>,
+    to: &SyncSender<Piece<K>>,
+    spare: &Receiver<Block>,
+) -> Option<()> {
+    let mut stream = match opened {
+        Ok(stream) => stream,
+        Err(error) => return to.send(Piece::Begin(key, Err(error))).ok(),
+    };
+    to.send(Piece::Begin(key, Ok(stream.capture().clone()))).ok()?;
+    loop {
+        let mut block = spare.try_recv().unwrap_or_default();
+        let next = stream.next_block(&mut block).map(|more| more.then_some(block));
+        let last = !matches!(next, Ok(Some(_)));
+        to.send(Piece::Next(next)).ok()?;
+        if last {
+            return Some(());
+        }
+    }
 }
 
 /// What the reading thread hands on.
@@ -77,6 +89,15 @@ impl<K: Copy> Ahead<K> {
         self.begun.as_ref().map(|(key, _)| *key)
     }
 
+    /// The next block of the capture that is open.
+    fn next(&mut self) -> Result<Option<Block>> {
+        match self.pieces.recv() {
+            Ok(Piece::Next(next)) => next,
+            // The thread is gone.
+            _ => Ok(None),
+        }
+    }
+
     /// Opens the next capture.
     pub(super) fn open(&mut self) -> Result<Reading<'_, K>> {
         self.coming();
@@ -99,15 +120,10 @@ impl<K: Copy + Send> SampleStream for Reading<'_, K> {
     }
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
-        let next = match self.ended {
-            true => None,
-            // A stream that failed, or a thread that is gone, has no more.
-            false => match self.ahead.pieces.recv() {
-                Ok(Piece::Next(next)) => next.inspect_err(|_| self.ended = true)?,
-                _ => None,
-            },
-        };
-        self.ended = next.is_none();
+        let next = if self.ended { Ok(None) } else { self.ahead.next() };
+        // Behind an error comes nothing more.
+        self.ended = !matches!(next, Ok(Some(_)));
+        let next = next?;
         let emptied = std::mem::replace(block, next.unwrap_or_default());
         // Nobody takes it behind the last capture.
         let _ = self.ahead.used.send(emptied);

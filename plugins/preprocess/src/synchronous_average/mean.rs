@@ -98,7 +98,9 @@ impl Mean {
     /// turns looked at.
     pub(super) fn scatter(&self) -> Option<Vec<Complex64>> {
         let mut covariance = self.scatter.covariance()?;
-        covariance.iter_mut().for_each(|entry| *entry /= self.turns as f64);
+        for entry in &mut covariance {
+            *entry /= self.turns as f64;
+        }
         Some(covariance)
     }
 }
