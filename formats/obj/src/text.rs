@@ -1,16 +1,15 @@
 //! Numbers as text, fast.
 
-use std::io::{self, Write};
-
-/// A growing text that is handed on in portions.
+/// A growing text.
+#[derive(Default)]
 pub struct Text {
     bytes: Vec<u8>,
     number: zmij::Buffer,
 }
 
 impl Text {
-    pub fn with_capacity(bytes: usize) -> Self {
-        Self { bytes: Vec::with_capacity(bytes), number: zmij::Buffer::new() }
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     pub fn raw(&mut self, text: &str) -> &mut Self {
@@ -36,15 +35,6 @@ impl Text {
         let normal = Digits::of(normal);
         self.bytes.extend_from_slice(normal.text());
         self
-    }
-
-    /// Hands on what has gathered, where it is more than `portion` bytes.
-    pub fn flush_above(&mut self, portion: usize, to: &mut impl Write) -> io::Result<()> {
-        if self.bytes.len() > portion {
-            to.write_all(&self.bytes)?;
-            self.bytes.clear();
-        }
-        Ok(())
     }
 }
 
