@@ -86,3 +86,47 @@ impl Rows {
 fn named(rows: &Range<usize>) -> String {
     format!("samples {} to {}", rows.start, rows.end.saturating_sub(1))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    const ROWS: usize = 500;
+    const COLUMNS: usize = 3;
+
+    /// Rows 7 to 432, and whether they came straight from the file.
+    fn read(dataset: Dataset, columns: Range<usize>) -> (Vec<f64>, bool) {
+        let place = Place::root(std::path::Path::new("rows.h5"));
+        let mut rows = Rows::new::<f64>(dataset, place, columns).unwrap();
+        let mut found = vec![9.0; 4];
+        rows.read(&(7..433), &mut found).unwrap();
+        (found, rows.plain.is_some())
+    }
+
+    #[test]
+    fn rows_are_the_same_straight_from_the_file_and_through_the_library() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.h5");
+        let values = ndarray::Array2::from_shape_fn((ROWS, COLUMNS), |(row, column)| (row * COLUMNS + column) as f64);
+        {
+            // What stands before the file's own beginning counts.
+            let file =
+                hdf5_metno::File::with_options().with_fcpl(|create| create.userblock(1024)).create(&path).unwrap();
+            file.new_dataset_builder().with_data(&values).create("plain").unwrap();
+            file.new_dataset_builder().with_data(&values).chunk((64, COLUMNS)).deflate(1).create("packed").unwrap();
+            file.new_dataset_builder().with_data(&values.mapv(|value| value as f32)).create("single").unwrap();
+            let elsewhere = folder.path().join("elsewhere.bin").display().to_string();
+            let external = file.new_dataset_builder().external(&elsewhere, 0, ROWS * COLUMNS * size_of::<f64>());
+            external.with_data(&values).create("external").unwrap();
+        }
+        let file = hdf5_metno::File::open(&path).unwrap();
+        let expected: Vec<f64> = values.slice(s![7..433, ..]).iter().copied().collect();
+        for (name, straight) in [("plain", true), ("packed", false), ("single", false), ("external", false)] {
+            assert_eq!(read(file.dataset(name).unwrap(), 0..COLUMNS), (expected.clone(), straight), "{name}");
+        }
+        let some: Vec<f64> = values.slice(s![7..433, 1..3]).iter().copied().collect();
+        assert_eq!(read(file.dataset("plain").unwrap(), 1..3), (some, false));
+    }
+}
