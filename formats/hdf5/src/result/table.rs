@@ -41,7 +41,7 @@ pub(super) fn name(text: &str) -> Result<Name> {
 enum Contents {
     /// The same again and again, which packs to little.
     Repeated,
-    /// Measured numbers: packing takes longer than all the work on a station, and saves a tenth.
+    /// Measured numbers, whose last digits are noise: packing them takes long and saves little.
     Measured,
 }
 
