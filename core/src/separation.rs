@@ -1,6 +1,6 @@
 //! Form and motion, one harmonic at a time: estimates, covariance, and what the layout cannot tell.
 
-use crate::Complex64;
+use crate::{Complex64, rig::Gaps};
 
 /// What the numbers of form, motion and harmonics are, for files that explain themselves.
 pub const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \
@@ -151,6 +151,24 @@ pub struct SectionAt {
     pub id: String,
     /// Its place along the spindle, in mm.
     pub z_mm: f64,
+    /// Where nothing is known of it: a keyway, a stretch without readings. Every value leaves these out.
+    pub gaps: Gaps,
+    /// Share of its readings that the form was computed from.
+    pub used: f64,
+}
+
+impl SectionAt {
+    /// A circle that was measured all around.
+    #[must_use]
+    pub fn whole(id: impl Into<String>, z_mm: f64) -> Self {
+        Self { id: id.into(), z_mm, gaps: Gaps::default(), used: 1.0 }
+    }
+
+    /// Share of the profile that was there: of so many equal angles, and of the readings.
+    #[must_use]
+    pub fn coverage(&self, angles: usize) -> f64 {
+        self.gaps.coverage(angles).min(self.used)
+    }
 }
 
 /// What a fit leaves of the averaged readings.

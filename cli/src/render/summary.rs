@@ -1,5 +1,6 @@
 //! What a run found, for people: `run`'s last words.
 
+mod motion;
 mod straightness;
 mod values;
 
@@ -37,6 +38,7 @@ pub fn text(summary: &Summary) -> String {
         if sections(stations).any(|(_, section)| section.form_std_um.is_some()) {
             page.line("  ± is the standard uncertainty: beside rms that of the form at any one angle");
         }
+        motion::section(&mut page, stations);
         values::part(&mut page, summary);
         values::limits(&mut page, summary);
         residual(&mut page, stations);

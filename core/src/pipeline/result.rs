@@ -7,7 +7,7 @@ use crate::{
     measurement::StationTruth,
     numerics::fourier::Fourier,
     profile::Profile,
-    rig::{Gaps, Rig},
+    rig::Rig,
     separation::{Assessment, Quantity, Separation, UM_PER_MM_URAD},
 };
 
@@ -33,8 +33,6 @@ pub struct StationResult {
     pub angles: usize,
     /// Form and motion.
     pub separation: Separation,
-    /// Of each section, the part angles at which it is interrupted; none where nothing is.
-    pub gaps: Vec<Gaps>,
     /// The averages that it came from; empty for measured points.
     pub profiles: Vec<Profile>,
     /// The standards' values, section by section.
@@ -47,7 +45,7 @@ pub struct StationResult {
 
 impl StationResult {
     /// One unknown on [`angles`](Self::angles) equal angles from 0: form over the part's, motion over the spindle's.
-    /// Orders that the layout cannot tell are left out; where the part is interrupted, its form is NaN.
+    /// Orders that the layout cannot tell are left out; where nothing is known of a section, its form is NaN.
     #[must_use]
     pub fn over_angle(&self, unknown: usize) -> Vec<f64> {
         let quantity = self.separation.unknowns[unknown];
@@ -55,15 +53,9 @@ impl StationResult {
         let mut values =
             Fourier::new(self.angles).synthesise(self.separation.coefficients(unknown).map(turned)).to_vec();
         if let Quantity::Form(section) = quantity {
-            self.gaps_of(section).blank(&mut values);
+            self.separation.sections[section].gaps.blank(&mut values);
         }
         values
-    }
-
-    /// Where a section is interrupted.
-    #[must_use]
-    pub fn gaps_of(&self, section: usize) -> Gaps {
-        self.gaps.get(section).cloned().unwrap_or_default()
     }
 }
 
@@ -80,16 +72,17 @@ pub(super) fn complete(
     station: String,
     z_mm: f64,
     angles: usize,
-    separation: Separation,
+    mut separation: Separation,
     profiles: Vec<Profile>,
     truth: Option<StationTruth>,
     evaluation: Evaluation,
 ) -> StationResult {
     let (values, motion_values) = (Vec::new(), Vec::new());
     let Evaluation { evaluate, radius_mm, rig } = evaluation;
-    let gaps_of = |rig: &Rig| separation.sections.iter().map(|section| rig.gaps_of(&section.id)).collect();
-    let gaps = rig.map(gaps_of).unwrap_or_default();
-    let mut result = StationResult { station, z_mm, angles, separation, gaps, profiles, values, motion_values, truth };
+    if let Some(rig) = rig {
+        separation.sections.iter_mut().for_each(|section| section.gaps = rig.gaps_of(&section.id));
+    }
+    let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
     let sections = 0..result.separation.sections.len();
     result.values = sections.map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
     result
@@ -156,7 +149,7 @@ mod tests {
         estimate[3 * 2] = Complex64::from(2.5);
         estimate[3 * 2 + 1] = Complex64::from(-0.7);
         let separation = Separation {
-            sections: vec![SectionAt { id: "a".into(), z_mm: 100.0 }],
+            sections: vec![SectionAt::whole("a", 100.0)],
             unknowns: vec![Quantity::X, Quantity::Y],
             estimate,
             variance: vec![0.0; 8],

@@ -27,7 +27,7 @@ use crate::{
         error_motion::{Centre, ErrorMotion},
     },
     provenance::{Input, Provenance, VERSION},
-    rig::{Gaps, Rig},
+    rig::Rig,
     separation::Separation,
     stage::{Export, Source, Station},
     surface::{Surface, SurfaceBuilder},
@@ -173,24 +173,23 @@ impl Gathering {
         if evaluate.has(Group::Cylindricity) || evaluate.has(Group::Areal) {
             self.summary.part = part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
         }
-        let mut interrupted: Vec<Gaps> = Vec::new();
-        for section in builder.sections() {
-            if !interrupted.contains(&section.gaps) {
-                interrupted.push(section.gaps.clone());
-            }
+        if !self.wanted {
+            return Ok(None);
         }
-        let surface = self.wanted.then(|| builder.build(radius_mm)).transpose()?;
-        if let (true, Some(surface)) = (evaluate.has(Group::Areal), &surface) {
-            add_areal(self.summary.part.get_or_insert_with(PartSummary::default), surface, &interrupted, evaluate)?;
+        let (surface, uncertain) = builder.build(radius_mm)?;
+        if evaluate.has(Group::Areal) {
+            let part = self.summary.part.get_or_insert_with(PartSummary::default);
+            let lowest = if self.placed { 0 } else { 2 };
+            add_areal(part, &surface, &uncertain, lowest, evaluate)?;
         }
-        self.summary.surface = surface.as_ref().map(|surface| SurfaceSummary {
+        self.summary.surface = Some(SurfaceSummary {
             angles: surface.angles,
             rings: surface.z_mm.len(),
             z_mm: [surface.z_mm.first().copied().unwrap_or(f64::NAN), surface.z_mm.last().copied().unwrap_or(f64::NAN)],
             interpolation: surface.interpolation.to_owned(),
             meetings: surface.meetings.clone(),
         });
-        Ok(surface)
+        Ok(Some(surface))
     }
 
     /// Completes the exports and gives all files their names, one more among them where there is one.

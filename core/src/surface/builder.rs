@@ -6,10 +6,11 @@ use super::{
 };
 use crate::{
     Complex64, Error, Result,
+    evaluate::uncertainty::Errors,
     numerics::fourier::{Fourier, max_order},
     pipeline::run::StationResult,
     rig::Gaps,
-    separation::{Quantity, Separation},
+    separation::{Quantity, SectionAt, Separation},
 };
 
 /// Sections nearer to each other than this lie at one z, in mm: a carriage's repeatability.
@@ -34,6 +35,7 @@ pub(crate) struct Section {
     pub(crate) station: String,
     pub(crate) z_mm: f64,
     pub(crate) gaps: Gaps,
+    pub(crate) used: f64,
     pub(crate) orders: Vec<Option<Order>>,
 }
 
@@ -72,19 +74,19 @@ impl SurfaceBuilder {
             let fitting = max_order(self.config.angles) + 1;
             self.band_limited |= orders.iter().skip(fitting).flatten().any(|order| order.value != Complex64::ZERO);
             orders.truncate(fitting);
-            let (id, station, gaps) = (at.id.clone(), result.station.clone(), result.gaps_of(index));
-            self.sections.push(Section { id, station, z_mm: at.z_mm, gaps, orders });
+            let SectionAt { id, z_mm, gaps, used } = at.clone();
+            self.sections.push(Section { id, station: result.station.clone(), z_mm, gaps, used, orders });
         }
     }
 
-    /// The surface.
+    /// The surface, and what is not known of it.
     ///
     /// Sections at one z become one ring, each order their mean, weighted by the inverse variance where all of them
     /// know it.
     ///
     /// # Errors
     /// With fewer than two sections along z, or more points than can be held.
-    pub fn build(mut self, radius_mm: f64) -> Result<Surface> {
+    pub fn build(mut self, radius_mm: f64) -> Result<(Surface, Uncertain)> {
         let failure = |problem: String| Error::new("build", "the surface", problem);
         if let Some(section) = self.sections.iter().find(|section| !section.z_mm.is_finite()) {
             return Err(failure(format!("section {} has no place along z", section.label())));
@@ -93,6 +95,7 @@ impl SurfaceBuilder {
         let angles = self.config.angles;
         let mut fourier = Fourier::new(angles);
         let mut rings = Rings { angles, z_mm: Vec::new(), deviation_um: Vec::new() };
+        let mut variance = Vec::new();
         let mut meetings = Vec::new();
         let mut rest = self.sections.as_slice();
         while let Some(first) = rest.first() {
@@ -102,7 +105,8 @@ impl SurfaceBuilder {
                 meetings.extend(others.map(|other| meeting(section, other, &mut fourier)));
             }
             rings.z_mm.push(group.iter().map(|section| section.z_mm).sum::<f64>() / group.len() as f64);
-            rings.deviation_um.extend_from_slice(fourier.synthesise(mean(group)));
+            rings.deviation_um.extend_from_slice(fourier.synthesise(mean(group).map(|order| order.value)));
+            variance.push(mean(group).map(|order| order.variance).collect());
             rest = later;
         }
         let (start, end) = match rings.z_mm.as_slice() {
@@ -114,23 +118,57 @@ impl SurfaceBuilder {
             [start, .., end] => (*start, *end),
         };
         let interpolation = describe(rings.z_mm.len(), self.band_limited);
-        let rings = match self.config.step_mm {
-            None => rings,
-            Some(step) => {
-                let points = ((end - start) / step + 2.0) * angles as f64;
-                if points > MOST_POINTS {
-                    let problem = format!("rings every {step} mm over {} mm are more than can be held", end - start);
-                    return Err(failure(problem).help("enlarge step_mm or take fewer angles"));
-                }
-                rings.every(step, start, end)
+        if let Some(step) = self.config.step_mm {
+            let points = ((end - start) / step + 2.0) * angles as f64;
+            if points > MOST_POINTS {
+                let problem = format!("rings every {step} mm over {} mm are more than can be held", end - start);
+                return Err(failure(problem).help("enlarge step_mm or take fewer angles"));
             }
-        };
-        let Rings { z_mm, deviation_um, .. } = rings;
-        Ok(Surface { radius_mm, angles, z_mm, deviation_um, interpolation, meetings })
+        }
+        let Rings { z_mm, deviation_um, .. } = rings.laid(self.config.step_mm);
+        let surface = Surface { radius_mm, angles, z_mm, deviation_um, interpolation, meetings };
+        Ok((surface, Uncertain { rings, variance, step_mm: self.config.step_mm, sections: self.sections }))
+    }
+}
+
+/// A surface's measured rings with what is not known of them, from which surfaces are drawn that could be as well.
+#[derive(Debug)]
+pub struct Uncertain {
+    rings: Rings,
+    /// Of each ring, E|δ|² by order from 0; NaN where not known.
+    variance: Vec<Vec<f64>>,
+    step_mm: Option<f64>,
+    sections: Vec<Section>,
+}
+
+impl Uncertain {
+    /// The sections that the surface was made of.
+    pub(crate) fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Draws: each fills a surface's deviations. Orders below `lowest` are taken as exact. `None` where a ring's errors are
+    /// not known.
+    pub(crate) fn draws(&self, lowest: usize, seed: u64) -> Option<impl FnMut(&mut Surface) + '_> {
+        let each = self.variance.iter().zip(0..);
+        let errors: Option<Vec<Errors>> =
+            each.map(|(variance, ring)| Errors::new(variance, lowest, seed.wrapping_add(ring))).collect();
+        let mut errors = errors?;
+        let angles = self.rings.angles;
+        let (mut fourier, mut ring) = (Fourier::new(angles), Vec::new());
+        Some(move |surface: &mut Surface| {
+            let mut drawn = Rings { angles, z_mm: self.rings.z_mm.clone(), deviation_um: Vec::new() };
+            for (errors, form_um) in errors.iter_mut().zip(self.rings.deviation_um.chunks(angles)) {
+                errors.draw(&mut fourier, form_um, &mut ring);
+                drawn.deviation_um.extend_from_slice(&ring);
+            }
+            surface.deviation_um = drawn.laid(self.step_mm).deviation_um;
+        })
     }
 }
 
 /// Form over (angle, z), as in [`Surface`].
+#[derive(Debug, Clone)]
 struct Rings {
     angles: usize,
     z_mm: Vec<f64>,
@@ -138,11 +176,12 @@ struct Rings {
 }
 
 impl Rings {
-    /// Rings at every `step` from `start`, and one at `end`.
-    fn every(&self, step: f64, start: f64, end: f64) -> Self {
+    /// As they are, or at every `step_mm` from the first on, and one where the last is.
+    fn laid(&self, step_mm: Option<f64>) -> Self {
+        let (Some(step), [start, .., end]) = (step_mm, self.z_mm.as_slice()) else { return self.clone() };
         // A last gap below a thousandth of the step is rounding, not a ring.
         let full = ((end - start) / step - 1e-3).ceil().max(1.0) as usize;
-        let z_mm: Vec<f64> = (0..full).map(|ring| start + step * ring as f64).chain([end]).collect();
+        let z_mm: Vec<f64> = (0..full).map(|ring| start + step * ring as f64).chain([*end]).collect();
         let mut deviation_um = Vec::with_capacity(z_mm.len() * self.angles);
         let ring = |index: usize| &self.deviation_um[index * self.angles..(index + 1) * self.angles];
         for stencil in z_mm.iter().filter_map(|z| Stencil::locate(&self.z_mm, *z)) {
@@ -198,8 +237,8 @@ fn meeting(a: &Section, b: &Section, fourier: &mut Fourier) -> Meeting {
     }
 }
 
-/// The mean of sections at one z, order by order over those that know it.
-fn mean(group: &[Section]) -> impl Iterator<Item = Complex64> + '_ {
+/// The mean of sections at one z, order by order over those that know it; its variance is NaN where not known.
+fn mean(group: &[Section]) -> impl Iterator<Item = Order> + '_ {
     let orders = group.iter().map(|section| section.orders.len()).max().unwrap_or(0);
     (0..orders).map(move |order| {
         let known = || group.iter().filter_map(move |section| *section.orders.get(order)?);
@@ -207,6 +246,11 @@ fn mean(group: &[Section]) -> impl Iterator<Item = Complex64> + '_ {
         let weight = |order: &Order| if weighted { order.variance.recip() } else { 1.0 };
         let weights: f64 = known().map(|order| weight(&order)).sum();
         let sum: Complex64 = known().map(|order| order.value * weight(&order)).sum();
-        if weights > 0.0 { sum / weights } else { Complex64::ZERO }
+        let spread: f64 = known().map(|order| order.variance * weight(&order).powi(2)).sum();
+        if weights > 0.0 {
+            Order { value: sum / weights, variance: spread / weights.powi(2) }
+        } else {
+            Order { value: Complex64::ZERO, variance: f64::NAN }
+        }
     })
 }

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use builder::Section;
-pub use builder::SurfaceBuilder;
+pub use builder::{SurfaceBuilder, Uncertain};
 
 use crate::pipeline::error::Fault;
 use monotone::{STENCIL, Stencil};

@@ -21,7 +21,7 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
         z_mm: 0.0,
         angles: 64,
         separation: Separation {
-            sections: sections.iter().map(|(id, z_mm, _)| SectionAt { id: (*id).into(), z_mm: *z_mm }).collect(),
+            sections: sections.iter().map(|(id, z_mm, _)| SectionAt::whole(*id, *z_mm)).collect(),
             unknowns: (0..width).map(Quantity::Form).collect(),
             estimate: entries().collect(),
             variance: vec![variance; width * orders],
@@ -31,7 +31,6 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
             residual: Residual::default(),
             warnings: Vec::new(),
         },
-        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),
@@ -49,7 +48,7 @@ fn surface_of_levels(knots: &[(f64, f64)], config: &SurfaceConfig) -> Surface {
     for (index, (z_mm, value)) in knots.iter().enumerate() {
         builder.add(&station(&format!("s{index}"), &[("a", *z_mm, &level(*value))], f64::NAN));
     }
-    builder.build(30.0).unwrap()
+    builder.build(30.0).unwrap().0
 }
 
 fn config(angles: usize, step_mm: Option<f64>) -> SurfaceConfig {
@@ -121,7 +120,7 @@ fn sections_come_back_at_their_own_angles_and_in_between() {
         // Out of order: the builder sorts.
         builder.add(&station("far", &[("a", 50.0, &second)], f64::NAN));
         builder.add(&station("near", &[("a", 10.0, &first)], f64::NAN));
-        let surface = builder.build(30.0).unwrap();
+        let surface = builder.build(30.0).unwrap().0;
         assert_eq!(surface.z_mm, [10.0, 50.0]);
         let form = |orders: &[Complex64], angle: f64| -> f64 {
             let wave =
@@ -146,7 +145,7 @@ fn the_seam_is_a_place_like_any_other() {
         (0..12).map(|order| Complex64::from_polar(1.0 / f64::from(order + 1), f64::from(order))).collect();
     let mut builder = SurfaceBuilder::new(&config(40, None));
     builder.add(&station("s1", &[("a", 0.0, &form), ("b", 1.0, &form)], f64::NAN));
-    let surface = builder.build(10.0).unwrap();
+    let surface = builder.build(10.0).unwrap().0;
     let around = |turns: f64| surface.sample(TAU * turns, 0.5).unwrap();
     assert!((around(0.0) - surface.ring(0)[0]).abs() < 1e-12);
     assert!((around(0.0) - around(1.0)).abs() < 1e-12);
@@ -174,7 +173,7 @@ fn sections_of_two_sensors_meet_and_are_averaged_by_their_variance() {
     builder.add(&station("s2", &[("a", 230.0004, &form(2.3)), ("b", 260.0, &form(1.0))], 0.03));
     // The same sensors once more: a repeat, not a meeting.
     builder.add(&station("s3", &[("a", 200.0, &form(1.0)), ("b", 300.0, &form(1.0))], 0.01));
-    let surface = builder.build(30.0).unwrap();
+    let surface = builder.build(30.0).unwrap().0;
     assert_eq!(surface.z_mm.len(), 4);
     assert!((surface.z_mm[1] - 230.0002).abs() < 1e-9);
     let [meeting] = surface.meetings.as_slice() else { panic!("{:?}", surface.meetings) };
@@ -194,7 +193,7 @@ fn an_order_that_one_section_cannot_tell_comes_from_the_other() {
     let whole = [Complex64::ZERO, Complex64::ZERO, Complex64::new(4.0, 0.0), Complex64::new(3.0, 0.0)];
     let mut builder = SurfaceBuilder::new(&config(16, None));
     builder.add(&station("s1", &[("a", 0.0, &lost), ("b", 0.0, &whole), ("c", 9.0, &whole)], f64::NAN));
-    let surface = builder.build(30.0).unwrap();
+    let surface = builder.build(30.0).unwrap().0;
     // Order 2 from b alone, order 3 the plain mean.
     assert!((surface.ring(0)[0] - (4.0 + 2.0)).abs() < 1e-12);
     assert!((surface.meetings[0].max_um - 2.0).abs() < 1e-12);
@@ -207,7 +206,7 @@ fn what_does_not_fit_on_the_grid_is_said() {
     form[9] = Complex64::new(1.0, 0.0);
     let mut builder = SurfaceBuilder::new(&config(16, None));
     builder.add(&station("s1", &[("a", 0.0, &form), ("b", 9.0, &form)], f64::NAN));
-    let surface = builder.build(30.0).unwrap();
+    let surface = builder.build(30.0).unwrap().0;
     assert!(surface.interpolation.contains("left out"));
     assert!(surface.ring(0).iter().all(|value| value.abs() < 1e-12));
 }

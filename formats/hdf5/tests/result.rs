@@ -29,7 +29,7 @@ pub fn station(name: &str) -> StationResult {
         z_mm: 12.5,
         angles: ANGLES,
         separation: Separation {
-            sections: vec![SectionAt { id: "ä".into(), z_mm: 212.5 }],
+            sections: vec![SectionAt::whole("ä", 212.5)],
             unknowns: vec![Quantity::Form(0), Quantity::X],
             estimate: vec![
                 number(0.0, 0.0),
@@ -46,7 +46,6 @@ pub fn station(name: &str) -> StationResult {
             residual: Residual::default(),
             warnings: Vec::new(),
         },
-        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),

@@ -42,7 +42,7 @@ fn station(index: usize, motion: bool) -> StationResult {
     let lost = |order: usize| order == LOST;
     let z_mm = 10.0 * index as f64;
     let separation = Separation {
-        sections: vec![SectionAt { id: "a".into(), z_mm }, SectionAt { id: "b".into(), z_mm: z_mm + 30.0 }],
+        sections: vec![SectionAt::whole("a", z_mm), SectionAt::whole("b", z_mm + 30.0)],
         estimate: places()
             .map(
                 |(order, unknown)| {
@@ -64,7 +64,6 @@ fn station(index: usize, motion: bool) -> StationResult {
         z_mm,
         angles: ANGLES,
         separation,
-        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),

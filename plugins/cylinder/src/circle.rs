@@ -146,19 +146,23 @@ impl Cleaned {
     }
 }
 
-/// The widest stretch of the circle without a point, in degrees.
+/// Stretches of the circle from each point to the next one, in rad.
 #[must_use]
-pub fn widest_gap_deg(angle_rad: &[f64]) -> [f64; 2] {
+pub fn empty_stretches(angle_rad: &[f64]) -> Vec<[f64; 2]> {
     let mut angles: Vec<f64> = angle_rad.iter().map(|angle| angle.rem_euclid(TAU)).collect();
     angles.sort_by(f64::total_cmp);
     let around = angles.first().map(|first| first + TAU);
     let next = angles.iter().copied().skip(1).chain(around);
-    let gaps = angles.iter().copied().zip(next);
-    let widest =
-        gaps.fold([0.0, 0.0], |widest, (from, to)| if to - from > widest[1] - widest[0] { [from, to] } else { widest });
     // The input runs from −180° to 180° as often as from 0° to 360°; the smaller numbers read better.
-    let turn = if widest[0] > PI { TAU } else { 0.0 };
-    widest.map(|angle| (angle - turn).to_degrees())
+    let near_zero = |(from, to): (f64, f64)| if from > PI { [from - TAU, to - TAU] } else { [from, to] };
+    angles.iter().copied().zip(next).map(near_zero).collect()
+}
+
+/// The widest stretch of the circle without a point, in degrees.
+fn widest_gap_deg(angle_rad: &[f64]) -> [f64; 2] {
+    let wider =
+        |widest: [f64; 2], next: [f64; 2]| if next[1] - next[0] > widest[1] - widest[0] { next } else { widest };
+    empty_stretches(angle_rad).into_iter().fold([0.0; 2], wider).map(f64::to_degrees)
 }
 
 #[cfg(test)]

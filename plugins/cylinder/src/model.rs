@@ -14,7 +14,7 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term, Unseen},
     },
     points::Points,
-    separation::{Quantity, Residual, SectionAt, Separation},
+    separation::{Quantity, Residual, Separation},
     stage::{Conclusion, PointModel, Shape},
 };
 
@@ -182,7 +182,8 @@ impl PointModel for LeastSquaresCylinder {
 
 /// Form of one circle by the effects found: what changes the size is its level, lobes are its harmonics.
 fn section(circle: &Circle, middle_mm: f64, missing: &[Missing], fit: &LinearFit, raised: f64) -> Separation {
-    let z_mm = circle.scan.z_mm.iter().sum::<f64>() / circle.scan.len() as f64;
+    let at = circle.section(*LOBES.end());
+    let z_mm = at.z_mm;
     let orders = LOBES.end() + 1;
     let (mut estimate, mut variance) = (vec![Complex64::ZERO; orders], vec![0.0; orders]);
     for (effect, values, variances) in fit.effects() {
@@ -205,7 +206,7 @@ fn section(circle: &Circle, middle_mm: f64, missing: &[Missing], fit: &LinearFit
         }
     }
     Separation {
-        sections: vec![SectionAt { id: circle.trace.id.clone(), z_mm }],
+        sections: vec![at],
         unknowns: vec![Quantity::Form(0)],
         observable: vec![true; orders],
         estimate,

@@ -1,5 +1,7 @@
 //! The separator `least-squares-cylinder`.
 
+use std::f64::consts::PI;
+
 use runout_core::{
     Error, Result,
     pipeline::{
@@ -7,6 +9,7 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     points::{Points, Trace},
+    rig::Gaps,
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{PointModel, PointSeparator, Separator},
     surface::Surface,
@@ -15,7 +18,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    circle::{Cleaned, Harmonics, widest_gap_deg},
+    circle::{Cleaned, Harmonics, empty_stretches},
     predict::Prediction,
     robust::{median, rms},
     scan::Scan,
@@ -108,6 +111,22 @@ pub(crate) struct Circle<'a> {
     pub measured: usize,
     pub scan: Scan,
     pub warnings: Vec<String>,
+}
+
+impl Circle<'_> {
+    /// Its place, and what the harmonics up to an order only bridge.
+    pub(crate) fn section(&self, max_order: usize) -> SectionAt {
+        let mut gaps = Gaps::default();
+        unseen(&self.scan, max_order).for_each(|[from, to]| gaps.add(from, to - from));
+        let z_mm = self.scan.z_mm.iter().sum::<f64>() / self.scan.len() as f64;
+        let used = self.scan.len() as f64 / self.measured as f64;
+        SectionAt { gaps, used, ..SectionAt::whole(self.trace.id.clone(), z_mm) }
+    }
+}
+
+/// Stretches without a point that are longer than half a wave of the highest order, as angles in rad.
+fn unseen(scan: &Scan, max_order: usize) -> impl Iterator<Item = [f64; 2]> {
+    empty_stretches(&scan.angle_rad).into_iter().filter(move |[from, to]| to - from > PI / max_order as f64)
 }
 
 impl PointSeparator for LeastSquaresCylinder {
@@ -224,10 +243,8 @@ impl LeastSquaresCylinder {
         if cleaned.left_out() > 0 {
             warnings.push(format!("{} {}: {}", trace.kind, trace.id, left_out(&cleaned, &all, outlier_mad)));
         }
-        let [from, to] = widest_gap_deg(&scan.angle_rad);
-        // Half a wave of the highest order.
-        if to - from > 180.0 / max_order as f64 {
-            let gap = format!("no point is used between {from:.2}° and {to:.2}°: the harmonics bridge it");
+        for [from, to] in unseen(&scan, max_order).map(|ends| ends.map(f64::to_degrees)) {
+            let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");
             warnings.push(format!("{} {}: {gap}", trace.kind, trace.id));
         }
         Ok(Circle { trace, measured: all.len(), scan, warnings })
@@ -237,9 +254,8 @@ impl LeastSquaresCylinder {
         let remainder = circle.scan.less(|angle, z| cylinder.deviation_um(angle, z));
         let fit =
             Harmonics::fit(&remainder, self.0.max_order).map_err(|problem| unfit(points, circle.trace, &problem))?;
-        let z_mm = circle.scan.z_mm.iter().sum::<f64>() / circle.scan.len() as f64;
         Ok(Separation {
-            sections: vec![SectionAt { id: circle.trace.id.clone(), z_mm }],
+            sections: vec![circle.section(self.0.max_order)],
             unknowns: vec![Quantity::Form(0)],
             observable: vec![true; fit.coefficients.len()],
             estimate: fit.coefficients,

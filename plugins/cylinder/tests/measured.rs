@@ -59,14 +59,13 @@ fn surface(separator: &LeastSquaresCylinder, points: &Points) -> Surface {
             z_mm: separation.sections[0].z_mm,
             angles: 720,
             separation,
-            gaps: Vec::new(),
             profiles: Vec::new(),
             values: Vec::new(),
             motion_values: Vec::new(),
             truth: None,
         });
     }
-    builder.build(separator.reference_radius_mm(points).unwrap()).unwrap()
+    builder.build(separator.reference_radius_mm(points).unwrap()).unwrap().0
 }
 
 fn run_pipeline(text: &str) -> runout_core::Result<Summary> {
@@ -257,6 +256,29 @@ fn a_made_surface_is_predicted_between_its_circles() {
     // z = 2 to 17 mm in steps of 0.5 mm; the lobes grow linearly, which the surface follows: the ripple is left.
     assert_eq!((found.points, found.beyond, found.outliers), (31, 9, 0));
     assert!(found.rms_um < 0.012, "{found:?}");
+}
+
+/// A probe that is off over 13.5° leaves more than half a wave of order 15 (12°) unseen, and of order 12 (15°) not.
+#[test]
+fn points_left_out_are_in_the_coverage() {
+    let mut points = made(&[2.0, 7.0, 12.0]);
+    let wild = points.columns[2].values[133..147].iter_mut().zip([40.0, -40.0].into_iter().cycle());
+    wild.for_each(|(deviation, off)| *deviation += off);
+    for (max_order, gap) in [(15, true), (12, false)] {
+        let separated = separator(max_order, &[]).separate(&points).unwrap();
+        let at = |index: usize| &separated[index].sections[0];
+        assert!((at(0).used - 386.0 / 400.0).abs() < 1e-12, "{}", at(0).used);
+        assert_eq!(at(0).gaps.is_empty(), !gap);
+        if gap {
+            assert!((at(0).gaps.longest_rad().to_degrees() - 13.5).abs() < 1e-9);
+            assert!(
+                at(0).gaps.hold(126_f64.to_radians()) && separated[0].warnings[1].contains("left out of every value")
+            );
+        }
+        let expected = if gap { 1.0 - 13.5 / 360.0 } else { 386.0 / 400.0 };
+        assert!((at(0).coverage(3600) - expected).abs() < 1e-3, "{}", at(0).coverage(3600));
+        assert!((at(1).coverage(3600) - 1.0).abs() < 1e-12);
+    }
 }
 
 #[test]

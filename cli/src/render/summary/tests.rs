@@ -51,6 +51,29 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
     }
 }
 
+fn motion_values(size: f64) -> Vec<Value> {
+    let value = |symbol: &str, unit: &str, reference: &str, value, std: Option<f64>| Value {
+        symbol: symbol.into(),
+        unit: unit.into(),
+        value,
+        source: String::new(),
+        band_upr: [2, 80],
+        lost_orders: vec![],
+        filter: "none".into(),
+        reference: reference.into(),
+        coverage: 1.0,
+        uncertainty: std.map(|std| Uncertainty { std, interval_95: [value, value], draws: 0 }),
+    };
+    vec![
+        value("synchronous-radial-x", "um", "LSC", 3.2 * size, Some(0.004)),
+        value("total-radial-x", "um", "LSC", 4.1 * size, None),
+        value("synchronous-radial-x", "um", "MZC", 3.1 * size, None),
+        value("asynchronous-radial-x", "um", "turns at one angle", 0.8 * size, Some(0.05)),
+        value("residual-synchronous-tilt-y", "urad", "LSC", 6.0 * size, None),
+        value("fundamental-radial", "um", "PC", 0.6 * size, Some(0.002)),
+    ]
+}
+
 fn summary(stations: usize) -> Summary {
     let station = |index: usize| {
         let z_mm = 10.0 * index as f64;
@@ -59,7 +82,7 @@ fn summary(stations: usize) -> Summary {
             z_mm,
             captures: vec![capture("initial", 0), capture("reversed", index % 2)],
             sections: vec![section("a", 200.0 + z_mm), section("b", 230.0 + z_mm)],
-            motion_values: Vec::new(),
+            motion_values: motion_values(1.0 + 0.1 * index as f64),
             residual_rms_um: Some(0.0066 + 1e-4 * index as f64),
             expected_residual_rms_um: Some(0.0065),
             chi2_per_dof: Some(1.02),
@@ -102,6 +125,11 @@ fn summary(stations: usize) -> Summary {
 #[test]
 fn few_stations_stand_row_by_row() {
     assert_snapshot!(text(&summary(2)));
+}
+
+#[test]
+fn one_station_has_its_error_motion_with_uncertainty() {
+    assert_snapshot!(text(&summary(1)));
 }
 
 #[test]

@@ -48,6 +48,30 @@ pub struct ErrorMotion<'a> {
 pub const CENTRE: Centre = Centre::Plot(Reference::LeastSquares);
 
 const STANDARD: &str = "ISO 230-7:2015";
+
+/// Symbol and unit of every value that there may be.
+pub const SYMBOLS: [(&str, &str); 20] = [
+    ("synchronous-radial-x", "µm"),
+    ("synchronous-radial-y", "µm"),
+    ("synchronous-radial-rotating", "µm"),
+    ("residual-synchronous-tilt-x", "µrad"),
+    ("residual-synchronous-tilt-y", "µrad"),
+    ("residual-synchronous-tilt-rotating", "µrad"),
+    ("total-radial-x", "µm"),
+    ("total-radial-y", "µm"),
+    ("total-radial-rotating", "µm"),
+    ("total-tilt-x", "µrad"),
+    ("total-tilt-y", "µrad"),
+    ("total-tilt-rotating", "µrad"),
+    ("asynchronous-radial-x", "µm"),
+    ("asynchronous-radial-y", "µm"),
+    ("asynchronous-radial-rotating", "µm"),
+    ("asynchronous-tilt-x", "µrad"),
+    ("asynchronous-tilt-y", "µrad"),
+    ("asynchronous-tilt-rotating", "µrad"),
+    ("fundamental-radial", "µm"),
+    ("fundamental-tilt", "µrad"),
+];
 /// Two-sided 95 % quantiles of Student's distribution for 1, 2, 3, … degrees of freedom.
 const STUDENT_95: [f64; 10] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23];
 /// The same of the normal distribution.

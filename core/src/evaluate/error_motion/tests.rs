@@ -95,6 +95,21 @@ fn total_holds_all_turns_about_the_synchronous_plot() {
     }
 }
 
+/// Limits are checked against these names before there is any data.
+#[test]
+fn every_value_has_a_known_symbol_and_unit() {
+    let separation = separation(&[(4, [2.0, 1.0, 3.0, 5.0].map(Complex64::from))]);
+    let profiles = [profile(1.0, [-0.1, 0.2])];
+    let station = ErrorMotion { station: "s", z_mm: 0.0, angles: ANGLES, separation: &separation, profiles: &profiles };
+    let mut found: Vec<(String, String)> =
+        station.values(&[LSC]).into_iter().map(|value| (value.symbol, value.unit)).collect();
+    let mut known: Vec<(String, String)> =
+        SYMBOLS.iter().map(|(symbol, unit)| ((*symbol).into(), unit.replace('µ', "u"))).collect();
+    found.sort();
+    known.sort();
+    assert_eq!(found, known);
+}
+
 /// 2/rev that turns with the spindle only moves the circle that a turning tool cuts; what turns against it at 1/rev makes
 /// that circle an ellipse.
 #[test]

@@ -21,7 +21,7 @@ use crate::{
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EvaluateConfig {
-    /// Groups of values; without it `roundness`, `texture` and `cylindricity`.
+    /// Groups of values; without it `roundness`, `texture`, `cylindricity` and `error-motion`.
     pub values: Option<Vec<Group>>,
     /// Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY). Without it LSCI and
     /// MZCI.
@@ -97,7 +97,7 @@ pub struct Evaluate {
 impl Default for Evaluate {
     fn default() -> Self {
         Self {
-            groups: vec![Group::Roundness, Group::Texture, Group::Cylindricity],
+            groups: vec![Group::Roundness, Group::Texture, Group::Cylindricity, Group::ErrorMotion],
             references: vec![Reference::LeastSquares, Reference::MinimumZone],
             filter_upr: None,
             lambda_c_mm: None,
@@ -220,7 +220,7 @@ impl Evaluate {
         once_each(round.chain([between_name(self.lambda_s_mm, self.lambda_c_mm)]).collect())
     }
 
-    /// Symbols and units of the values that may come, but for those of error motion.
+    /// Symbols and units of the values that may come.
     pub(super) fn symbols(&self) -> Vec<(&'static str, &'static str)> {
         let mut symbols = Vec::new();
         if self.has(Group::Roundness) {
@@ -239,6 +239,9 @@ impl Evaluate {
         }
         if self.has(Group::Areal) {
             symbols.extend(areal::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
+        }
+        if self.has(Group::ErrorMotion) {
+            symbols.extend(error_motion::SYMBOLS);
         }
         symbols
     }

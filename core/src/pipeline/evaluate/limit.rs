@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluate, Group, PlacedValue, ascii_unit};
+use super::{Evaluate, PlacedValue, ascii_unit};
 use crate::{
     pipeline::error::{Fault, known_names},
     rig::Rig,
@@ -86,15 +86,14 @@ impl Limit {
                 let message = format!("{symbol} is given in `{}`, found `{}`", ascii_unit(unit), self.unit);
                 return Err(Fault::at("unit", message));
             }
-            // Which symbols a station's error motion has is told by its data.
-            None if !evaluate.has(Group::ErrorMotion) => {
+            None => {
                 let fault = Fault::at("symbol", format!("no value `{}` is computed", self.symbol));
                 let mut known: Vec<&str> = symbols.iter().map(|(symbol, _)| *symbol).collect();
                 known.dedup();
                 let more = "`values` and `lambda_c_mm` in [evaluate] give more";
                 return Err(fault.help(format!("{}; {more}", known_names(&self.symbol, known))));
             }
-            _ => {}
+            Some(_) => {}
         }
         let known = |key: &str, asked: &Option<String>, names: Vec<String>| match asked {
             Some(asked) if !names.contains(asked) => {
@@ -113,6 +112,10 @@ impl Limit {
             }
             "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
                 known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;
+            }
+            symbol if ["synchronous-", "residual-", "total-"].iter().any(|kind| symbol.starts_with(kind)) => {
+                let centres = evaluate.centres.iter().map(|centre| centre.symbol().to_owned());
+                known("reference", &self.reference, centres.collect())?;
             }
             _ => {}
         }

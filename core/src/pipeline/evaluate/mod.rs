@@ -1,16 +1,18 @@
 //! The standards' values of a run: which (`[evaluate]`), of what, and the limits that they have to keep (`[[limit]]`).
 
+mod areal;
 mod config;
 mod filter;
 mod limit;
 mod part;
 mod section;
 
+pub(super) use areal::add_areal;
 pub use config::{Evaluate, EvaluateConfig, Group};
 pub(super) use limit::decide;
 pub use limit::{Decision, Limit, LimitSummary, LimitValue};
 pub use part::PartSummary;
-pub(super) use part::{add_areal, part_summary};
+pub(super) use part::part_summary;
 pub(super) use section::section_values;
 
 use super::summary::StationSummary;

@@ -1,4 +1,4 @@
-//! Values of all sections together: cylindricity, and areal values of the surface.
+//! Values of all sections together: cylindricity.
 
 use std::collections::BTreeSet;
 
@@ -7,20 +7,16 @@ use serde::{Deserialize, Serialize};
 
 use super::{Evaluate, Filter, Group, Label, labelled};
 use crate::{
-    Complex64, Result,
+    Complex64,
     evaluate::{
-        Value, areal,
+        Value,
         cylindricity::{Disturbed, Generatrices, MedianLine, Points, Reference, Section, Values},
         roundness::Angles,
         uncertainty::{DRAWS, Errors, LARGEST, monte_carlo_of, seed},
     },
-    numerics::{
-        filter::areal_gaussian,
-        fourier::{Fourier, max_order},
-        height_map::HeightMap,
-    },
+    numerics::fourier::{Fourier, max_order},
     rig::Gaps,
-    surface::{self, Surface},
+    surface,
 };
 
 /// Angles at which a wall is looked at, at most: a surface's usual ones.
@@ -84,41 +80,6 @@ const CENTRED: &str = "every section is centred, without its 1/rev, and has the 
     not tell a section's centre and mean radius. Taper (CYLtt), straightness of generatrices and coaxiality are therefore \
     not given, and CYLt holds none of them";
 
-/// Adds ISO 25178-2's values of the unrolled surface, without its least-squares cylinder and filtered by λs and λc; where it
-/// comes from sections with lost orders, these are in no value. Angles at which a section is interrupted are left out
-/// along the whole part.
-///
-/// # Errors
-/// When the rings are not at equal distances.
-pub fn add_areal(part: &mut PartSummary, surface: &Surface, interrupted: &[Gaps], evaluate: &Evaluate) -> Result<()> {
-    let whole = HeightMap::unrolled(surface)?;
-    let mut there = whole.heights_um().to_vec();
-    there.chunks_mut(surface.angles).for_each(|ring| interrupted.iter().for_each(|gaps| gaps.blank(ring)));
-    let mut map = areal::without_cylinder(&whole.with(there))?;
-    if let Some(shortest) = evaluate.lambda_s_mm {
-        map = map.with(areal_gaussian(&map, shortest));
-    }
-    if let Some(longest) = evaluate.lambda_c_mm {
-        let mut rest = map.heights_um().to_vec();
-        rest.iter_mut().zip(areal_gaussian(&map, longest)).for_each(|(height, waviness)| *height -= waviness);
-        map = map.with(rest);
-    }
-    let found = areal::areal(&map, &areal::Settings::default());
-    let label = |(symbol, unit, clause): &(&'static str, &'static str, &str)| {
-        Label::new(symbol, unit, format!("ISO 25178-2:2021, {clause}"), "LSCY removed, mean")
-    };
-    let lost = part.values.first().map(|value| value.lost_orders.clone()).unwrap_or_default();
-    part.values.extend(labelled(
-        areal::PARAMETERS.iter().map(label).collect(),
-        found.parameters().iter().map(|parameter| (parameter.value, None)).collect(),
-        &Filter::between(evaluate.lambda_s_mm, evaluate.lambda_c_mm, surface.radius_mm),
-        max_order(surface.angles),
-        &lost,
-        found.points as f64 / (found.points + found.missing) as f64,
-    ));
-    Ok(())
-}
-
 /// Circles of a wall on common angles.
 struct Wall {
     angles: Angles,
@@ -135,6 +96,7 @@ struct Ring {
     harmonics: Vec<Complex64>,
     variance: Vec<f64>,
     gaps: Gaps,
+    used: f64,
     seed: u64,
 }
 
@@ -153,6 +115,7 @@ impl Wall {
                 harmonics: known().map(|known| known.map_or(Complex64::ZERO, |known| known.value)).collect(),
                 variance: known().map(|known| known.map_or(f64::NAN, |known| known.variance)).collect(),
                 gaps: section.gaps.clone(),
+                used: section.used,
                 seed: seed(&[&section.station, &section.id]),
             }
         });
@@ -234,7 +197,7 @@ impl Wall {
 
     /// Share of the wall that is there.
     fn coverage(&self) -> f64 {
-        let each = self.rings.iter().map(|ring| ring.gaps.coverage(self.count));
+        let each = self.rings.iter().map(|ring| ring.gaps.coverage(self.count).min(ring.used));
         each.sum::<f64>() / self.rings.len().max(1) as f64
     }
 

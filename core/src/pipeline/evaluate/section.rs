@@ -11,8 +11,7 @@ use crate::{
     },
     numerics::fourier::Fourier,
     pipeline::result::StationResult,
-    rig::Gaps,
-    separation::Quantity,
+    separation::{Quantity, SectionAt},
 };
 
 /// The values of a section whose nominal radius is known.
@@ -58,7 +57,7 @@ struct Form {
     lost: Vec<usize>,
     angles: usize,
     radius_mm: f64,
-    gaps: Gaps,
+    at: SectionAt,
     seed: u64,
 }
 
@@ -68,7 +67,7 @@ impl Form {
         let unknown = separation.position(Quantity::Form(section))?;
         let harmonics = separation.coefficients(unknown).enumerate();
         let width = separation.unknowns.len();
-        let id = separation.sections.get(section).map_or("", |at| at.id.as_str());
+        let at = separation.sections.get(section)?.clone();
         (result.angles > 1).then(|| Self {
             harmonics: harmonics.map(|(order, value)| if order < 2 { Complex64::ZERO } else { value }).collect(),
             variance: separation.variance.iter().skip(unknown).step_by(width).copied().collect(),
@@ -76,8 +75,8 @@ impl Form {
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
             angles: result.angles,
             radius_mm,
-            gaps: result.gaps_of(section),
-            seed: seed(&[&result.station, id]),
+            seed: seed(&[&result.station, &at.id]),
+            at,
         })
     }
 
@@ -107,7 +106,7 @@ impl Form {
 
     fn profile(&self, filter: &Filter, fourier: &mut Fourier) -> Vec<f64> {
         let mut form_um = fourier.synthesise(filter.harmonics(&self.harmonics)).to_vec();
-        self.gaps.blank(&mut form_um);
+        self.at.gaps.blank(&mut form_um);
         form_um
     }
 
@@ -116,7 +115,7 @@ impl Form {
     }
 
     fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {
-        labelled(labels, found, filter, self.highest, &self.lost, self.gaps.coverage(self.angles))
+        labelled(labels, found, filter, self.highest, &self.lost, self.at.coverage(self.angles))
     }
 
     fn round(&self, filter: &Filter, references: &[Reference], papers_ra: bool) -> Vec<Value> {

@@ -108,7 +108,7 @@ fn station() -> StationResult {
         z_mm: 0.0,
         angles: ANGLES,
         separation: Separation {
-            sections: vec![SectionAt { id: "a".into(), z_mm: 0.0 }],
+            sections: vec![SectionAt::whole("a", 0.0)],
             unknowns: vec![Quantity::Form(0)],
             variance: vec![f64::NAN; estimate.len()],
             observable: vec![true; estimate.len()],
@@ -118,7 +118,6 @@ fn station() -> StationResult {
             residual: Residual::default(),
             warnings: Vec::new(),
         },
-        gaps: Vec::new(),
         profiles: Vec::new(),
         values: Vec::new(),
         motion_values: Vec::new(),

@@ -284,7 +284,7 @@ impl Solver<'_> {
         }
         let rig = &self.selection.rig;
         let sections = (rig.sections.iter().enumerate())
-            .map(|(index, id)| SectionAt { id: id.clone(), z_mm: rig.section_z_mm(index) + station.z_mm });
+            .map(|(index, id)| SectionAt::whole(id.clone(), rig.section_z_mm(index) + station.z_mm));
         let tells_tilt = layout.unknowns.iter().any(|unknown| matches!(unknown, Quantity::TiltX | Quantity::TiltY));
         Separation {
             sections: sections.collect(),

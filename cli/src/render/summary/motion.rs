@@ -1,0 +1,69 @@
+//! Error motion of the axis.
+
+use runout_core::{evaluate::Value, pipeline::run::StationSummary};
+
+use super::{std_of, unit};
+use crate::render::{
+    number::{significant, spread, with_std},
+    page::Page,
+    table::Table,
+};
+
+const KINDS: [&str; 3] = ["synchronous", "asynchronous", "total"];
+
+/// One row a direction, one column a kind of value: of a station with ±, of several from the lowest to the highest.
+pub fn section(page: &mut Page, stations: &[StationSummary]) {
+    let Some(first) = stations.iter().flat_map(|station| &station.motion_values).find(|value| is_plot(value)) else {
+        return;
+    };
+    let values = || stations.iter().flat_map(|station| &station.motion_values).filter(|value| is_about(value, first));
+    let mut directions: Vec<(String, String)> = Vec::new();
+    for value in values() {
+        let direction = (parts(value).1, unit(&value.unit));
+        if !directions.contains(&direction) {
+            directions.push(direction);
+        }
+    }
+    let mut table = Table::new(1, std::iter::once("").chain(KINDS));
+    for (direction, unit) in &directions {
+        let cell = |kind: &str| {
+            let found = values().filter(|value| parts(value) == (kind, direction.clone()));
+            cell(&found.collect::<Vec<_>>())
+        };
+        table.row(std::iter::once(format!("{direction} {unit}")).chain(KINDS.map(cell)));
+    }
+    let of = if stations.len() > 1 { ", lowest to highest of the stations" } else { "" };
+    page.headed_table(format_args!("Error motion of the axis, peak to valley about {}{of}", first.reference), &table);
+}
+
+/// Whether it is drawn about a centre.
+fn is_plot(value: &Value) -> bool {
+    !["asynchronous", "fundamental"].iter().any(|kind| value.symbol.starts_with(kind))
+}
+
+/// Whether it has no centre, or that of `first`.
+fn is_about(value: &Value, first: &Value) -> bool {
+    !is_plot(value) || value.reference == first.reference
+}
+
+/// Kind and direction: "synchronous", "radial x". The fundamental is synchronous motion at 1/rev.
+fn parts(value: &Value) -> (&str, String) {
+    let symbol = value.symbol.strip_prefix("residual-").unwrap_or(&value.symbol);
+    let (kind, direction) = symbol.split_once('-').unwrap_or((symbol, ""));
+    match kind {
+        "fundamental" => ("synchronous", format!("{direction} fundamental")),
+        _ => (kind, direction.replace('-', " ")),
+    }
+}
+
+fn cell(values: &[&Value]) -> String {
+    match values {
+        [] => String::new(),
+        [only] if std_of(only).is_some() => with_std(only.value, std_of(only)),
+        [only] => significant(only.value, 4),
+        several => match spread(several.iter().map(|value| value.value)) {
+            Some([low, _, high]) => format!("{} to {}", significant(low, 3), significant(high, 3)),
+            None => String::new(),
+        },
+    }
+}
