@@ -49,7 +49,7 @@ def run_runout(threads, *settings):
 
 def run_values(threads):
     """The same, and the standards' values with their uncertainty, as a run gives them unless told otherwise."""
-    everything = 'evaluate.values=["roundness", "cylindricity", "texture"]'
+    everything = 'evaluate.values=["roundness", "cylindricity", "texture", "error-motion"]'
     return run_runout(threads, "--set", everything)
 
 

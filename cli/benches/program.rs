@@ -84,15 +84,7 @@ static SURFACE: LazyLock<Surface> = LazyLock::new(|| {
 fn summary() -> Summary {
     Summary {
         title: "bench".into(),
-        provenance: Provenance::default(),
-        lost_orders: LostOrders::default(),
-        stations: Vec::new(),
-        part: None,
-        limits: Vec::new(),
-        surface: None,
-        straightness: None,
-        outputs: Vec::new(),
-        warnings: Vec::new(),
+        ..Summary::default()
     }
 }
 

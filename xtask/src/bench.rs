@@ -10,8 +10,9 @@ use crate::{
     setup::{self, cargo},
 };
 
-/// Modules that the peers of a campaign and of reference circles import, and the packages that bring them.
+/// Modules that the peers of a campaign, of its stages and of reference circles import, and the packages that bring them.
 const CAMPAIGN: [[&str; 2]; 3] = [["numpy"; 2], ["scipy"; 2], ["h5py"; 2]];
+const STAGES: [[&str; 2]; 5] = [["numpy"; 2], ["scipy"; 2], ["h5py"; 2], ["polars"; 2], ["pyarrow"; 2]];
 const ROUNDNESS: [[&str; 2]; 6] = [
     ["numpy"; 2],
     ["scipy"; 2],
@@ -80,22 +81,39 @@ pub fn all_peers(words: &[&str]) -> Outcome {
     }
     lines.extend([first.head.as_str(), &rule]);
     lines.extend(tables.iter().flat_map(|table| &table.rows).map(String::as_str));
+    show("bench-peers", &lines.join("\n"))
+}
+
+/// Puts a table where `benchmarks/README.md` shows it, between two comments of this name.
+fn show(name: &str, table: &str) -> Outcome {
     let path = root().join("benchmarks/README.md");
     let failure = |error: std::io::Error| format!("{}: {error}", path.display());
     let text = std::fs::read_to_string(&path).map_err(failure)?;
-    let (Some((before, _)), Some((_, after))) = (text.split_once(BEGIN), text.split_once(END)) else {
-        return Err(format!("{} has no place {BEGIN} … {END}", path.display()));
+    let (begin, end) = (format!("<!-- {name} -->"), format!("<!-- /{name} -->"));
+    let (Some((before, _)), Some((_, after))) = (text.split_once(&begin), text.split_once(&end)) else {
+        return Err(format!("{} has no place {begin} … {end}", path.display()));
     };
-    std::fs::write(&path, format!("{before}{BEGIN}\n{}\n{END}{after}", lines.join("\n"))).map_err(failure)?;
-    say(&format!("wrote the table of {}", path.display()));
+    std::fs::write(&path, format!("{before}{begin}\n{}\n{end}{after}", table.trim_end())).map_err(failure)?;
+    say(&format!("wrote the table `{name}` of {}", path.display()));
     Ok(())
+}
+
+/// Times each stage and the peers' in turns; the table goes where `benchmarks/README.md` shows it.
+pub fn stages(words: &[&str]) -> Outcome {
+    let wanted = Wanted::read(words)?;
+    let Some(peers) = peers(&["record.py", "pipeline.py"]) else { return Ok(()) };
+    let python = python(&STAGES)?;
+    write_record(&wanted, &peers, &python)?;
+    run(&mut cargo(&["build", "--release", "--package", "runout", "--example", "stages"])?)?;
+    let mut compare = Command::new(python);
+    compare.arg("-B").arg("benchmarks/stages/compare.py").arg(target().join("release/examples/stages"));
+    run(compare.arg(&peers).arg(&wanted.scratch).arg(wanted.rounds.to_string()).arg(wanted.stations.to_string()))?;
+    let path = wanted.scratch.join("table-stages.md");
+    show("bench-stages", &std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?)
 }
 
 /// Kinds of samples.
 const KINDS: [&str; 2] = ["f64", "i16"];
-/// Around the table in `benchmarks/README.md`.
-const BEGIN: &str = "<!-- bench-peers -->";
-const END: &str = "<!-- /bench-peers -->";
 
 /// What `compare.py` found.
 struct Table {
@@ -125,11 +143,7 @@ fn time_campaign(wanted: &Wanted) -> Outcome<bool> {
         command.arg("-B").arg(Path::new("benchmarks/campaign").join(name));
         command
     };
-    let mut write = script("write_record.py");
-    write.arg(&peers).arg(&wanted.scratch);
-    write.args([SAMPLES_PER_REV, TURNS, wanted.stations].map(|number| number.to_string()));
-    write.args(wanted.i16.then_some("--i16"));
-    run(&mut write)?;
+    write_record(wanted, &peers, &python)?;
     run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
     for name in KINDS.into_iter().take(if wanted.i16 { 2 } else { 1 }) {
         let mut compare = script("compare.py");
@@ -137,6 +151,14 @@ fn time_campaign(wanted: &Wanted) -> Outcome<bool> {
         run(compare.arg(wanted.rounds.to_string()).arg(name).arg(wanted.stations.to_string()))?;
     }
     Ok(true)
+}
+
+/// The record that both programs read, where it is not yet.
+fn write_record(wanted: &Wanted, peers: &Path, python: &Path) -> Outcome {
+    let mut write = Command::new(python);
+    write.args(["-B", "benchmarks/campaign/write_record.py"]).arg(peers).arg(&wanted.scratch);
+    write.args([SAMPLES_PER_REV, TURNS, wanted.stations].map(|number| number.to_string()));
+    run(write.args(wanted.i16.then_some("--i16")))
 }
 
 /// Times the reference circles of runout and of the peers on the same points.

@@ -24,6 +24,8 @@ cargo xtask COMMAND
                 time a campaign of 98 million samples beside the same work in NumPy and SciPy; 1.6 GB in target/bench
   bench-peers [SCRATCH] [--stations K] [--rounds N]
                 the same with samples of 64 bits and of 16, and write the table into benchmarks/README.md
+  bench-stages [SCRATCH] [--rounds N]
+                each stage and the peers' side by side, one thread; the table goes into benchmarks/README.md
   bench-roundness
                 time reference circles of 2560 and 36 000 points beside SciPy and others
   areal-peers [RINGS POINTS ROUNDS]
@@ -48,6 +50,7 @@ fn main() -> ExitCode {
         ["areal-peers", ref rest @ ..] => areal::peers(rest),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
         ["bench-peers", ref rest @ ..] => bench::all_peers(rest),
+        ["bench-stages", ref rest @ ..] => bench::stages(rest),
         ["bench-roundness"] => bench::roundness(),
         ["studies", ref arguments @ ..] => chores::studies(arguments),
         _ => {

@@ -225,13 +225,8 @@ pub(super) fn begun(pipeline: &Pipeline) -> Summary {
             inputs: Vec::new(),
         },
         lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
-        stations: Vec::new(),
-        part: None,
-        limits: Vec::new(),
-        surface: None,
-        straightness: None,
-        outputs: Vec::new(),
         warnings: pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default(),
+        ..Summary::default()
     }
 }
 

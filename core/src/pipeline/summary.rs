@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// What a run found, for people and programs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     /// The pipeline's title.
     pub title: String,

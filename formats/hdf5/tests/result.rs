@@ -74,12 +74,8 @@ pub fn summary() -> Summary {
             truth: None,
             warnings: vec!["left out 3 points".into()],
         }],
-        part: None,
-        limits: Vec::new(),
-        surface: None,
-        straightness: None,
-        outputs: Vec::new(),
         warnings: vec!["order 1 of the form is lost".into()],
+        ..Summary::default()
     }
 }
 

@@ -80,13 +80,8 @@ fn summary() -> Summary {
             inputs: vec![Input { path: "shaft.h5".into(), bytes: 12, blake3: "00ff".into() }],
         },
         lost_orders: LostOrders { form: vec![LOST], motion: vec![LOST] },
-        stations: Vec::new(),
-        part: None,
-        limits: Vec::new(),
-        surface: None,
-        straightness: None,
-        outputs: Vec::new(),
         warnings: vec!["order 4 is lost".into()],
+        ..Summary::default()
     }
 }
 

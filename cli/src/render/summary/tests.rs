@@ -104,11 +104,8 @@ fn summary(stations: usize) -> Summary {
     };
     Summary {
         title: "Turned shaft".into(),
-        provenance: Provenance::default(),
         lost_orders: LostOrders { form: (2..=80).step_by(2).collect(), motion: vec![1] },
         stations: (0..stations).map(station).collect(),
-        part: None,
-        limits: Vec::new(),
         surface: Some(SurfaceSummary {
             angles: 720,
             rings: 2 * stations,
@@ -116,9 +113,8 @@ fn summary(stations: usize) -> Summary {
             interpolation: "monotone".into(),
             meetings: vec![meeting],
         }),
-        straightness: None,
         outputs: vec!["out/form.parquet".into()],
-        warnings: vec![],
+        ..Summary::default()
     }
 }
 

@@ -88,13 +88,7 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
             inputs: vec![Input { path: "part.h5".into(), bytes: 3, blake3: "00ff".into() }],
         },
         lost_orders: LostOrders { form: vec![1, 4, 500], motion: Vec::new() },
-        stations: Vec::new(),
-        part: None,
-        limits: Vec::new(),
-        surface: None,
-        straightness: None,
-        outputs: Vec::new(),
-        warnings: Vec::new(),
+        ..Summary::default()
     };
     commit_all(export.finish(&summary, surface)?)
 }
