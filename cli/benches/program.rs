@@ -82,10 +82,7 @@ static SURFACE: LazyLock<Surface> = LazyLock::new(|| {
 });
 
 fn summary() -> Summary {
-    Summary {
-        title: "bench".into(),
-        ..Summary::default()
-    }
+    Summary { title: "bench".into(), ..Summary::default() }
 }
 
 /// Writes a mesh with normals and colours; gives the size of the file.

@@ -63,15 +63,16 @@ fn main() -> Outcome {
         })?;
     }
     report("hdf5-read", || {
-        clocked(|| (0..CAPTURES / 2).try_for_each(|station| (0..2).try_for_each(|setup| drain(&mut *recording.open(station, setup)?))))
+        clocked(|| {
+            (0..CAPTURES / 2)
+                .try_for_each(|station| (0..2).try_for_each(|setup| drain(&mut *recording.open(station, setup)?)))
+        })
     })?;
     let csv = built(&pipeline, &csv_settings(&folder, &out))?;
     report("csv-read", || clocked(|| drain(&mut *opened(&csv)?.open(0, 0)?)))?;
 
-    let profiles: Vec<Profile> = captures
-        .into_iter()
-        .map(|record| stages.averager.average(Box::new(record)))
-        .collect::<Result<_, _>>()?;
+    let profiles: Vec<Profile> =
+        captures.into_iter().map(|record| stages.averager.average(Box::new(record))).collect::<Result<_, _>>()?;
     let station = Station { name: "s000".into(), z_mm: 0.0, profiles };
     let separation = stages.separator.separate(&station)?;
     report("separate", || clocked(|| Ok(drop(black_box(stages.separator.separate(&station)?)))))?;

@@ -20,6 +20,7 @@ mod header;
 mod lines;
 mod number;
 mod recording;
+mod row;
 mod scan;
 
 pub use config::{CsvConfig, FileConfig, StationConfig};

@@ -122,3 +122,22 @@ pub(crate) fn split(line: &[u8], delimiter: u8) -> (&[u8], Option<&[u8]>) {
     });
     (cell.trim_ascii(), rest)
 }
+
+/// A column's cell, and what follows its delimiter, from what is left of a line (the column that this begins with, and it);
+/// the number of cells where there are too few.
+pub(crate) fn cell_at(
+    (first, rest): (usize, Option<&[u8]>),
+    delimiter: u8,
+    column: usize,
+) -> std::result::Result<(&[u8], Option<&[u8]>), usize> {
+    let mut rest = rest.ok_or(first)?;
+    if memchr::memchr(b'"', rest).is_none() && column > first {
+        let before = memchr::memchr_iter(delimiter, rest).nth(column - first - 1);
+        let before = before.ok_or_else(|| first + memchr::memchr_iter(delimiter, rest).count() + 1)?;
+        return Ok(split(&rest[before + 1..], delimiter));
+    }
+    for passed in first..column {
+        rest = split(rest, delimiter).1.ok_or(passed + 1)?;
+    }
+    Ok(split(rest, delimiter))
+}

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use runout_core::{
     Error, Result,
+    encoder::EncoderScan,
     measurement::{Block, Capture, Recording, SampleStream, StationKey},
     rig::Rig,
 };
@@ -11,13 +12,16 @@ use runout_core::{
 use crate::{
     config::Stated,
     header::Header,
-    lines::{Line, Lines, split},
-    number,
-    scan::{Rows, Scan, ragged},
+    lines::Lines,
+    row::{Role, Row},
+    scan::{Kept, Rows, Scan},
 };
 
 /// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
 const BLOCK_SAMPLES: usize = 16_384;
+
+/// Readings of a file that are kept from the first look at it, at most: 32 MiB. A file that has more is read twice.
+const MOST_KEPT: usize = 1 << 22;
 
 /// Sampling rates that differ by a smaller share are the same: a time column's rounding.
 const SAME_RATE: f64 = 1e-3;
@@ -30,6 +34,7 @@ pub(crate) struct CsvRecording {
     paths: Vec<Vec<PathBuf>>,
     stated: Stated,
     remarks: Vec<String>,
+    most_kept: usize,
 }
 
 impl CsvRecording {
@@ -49,7 +54,7 @@ impl CsvRecording {
         if !unknown.is_empty() {
             remarks.push(format!("columns that the rig does not name: {}", unknown.join(", ")));
         }
-        Ok(Self { rig: rig.clone(), stations, paths, stated, remarks })
+        Ok(Self { rig: rig.clone(), stations, paths, stated, remarks, most_kept: MOST_KEPT })
     }
 }
 
@@ -64,7 +69,8 @@ impl Recording for CsvRecording {
             return Err(Error::new("open", format!("station {station} in setup {setup}"), "there is no such file"));
         };
         let (header, mut lines) = Header::open(path, &self.rig)?;
-        let scan = Scan::of(&header, &mut lines)?;
+        let roles = Role::of_columns(&header, &self.rig);
+        let mut scan = Scan::of(&header, &roles, &mut lines, self.most_kept)?;
         let sample_rate_hz = match (self.stated.sample_rate_hz, scan.sample_rate_hz) {
             (Some(stated), Some(found)) if (found / stated - 1.0).abs() > SAME_RATE => {
                 return Err(Error::new(
@@ -92,14 +98,10 @@ impl Recording for CsvRecording {
             trimmed: Vec::new(),
             responses: Vec::new(),
         };
+        if let Some(kept) = scan.kept.take() {
+            return Ok(Box::new(KeptStream { capture, kept, encoder: scan.encoder, next: 0 }));
+        }
         let (header, lines) = Header::open(path, &self.rig)?;
-        let mut roles = vec![Role::Skip; header.names.len()];
-        for (channel, (column, sensor)) in header.sensors.iter().zip(&self.rig.sensors).enumerate() {
-            roles[*column] = Role::Sensor { channel, sign: sensor.sign };
-        }
-        if scan.encoder.is_some() {
-            roles[header.phase.column()] = Role::Angle;
-        }
         Ok(Box::new(CsvStream { capture, header, lines, roles, scan, rows: Rows::default(), next: 0 }))
     }
 
@@ -112,12 +114,33 @@ impl Recording for CsvRecording {
     }
 }
 
-/// What a column is read for.
-#[derive(Debug, Clone, Copy)]
-enum Role {
-    Sensor { channel: usize, sign: f64 },
-    Angle,
-    Skip,
+/// A file's samples in memory.
+struct KeptStream {
+    capture: Capture,
+    kept: Kept,
+    encoder: Option<EncoderScan>,
+    next: usize,
+}
+
+impl SampleStream for KeptStream {
+    fn capture(&self) -> &Capture {
+        &self.capture
+    }
+
+    fn next_block(&mut self, block: &mut Block) -> Result<bool> {
+        block.clear();
+        block.start = self.next as u64;
+        let channels = self.capture.channels().max(1);
+        let end = (self.next + BLOCK_SAMPLES).min(self.kept.samples.len() / channels);
+        block.samples.extend_from_slice(&self.kept.samples[self.next * channels..end * channels]);
+        if let Some(encoder) = &self.encoder {
+            let angles_deg = self.kept.angle_deg.get(self.next..end).unwrap_or_default();
+            block.angle_rev.extend(angles_deg.iter().map(|angle_deg| encoder.turns(*angle_deg)));
+        }
+        let some = end > self.next;
+        self.next = end;
+        Ok(some)
+    }
 }
 
 /// The second pass over a file.
@@ -149,9 +172,9 @@ impl SampleStream for CsvStream {
             let begin = block.samples.len();
             block.samples.resize(begin + channels, f64::NAN);
             let row = Row { header: &self.header, roles: &self.roles, decimal: self.scan.decimal };
-            let angle_deg = row.read(line, &mut block.samples[begin..])?;
+            let instant = row.read(line, &mut block.samples[begin..])?;
             if let Some(encoder) = &self.scan.encoder {
-                block.angle_rev.push(encoder.turns(angle_deg));
+                block.angle_rev.push(encoder.turns(instant.phase));
             }
             filled += 1;
         }
@@ -165,54 +188,79 @@ impl SampleStream for CsvStream {
     }
 }
 
-/// How a row is read.
-struct Row<'a> {
-    header: &'a Header,
-    roles: &'a [Role],
-    decimal: u8,
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
 
-impl Row<'_> {
-    /// Fills the channels and gives the encoder's angle, where there is one.
-    fn read(&self, line: Line, channels: &mut [f64]) -> Result<f64> {
-        let delimiter = self.header.delimiter;
-        let mut angle_deg = f64::NAN;
-        let mut rest = Some(line.bytes);
-        for (column, role) in self.roles.iter().enumerate() {
-            let Some(bytes) = rest else { return Err(ragged(self.header, line.number, column)) };
-            if let Role::Skip = role {
-                rest = split(bytes, delimiter).1;
-                continue;
+    use std::fmt::Write as _;
+
+    use runout_core::rig::{RigConfig, Rotation, SensorConfig, SetupConfig};
+
+    use super::*;
+
+    fn rig() -> Rig {
+        let sensor =
+            |id: &str, sign| SensorConfig { id: id.into(), angle_deg: 0.0, z_mm: 0.0, section: id.into(), sign };
+        let config = RigConfig {
+            interruptions: Vec::new(),
+            part_radius_mm: 30.0,
+            rotation: Rotation::Ccw,
+            sensors: vec![sensor("S1", 1), sensor("S2", -1)],
+            setups: vec![SetupConfig { id: "one".into(), part_deg: 0.0, sensors_deg: 0.0 }],
+        };
+        config.check().unwrap()
+    }
+
+    /// Capture, readings and angles, and in how many blocks they came.
+    fn read(text: &str, most_kept: usize) -> Result<(Capture, Vec<f64>, Vec<f64>, usize)> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.csv");
+        std::fs::write(&path, text).unwrap();
+        let station = StationKey { name: "s".into(), z_mm: 0.0 };
+        let stated = Stated { sample_rate_hz: None, speed_rpm: None };
+        let mut recording = CsvRecording::open(&rig(), vec![station], vec![vec![path]], stated)?;
+        recording.most_kept = most_kept;
+        let mut stream = recording.open(0, 0)?;
+        let (mut samples, mut angles, mut block, mut blocks) = (Vec::new(), Vec::new(), Block::default(), 0);
+        while stream.next_block(&mut block)? {
+            assert_eq!(block.start as usize * 2, samples.len());
+            samples.append(&mut block.samples);
+            angles.append(&mut block.angle_rev);
+            blocks += 1;
+        }
+        let capture = Capture { object: String::new(), ..stream.capture().clone() };
+        Ok((capture, samples, angles, blocks))
+    }
+
+    #[test]
+    fn a_file_that_is_kept_and_one_that_is_read_twice_are_the_same() {
+        let rows = 2 * BLOCK_SAMPLES + 100;
+        for phase in ["index", "angle_deg"] {
+            let mut text = format!("time_s;S2;other;{phase};S1\n");
+            for row in 0..rows {
+                let phase = if phase == "index" { f64::from(u8::from(row % 500 == 3)) } else { 0.72 * row as f64 };
+                let reading = (0.01 * row as f64).sin();
+                writeln!(text, "{:.4};{reading:.6};\"a;b\";{phase};{:.3}", 1e-4 * row as f64, -reading).unwrap();
             }
-            let value = match number::leading(bytes, self.decimal) {
-                Some((value, length)) if length == bytes.len() => {
-                    rest = None;
-                    value
-                }
-                Some((value, length)) if bytes[length] == delimiter => {
-                    rest = Some(&bytes[length + 1..]);
-                    value
-                }
-                _ => {
-                    let (cell, after) = split(bytes, delimiter);
-                    rest = after;
-                    number::of_cell(cell, self.decimal)
-                        .ok_or_else(|| self.header.no_number(line.number, column, cell, self.decimal))?
-                }
-            };
-            match role {
-                Role::Sensor { channel, sign } => channels[*channel] = value * sign,
-                Role::Angle => angle_deg = value,
-                Role::Skip => {}
+            let kept = read(&text, MOST_KEPT).unwrap();
+            assert_eq!((kept.1.len(), kept.3), (2 * rows, 3));
+            assert_eq!(kept.2.len(), if phase == "index" { 0 } else { rows });
+            assert_eq!(kept.0.marks.len(), rows / 500 + 1);
+            for most_kept in [0, 1001] {
+                assert!(read(&text, most_kept).unwrap() == kept, "{phase}, {most_kept} kept");
             }
         }
-        match rest {
-            // Some programs end each row with a delimiter.
-            Some(bytes) if !bytes.trim_ascii().is_empty() => {
-                let more = memchr::memchr_iter(delimiter, bytes).count() + 1;
-                Err(ragged(self.header, line.number, self.roles.len() + more))
-            }
-            _ => Ok(angle_deg),
+    }
+
+    #[test]
+    fn mistakes_are_the_same_either_way() {
+        for row in ["1.0,2.0", "1.0,2.0,0,4.0", "x,2.0,0", "1.0,2.0,", "1.0,2.0,7", "", "1.0,2.0,\"0"] {
+            let text = format!("S1,S2,index\n1.0,2.0,0\n{row}\n1.0,2.0,1\n");
+            let told = |most_kept| {
+                let error = read(&text, most_kept).map(|_| ()).unwrap_err().to_string();
+                error.rsplit("x.csv").next().map(str::to_owned)
+            };
+            assert_eq!(told(MOST_KEPT), told(0), "{row}");
         }
     }
 }

@@ -1,11 +1,12 @@
-//! The first pass over a file: how many samples, where turns begin, and how fast they were taken.
+//! The first pass over a file: how many samples, where turns begin, and how fast they were taken; and the samples themselves
+//! where they are not too many.
 
 use runout_core::{Result, encoder::EncoderScan};
 
 use crate::{
     header::{Header, Phase},
-    lines::{Line, Lines, split},
-    number,
+    lines::{Line, Lines},
+    row::{Role, Row},
 };
 
 /// What the first pass finds.
@@ -18,12 +19,23 @@ pub(crate) struct Scan {
     pub(crate) sample_rate_hz: Option<f64>,
     /// `.` or `,`.
     pub(crate) decimal: u8,
+    /// All readings, of a file that is not too large.
+    pub(crate) kept: Option<Kept>,
+}
+
+/// Readings in memory.
+#[derive(Debug, Default)]
+pub(crate) struct Kept {
+    /// `[sample][channel]`.
+    pub(crate) samples: Vec<f64>,
+    /// The encoder's angle at each sample; empty without one.
+    pub(crate) angle_deg: Vec<f64>,
 }
 
 impl Scan {
-    pub(crate) fn of(header: &Header, lines: &mut Lines) -> Result<Self> {
-        let phase = header.phase.column();
-        let last = header.time.map_or(phase, |time| time.max(phase));
+    /// Keeps up to so many readings.
+    pub(crate) fn of(header: &Header, roles: &[Role], lines: &mut Lines, most_kept: usize) -> Result<Self> {
+        let channels = header.sensors.len();
         // Where the comma delimits, it cannot be in a number.
         let mut decimal = (header.delimiter == b',').then_some(b'.');
         let mut index = IndexScan::default();
@@ -31,6 +43,7 @@ impl Scan {
         let mut time = TimeScan::default();
         let mut samples = 0;
         let mut rows = Rows::default();
+        let mut kept = Some(Kept::default());
         while let Some(line) = lines.next()? {
             if rows.ends_at(&line, header)? {
                 continue;
@@ -38,26 +51,27 @@ impl Scan {
             if decimal.is_none() {
                 decimal = memchr::memchr2(b',', b'.', line.bytes).map(|place| line.bytes[place]);
             }
-            let decimal = decimal.unwrap_or(b'.');
-            let mut rest = Some(line.bytes);
-            for column in 0..=last {
-                let Some(bytes) = rest else { return Err(ragged(header, line.number, column)) };
-                let (cell, after) = split(bytes, header.delimiter);
-                rest = after;
-                if column != phase && Some(column) != header.time {
-                    continue;
+            let row = Row { header, roles, decimal: decimal.unwrap_or(b'.') };
+            kept = kept.filter(|kept| kept.samples.len() + channels <= most_kept);
+            let instant = match &mut kept {
+                Some(kept) => {
+                    let begin = kept.samples.len();
+                    kept.samples.resize(begin + channels, f64::NAN);
+                    let instant = row.read(line, &mut kept.samples[begin..])?;
+                    if encoder.is_some() {
+                        kept.angle_deg.push(instant.phase);
+                    }
+                    instant
                 }
-                let value = number::of_cell(cell, decimal)
-                    .filter(|value| value.is_finite())
-                    .ok_or_else(|| header.no_number(line.number, column, cell, decimal))?;
-                let taken = if Some(column) == header.time {
-                    time.push(value)
-                } else if let Some(encoder) = &mut encoder {
-                    encoder.push(value).map_err(|fault| fault.problem)
-                } else {
-                    index.push(value)
-                };
-                taken.map_err(|problem| header.error(line.number, column, problem))?;
+                None => row.instant(line)?,
+            };
+            let taken = match &mut encoder {
+                Some(encoder) => encoder.push(instant.phase).map_err(|fault| fault.problem),
+                None => index.push(instant.phase),
+            };
+            taken.map_err(|problem| header.error(line.number, header.phase.column(), problem))?;
+            if let Some(column) = header.time {
+                time.push(instant.time_s).map_err(|problem| header.error(line.number, column, problem))?;
             }
             samples += 1;
         }
@@ -69,7 +83,8 @@ impl Scan {
             ));
         }
         let marks = encoder.as_ref().map_or(index.marks, |encoder| encoder.marks().to_vec());
-        Ok(Self { samples, marks, encoder, sample_rate_hz: time.rate_hz(), decimal: decimal.unwrap_or(b'.') })
+        let decimal = decimal.unwrap_or(b'.');
+        Ok(Self { samples, marks, encoder, sample_rate_hz: time.rate_hz(), decimal, kept })
     }
 }
 
@@ -93,11 +108,6 @@ impl Rows {
             None => Ok(false),
         }
     }
-}
-
-/// A row of too few or too many cells.
-pub(crate) fn ragged(header: &Header, line: u64, found: usize) -> runout_core::Error {
-    header.line_error(line, format!("expected {} cells as in the header, found {found}", header.names.len()))
 }
 
 /// Finds the rising edges of the mark.

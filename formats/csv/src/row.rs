@@ -1,0 +1,147 @@
+//! One row of a file: the readings of an instant.
+
+use runout_core::{Result, rig::Rig};
+
+use crate::{
+    header::Header,
+    lines::{Line, cell_at, split},
+    number,
+};
+
+/// What a column is read for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Role {
+    Sensor {
+        channel: usize,
+        sign: f64,
+    },
+    /// The mark, or the encoder's angle.
+    Phase,
+    Time,
+    Skip,
+}
+
+impl Role {
+    /// Of each column.
+    pub(crate) fn of_columns(header: &Header, rig: &Rig) -> Vec<Self> {
+        let mut roles = vec![Self::Skip; header.names.len()];
+        for (channel, (column, sensor)) in header.sensors.iter().zip(&rig.sensors).enumerate() {
+            roles[*column] = Self::Sensor { channel, sign: sensor.sign };
+        }
+        roles[header.phase.column()] = Self::Phase;
+        if let Some(column) = header.time {
+            roles[column] = Self::Time;
+        }
+        roles
+    }
+}
+
+/// How a row is read.
+pub(crate) struct Row<'a> {
+    pub(crate) header: &'a Header,
+    pub(crate) roles: &'a [Role],
+    pub(crate) decimal: u8,
+}
+
+/// What a row holds besides readings.
+pub(crate) struct Instant {
+    /// The mark, 0 or 1, or the encoder's angle in degrees.
+    pub(crate) phase: f64,
+    /// NaN without such a column.
+    pub(crate) time_s: f64,
+}
+
+impl Row<'_> {
+    /// Fills the channels.
+    pub(crate) fn read(&self, line: Line, channels: &mut [f64]) -> Result<Instant> {
+        self.plain(line.bytes, channels).map_or_else(|| self.cell_by_cell(line, channels), Ok)
+    }
+
+    /// A row of plain numbers between delimiters, as most are: where one begins does not wait for the one before to be read.
+    fn plain(&self, line: &[u8], channels: &mut [f64]) -> Option<Instant> {
+        let mut found = Instant { phase: f64::NAN, time_s: f64::NAN };
+        let mut ends = memchr::memchr_iter(self.header.delimiter, line).chain([line.len()]);
+        let mut begin = 0;
+        for role in self.roles {
+            let end = ends.next()?;
+            if let Role::Skip = role {
+                if line.get(begin) == Some(&b'"') {
+                    return None;
+                }
+            } else {
+                let (value, length) = number::leading(&line[begin..], self.decimal)?;
+                if begin + length != end {
+                    return None;
+                }
+                match role {
+                    Role::Sensor { channel, sign } => channels[*channel] = value * sign,
+                    Role::Phase => found.phase = value,
+                    Role::Time => found.time_s = value,
+                    Role::Skip => {}
+                }
+            }
+            begin = end + 1;
+        }
+        (begin > line.len()).then_some(found)
+    }
+
+    /// Any row: with quotes, exponents, missing readings, or mistakes.
+    fn cell_by_cell(&self, line: Line, channels: &mut [f64]) -> Result<Instant> {
+        let delimiter = self.header.delimiter;
+        let mut found = Instant { phase: f64::NAN, time_s: f64::NAN };
+        let mut rest = Some(line.bytes);
+        for (column, role) in self.roles.iter().enumerate() {
+            let Some(bytes) = rest else { return Err(ragged(self.header, line.number, column)) };
+            if let Role::Skip = role {
+                rest = split(bytes, delimiter).1;
+                continue;
+            }
+            let (cell, after) = split(bytes, delimiter);
+            rest = after;
+            let readable = |value: &f64| matches!(role, Role::Sensor { .. }) || value.is_finite();
+            let value = number::of_cell(cell, self.decimal)
+                .filter(readable)
+                .ok_or_else(|| self.header.no_number(line.number, column, cell, self.decimal))?;
+            match role {
+                Role::Sensor { channel, sign } => channels[*channel] = value * sign,
+                Role::Phase => found.phase = value,
+                Role::Time => found.time_s = value,
+                Role::Skip => {}
+            }
+        }
+        match rest {
+            // Some programs end each row with a delimiter.
+            Some(bytes) if !bytes.trim_ascii().is_empty() => {
+                let more = memchr::memchr_iter(delimiter, bytes).count() + 1;
+                Err(ragged(self.header, line.number, self.roles.len() + more))
+            }
+            _ => Ok(found),
+        }
+    }
+
+    /// Phase and time alone.
+    pub(crate) fn instant(&self, line: Line) -> Result<Instant> {
+        let mut found = Instant { phase: f64::NAN, time_s: f64::NAN };
+        let mut wanted: Vec<usize> = std::iter::once(self.header.phase.column()).chain(self.header.time).collect();
+        wanted.sort_unstable();
+        let mut rest = (0, Some(line.bytes));
+        for column in wanted {
+            let (cell, after) = cell_at(rest, self.header.delimiter, column)
+                .map_err(|found| ragged(self.header, line.number, found))?;
+            rest = (column + 1, after);
+            let value = number::of_cell(cell, self.decimal)
+                .filter(|value| value.is_finite())
+                .ok_or_else(|| self.header.no_number(line.number, column, cell, self.decimal))?;
+            match self.roles[column] {
+                Role::Time => found.time_s = value,
+                _ => found.phase = value,
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// A row of too few or too many cells.
+fn ragged(header: &Header, line: u64, found: usize) -> runout_core::Error {
+    header.line_error(line, format!("expected {} cells as in the header, found {found}", header.names.len()))
+}
