@@ -90,7 +90,7 @@ fn mesh(plugin: &str, extension: &str, surface: &Surface) -> u64 {
     let config = format!("plugin = \"{plugin}\"\npath = \"part.{extension}\"");
     let context = Context { folder: FOLDER.path(), rig: None };
     let exporter = registry().exporters.build(&DeTable::parse(&config).unwrap(), &context).unwrap();
-    let export = exporter.begin(&RunInfo { title: "bench".into(), rig: None, assessment: None }).unwrap();
+    let export = exporter.begin(&RunInfo { title: "bench".into(), ..RunInfo::default() }).unwrap();
     let files = export.finish(&summary(), Some(surface)).unwrap();
     // The files are not kept: they go as they are dropped.
     files.iter().map(|file| fs::metadata(file.path()).unwrap().len()).sum()

@@ -16,7 +16,7 @@ use std::{
 use runout_cli::builtin::registry;
 use runout_core::{
     atomic_file::commit_all,
-    measurement::{Block, MemoryStream, Recording, SampleStream},
+    measurement::{Block, MemoryStream, Recording, SampleStream, StationKey},
     pipeline::{
         config::{INCLUDE_KEY, Pipeline, Route},
         document::Sources,
@@ -59,7 +59,7 @@ fn main() -> Outcome {
         let wanted = Wanted { projection, ..Wanted::default() };
         report(name, || {
             let record = Box::new(captures[0].clone());
-            clocked(|| Ok(drop(black_box(stages.averager.average_wanting(record, wanted)?))))
+            clocked(|| stages.averager.average_wanting(record, wanted).map(black_box).map_err(Into::into))
         })?;
     }
     report("hdf5-read", || {
@@ -75,7 +75,7 @@ fn main() -> Outcome {
         captures.into_iter().map(|record| stages.averager.average(Box::new(record))).collect::<Result<_, _>>()?;
     let station = Station { name: "s000".into(), z_mm: 0.0, profiles };
     let separation = stages.separator.separate(&station)?;
-    report("separate", || clocked(|| Ok(drop(black_box(stages.separator.separate(&station)?)))))?;
+    report("separate", || clocked(|| stages.separator.separate(&station).map(black_box).map_err(Into::into)))?;
     let results: Vec<StationResult> = (0..STATIONS).map(|index| result(index, separation.clone())).collect();
     for (index, name) in ["parquet-write", "hdf5-write"].into_iter().enumerate() {
         report(name, || clocked(|| write(&campaign, index, &results)))?;
@@ -156,8 +156,8 @@ fn result(index: usize, separation: Separation) -> StationResult {
 
 /// Writes all results by one of the pipeline's exporters.
 fn write(pipeline: &Pipeline, exporter: usize, results: &[StationResult]) -> Outcome {
-    let info =
-        RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
+    let names = results.iter().map(|result| StationKey { name: result.station.clone(), z_mm: result.z_mm });
+    let info = RunInfo::of(pipeline, &names.collect::<Vec<_>>());
     let mut export = pipeline.exporters.get(exporter).ok_or("the pipeline has too few exporters")?.begin(&info)?;
     results.iter().try_for_each(|result| export.station(result))?;
     commit_all(export.finish(&Summary::default(), None)?)?;
@@ -165,7 +165,7 @@ fn write(pipeline: &Pipeline, exporter: usize, results: &[StationResult]) -> Out
 }
 
 /// Seconds of the work itself.
-fn clocked(work: impl FnOnce() -> Outcome) -> Outcome<f64> {
+fn clocked<T>(work: impl FnOnce() -> Outcome<T>) -> Outcome<f64> {
     let start = Instant::now();
     work()?;
     Ok(start.elapsed().as_secs_f64())

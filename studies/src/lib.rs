@@ -6,6 +6,7 @@ pub mod campaign;
 pub mod coverage;
 pub mod eccentricity;
 pub mod minimum_zone_cylinder;
+pub mod monte_carlo;
 pub mod plot;
 pub mod scaling;
 pub mod straightness;

@@ -10,7 +10,7 @@ use runout_studies::{
     blind::{self, draw::Layout},
     coverage, eccentricity,
     minimum_zone_cylinder::{self, Wall},
-    scaling, straightness, surface as unrolled,
+    monte_carlo, scaling, straightness, surface as unrolled,
 };
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
@@ -19,6 +19,7 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies blind [CAMPAIGNS [SEED [FILE [LAYOUT]]]]   what the closed loop says of campaigns that it knows
                                              nothing of; LAYOUT is four, six or reversed
        runout-studies blind-campaign INDEX [SEED [LAYOUT]]   one of them in full
+       runout-studies monte-carlo [CAMPAIGNS]   time of many campaigns, on one thread and on all
        runout-studies diagnose-scaling       time of a diagnosis over the number of stations
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
@@ -42,6 +43,10 @@ fn main() -> ExitCode {
         ["blind-campaign", ref rest @ ..] if (1..=3).contains(&rest.len()) && sizes(rest, [0, 1]).is_some() => {
             layout(rest.get(2)).and_then(|only| blind_campaign(sizes(rest, [0, 1]).unwrap_or_default(), only))
         }
+        ["monte-carlo"] => monte_carlo(1000),
+        ["monte-carlo", campaigns] if campaigns.parse::<u64>().is_ok() => {
+            monte_carlo(campaigns.parse().unwrap_or_default())
+        }
         ["diagnose-scaling"] => scaling::rows().map(|rows| println!("{}", scaling::table(&rows))),
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["straightness-traces", file] => straightness_traces(file),
@@ -64,6 +69,13 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn monte_carlo(campaigns: u64) -> Result<()> {
+    let all = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    let threads: Vec<usize> = (1..=all).filter(|threads| threads.is_power_of_two() || *threads == all).collect();
+    println!("{}", monte_carlo::table(campaigns, &monte_carlo::rows(campaigns, &threads)?));
+    Ok(())
 }
 
 fn averaging(picture: Option<&str>) -> Result<()> {

@@ -78,8 +78,7 @@ fn diagnose_turns(
     )?;
     let found = model.diagnose(&stations, &pipeline.diagnose.settings)?;
     let mut diagnosis = found.diagnosis;
-    let info =
-        RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
+    let info = RunInfo::of(pipeline, recording.stations());
     let mut gathering = Gathering::begin(pipeline, &info)?;
     let mut errors = [Vec::new(), Vec::new()];
     let nothing = Evaluate::nothing();
@@ -138,7 +137,7 @@ fn diagnose_points(
         commit_all(written.into_iter().collect())?;
         return Ok(diagnosis);
     };
-    let info = RunInfo { title: pipeline.title.clone(), rig: None, assessment: None };
+    let info = RunInfo { title: pipeline.title.clone(), ..RunInfo::default() };
     let mut gathering = Gathering::begin(pipeline, &info)?;
     take_sections(shape.sections, pipeline, shape.radius_mm, observer, &mut gathering)?;
     let surface = gathering.build_surface(shape.radius_mm)?;

@@ -1,10 +1,13 @@
 //! What a run knows of one station, and gives to exporters.
 
-use super::evaluate::{Evaluate, section_values};
+use super::{
+    config::Pipeline,
+    evaluate::{Evaluate, section_values},
+};
 use crate::{
     Complex64,
     evaluate::Value,
-    measurement::StationTruth,
+    measurement::{StationKey, StationTruth},
     numerics::fourier::Fourier,
     profile::Profile,
     rig::Rig,
@@ -12,7 +15,7 @@ use crate::{
 };
 
 /// What exporters know when they begin.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct RunInfo {
     /// The pipeline's title.
     pub title: String,
@@ -20,6 +23,21 @@ pub struct RunInfo {
     pub rig: Option<Rig>,
     /// What the separator can tell with the rig.
     pub assessment: Option<Assessment>,
+    /// Names of the stations that will come, in their order; empty for measured points.
+    pub stations: Vec<String>,
+}
+
+impl RunInfo {
+    /// Of a pipeline and the stations that it will be run on.
+    #[must_use]
+    pub fn of(pipeline: &Pipeline, stations: &[StationKey]) -> Self {
+        Self {
+            title: pipeline.title.clone(),
+            rig: pipeline.rig.clone(),
+            assessment: pipeline.assessment.clone(),
+            stations: stations.iter().map(|station| station.name.clone()).collect(),
+        }
+    }
 }
 
 /// One station, done.

@@ -52,12 +52,11 @@ impl Observer for Silent {}
 /// When the data or a file fails. Exports that had begun leave nothing behind.
 pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Summary> {
     let source = pipeline.loader.open(pipeline.rig.as_ref())?;
-    let info =
-        RunInfo { title: pipeline.title.clone(), rig: pipeline.rig.clone(), assessment: pipeline.assessment.clone() };
-    let inputs = match &source {
-        Source::Turns(recording) => recording.inputs(),
-        Source::Points(points) => vec![points.input.clone()],
+    let (inputs, stations) = match &source {
+        Source::Turns(recording) => (recording.inputs(), recording.stations()),
+        Source::Points(points) => (vec![points.input.clone()], &[][..]),
     };
+    let info = RunInfo::of(pipeline, stations);
     spare_inputs(&pipeline.outputs(), &inputs)?;
     if let (Source::Points(points), Route::Traces { separator }) = (&source, &pipeline.route) {
         return traces::run(pipeline, points, &**separator);

@@ -83,7 +83,7 @@ pub fn begin(path: &Path) -> Box<dyn Export> {
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ResultConfig { path: path.to_owned() }.check(&context).unwrap();
     assert_eq!(exporter.outputs(), [path]);
-    exporter.begin(&RunInfo { title: "Shaft".into(), rig: None, assessment: None }).unwrap()
+    exporter.begin(&RunInfo { title: "Shaft".into(), ..RunInfo::default() }).unwrap()
 }
 
 /// Writes a result of two stations.

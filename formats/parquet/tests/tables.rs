@@ -88,7 +88,7 @@ fn summary() -> Summary {
 fn export(folder: &Path, stations: usize, motion: bool) {
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ParquetConfig { path: folder.to_path_buf() }.check(&context).unwrap();
-    let info = RunInfo { title: String::new(), rig: None, assessment: None };
+    let info = RunInfo::default();
     let mut export = exporter.begin(&info).unwrap();
     for index in 0..stations {
         export.station(&station(index, motion)).unwrap();
@@ -237,7 +237,7 @@ fn a_run_that_fails_leaves_what_was_there() {
     let exporter = ParquetConfig { path: "".into() }.check(&context);
     assert!(exporter.is_err_and(|fault| fault.to_string().contains("folder")));
     let exporter = ParquetConfig { path: ".".into() }.check(&context).unwrap();
-    let info = RunInfo { title: String::new(), rig: None, assessment: None };
+    let info = RunInfo::default();
     let mut export = exporter.begin(&info).unwrap();
     export.station(&station(5, true)).unwrap();
     drop(export);
@@ -252,7 +252,7 @@ fn values_are_rows_and_null_where_there_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ParquetConfig { path: folder.path().to_path_buf() }.check(&context).unwrap();
-    let export = exporter.begin(&RunInfo { title: String::new(), rig: None, assessment: None }).unwrap();
+    let export = exporter.begin(&RunInfo::default()).unwrap();
     let interval = Uncertainty { std: 0.1, interval_95: [3.7, 4.1], draws: 400 };
     let value = |symbol: &str, value, uncertainty| Value {
         symbol: symbol.into(),

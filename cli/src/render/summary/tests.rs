@@ -5,7 +5,6 @@ use runout_core::{
         CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
         SurfaceSummary,
     },
-    provenance::Provenance,
     surface::Meeting,
 };
 

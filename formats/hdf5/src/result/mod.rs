@@ -37,7 +37,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{RESULT_FORMAT, VERSION, node};
-use table::{FormTable, HarmonicsTable, MotionTable};
+use table::{FormTable, HarmonicsTable, LONG, MotionTable, SHORT};
 
 /// `[[export]] plugin = "hdf5"`: a result file.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -74,10 +74,32 @@ impl Exporter for ResultExporter {
     }
 
     fn begin(&self, run: &RunInfo) -> Result<Box<dyn Export>> {
-        let pending = PendingFile::new(&self.path)?;
-        let begin = || -> hdf5_metno::Result<ResultExport> {
-            let file = create(pending.path(), &run.title, CONVENTION)?;
-            Ok(ResultExport {
+        let sections = run.rig.iter().flat_map(|rig| &rig.sections);
+        let longest = run.stations.iter().chain(sections).map(String::len).max();
+        // Without stations the names that will come are not known.
+        if !run.stations.is_empty() && longest.is_some_and(|longest| longest <= SHORT) {
+            Ok(Box::new(ResultExport::<SHORT>::begin(&self.path, &run.title)?))
+        } else {
+            Ok(Box::new(ResultExport::<LONG>::begin(&self.path, &run.title)?))
+        }
+    }
+}
+
+/// A result file being written. The datasets come first: they have to be closed before the file gets its name.
+struct ResultExport<const N: usize> {
+    form: FormTable<N>,
+    motion: MotionTable<N>,
+    harmonics: HarmonicsTable<N>,
+    file: File,
+    pending: Option<PendingFile>,
+}
+
+impl<const N: usize> ResultExport<N> {
+    fn begin(path: &Path, title: &str) -> Result<Self> {
+        let pending = PendingFile::new(path)?;
+        let begin = || -> hdf5_metno::Result<Self> {
+            let file = create(pending.path(), title, CONVENTION)?;
+            Ok(Self {
                 form: FormTable::create(&file)?,
                 motion: MotionTable::create(&file)?,
                 harmonics: HarmonicsTable::create(&file)?,
@@ -87,20 +109,9 @@ impl Exporter for ResultExporter {
             })
         };
         let export = begin().map_err(|error| pending.failure(error))?;
-        Ok(Box::new(ResultExport { pending: Some(pending), ..export }))
+        Ok(Self { pending: Some(pending), ..export })
     }
-}
 
-/// A result file being written. The datasets come first: they have to be closed before the file gets its name.
-struct ResultExport {
-    form: FormTable,
-    motion: MotionTable,
-    harmonics: HarmonicsTable,
-    file: File,
-    pending: Option<PendingFile>,
-}
-
-impl ResultExport {
     fn failure(&self, problem: impl ToString) -> Error {
         match &self.pending {
             Some(pending) => pending.failure(problem),
@@ -138,7 +149,7 @@ fn complete(file: &File, summary: &Summary) -> hdf5_metno::Result<()> {
     file.flush()
 }
 
-impl Export for ResultExport {
+impl<const N: usize> Export for ResultExport<N> {
     fn station(&mut self, result: &StationResult) -> Result<()> {
         let name = table::name(&result.station).map_err(|error| self.failure(error))?;
         let separation = &result.separation;

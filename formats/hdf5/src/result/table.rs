@@ -14,10 +14,12 @@ use crate::node;
 
 use Contents::{Measured, Repeated};
 
-/// A name in a table.
-pub(super) type Name = FixedUnicode<NAME_BYTES>;
-/// Longest name in UTF-8: names that repeat on every row compress to nothing only at a fixed length.
-const NAME_BYTES: usize = 64;
+/// A name in a table, of at most so many bytes of UTF-8: names that repeat on every row compress to nothing only at a fixed
+/// length, and in less time when it is short.
+pub(super) type Name<const N: usize> = FixedUnicode<N>;
+/// Bytes of names where all are short, and of the longest that there may be.
+pub(super) const SHORT: usize = 16;
+pub(super) const LONG: usize = 64;
 /// Rows of a chunk: 64 KiB of f64.
 const CHUNK_ROWS: usize = 8192;
 /// Higher levels take several times as long for some percent less.
@@ -31,9 +33,9 @@ pub(super) const MOTION: [(Quantity, &str, &str); 4] = [
     (Quantity::TiltY, "tilt_y_urad", "tilt about y, right-handed"),
 ];
 
-/// A name of at most 64 bytes.
-pub(super) fn name(text: &str) -> Result<Name> {
-    text.parse().map_err(|_| format!("a name must be of at most {NAME_BYTES} bytes without NUL: `{text}`").into())
+/// A name as tables hold it.
+pub(super) fn name<const N: usize>(text: &str) -> Result<Name<N>> {
+    text.parse().map_err(|_| format!("a name must be of at most {N} bytes without NUL: `{text}`").into())
 }
 
 /// What stands in a column.
@@ -95,16 +97,16 @@ fn angles_deg(angles: usize) -> Vec<f64> {
 }
 
 /// Form over the part's angle.
-pub(super) struct FormTable {
-    section: Column<Name>,
-    station: Column<Name>,
+pub(super) struct FormTable<const N: usize> {
+    section: Column<Name<N>>,
+    station: Column<Name<N>>,
     z_mm: Column<f64>,
     angle_deg: Column<f64>,
     form_um: Column<f64>,
     std_um: Column<f64>,
 }
 
-impl FormTable {
+impl<const N: usize> FormTable<N> {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("form")?;
         Ok(Self {
@@ -126,7 +128,7 @@ impl FormTable {
     pub(super) fn append(
         &mut self,
         result: &StationResult,
-        station: &Name,
+        station: &Name<N>,
         section: &SectionAt,
         unknown: usize,
     ) -> Result<()> {
@@ -142,14 +144,14 @@ impl FormTable {
 }
 
 /// Error motion over the spindle's angle.
-pub(super) struct MotionTable {
-    station: Column<Name>,
+pub(super) struct MotionTable<const N: usize> {
+    station: Column<Name<N>>,
     angle_deg: Column<f64>,
     /// Value and standard uncertainty of each of [`MOTION`].
     motions: Vec<[Column<f64>; 2]>,
 }
 
-impl MotionTable {
+impl<const N: usize> MotionTable<N> {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("motion")?;
         let pair = |(quantity, name, what): &(Quantity, &str, &str)| {
@@ -169,7 +171,7 @@ impl MotionTable {
     pub(super) fn append(
         &mut self,
         result: &StationResult,
-        station: &Name,
+        station: &Name<N>,
         unknowns: [Option<usize>; 4],
     ) -> Result<()> {
         let rows = result.angles;
@@ -189,10 +191,10 @@ impl MotionTable {
 }
 
 /// Coefficients by order: form is Re Σ c e^{+inα}, motion Re Σ c e^{−inΦ}.
-pub(super) struct HarmonicsTable {
-    quantity: Column<Name>,
-    section: Column<Name>,
-    station: Column<Name>,
+pub(super) struct HarmonicsTable<const N: usize> {
+    quantity: Column<Name<N>>,
+    section: Column<Name<N>>,
+    station: Column<Name<N>>,
     order: Column<u32>,
     re: Column<f64>,
     im: Column<f64>,
@@ -203,7 +205,7 @@ pub(super) struct HarmonicsTable {
 /// Unit of coefficients, whose rows are of all quantities.
 const MIXED: &str = "um; urad for tilt_x, tilt_y";
 
-impl HarmonicsTable {
+impl<const N: usize> HarmonicsTable<N> {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("harmonics")?;
         Ok(Self {
@@ -231,7 +233,7 @@ impl HarmonicsTable {
     }
 
     /// Adds one unknown of one station: orders from 1, and the mean level where the method knows it.
-    pub(super) fn append(&mut self, separation: &Separation, station: &Name, unknown: usize) -> Result<()> {
+    pub(super) fn append(&mut self, separation: &Separation, station: &Name<N>, unknown: usize) -> Result<()> {
         let Some(quantity) = separation.unknowns.get(unknown) else { return Ok(()) };
         let section = match quantity {
             Quantity::Form(section) => separation.sections.get(*section).map_or("", |section| section.id.as_str()),

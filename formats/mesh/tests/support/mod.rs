@@ -77,7 +77,7 @@ pub fn exporter(registry: &Registry, toml: &str, folder: &Path) -> Result<Box<dy
 /// Runs an exporter over a surface.
 pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<PathBuf>, Error> {
     let title = "Waisted part\nwith a second line";
-    let run = RunInfo { title: title.into(), rig: None, assessment: None };
+    let run = RunInfo { title: title.into(), ..RunInfo::default() };
     let mut export = exporter.begin(&run)?;
     export.station(&station())?;
     let summary = Summary {
