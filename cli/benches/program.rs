@@ -16,9 +16,8 @@ use runout_cli::builtin::registry;
 use runout_core::{
     pipeline::{
         registry::Context,
-        run::{LostOrders, RunInfo, Summary},
+        run::{RunInfo, Summary},
     },
-    provenance::Provenance,
     surface::Surface,
 };
 use tempfile::TempDir;

@@ -26,7 +26,7 @@ pub enum Command {
     /// Say everything that can be said without the data: configuration, what the rig can and cannot separate.
     Check(PipelineArgs),
     /// Find what the declared model lacks, name it or say that it cannot be named, add it: error before and after.
-    Diagnose(PipelineArgs),
+    Diagnose(DiagnoseArgs),
     /// Run several separators on the same data: values side by side, differences with their uncertainty, E_n.
     Compare(CompareArgs),
     /// Make a campaign with declared truth and effects, as a measurement file.
@@ -65,13 +65,23 @@ pub struct RunArgs {
     #[command(flatten)]
     pub pipeline: PipelineArgs,
     /// Stations worked on at a time; as many as there are processors without it.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
     /// End with exit status 1 unless every value under a [[limit]] is proven to keep it: its 95 % interval lies within (ISO
     /// 14253-1). A value without uncertainty, and a limit that names no value, prove nothing. Files and the summary are
     /// written all the same. Without any [[limit]] that is a mistake (exit status 2).
     #[arg(long)]
     pub fail_on_limit: bool,
+}
+
+/// `runout diagnose`.
+#[derive(Debug, Args)]
+pub struct DiagnoseArgs {
+    #[command(flatten)]
+    pub pipeline: PipelineArgs,
+    /// Stations read and averaged at a time; as many as there are processors without it.
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<NonZeroUsize>,
 }
 
 /// `runout compare`.
@@ -87,7 +97,7 @@ pub struct CompareArgs {
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Stations worked on at a time; as many as there are processors without it.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
 }
 
@@ -169,6 +179,10 @@ fn orders(text: &str) -> Result<RangeInclusive<usize>, String> {
             None => "expected two orders, as in `2..80`".into(),
         }),
     }
+}
+
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    text.parse().map_err(|_| "expected a whole number from 1 on".into())
 }
 
 fn degrees(text: &str) -> Result<f64, String> {

@@ -40,8 +40,14 @@ impl PendingFile {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        fs::create_dir_all(folder)
-            .map_err(|error| Error::new("create the folder", folder.display().to_string(), error))?;
+        fs::create_dir_all(folder).map_err(|error| {
+            let file = folder.ancestors().find(|above| above.is_file());
+            let failure = Error::new("create the folder", folder.display().to_string(), error);
+            match file {
+                Some(file) => failure.help(format!("{} is a file; name another folder", file.display())),
+                None => failure,
+            }
+        })?;
         remove_stale(folder, &name);
         let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
         let temporary = folder.join(format!(".{name}.{}-{serial}.partial", std::process::id()));
@@ -66,6 +72,23 @@ impl PendingFile {
     /// When the file system refuses.
     pub fn create(&self) -> Result<fs::File> {
         fs::File::create(&self.temporary).map_err(|error| self.failure(error))
+    }
+
+    /// Refuses to begin what may not fit: a library that the disk fails in the middle of a file may not survive it.
+    ///
+    /// # Errors
+    /// When fewer bytes are free where it will lie.
+    pub fn room_for(&self, bytes: u64) -> Result<()> {
+        let folder = self.temporary.parent().filter(|folder| !folder.as_os_str().is_empty());
+        match fs4::available_space(folder.unwrap_or(Path::new("."))) {
+            Ok(free) if free < bytes => {
+                let [wanted, free] = [bytes, free].map(|bytes| bytes as f64 / 1e6);
+                let problem = format!("it may take {wanted:.1} MB, and {free:.1} MB are free there");
+                Err(self.failure(problem).help("make room, or write elsewhere"))
+            }
+            // Where the system does not tell, the attempt will.
+            _ => Ok(()),
+        }
     }
 
     /// An error about this file, named by its final name.
@@ -148,4 +171,23 @@ pub fn write(destination: impl Into<PathBuf>, contents: &[u8]) -> Result<PathBuf
     let pending = PendingFile::new(destination)?;
     fs::write(pending.path(), contents).map_err(|error| pending.failure(error))?;
     pending.commit()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    #[test]
+    fn what_cannot_fit_is_refused_and_a_file_in_a_folder_s_place_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let pending = PendingFile::new(folder.path().join("big.h5")).unwrap();
+        assert!(pending.room_for(1).is_ok());
+        let error = pending.room_for(u64::MAX).unwrap_err();
+        assert!(error.to_string().contains("MB are free there") && error.advice().is_some(), "{error}");
+        fs::write(folder.path().join("file"), "").unwrap();
+        let error = PendingFile::new(folder.path().join("file/deeper/x.csv")).unwrap_err();
+        assert!(error.advice().is_some_and(|advice| advice.contains("file is a file")), "{error:?}");
+    }
 }

@@ -2,6 +2,8 @@
 
 pub mod config;
 
+use std::num::NonZeroUsize;
+
 use super::{
     config::{Pipeline, Route},
     evaluate::Evaluate,
@@ -26,7 +28,7 @@ use crate::{
 ///
 /// # Errors
 /// When the data or a file fails, or the separator has no model for the loop. Exports that had begun leave nothing behind.
-pub fn diagnose(pipeline: &Pipeline, observer: &dyn Observer) -> Result<Diagnosis> {
+pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Diagnosis> {
     let source = pipeline.loader.open(pipeline.rig.as_ref())?;
     let no_model = |separator: &str| {
         Error::new("diagnose", &pipeline.title, format!("`{separator}` has no model of effects for the closed loop"))
@@ -48,7 +50,7 @@ pub fn diagnose(pipeline: &Pipeline, observer: &dyn Observer) -> Result<Diagnosi
                 hold_out,
                 projections: Vec::new(),
             };
-            diagnose_turns(pipeline, &line, &**model, observer)
+            diagnose_turns(pipeline, &line, threads, &**model, observer)
         }
         _ => Err(no_model(&pipeline.separator)),
     }
@@ -60,6 +62,7 @@ const HOLD_OUT: f64 = 0.2;
 fn diagnose_turns(
     pipeline: &Pipeline,
     line: &Line,
+    threads: Option<NonZeroUsize>,
     model: &dyn StationModel,
     observer: &dyn Observer,
 ) -> Result<Diagnosis> {
@@ -68,7 +71,7 @@ fn diagnose_turns(
     spare_inputs(&outputs, &recording.inputs())?;
     let mut stations: Vec<Station> = Vec::new();
     let inputs = line.run(
-        None,
+        threads,
         observer,
         |_, station| Ok(station),
         |station| {

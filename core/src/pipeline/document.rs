@@ -249,8 +249,10 @@ fn assign<'a>(table: &mut DeTable<'a>, steps: &[&str], value: Spanned<DeValue<'a
         Some(DeValue::Array(items)) => {
             let count = items.len();
             let item = next.parse().ok().and_then(|index: usize| items.get_mut(index));
-            let item =
-                item.ok_or_else(|| format!("`{step}` has {count} items, counted from 0; there is no `{next}`"))?;
+            let item = item.ok_or_else(|| {
+                let items = if count == 1 { "item" } else { "items" };
+                format!("`{step}` has {count} {items}, counted from 0; there is no `{next}`")
+            })?;
             match item.get_mut() {
                 _ if after.is_empty() => {
                     *item = value;
@@ -278,10 +280,18 @@ fn read_text(path: &Path) -> Result<String, Error> {
 /// # Errors
 /// When the table does not fit the type.
 pub fn read<T: DeserializeOwned>(table: &Table) -> Result<T, Fault> {
+    read_besides(table, &[])
+}
+
+/// The same, of a table in which these keys stood besides: what is misspelt may have been meant for one of them.
+///
+/// # Errors
+/// When the table does not fit the type.
+pub fn read_besides<T: DeserializeOwned>(table: &Table, besides: &[&str]) -> Result<T, Fault> {
     let value = Spanned::new(table.span(), DeValue::Table(table.get_ref().clone()));
     T::deserialize(ValueDeserializer::from(value)).map_err(|error| {
         let span = error.span().filter(|span| *span != table.span());
-        explain(span.unwrap_or_else(|| head(table.span())), error.message())
+        explain(span.unwrap_or_else(|| head(table.span())), error.message(), besides)
     })
 }
 
@@ -308,7 +318,7 @@ fn head(span: Range<usize>) -> Range<usize> {
 }
 
 /// Adds near names to serde's "unknown field `x`, expected one of `a`, `b`".
-fn explain(span: Range<usize>, message: &str) -> Fault {
+fn explain(span: Range<usize>, message: &str, besides: &[&str]) -> Fault {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     let noun = match message {
         _ if message.starts_with("unknown field") => "key",
@@ -317,7 +327,9 @@ fn explain(span: Range<usize>, message: &str) -> Fault {
     };
     match quoted.split_first() {
         Some((name, known)) => {
-            Fault::span(span, format!("unknown {noun} `{name}`")).help(known_names(name, known.iter().copied()))
+            let besides = besides.iter().filter(|_| noun == "key");
+            let known = known.iter().chain(besides).copied();
+            Fault::span(span, format!("unknown {noun} `{name}`")).help(known_names(name, known))
         }
         None => Fault::span(span, message),
     }

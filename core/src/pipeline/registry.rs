@@ -99,7 +99,7 @@ impl<S> Plugin<S> {
             name: C::NAME,
             about: C::ABOUT,
             schema: super::config::inline::<C>,
-            build: |table, context| document::read::<C>(table)?.check(context),
+            build: |table, context| document::read_besides::<C>(table, &["plugin"])?.check(context),
         }
     }
 

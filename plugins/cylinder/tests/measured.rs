@@ -322,7 +322,7 @@ fn diagnosed(text: &str) -> Diagnosis {
     let mut registry = Registry::default();
     runout_cylinder::register(&mut registry);
     let sources = Sources::from_text("test.toml", text, PathBuf::new(), &[], "rig").unwrap();
-    diagnose(&Pipeline::from_sources(&sources, &registry).unwrap(), &Silent).unwrap()
+    diagnose(&Pipeline::from_sources(&sources, &registry).unwrap(), None, &Silent).unwrap()
 }
 
 #[test]

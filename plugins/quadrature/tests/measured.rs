@@ -26,7 +26,7 @@ fn text(path: &std::path::Path) -> String {
 }
 
 fn diagnosed(path: &std::path::Path) -> Diagnosis {
-    diagnose(&pipeline(&text(path)), &Silent).unwrap()
+    diagnose(&pipeline(&text(path)), None, &Silent).unwrap()
 }
 
 #[test]
@@ -106,13 +106,13 @@ fn the_diagnosis_is_written_and_a_run_says_what_it_cannot() {
     let (signal, folder) = (made([3.0, 0.0], 1.0, 0.0), tempfile::tempdir().unwrap());
     let path = folder.path().join("diagnosis.json");
     let text = format!("{}diagnose.path = '{}'", text(signal.path()), path.display());
-    let found = diagnose(&pipeline(&text), &Silent).unwrap();
+    let found = diagnose(&pipeline(&text), None, &Silent).unwrap();
     let written: Diagnosis = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
     assert_eq!(written.added.len(), found.added.len());
     let error = run(&pipeline(&text), None, &Silent).unwrap_err();
     assert!(error.to_string().contains("separates no form"), "{error}");
     let known = format!("{text}\ndiagnose.known = [{{ effect = 'quadrature-offset', values = {{ cosine = 3.0 }} }}]");
-    assert!(diagnose(&pipeline(&known), &Silent).unwrap().added.is_empty());
+    assert!(diagnose(&pipeline(&known), None, &Silent).unwrap().added.is_empty());
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn diagnosed(path: &Path, keys: &str) -> runout_core::Result<Diagnosis> {
         path.display()
     );
     let sources = Sources::from_text("test.toml", &text, PathBuf::new(), &[], "rig").unwrap();
-    diagnose(&Pipeline::from_sources(&sources, &registry).unwrap(), &Silent)
+    diagnose(&Pipeline::from_sources(&sources, &registry).unwrap(), None, &Silent)
 }
 
 fn published() -> PathBuf {

@@ -62,6 +62,7 @@ pub fn write_measurement(
         return Err(Error::new("write", path.display().to_string(), "expected a deflate level from 0 to 9"));
     }
     let pending = PendingFile::new(path)?;
+    pending.room_for(largest(recording, rig, options)?)?;
     {
         let failure = |error: hdf5_metno::Error| pending.failure(error);
         let file = File::with_options()
@@ -95,6 +96,25 @@ pub fn write_measurement(
         file.flush().map_err(failure)?;
     }
     pending.commit()
+}
+
+/// Bytes of a file besides samples, about.
+const HEAD_BYTES: u64 = 1 << 20;
+
+/// Bytes that the file may take, judged by its first capture.
+fn largest(recording: &dyn Recording, rig: &Rig, options: &WriteOptions) -> Result<u64> {
+    let captures = (recording.stations().len() * rig.setups.len()) as u64;
+    if captures == 0 {
+        return Ok(HEAD_BYTES);
+    }
+    let stream = recording.open(0, 0)?;
+    let capture = stream.capture();
+    let bytes = match options.samples {
+        SampleFormat::F64 => 8,
+        SampleFormat::F32 | SampleFormat::I32(_) => 4,
+        SampleFormat::I16(_) => 2,
+    };
+    Ok(HEAD_BYTES + captures * capture.samples * (capture.channels() * bytes) as u64)
 }
 
 fn describe(file: &File, options: &WriteOptions) -> hdf5_metno::Result<()> {
