@@ -4,6 +4,7 @@
 //! micrometres, geometry in millimetres, angles in radians inside the code (`_deg` in files).
 
 pub mod atomic_file;
+pub mod checksum;
 pub mod encoder;
 pub mod error;
 pub mod evaluate;

@@ -2,7 +2,7 @@
 
 use std::{ops::Range, path::PathBuf};
 
-use crate::Result;
+use crate::{Result, checksum::Checksum};
 
 /// A recording of all stations in all setups.
 pub trait Recording: Send + Sync {
@@ -17,6 +17,11 @@ pub trait Recording: Send + Sync {
 
     /// The files behind it, for their checksums.
     fn inputs(&self) -> Vec<PathBuf>;
+
+    /// Where its checksum is taken from what is read anyway, that checksum: complete when everything was read.
+    fn checksum(&self) -> Option<&Checksum> {
+        None
+    }
 
     /// What the recording itself says is true, at one station: only simulations and certified artefacts carry it.
     ///

@@ -1,6 +1,6 @@
 //! What was written comes back.
 
-use runout_core::measurement::StationTruth;
+use runout_core::{measurement::StationTruth, provenance::Input};
 use runout_hdf5::{SampleFormat, Scale, WriteOptions, inspect};
 
 use crate::double::{Memory, TURN, load, message, noise, read, rig, write};
@@ -32,6 +32,11 @@ fn floats_of_64_bits_come_back_to_the_bit_and_stations_by_z() {
                 capture.object.clone_from(&written.capture.object);
                 assert_eq!(capture, written.capture);
             }
+        }
+        // The checksum that came of reading is that of the file.
+        assert_eq!(recording.checksum().is_some(), deflate.is_none());
+        if let Some(checksum) = recording.checksum() {
+            assert_eq!(checksum.finish().unwrap(), Input::of(&path).unwrap());
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use hdf5_metno::{File, LocationType};
+use hdf5_metno::{File, LocationType, dataset::Layout};
 use runout_core::{
     Error, Result,
+    checksum::Checksum,
     measurement::{Recording, SampleStream, StationKey, StationTruth},
     pipeline::{
         error::Fault,
@@ -73,6 +74,9 @@ struct Hdf5Recording {
     rig: Rig,
     stations: Vec<StationKey>,
     remarks: Vec<String>,
+    checksum: Checksum,
+    /// Whether samples lie in the file as they are wanted, so that the checksum sees them.
+    is_plain: bool,
 }
 
 /// Carriage positions of one station that differ by less are the same: a micrometre, the resolution of a usual scale.
@@ -88,12 +92,14 @@ impl Hdf5Recording {
         let names = stations(&file, &place, rig, &mut remarks)?;
         let mut keys: Vec<StationKey> = Vec::with_capacity(names.len());
         let mut extra_channels = Vec::new();
+        let mut is_plain = true;
         for name in names {
             let mut z_mm = None;
             for setup in &setups {
                 let (group, setup_place) = node::group(&file, &place, setup)?;
                 let source = CaptureSource::open(&group, &setup_place, &name)?;
                 columns_of(&source.stored.sensors, rig, &source.samples_place)?;
+                is_plain &= source.dataset.layout() == Layout::Contiguous;
                 for id in source.stored.sensors.iter().filter(|id| rig.sensor(id).is_none()) {
                     if !extra_channels.contains(id) {
                         extra_channels.push(id.clone());
@@ -119,7 +125,9 @@ impl Hdf5Recording {
             remarks.push(format!("{place}: channels that the rig does not name: {}", extra_channels.join(", ")));
         }
         keys.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm).then_with(|| a.name.cmp(&b.name)));
-        Ok(Self { file, place, path: path.to_owned(), rig: rig.clone(), stations: keys, remarks })
+        let (path, rig, stations) = (path.to_owned(), rig.clone(), keys);
+        let checksum = Checksum::of(&path);
+        Ok(Self { file, place, path, rig, stations, remarks, checksum, is_plain })
     }
 }
 
@@ -135,11 +143,15 @@ impl Recording for Hdf5Recording {
         let (group, place) = node::group(&self.file, &self.place, &at.id)?;
         let mut source = CaptureSource::open(&group, &place, &key.name)?;
         source.z_mm = key.z_mm;
-        Ok(Box::new(Hdf5Stream::new(source, &self.rig, setup, &key.name)?))
+        Ok(Box::new(Hdf5Stream::new(source, &self.rig, setup, &key.name, self.checksum.reader())?))
     }
 
     fn inputs(&self) -> Vec<PathBuf> {
         vec![self.path.clone()]
+    }
+
+    fn checksum(&self) -> Option<&Checksum> {
+        self.is_plain.then_some(&self.checksum)
     }
 
     fn truth(&self, station: usize) -> Result<Option<StationTruth>> {

@@ -1,4 +1,5 @@
-//! Rows of a dataset: through the library, or, where they lie in the file as they are wanted, straight from there.
+//! Rows of a dataset: through the library, or, where they lie in the file as they are wanted, straight from there and into the
+//! file's checksum.
 
 use std::{
     fs::File,
@@ -9,7 +10,7 @@ use std::{
 use bytemuck::Pod;
 use hdf5_metno::{Dataset, Datatype, H5Type, dataset::Layout};
 use ndarray::s;
-use runout_core::Result;
+use runout_core::{Result, checksum::Reader};
 
 use crate::node::Place;
 
@@ -20,6 +21,7 @@ pub(super) struct Rows {
     columns: Range<usize>,
     /// The file and where the dataset begins in it.
     plain: Option<(File, u64)>,
+    checksum: Reader,
 }
 
 impl Rows {
@@ -28,8 +30,9 @@ impl Rows {
         dataset: Dataset,
         place: Place,
         columns: Range<usize>,
+        checksum: Reader,
     ) -> Result<Self> {
-        let mut rows = Self { dataset, place, columns, plain: None };
+        let mut rows = Self { dataset, place, columns, plain: None, checksum };
         rows.plain = rows.beginning::<T>().and_then(|start| Some((File::open(rows.dataset.filename()).ok()?, start)));
         if rows.plain.is_some() && !rows.agree::<T>()? {
             rows.plain = None;
@@ -70,7 +73,9 @@ impl Rows {
         to.resize(rows.len() * width, T::zeroed());
         let first = *start + (rows.start * width * size_of::<T>()) as u64;
         let read = file.seek(SeekFrom::Start(first)).and_then(|_| file.read_exact(bytemuck::cast_slice_mut(to)));
-        read.map_err(|error| self.place.error(format!("{}: {error}", named(rows))))
+        read.map_err(|error| self.place.error(format!("{}: {error}", named(rows))))?;
+        self.checksum.take(first, bytemuck::cast_slice(to));
+        Ok(())
     }
 
     fn through<T: H5Type>(&self, rows: &Range<usize>) -> Result<Vec<T>> {
@@ -91,6 +96,8 @@ fn named(rows: &Range<usize>) -> String {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
+    use runout_core::checksum::Checksum;
+
     use super::*;
 
     const ROWS: usize = 500;
@@ -99,7 +106,8 @@ mod tests {
     /// Rows 7 to 432, and whether they came straight from the file.
     fn read(dataset: Dataset, columns: Range<usize>) -> (Vec<f64>, bool) {
         let place = Place::root(std::path::Path::new("rows.h5"));
-        let mut rows = Rows::new::<f64>(dataset, place, columns).unwrap();
+        let checksum = Checksum::of(std::path::Path::new("rows.h5")).reader();
+        let mut rows = Rows::new::<f64>(dataset, place, columns, checksum).unwrap();
         let mut found = vec![9.0; 4];
         rows.read(&(7..433), &mut found).unwrap();
         (found, rows.plain.is_some())

@@ -7,6 +7,7 @@ use hdf5_metno::{Dataset, H5Type};
 use ndarray::s;
 use runout_core::{
     Error, Result,
+    checksum::Reader,
     encoder::EncoderScan,
     measurement::{Block, Capture, SampleStream},
     numerics::lanes::{LaneWork, in_lanes},
@@ -50,7 +51,7 @@ pub(super) struct Hdf5Stream {
 }
 
 impl Hdf5Stream {
-    pub(super) fn new(source: CaptureSource, rig: &Rig, setup: usize, station: &str) -> Result<Self> {
+    pub(super) fn new(source: CaptureSource, rig: &Rig, setup: usize, station: &str, checksum: Reader) -> Result<Self> {
         let stored = &source.stored;
         let found = columns_of(&stored.sensors, rig, &source.samples_place)?;
         let first_column = found.iter().copied().min().unwrap_or(0);
@@ -108,7 +109,7 @@ impl Hdf5Stream {
             samples: stored.samples,
             kind: stored.kind,
             capture,
-            rows: rows(source.dataset, source.samples_place, read.clone())?,
+            rows: rows(source.dataset, source.samples_place, read.clone(), checksum)?,
             read_columns: read.len(),
             is_plain: columns.len() == read.len() && columns.iter().enumerate().all(plain),
             columns,
