@@ -1,11 +1,11 @@
 //! The binary chunk: vertices, all attributes of one side by side, then triangles.
 //!
-//! It is written in portions that stay in the processor's cache: a chunk held whole would first have to be given its
+//! It is made on all processors, in portions that stay in their caches: a chunk held whole would first have to be given its
 //! memory page by page, which takes longer than filling it.
 
 use std::io::{self, Write};
 
-use runout_mesh::{COLOUR_STEPS, Mesh, UNMEASURED, Vertex, linear, palette};
+use runout_mesh::{COLOUR_STEPS, Mesh, UNMEASURED, Vertex, in_order, linear, palette};
 
 /// Bytes from one vertex to the next.
 pub const STRIDE: usize = 32;
@@ -19,7 +19,7 @@ pub const COLOUR: usize = 24;
 pub const DEVIATION: usize = 28;
 /// Bytes of an index.
 const INDEX: usize = 4;
-/// Bytes that are handed on at a time.
+/// Bytes that are handed on at a time, about.
 const PORTION: usize = 1 << 18;
 
 /// What the binary chunk holds.
@@ -80,71 +80,52 @@ fn y_up([x, y, z]: [f64; 3]) -> [f32; 3] {
 /// Writes the chunk: the wall ring by ring, then each cap's rim and centre, then the triangles.
 pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     let colours: [[u8; 4]; COLOUR_STEPS] = palette().map(linear_rgba);
-    let mut portion = Portion { bytes: Vec::with_capacity(2 * PORTION), to };
-    for ring in 0..mesh.rings() {
-        mesh.ring(ring, |vertex| portion.vertex(&vertex, colours[vertex.colour]));
-        portion.pass(PORTION)?;
-    }
+    let together = PORTION / (STRIDE * mesh.angles());
+    in_order(mesh.rings(), together, to, |ring, bytes| {
+        mesh.ring(ring, |vertex| put_vertex(bytes, &vertex, colours[vertex.colour]));
+    })?;
     let caps = mesh.caps();
+    let mut bytes = Vec::new();
     for cap in &caps {
         // glTF has no "not measured": a cap's deviation is 0 and its colour says so.
         let normal = [0.0, 0.0, cap.normal_z];
         for position_mm in mesh.rim(cap.ring).chain([[0.0, 0.0, cap.z_mm]]) {
             let vertex = Vertex { position_mm, normal, deviation_um: 0.0, colour: 0 };
-            portion.vertex(&vertex, linear_rgba(UNMEASURED));
+            put_vertex(&mut bytes, &vertex, linear_rgba(UNMEASURED));
         }
-        portion.pass(PORTION)?;
     }
-    for ring in 0..mesh.rings() - 1 {
-        for [one, other] in mesh.band(ring) {
-            portion.triangle(one);
-            portion.triangle(other);
+    to.write_all(&bytes)?;
+    in_order(mesh.rings() - 1, together, to, |ring, bytes| {
+        for triangle in mesh.band(ring).flatten() {
+            put_triangle(bytes, triangle);
         }
-        portion.pass(PORTION)?;
-    }
+    })?;
+    bytes.clear();
     let angles = mesh.angles() as u32;
     for (index, cap) in caps.iter().enumerate() {
         let rim = mesh.rings() as u32 * angles + index as u32 * (angles + 1);
-        cap.triangles(angles, rim + angles, rim).for_each(|triangle| portion.triangle(triangle));
-        portion.pass(PORTION)?;
+        cap.triangles(angles, rim + angles, rim).for_each(|triangle| put_triangle(&mut bytes, triangle));
     }
-    portion.pass(0)
+    to.write_all(&bytes)
 }
 
-/// Bytes on their way.
-struct Portion<'a, W> {
-    bytes: Vec<u8>,
-    to: &'a mut W,
+#[inline]
+fn put_vertex(bytes: &mut Vec<u8>, vertex: &Vertex, colour: [u8; 4]) {
+    let mut record = [0; STRIDE];
+    put_vector(&mut record[POSITION..NORMAL], metres_y_up(vertex.position_mm));
+    put_vector(&mut record[NORMAL..COLOUR], y_up(vertex.normal));
+    record[COLOUR..DEVIATION].copy_from_slice(&colour);
+    record[DEVIATION..].copy_from_slice(&(vertex.deviation_um as f32).to_le_bytes());
+    bytes.extend_from_slice(&record);
 }
 
-impl<W: Write> Portion<'_, W> {
-    #[inline]
-    fn vertex(&mut self, vertex: &Vertex, colour: [u8; 4]) {
-        let mut record = [0; STRIDE];
-        put_vector(&mut record[POSITION..NORMAL], metres_y_up(vertex.position_mm));
-        put_vector(&mut record[NORMAL..COLOUR], y_up(vertex.normal));
-        record[COLOUR..DEVIATION].copy_from_slice(&colour);
-        record[DEVIATION..].copy_from_slice(&(vertex.deviation_um as f32).to_le_bytes());
-        self.bytes.extend_from_slice(&record);
+#[inline]
+fn put_triangle(bytes: &mut Vec<u8>, triangle: [u32; 3]) {
+    let mut record = [0; 3 * INDEX];
+    for (place, vertex) in record.chunks_exact_mut(INDEX).zip(triangle) {
+        place.copy_from_slice(&vertex.to_le_bytes());
     }
-
-    #[inline]
-    fn triangle(&mut self, triangle: [u32; 3]) {
-        let mut record = [0; 3 * INDEX];
-        for (place, vertex) in record.chunks_exact_mut(INDEX).zip(triangle) {
-            place.copy_from_slice(&vertex.to_le_bytes());
-        }
-        self.bytes.extend_from_slice(&record);
-    }
-
-    /// Hands on what has gathered, where it is more than `least` bytes.
-    fn pass(&mut self, least: usize) -> io::Result<()> {
-        if self.bytes.len() > least {
-            self.to.write_all(&self.bytes)?;
-            self.bytes.clear();
-        }
-        Ok(())
-    }
+    bytes.extend_from_slice(&record);
 }
 
 #[inline]

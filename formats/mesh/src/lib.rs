@@ -9,9 +9,11 @@ mod config;
 mod export;
 mod mesh;
 mod notes;
+mod portions;
 
 pub use colour::{ColourScale, STEPS as COLOUR_STEPS, UNMEASURED, linear, palette};
 pub use config::MeshConfig;
 pub use export::Format;
 pub use mesh::{Cap, Mesh, Vertex};
 pub use notes::{InputNote, Notes};
+pub use portions::in_order;

@@ -8,9 +8,6 @@ mod text;
 use std::{
     fs::File,
     io::{self, Write},
-    num::NonZeroUsize,
-    sync::mpsc::sync_channel,
-    thread,
 };
 
 use runout_core::{
@@ -20,7 +17,7 @@ use runout_core::{
     },
     stage::Exporter,
 };
-use runout_mesh::{COLOUR_STEPS, Format, Mesh, MeshConfig, Notes, UNMEASURED, palette};
+use runout_mesh::{COLOUR_STEPS, Format, Mesh, MeshConfig, Notes, UNMEASURED, in_order, palette};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -49,42 +46,44 @@ pub fn register(registry: &mut Registry) {
 
 /// Rings that one thread writes out at a time: a megabyte of text with 2560 angles.
 const TOGETHER: usize = 4;
-/// Portions of text that wait for the file, a thread.
-const WAITING: usize = 2;
-
 /// Writes comments, vertices with their normals ring by ring, and triangles band by band.
 ///
 /// A cap shares the rim's vertices, so that the solid is closed by its very indices, and has a normal of its own.
 fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
-    let mut text = Text::default();
+    let mut bytes = Vec::new();
+    let mut text = Text::behind(&mut bytes);
     for line in notes.lines() {
         text.raw("# ").raw(&line).raw("\n");
     }
     text.raw("# axes: z along the spindle, x at the part's 0 deg\n");
     text.raw("o ").raw(&object_name(&notes.title)).raw("\n");
-    file.write_all(text.bytes())?;
+    file.write_all(&bytes)?;
     let colours: [String; COLOUR_STEPS] = palette().map(colour_text);
-    in_order(mesh.rings(), file, |ring, text| {
+    in_order(mesh.rings(), TOGETHER, file, |ring, bytes| {
+        let mut text = Text::behind(bytes);
         mesh.ring(ring, |vertex| {
             text.raw("v").vector(vertex.position_mm).raw(&colours[vertex.colour]);
             text.raw("vn").vector(vertex.normal).raw("\n");
         });
     })?;
     let caps = mesh.caps();
-    let mut text = Text::default();
+    let mut bytes = Vec::new();
+    let mut text = Text::behind(&mut bytes);
     for cap in &caps {
         text.raw("v").vector([0.0, 0.0, cap.z_mm]).raw(&colour_text(UNMEASURED));
         text.raw("vn").vector([0.0, 0.0, cap.normal_z]).raw("\n");
     }
-    file.write_all(text.bytes())?;
-    in_order(mesh.rings() - 1, file, |ring, text| {
+    file.write_all(&bytes)?;
+    in_order(mesh.rings() - 1, TOGETHER, file, |ring, bytes| {
+        let mut text = Text::behind(bytes);
         for triangle in mesh.band(ring).flatten() {
             // OBJ counts from 1.
             let [a, b, c] = triangle.map(|vertex| vertex + 1);
             text.raw("f").corner(a, a).corner(b, b).corner(c, c).raw("\n");
         }
     })?;
-    let mut text = Text::default();
+    let mut bytes = Vec::new();
+    let mut text = Text::behind(&mut bytes);
     let angles = mesh.angles() as u32;
     let wall = mesh.rings() as u32 * angles;
     for (index, cap) in caps.iter().enumerate() {
@@ -94,36 +93,7 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
             text.raw("f").corner(a, centre + 1).corner(b, centre + 1).corner(c, centre + 1).raw("\n");
         }
     }
-    file.write_all(text.bytes())
-}
-
-/// Writes what `write` makes of each of `count` rings, one after the other, made on all processors.
-fn in_order(count: usize, to: &mut impl Write, write: impl Fn(usize, &mut Text) + Sync) -> io::Result<()> {
-    let portions = count.div_ceil(TOGETHER);
-    let workers = thread::available_parallelism().map_or(1, NonZeroUsize::get).clamp(1, portions.max(1));
-    thread::scope(|scope| {
-        let made = (0..workers).map(|first| {
-            let (sender, receiver) = sync_channel(WAITING);
-            let write = &write;
-            scope.spawn(move || {
-                for portion in (first..portions).step_by(workers) {
-                    let mut text = Text::default();
-                    (portion * TOGETHER..count.min((portion + 1) * TOGETHER)).for_each(|ring| write(ring, &mut text));
-                    // Nobody takes it where the file has failed.
-                    if sender.send(text).is_err() {
-                        return;
-                    }
-                }
-            });
-            receiver
-        });
-        let made: Vec<_> = made.collect();
-        (0..portions).try_for_each(|portion| {
-            let text =
-                made[portion % workers].recv().map_err(|_| io::Error::other("a thread that makes text stopped"))?;
-            to.write_all(text.bytes())
-        })
-    })
+    file.write_all(&bytes)
 }
 
 /// Names of objects hold no blanks.

@@ -1,15 +1,15 @@
 //! Numbers as text, fast.
 
 /// A growing text.
-#[derive(Default)]
-pub struct Text {
-    bytes: Vec<u8>,
+pub struct Text<'a> {
+    bytes: &'a mut Vec<u8>,
     number: zmij::Buffer,
 }
 
-impl Text {
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+impl<'a> Text<'a> {
+    /// Goes on behind what is there.
+    pub fn behind(bytes: &'a mut Vec<u8>) -> Self {
+        Self { bytes, number: zmij::Buffer::new() }
     }
 
     pub fn raw(&mut self, text: &str) -> &mut Self {
