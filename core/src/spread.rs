@@ -89,6 +89,17 @@ impl Spread {
         Some((self.low.get(range.clone())?, self.high.get(range)?))
     }
 
+    /// What 1 µm in every sensor makes in a direction at most, whatever the signs, in µm or µrad.
+    #[must_use]
+    pub fn reach(&self, direction: Direction) -> f64 {
+        let sum = |wanted: Quantity| -> f64 {
+            let row = self.projection.rows.iter().find(|(quantity, _)| *quantity == wanted);
+            row.map_or(0.0, |(_, weights)| weights.iter().map(|(_, weight)| weight.abs()).sum())
+        };
+        let (first, second) = direction.parts();
+        sum(first).hypot(second.map_or(0.0, |(second, _)| sum(second)))
+    }
+
     /// What noise of 1 µm in every sensor makes in a direction, at the angle where it makes most, in µm or µrad.
     #[must_use]
     pub fn noise_gain(&self, direction: Direction) -> f64 {

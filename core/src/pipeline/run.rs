@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use super::{
     config::{Pipeline, Route},
-    evaluate::{Evaluate, Group, add_areal, decide, part_summary},
+    evaluate::{Evaluate, Group, add_areal, decide, part_summary, steepest_um_per_deg},
     line::{Line, separate},
     overlap::write_behind,
     result::{Evaluation, complete},
@@ -91,7 +91,8 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 let truth = recording.truth(index)?;
                 let profiles = station.profiles;
                 let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
-                Ok(StationResult { motion_values: error_motion_values(&result, &pipeline.evaluate.centres), ..result })
+                let motion_values = error_motion_values(&result, &pipeline.evaluate.centres, rig.part_radius_mm);
+                Ok(StationResult { motion_values, ..result })
             };
             let inputs = write_behind(
                 |result| gathering.take(&result, Some(rig)),
@@ -111,9 +112,15 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     gathering.conclude(inputs, remarks, surface.as_ref(), None)
 }
 
-fn error_motion_values(result: &StationResult, centres: &[Centre]) -> Vec<Value> {
+fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f64) -> Vec<Value> {
     let StationResult { station, z_mm, angles, separation, profiles, .. } = result;
-    ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles }.values(centres)
+    if profiles.iter().all(|profile| profile.spread.is_none()) {
+        return Vec::new();
+    }
+    let forms = separation.unknowns.iter().enumerate().filter(|(_, quantity)| quantity.is_form());
+    let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
+    let slope = steepest.to_degrees() / (1e3 * radius_mm);
+    ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres)
 }
 
 /// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.

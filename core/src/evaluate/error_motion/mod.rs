@@ -42,6 +42,8 @@ pub struct ErrorMotion<'a> {
     pub separation: &'a Separation,
     /// The averages; those with a [`Profile::spread`] count.
     pub profiles: &'a [Profile],
+    /// The steepest slope of the form along the circumference, µm/µm: a part that moves across a sensor carries it past.
+    pub slope: f64,
 }
 
 /// The centre where none is named.
@@ -98,7 +100,7 @@ impl ErrorMotion<'_> {
                     values.extend(self.about(*centre, direction, z_mm, &plot, &told).into_iter().flatten());
                 }
             }
-            values.push(asynchronous(direction, z_mm, &told));
+            values.push(asynchronous(direction, z_mm, &told, self.carried(direction, &spreads)));
         }
         for (motion, direction) in [(Quantity::X, Direction::Rotating), (Quantity::TiltY, Direction::RotatingTilt)] {
             if spreads.iter().any(|spread| spread.in_direction(direction).is_some()) {
@@ -162,11 +164,20 @@ impl ErrorMotion<'_> {
             ("synchronous", "synchronous error motion value")
         };
         let total = format!("total error motion value without 1/rev, {}", over(spreads));
-        let std = known.as_ref().map_or(0.0, |known| known.std);
+        let std = known.as_ref().map_or(0.0, |known| known.std).hypot(self.carried(direction, spreads));
         Some([
             about(format!("{kind}-{}", id(direction)), synchronous, ront_lsci_um(&seen), known),
             about(format!("total-{}", id(direction)), &total, all.1 - all.0, between_setups(&each, std)),
         ])
+    }
+
+    /// Standard uncertainty of a range over turns from the form's slope: nothing tells it from motion along the sensor. It is
+    /// at most the slope times the range across, in every sensor of the combination, and as likely to be anything below.
+    fn carried(&self, direction: Direction, spreads: &[&Spread]) -> f64 {
+        let radial = [Direction::X, Direction::Y, Direction::Rotating];
+        let across = radial.iter().flat_map(|direction| spreads.iter().map(|spread| widest(spread, *direction)));
+        let reach = spreads.iter().map(|spread| spread.reach(direction)).fold(0.0, f64::max);
+        self.slope * across.fold(0.0, f64::max) * reach / 3.0_f64.sqrt()
     }
 
     /// Twice the amplitude of what turns against the spindle at 1/rev.
@@ -202,13 +213,15 @@ impl ErrorMotion<'_> {
     }
 }
 
-/// The largest spread of a setup's turns at one angle, in the setup where it is largest.
-fn asynchronous(direction: Direction, z_mm: f64, spreads: &[&Spread]) -> Value {
-    let widest = |spread: &&Spread| {
-        let (low, high) = spread.in_direction(direction).unwrap_or_default();
-        low.iter().zip(high).map(|(low, high)| high - low).fold(0.0, f64::max)
-    };
-    let each: Vec<f64> = spreads.iter().map(widest).collect();
+/// The largest spread of a setup's turns at one angle.
+fn widest(spread: &Spread, direction: Direction) -> f64 {
+    let (low, high) = spread.in_direction(direction).unwrap_or_default();
+    low.iter().zip(high).map(|(low, high)| high - low).fold(0.0, f64::max)
+}
+
+/// The largest spread of a setup's turns at one angle, in the setup where it is largest; `std` is of what all setups share.
+fn asynchronous(direction: Direction, z_mm: f64, spreads: &[&Spread], std: f64) -> Value {
+    let each: Vec<f64> = spreads.iter().map(|spread| widest(spread, direction)).collect();
     let gain = spreads.iter().map(|spread| spread.noise_gain(direction)).fold(0.0, f64::max);
     let gain_unit = if direction.is_tilt() { " µrad/µm" } else { "" };
     let alone = if each.len() < 2 { "; one setup leaves its uncertainty unknown" } else { "" };
@@ -227,7 +240,7 @@ fn asynchronous(direction: Direction, z_mm: f64, spreads: &[&Spread]) -> Value {
         filter: "none".into(),
         reference: "turns at one angle".into(),
         coverage: 1.0,
-        uncertainty: between_setups(&each, 0.0),
+        uncertainty: between_setups(&each, std),
     }
 }
 

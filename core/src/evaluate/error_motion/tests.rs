@@ -58,7 +58,7 @@ fn profile(rotation: f64, [low, high]: [f64; 2]) -> Profile {
 }
 
 fn values(separation: &Separation, profiles: &[Profile], centre: Centre) -> impl Fn(&str) -> Value + use<> {
-    let station = ErrorMotion { station: "s", z_mm: 60.0, angles: ANGLES, separation, profiles };
+    let station = ErrorMotion { station: "s", z_mm: 60.0, angles: ANGLES, separation, profiles, slope: 0.0 };
     let values = station.values(&[centre]);
     move |symbol: &str| values.iter().find(|value| value.symbol == symbol).unwrap().clone()
 }
@@ -100,7 +100,14 @@ fn total_holds_all_turns_about_the_synchronous_plot() {
 fn every_value_has_a_known_symbol_and_unit() {
     let separation = separation(&[(4, [2.0, 1.0, 3.0, 5.0].map(Complex64::from))]);
     let profiles = [profile(1.0, [-0.1, 0.2])];
-    let station = ErrorMotion { station: "s", z_mm: 0.0, angles: ANGLES, separation: &separation, profiles: &profiles };
+    let station = ErrorMotion {
+        station: "s",
+        z_mm: 0.0,
+        angles: ANGLES,
+        separation: &separation,
+        profiles: &profiles,
+        slope: 0.0,
+    };
     let mut found: Vec<(String, String)> =
         station.values(&[LSC]).into_iter().map(|value| (value.symbol, value.unit)).collect();
     let mut known: Vec<(String, String)> =
@@ -182,7 +189,8 @@ fn what_is_lost_is_said_and_left_out() {
     assert!((value("synchronous-radial-x").value - 2.0).abs() < 1e-12);
     assert_eq!(value("synchronous-radial-x").lost_orders, [3]);
     assert_eq!(value("synchronous-radial-rotating").lost_orders, [1, 3, 4]);
-    let station = ErrorMotion { station: "s", z_mm: 0.0, angles: ANGLES, separation: &lossy, profiles: &profiles };
+    let station =
+        ErrorMotion { station: "s", z_mm: 0.0, angles: ANGLES, separation: &lossy, profiles: &profiles, slope: 0.0 };
     assert!(station.values(&[LSC]).iter().all(|value| value.symbol != "fundamental-radial"));
     let mut without_y = lossy.clone();
     without_y.observable.iter_mut().skip(1).step_by(4).for_each(|told| *told = false);

@@ -31,7 +31,7 @@ pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluat
 
 /// The largest |dr/dθ| of a profile on equal angles, by central differences over three points; NaN where no point has
 /// both neighbours.
-fn steepest_um_per_deg(profile_um: &[f64]) -> f64 {
+pub(in crate::pipeline) fn steepest_um_per_deg(profile_um: &[f64]) -> f64 {
     let count = profile_um.len();
     let [first, second, .., before, last] = *profile_um else { return f64::NAN };
     // Lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
