@@ -26,7 +26,7 @@ ROWS = (
     ("motion of every turn from three points", "motion-of-every-turn", "motion-of-every-turn", 3),
     ("read CSV; peer: polars, one thread", "csv-read", "csv-read", 2),
     ("read CSV; peer: polars, all threads", "csv-read", "csv-read-all-threads", 2),
-    ("read HDF5, contiguous; peer: h5py", "hdf5-read", "hdf5-read", 1),
+    ("read HDF5, contiguous, with its checksum; peer: h5py, without", "hdf5-read", "hdf5-read", 1),
     ("write Parquet; peer: pyarrow", "parquet-write", "parquet-write", 1),
     ("write HDF5; peer: h5py", "hdf5-write", "hdf5-write", 1),
 )
