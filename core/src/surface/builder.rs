@@ -48,6 +48,12 @@ pub(crate) struct Order {
 }
 
 impl Section {
+    /// Orders from 2 that are not known, ascending.
+    pub(crate) fn lost_orders(&self) -> impl Iterator<Item = usize> + '_ {
+        let orders = self.orders.iter().enumerate().skip(2);
+        orders.filter(|(_, known)| known.is_none()).map(|(order, _)| order)
+    }
+
     fn label(&self) -> String {
         format!("{}@{}", self.id, self.station)
     }

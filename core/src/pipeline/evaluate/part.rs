@@ -107,7 +107,7 @@ impl Wall {
         let mut highest = 0;
         let rings = sections.iter().map(|section| {
             let orders = || section.orders.iter().take(fitting).enumerate();
-            lost.extend(orders().filter(|(order, known)| *order >= 2 && known.is_none()).map(|(order, _)| order));
+            lost.extend(section.lost_orders().filter(|order| *order < fitting));
             highest = highest.max(orders().count().saturating_sub(1));
             let known = || orders().map(|(order, known)| known.filter(|_| order >= lowest));
             Ring {

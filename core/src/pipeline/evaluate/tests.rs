@@ -213,6 +213,19 @@ fn areal_intervals(rings: usize, angles: usize, trials: usize) -> Vec<(String, u
     exact.into_iter().zip(inside).map(|(value, inside)| (value.symbol, inside)).collect()
 }
 
+/// Also where no other value of the part was asked for.
+#[test]
+fn lost_orders_are_said_of_areal_values() {
+    let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 64, step_mm: None });
+    builder.add(&station(0.0, &[lobes(3, 1.0)], 20, 1e-6, &[1, 7]));
+    builder.add(&station(5.0, &[lobes(3, 1.2)], 20, 1e-6, &[9]));
+    let (surface, uncertain) = builder.build(RADIUS_MM).unwrap();
+    let mut part = PartSummary::default();
+    add_areal(&mut part, &surface, &uncertain, 2, &evaluate("values = ['areal']").unwrap()).unwrap();
+    assert!(!part.values.is_empty() && part.values.iter().all(|value| value.lost_orders == [7, 9]));
+    assert_eq!(part.remarks.len(), 1);
+}
+
 #[test]
 fn areal_intervals_hold_the_truth() {
     let found = areal_intervals(8, 128, 60);
