@@ -21,6 +21,7 @@ mod lines;
 mod number;
 mod recording;
 mod row;
+mod rows;
 mod scan;
 
 pub use config::{CsvConfig, FileConfig, StationConfig};

@@ -75,6 +75,24 @@ impl Lines {
         Ok(Some(Line { number: self.number, bytes: line.strip_suffix(b"\r").unwrap_or(line) }))
     }
 
+    /// What is in memory of the lines to come: often many of them, but it may end within one.
+    #[inline]
+    pub(crate) fn ahead(&self) -> &[u8] {
+        &self.buffer[self.start..self.end]
+    }
+
+    /// Passes over a line of so many bytes, its end included.
+    #[inline]
+    pub(crate) fn pass(&mut self, length: usize) {
+        self.start += length;
+        self.number += 1;
+    }
+
+    /// The number of the line that was handed on last.
+    pub(crate) fn number(&self) -> u64 {
+        self.number
+    }
+
     /// Reads more, behind what is waiting; gives the number of bytes.
     fn fill(&mut self) -> Result<usize> {
         self.buffer.copy_within(self.start..self.end, 0);

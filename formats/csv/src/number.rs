@@ -6,6 +6,9 @@ const EXACT_POWERS: [f64; 23] = [
     1e21, 1e22,
 ];
 
+/// Powers of ten that a fraction's digits ask for.
+const WHOLE_POWERS: [u64; HALF + 1] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
+
 /// Whole numbers up to here are exact in f64.
 const EXACT_WHOLE: u64 = 1 << 53;
 
@@ -17,68 +20,77 @@ const EXACT_WHOLE: u64 = 1 << 53;
 #[inline]
 pub(crate) fn leading(bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
     let negative = bytes.first() == Some(&b'-');
-    let begin = usize::from(negative);
-    let (value, place) = by_eights(bytes, begin, decimal).or_else(|| one_by_one(bytes, begin, decimal))?;
+    let (value, length) = at_once(bytes, negative, decimal).or_else(|| one_by_one(bytes, negative, decimal))?;
     // Signs come as they like: no branch foresees them.
-    Some((f64::from_bits(value.to_bits() | (u64::from(negative) << 63)), place))
+    Some((f64::from_bits(value.to_bits() | (u64::from(negative) << 63)), length))
 }
 
-/// A number of up to seven digits, a decimal mark and up to seven digits, with eight bytes left to look at from each part's
-/// beginning: as most are, and without a branch for each digit.
+/// Characters that are looked at together.
+const TOGETHER: usize = 16;
+/// Digits on either side of the decimal mark that eight bytes hold.
+const HALF: usize = 8;
+/// So many digits are always below 2^53.
+const EXACT_DIGITS: usize = 15;
+
+/// A number that ends within 16 characters, with so many to look at: as most are, and without a branch for each digit.
 #[inline]
-fn by_eights(bytes: &[u8], begin: usize, decimal: u8) -> Option<(f64, usize)> {
-    let whole = Eight::of(bytes, begin)?;
-    let mark = begin + whole.count;
-    if whole.count == 8 || bytes.get(mark) != Some(&decimal) {
+fn at_once(bytes: &[u8], negative: bool, decimal: u8) -> Option<(f64, usize)> {
+    let window: &[u8; TOGETHER] = bytes.first_chunk()?;
+    // A minus sign is taken for a zero in front.
+    let characters = u128::from_le_bytes(*window) ^ (u128::from(negative) * u128::from(b'-' ^ b'0'));
+    let others = not_digits(characters);
+    let whole = place_of_lowest(others);
+    if whole > HALF {
         return None;
     }
-    let fraction = Eight::of(bytes, mark + 1)?;
-    if fraction.count == 8 || whole.count + fraction.count == 0 {
+    let (length, fraction) = if (characters >> (8 * whole)) as u8 == decimal {
+        let end = place_of_lowest(others & (others - 1));
+        (end, end - whole - 1)
+    } else {
+        (whole, 0)
+    };
+    let digits = whole + fraction;
+    if length == TOGETHER || fraction > HALF || digits > EXACT_DIGITS || digits == usize::from(negative) {
         return None;
     }
-    // 14 digits are below 2^53.
-    let power = EXACT_POWERS[fraction.count];
-    Some(((whole.value() * power + fraction.value()) / power, mark + 1 + fraction.count))
+    let [before, behind] = [(0, whole), (whole + 1, fraction)];
+    let value = |(begin, count): (usize, usize)| joined((characters >> (8 * begin)) as u64, count);
+    let number = value(before) * WHOLE_POWERS[fraction] + value(behind);
+    // Signed numbers have an instruction for it.
+    Some((number.cast_signed() as f64 / EXACT_POWERS[fraction], length))
 }
 
-/// Eight characters, the first in the lowest byte, and how many of them are digits before the first that is none.
-struct Eight {
-    characters: u64,
-    count: usize,
+/// The top bit of each byte that is no digit.
+#[inline]
+fn not_digits(characters: u128) -> u128 {
+    const EACH: u128 = u128::MAX / 0xFF;
+    let digits = characters ^ (EACH * 0x30);
+    // A digit's low half is at most 9 and stays below 0x80 with 0x76 added; nothing is carried into the next byte.
+    (((digits & (EACH * 0x7F)) + EACH * 0x76) | digits) & (EACH * 0x80)
 }
 
-impl Eight {
-    #[inline]
-    fn of(bytes: &[u8], begin: usize) -> Option<Self> {
-        let eight: &[u8; 8] = bytes.get(begin..begin + 8)?.try_into().ok()?;
-        let characters = u64::from_le_bytes(*eight);
-        // A digit's high half is 3, and adding 6 to its low half does not carry into it.
-        let high = 0xF0F0_F0F0_F0F0_F0F0;
-        let threes = 0x3030_3030_3030_3030;
-        let sixes = 0x0606_0606_0606_0606;
-        let others = ((characters & high) ^ threes) | ((characters.wrapping_add(sixes) & high) ^ threes);
-        Some(Self { characters, count: others.trailing_zeros() as usize / 8 })
-    }
+/// The byte of the lowest bit that is set; 16 where none is.
+#[inline]
+fn place_of_lowest(bits: u128) -> usize {
+    bits.trailing_zeros() as usize / 8
+}
 
-    /// The number that its digits make: neighbours are joined to pairs, pairs to fours, fours to eight.
-    #[inline]
-    fn value(&self) -> f64 {
-        if self.count == 0 {
-            return 0.0;
-        }
-        let low_halves = 0x0F0F_0F0F_0F0F_0F0F;
-        // What is no digit goes out at the top; zeros that lead come in below.
-        let digits = (self.characters << (64 - 8 * self.count)) & low_halves;
-        let odd = 0x00FF_00FF_00FF_00FF;
-        let pairs = (digits & odd) * 10 + ((digits >> 8) & odd);
-        let odd = 0x0000_FFFF_0000_FFFF;
-        let fours = (pairs & odd) * 100 + ((pairs >> 16) & odd);
-        ((fours & 0xFFFF_FFFF) * 10_000 + (fours >> 32)) as f64
-    }
+/// The number that the first `count` of eight digits make, the first in the lowest byte: neighbours are joined to pairs, pairs
+/// to fours, fours to eight.
+#[inline]
+fn joined(characters: u64, count: usize) -> u64 {
+    // What stands behind them goes out at the top; zeros come in before them.
+    let digits = characters.checked_shl(64 - 8 * count as u32).unwrap_or(0) & 0x0F0F_0F0F_0F0F_0F0F;
+    let odd = 0x00FF_00FF_00FF_00FF;
+    let pairs = (digits & odd) * 10 + ((digits >> 8) & odd);
+    let odd = 0x0000_FFFF_0000_FFFF;
+    let fours = (pairs & odd) * 100 + ((pairs >> 16) & odd);
+    (fours & 0xFFFF_FFFF) * 10_000 + (fours >> 32)
 }
 
 /// A number of any length, digit by digit.
-fn one_by_one(bytes: &[u8], begin: usize, decimal: u8) -> Option<(f64, usize)> {
+fn one_by_one(bytes: &[u8], negative: bool, decimal: u8) -> Option<(f64, usize)> {
+    let begin = usize::from(negative);
     let mut place = begin;
     let mut digits: u64 = 0;
     let mut separator = None;

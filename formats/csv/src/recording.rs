@@ -12,13 +12,9 @@ use runout_core::{
 use crate::{
     config::Stated,
     header::Header,
-    lines::Lines,
-    row::{Role, Row},
-    scan::{Kept, Rows, Scan},
+    rows::Rows,
+    scan::{BLOCK_SAMPLES, Scan},
 };
-
-/// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
-const BLOCK_SAMPLES: usize = 16_384;
 
 /// Readings of a file that are kept from the first look at it, at most: 32 MiB. A file that has more is read twice.
 const MOST_KEPT: usize = 1 << 22;
@@ -68,9 +64,9 @@ impl Recording for CsvRecording {
         let (Some(key), Some(path)) = (self.stations.get(station), path) else {
             return Err(Error::new("open", format!("station {station} in setup {setup}"), "there is no such file"));
         };
-        let (header, mut lines) = Header::open(path, &self.rig)?;
-        let roles = Role::of_columns(&header, &self.rig);
-        let mut scan = Scan::of(&header, &roles, &mut lines, self.most_kept)?;
+        let mut rows = Rows::open(path, &self.rig)?;
+        let mut scan = Scan::of(&mut rows, self.most_kept)?;
+        let header = &rows.header;
         let sample_rate_hz = match (self.stated.sample_rate_hz, scan.sample_rate_hz) {
             (Some(stated), Some(found)) if (found / stated - 1.0).abs() > SAME_RATE => {
                 return Err(Error::new(
@@ -99,10 +95,10 @@ impl Recording for CsvRecording {
             responses: Vec::new(),
         };
         if let Some(kept) = scan.kept.take() {
-            return Ok(Box::new(KeptStream { capture, kept, encoder: scan.encoder, next: 0 }));
+            return Ok(Box::new(KeptStream { capture, blocks: kept.into_iter(), encoder: scan.encoder }));
         }
-        let (header, lines) = Header::open(path, &self.rig)?;
-        Ok(Box::new(CsvStream { capture, header, lines, roles, scan, rows: Rows::default(), next: 0 }))
+        let rows = Rows::open(path, &self.rig)?;
+        Ok(Box::new(CsvStream { capture, rows, encoder: scan.encoder, next: 0 }))
     }
 
     fn inputs(&self) -> Vec<PathBuf> {
@@ -117,9 +113,8 @@ impl Recording for CsvRecording {
 /// A file's samples in memory.
 struct KeptStream {
     capture: Capture,
-    kept: Kept,
+    blocks: std::vec::IntoIter<Block>,
     encoder: Option<EncoderScan>,
-    next: usize,
 }
 
 impl SampleStream for KeptStream {
@@ -129,28 +124,22 @@ impl SampleStream for KeptStream {
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
         block.clear();
-        block.start = self.next as u64;
-        let channels = self.capture.channels().max(1);
-        let end = (self.next + BLOCK_SAMPLES).min(self.kept.samples.len() / channels);
-        block.samples.extend_from_slice(&self.kept.samples[self.next * channels..end * channels]);
+        let Some(next) = self.blocks.next() else { return Ok(false) };
+        *block = next;
         if let Some(encoder) = &self.encoder {
-            let angles_deg = self.kept.angle_deg.get(self.next..end).unwrap_or_default();
-            block.angle_rev.extend(angles_deg.iter().map(|angle_deg| encoder.turns(*angle_deg)));
+            for angle in &mut block.angle_rev {
+                *angle = encoder.turns(*angle);
+            }
         }
-        let some = end > self.next;
-        self.next = end;
-        Ok(some)
+        Ok(true)
     }
 }
 
 /// The second pass over a file.
 struct CsvStream {
     capture: Capture,
-    header: Header,
-    lines: Lines,
-    roles: Vec<Role>,
-    scan: Scan,
     rows: Rows,
+    encoder: Option<EncoderScan>,
     next: u64,
 }
 
@@ -160,29 +149,27 @@ impl SampleStream for CsvStream {
     }
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
+        // Not cleared: what is written over needs no zeros.
+        let mut samples = std::mem::take(&mut block.samples);
         block.clear();
         block.start = self.next;
         let channels = self.capture.channels();
+        samples.resize(BLOCK_SAMPLES * channels, 0.0);
         let mut filled = 0;
-        while filled < BLOCK_SAMPLES {
-            let Some(line) = self.lines.next()? else { break };
-            if self.rows.ends_at(&line, &self.header)? {
-                continue;
-            }
-            let begin = block.samples.len();
-            block.samples.resize(begin + channels, f64::NAN);
-            let row = Row { header: &self.header, roles: &self.roles, decimal: self.scan.decimal };
-            let instant = row.read(line, &mut block.samples[begin..])?;
-            if let Some(encoder) = &self.scan.encoder {
+        for frame in samples.chunks_exact_mut(channels.max(1)) {
+            let Some(instant) = self.rows.next(frame)? else { break };
+            if let Some(encoder) = &self.encoder {
                 block.angle_rev.push(encoder.turns(instant.phase));
             }
             filled += 1;
         }
+        samples.truncate(filled * channels);
+        block.samples = samples;
         self.next += filled as u64;
         let ended = filled < BLOCK_SAMPLES;
-        if self.next > self.scan.samples || (ended && self.next != self.scan.samples) {
-            let problem = format!("it had {} rows at first and {} now", self.scan.samples, self.next);
-            return Err(Error::new("read", &self.header.shown, problem).help("something writes to it"));
+        if self.next > self.capture.samples || (ended && self.next != self.capture.samples) {
+            let problem = format!("it had {} rows at first and {} now", self.capture.samples, self.next);
+            return Err(Error::new("read", &self.rows.header.shown, problem).help("something writes to it"));
         }
         Ok(filled > 0)
     }

@@ -40,6 +40,7 @@ impl Role {
 pub(crate) struct Row<'a> {
     pub(crate) header: &'a Header,
     pub(crate) roles: &'a [Role],
+    /// `.` or `,`; what is in no number where that is not known.
     pub(crate) decimal: u8,
 }
 
@@ -52,41 +53,46 @@ pub(crate) struct Instant {
 }
 
 impl Row<'_> {
-    /// Fills the channels.
-    pub(crate) fn read(&self, line: Line, channels: &mut [f64]) -> Result<Instant> {
-        self.plain(line.bytes, channels).map_or_else(|| self.cell_by_cell(line, channels), Ok)
-    }
-
-    /// A row of plain numbers between delimiters, as most are: where one begins does not wait for the one before to be read.
-    fn plain(&self, line: &[u8], channels: &mut [f64]) -> Option<Instant> {
+    /// A row of plain numbers, as most are, that begins where `bytes` do and ends somewhere in them: fills the channels, and
+    /// gives its length with the line's end. `None` where only a look at each cell tells.
+    #[inline]
+    pub(crate) fn plain(&self, bytes: &[u8], channels: &mut [f64]) -> Option<(Instant, usize)> {
+        let delimiter = self.header.delimiter;
         let mut found = Instant { phase: f64::NAN, time_s: f64::NAN };
-        let mut ends = memchr::memchr_iter(self.header.delimiter, line).chain([line.len()]);
-        let mut begin = 0;
-        for role in self.roles {
-            let end = ends.next()?;
-            if let Role::Skip = role {
-                if line.get(begin) == Some(&b'"') {
+        let mut end = 0;
+        for (column, role) in self.roles.iter().enumerate() {
+            if column > 0 {
+                if bytes.get(end) != Some(&delimiter) {
                     return None;
                 }
-            } else {
-                let (value, length) = number::leading(&line[begin..], self.decimal)?;
-                if begin + length != end {
-                    return None;
-                }
-                match role {
-                    Role::Sensor { channel, sign } => channels[*channel] = value * sign,
-                    Role::Phase => found.phase = value,
-                    Role::Time => found.time_s = value,
-                    Role::Skip => {}
-                }
+                end += 1;
             }
-            begin = end + 1;
+            let rest = bytes.get(end..)?;
+            if let Role::Skip = role {
+                if rest.first() == Some(&b'"') {
+                    return None;
+                }
+                end += memchr::memchr3(delimiter, b'\n', b'\r', rest)?;
+                continue;
+            }
+            let (value, length) = number::leading(rest, self.decimal)?;
+            end += length;
+            match role {
+                Role::Sensor { channel, sign } => channels[*channel] = value * sign,
+                Role::Phase => found.phase = value,
+                Role::Time => found.time_s = value,
+                Role::Skip => {}
+            }
         }
-        (begin > line.len()).then_some(found)
+        match bytes.get(end..)? {
+            [b'\n', ..] => Some((found, end + 1)),
+            [b'\r', b'\n', ..] => Some((found, end + 2)),
+            _ => None,
+        }
     }
 
     /// Any row: with quotes, exponents, missing readings, or mistakes.
-    fn cell_by_cell(&self, line: Line, channels: &mut [f64]) -> Result<Instant> {
+    pub(crate) fn cell_by_cell(&self, line: Line, channels: &mut [f64]) -> Result<Instant> {
         let delimiter = self.header.delimiter;
         let mut found = Instant { phase: f64::NAN, time_s: f64::NAN };
         let mut rest = Some(line.bytes);

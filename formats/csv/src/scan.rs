@@ -1,112 +1,101 @@
 //! The first pass over a file: how many samples, where turns begin, and how fast they were taken; and the samples themselves
 //! where they are not too many.
 
-use runout_core::{Result, encoder::EncoderScan};
+use runout_core::{Error, Result, encoder::EncoderScan, measurement::Block};
 
-use crate::{
-    header::{Header, Phase},
-    lines::{Line, Lines},
-    row::{Role, Row},
-};
+use crate::{header::Phase, rows::Rows};
+
+/// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
+pub(crate) const BLOCK_SAMPLES: usize = 16_384;
 
 /// What the first pass finds.
-#[derive(Debug)]
 pub(crate) struct Scan {
     pub(crate) samples: u64,
     pub(crate) marks: Vec<f64>,
     pub(crate) encoder: Option<EncoderScan>,
     /// From the column `time_s`.
     pub(crate) sample_rate_hz: Option<f64>,
-    /// `.` or `,`.
-    pub(crate) decimal: u8,
-    /// All readings, of a file that is not too large.
-    pub(crate) kept: Option<Kept>,
-}
-
-/// Readings in memory.
-#[derive(Debug, Default)]
-pub(crate) struct Kept {
-    /// `[sample][channel]`.
-    pub(crate) samples: Vec<f64>,
-    /// The encoder's angle at each sample; empty without one.
-    pub(crate) angle_deg: Vec<f64>,
+    /// All samples, of a file that is not too large; the encoder's angles are in degrees.
+    pub(crate) kept: Option<Vec<Block>>,
 }
 
 impl Scan {
     /// Keeps up to so many readings.
-    pub(crate) fn of(header: &Header, roles: &[Role], lines: &mut Lines, most_kept: usize) -> Result<Self> {
-        let channels = header.sensors.len();
-        // Where the comma delimits, it cannot be in a number.
-        let mut decimal = (header.delimiter == b',').then_some(b'.');
+    pub(crate) fn of(rows: &mut Rows, most_kept: usize) -> Result<Self> {
+        let channels = rows.header.sensors.len();
+        let phase = rows.header.phase;
         let mut index = IndexScan::default();
-        let mut encoder = matches!(header.phase, Phase::Angle(_)).then(EncoderScan::default);
+        let mut encoder = matches!(phase, Phase::Angle(_)).then(EncoderScan::default);
         let mut time = TimeScan::default();
-        let mut samples = 0;
-        let mut rows = Rows::default();
-        let mut kept = Some(Kept::default());
-        while let Some(line) = lines.next()? {
-            if rows.ends_at(&line, header)? {
-                continue;
-            }
-            if decimal.is_none() {
-                decimal = memchr::memchr2(b',', b'.', line.bytes).map(|place| line.bytes[place]);
-            }
-            let row = Row { header, roles, decimal: decimal.unwrap_or(b'.') };
-            kept = kept.filter(|kept| kept.samples.len() + channels <= most_kept);
-            let instant = match &mut kept {
-                Some(kept) => {
-                    let begin = kept.samples.len();
-                    kept.samples.resize(begin + channels, f64::NAN);
-                    let instant = row.read(line, &mut kept.samples[begin..])?;
-                    if encoder.is_some() {
-                        kept.angle_deg.push(instant.phase);
-                    }
-                    instant
-                }
-                None => row.instant(line)?,
-            };
+        let mut samples: usize = 0;
+        let mut kept = Keeping { channels, most: most_kept, blocks: Some(Vec::new()) };
+        while let Some(instant) = match kept.next(samples) {
+            Some(frame) => rows.next(frame)?,
+            None => rows.next_instant()?,
+        } {
             let taken = match &mut encoder {
                 Some(encoder) => encoder.push(instant.phase).map_err(|fault| fault.problem),
                 None => index.push(instant.phase),
             };
-            taken.map_err(|problem| header.error(line.number, header.phase.column(), problem))?;
-            if let Some(column) = header.time {
-                time.push(instant.time_s).map_err(|problem| header.error(line.number, column, problem))?;
+            taken.map_err(|problem| rows.error(phase.column(), problem))?;
+            if let Some(column) = rows.header.time {
+                time.push(instant.time_s).map_err(|problem| rows.error(column, problem))?;
+            }
+            if encoder.is_some() {
+                kept.angle(instant.phase);
             }
             samples += 1;
         }
         if samples == 0 {
-            return Err(runout_core::Error::new(
-                "read",
-                &header.shown,
-                "expected samples below the header, found none",
-            ));
+            let shown = &rows.header.shown;
+            return Err(Error::new("read", shown, "expected samples below the header, found none"));
         }
         let marks = encoder.as_ref().map_or(index.marks, |encoder| encoder.marks().to_vec());
-        let decimal = decimal.unwrap_or(b'.');
-        Ok(Self { samples, marks, encoder, sample_rate_hz: time.rate_hz(), decimal, kept })
+        let (sample_rate_hz, kept) = (time.rate_hz(), kept.blocks(samples));
+        Ok(Self { samples: samples as u64, marks, encoder, sample_rate_hz, kept })
     }
 }
 
-/// Tells blank lines at the end from gaps.
-#[derive(Debug, Default)]
-pub(crate) struct Rows {
-    blank: Option<u64>,
+/// Samples on their way into blocks.
+struct Keeping {
+    channels: usize,
+    /// Readings that are kept, at most.
+    most: usize,
+    /// `None` where there are more.
+    blocks: Option<Vec<Block>>,
 }
 
-impl Rows {
-    /// Whether a line is blank; only blank lines may follow it.
-    pub(crate) fn ends_at(&mut self, line: &Line, header: &Header) -> Result<bool> {
-        // A row begins with a digit, a sign or a quote as a rule: a look at the first byte spares the whole line.
-        let blank = line.bytes.first().is_none_or(u8::is_ascii_whitespace) && line.is_blank();
-        match self.blank {
-            _ if blank => {
-                self.blank.get_or_insert(line.number);
-                Ok(true)
-            }
-            Some(number) => Err(header.line_error(number, "expected a row, found a blank line between rows")),
-            None => Ok(false),
+impl Keeping {
+    /// Where the next frame, of this number, is to be put.
+    #[inline]
+    fn next(&mut self, sample: usize) -> Option<&mut [f64]> {
+        if (sample + 1) * self.channels > self.most {
+            self.blocks = None;
         }
+        let blocks = self.blocks.as_mut()?;
+        let place = sample % BLOCK_SAMPLES;
+        if place == 0 {
+            let samples = vec![0.0; BLOCK_SAMPLES * self.channels];
+            blocks.push(Block { start: sample as u64, samples, ..Block::default() });
+        }
+        blocks.last_mut()?.samples.get_mut(place * self.channels..(place + 1) * self.channels)
+    }
+
+    fn angle(&mut self, angle_deg: f64) {
+        if let Some(block) = self.blocks.as_mut().and_then(|blocks| blocks.last_mut()) {
+            block.angle_rev.push(angle_deg);
+        }
+    }
+
+    /// All blocks, with the last one's room taken back.
+    fn blocks(self, samples: usize) -> Option<Vec<Block>> {
+        let mut blocks = self.blocks?;
+        for block in &mut blocks {
+            let frames = (samples - block.start as usize).min(BLOCK_SAMPLES);
+            block.samples.truncate(frames * self.channels);
+        }
+        blocks.retain(|block| !block.samples.is_empty());
+        Some(blocks)
     }
 }
 
