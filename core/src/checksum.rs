@@ -9,7 +9,10 @@ use std::{
     fs::File,
     io::{Read, Seek, SeekFrom},
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use blake3::{
@@ -26,14 +29,20 @@ const BRANCH: u64 = 1 << 18;
 #[derive(Debug, Clone)]
 pub struct Checksum {
     path: PathBuf,
+    begun: Arc<AtomicBool>,
     branches: Arc<Mutex<HashMap<u64, ChainingValue>>>,
 }
 
 impl Checksum {
-    /// Of a file of which nothing was read.
+    /// Of a file of which nothing was read. Readers pay for it only once it has [begun](Self::begin).
     #[must_use]
     pub fn of(path: &Path) -> Self {
-        Self { path: path.to_owned(), branches: Arc::default() }
+        Self { path: path.to_owned(), begun: Arc::default(), branches: Arc::default() }
+    }
+
+    /// From now on, what is read is hashed.
+    pub fn begin(&self) {
+        self.begun.store(true, Ordering::Relaxed);
     }
 
     /// Looks on while someone reads.
@@ -103,6 +112,9 @@ pub struct Reader {
 impl Reader {
     /// Takes bytes that stand at a place in the file. Whole branches are hashed; of others the beginning is missing.
     pub fn take(&mut self, start: u64, mut bytes: &[u8]) {
+        if !self.checksum.begun.load(Ordering::Relaxed) {
+            return;
+        }
         if start != self.next {
             self.hasher = None;
         }
@@ -152,6 +164,7 @@ mod tests {
             // Pieces of a size, from a place on; and nothing at all.
             for (start, piece) in [(0, branch / 3 + 7), (1000, 4096), (branch + 5, 3 * branch + 1), (length, 1)] {
                 let checksum = Checksum::of(&path);
+                checksum.begin();
                 let mut reader = checksum.reader();
                 for from in (start.min(length)..length).step_by(piece) {
                     reader.take(from as u64, &all[from..length.min(from + piece)]);
@@ -168,6 +181,9 @@ mod tests {
         let mut all = bytes(3 * BRANCH as usize);
         std::fs::write(&path, &all).unwrap();
         let checksum = Checksum::of(&path);
+        checksum.reader().take(0, &all);
+        assert_eq!(checksum.branches.lock().unwrap().len(), 0, "it has not begun");
+        checksum.begin();
         // Out of order, with a gap, by two readers.
         let (mut one, mut other) = (checksum.reader(), checksum.reader());
         let at = |branch: usize| branch * BRANCH as usize..(branch + 1) * BRANCH as usize;

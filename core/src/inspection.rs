@@ -170,10 +170,12 @@ impl SampleStream for Inspection<'_> {
     }
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
-        block.clear();
         if self.channels.is_empty() {
             return self.input.next_block(block);
         }
+        // What the block was is read into next; not cleared, it needs no zeros.
+        std::mem::swap(block, &mut self.raw);
+        block.clear();
         loop {
             let decided = self.decided();
             if decided > 0 {
@@ -183,7 +185,6 @@ impl SampleStream for Inspection<'_> {
             if self.ended {
                 return Ok(false);
             }
-            self.raw.clear();
             if self.input.next_block(&mut self.raw)? {
                 self.take();
             } else {

@@ -18,7 +18,8 @@ pub trait Recording: Send + Sync {
     /// The files behind it, for their checksums.
     fn inputs(&self) -> Vec<PathBuf>;
 
-    /// Where its checksum is taken from what is read anyway, that checksum: complete when everything was read.
+    /// Where its checksum can be taken from what is read anyway, that checksum: complete when everything was read since it was
+    /// [begun](Checksum::begin).
     fn checksum(&self) -> Option<&Checksum> {
         None
     }
@@ -131,7 +132,7 @@ pub trait SampleStream: Send {
     /// What is known before reading.
     fn capture(&self) -> &Capture;
 
-    /// Fills `block` with the next samples; false at the end, when `block` is left empty.
+    /// Fills `block` with the next samples in place of what it holds; false at the end, when `block` is left empty.
     ///
     /// # Errors
     /// When the source fails.

@@ -156,8 +156,13 @@ pub fn smooth(covariance: &mut [Complex64], size: usize) {
     for order in 2..=max_order {
         let window = order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order);
         let share = 1.0 / (window.end() + 1 - window.start()) as f64;
-        for (entry, target) in covariance[order * size..(order + 1) * size].iter_mut().enumerate() {
-            *target = window.clone().map(|near| raw[near * size + entry]).sum::<Complex64>() * share;
+        let target = &mut covariance[order * size..(order + 1) * size];
+        target.fill(Complex64::ZERO);
+        for near in window {
+            target.iter_mut().zip(&raw[near * size..(near + 1) * size]).for_each(|(sum, entry)| *sum += entry);
+        }
+        for sum in target {
+            *sum *= share;
         }
     }
 }

@@ -18,12 +18,17 @@ const WIDEST: usize = 8;
 pub trait LaneWork {
     /// Works on the channels `offset..offset + C`. Mark it `#[inline(always)]`, and what it calls in its loops: what is
     /// not inlined stays in narrow registers.
-    fn lanes<const C: usize>(&mut self, offset: usize);
+    fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize);
 }
 
 /// Does the work for all channels, in groups of at most 8.
 pub fn in_lanes(channels: usize, work: &mut impl LaneWork) {
-    vectorised(Groups { channels, work });
+    vectorised(Calling(Groups { channels, work }, PhantomData::<Separate>));
+}
+
+/// The same with products and sums as [`fused`] takes them.
+pub fn in_lanes_fused(channels: usize, work: &mut impl LaneWork) {
+    fused(Groups { channels, work });
 }
 
 /// Calls what is `#[inline(always)]` in a function compiled for the widest vectors that the processor has.
@@ -92,22 +97,20 @@ struct Groups<'a, W> {
     work: &'a mut W,
 }
 
-impl<W: LaneWork> NullaryFnOnce for Groups<'_, W> {
-    type Output = ();
-
+impl<W: LaneWork> FusedWork for Groups<'_, W> {
     #[inline(always)]
-    fn call(self) {
+    fn call<A: Arithmetic>(self) {
         let Self { channels, work } = self;
         for offset in (0..channels).step_by(WIDEST) {
             match (channels - offset).min(WIDEST) {
-                1 => work.lanes::<1>(offset),
-                2 => work.lanes::<2>(offset),
-                3 => work.lanes::<3>(offset),
-                4 => work.lanes::<4>(offset),
-                5 => work.lanes::<5>(offset),
-                6 => work.lanes::<6>(offset),
-                7 => work.lanes::<7>(offset),
-                _ => work.lanes::<8>(offset),
+                1 => work.lanes::<A, 1>(offset),
+                2 => work.lanes::<A, 2>(offset),
+                3 => work.lanes::<A, 3>(offset),
+                4 => work.lanes::<A, 4>(offset),
+                5 => work.lanes::<A, 5>(offset),
+                6 => work.lanes::<A, 6>(offset),
+                7 => work.lanes::<A, 7>(offset),
+                _ => work.lanes::<A, 8>(offset),
             }
         }
     }
@@ -129,7 +132,7 @@ mod tests {
     struct Widths(Vec<(usize, usize)>);
 
     impl LaneWork for Widths {
-        fn lanes<const C: usize>(&mut self, offset: usize) {
+        fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize) {
             self.0.push((offset, C));
         }
     }
@@ -139,7 +142,7 @@ mod tests {
 
     impl LaneWork for Recursion<'_> {
         #[inline(always)]
-        fn lanes<const C: usize>(&mut self, offset: usize) {
+        fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize) {
             let mut state = [0.3; C];
             for frame in self.0.chunks_exact_mut(self.1) {
                 let value: [f64; C] = load(frame, offset);
@@ -156,7 +159,7 @@ mod tests {
         for channels in 1..=11 {
             let frames: Vec<f64> = (0..500 * channels).map(|index| (index as f64).sin()).collect();
             let (mut plain, mut wide) = (frames.clone(), frames);
-            Groups { channels, work: &mut Recursion(&mut plain, channels) }.call();
+            Groups { channels, work: &mut Recursion(&mut plain, channels) }.call::<Separate>();
             in_lanes(channels, &mut Recursion(&mut wide, channels));
             assert!(plain.iter().zip(&wide).all(|(plain, wide)| plain.to_bits() == wide.to_bits()));
         }

@@ -2,15 +2,13 @@
 
 use std::{
     num::NonZeroUsize,
-    sync::{
-        Condvar, Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-    },
+    sync::atomic::{AtomicBool, AtomicUsize, Ordering},
 };
 
 use super::{
-    overlap::{Ahead, read_ahead},
+    overlap::{Captures, read_ahead, read_along},
     run::Observer,
+    turnstile::Turnstile,
 };
 use crate::{
     Error, Result,
@@ -38,25 +36,28 @@ pub struct Line<'a> {
 
 impl Line<'_> {
     /// Does `work` on every station (its index and its profiles), and the inputs' checksums meanwhile; `take` gets
-    /// what comes of it.
+    /// what comes of it, in the order of the stations.
     ///
-    /// Each worker takes the next station and then waits for its turn to hand the result on: results come in order,
-    /// and no more of them exist at a time than there are workers.
-    pub fn run<T>(
+    /// Each worker takes the next station, and waits only where it is too far ahead of the others: few results exist at a
+    /// time.
+    pub fn run<T: Send>(
         &self,
         threads: Option<NonZeroUsize>,
         observer: &dyn Observer,
         work: impl Fn(usize, Station) -> Result<T> + Sync,
-        take: impl FnMut(T) -> Result<()> + Send,
+        mut take: impl FnMut(T) -> Result<()> + Send,
     ) -> Result<Vec<Input>> {
         let stations = self.recording.stations();
         observer.begin(stations.len());
-        let available = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-        let workers = threads.map_or_else(available, NonZeroUsize::get).clamp(1, stations.len().max(1));
+        let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let workers = threads.map_or(processors, NonZeroUsize::get).clamp(1, stations.len().max(1));
         let next = AtomicUsize::new(0);
         let failed = AtomicBool::new(false);
-        let turnstile = Mutex::new((0_usize, Ok(()), take));
-        let turned = Condvar::new();
+        let turnstile = Turnstile::new(|index: usize, result| {
+            take(result)?;
+            observer.station(&stations[index].name);
+            Ok(())
+        });
         let setups = self.rig.setups.len();
         let worker = || {
             let claimed = std::iter::from_fn(|| {
@@ -66,42 +67,31 @@ impl Line<'_> {
             let captures = claimed
                 .flat_map(|station| (0..setups).map(move |setup| (station, setup)))
                 .map(|(station, setup)| (station, self.recorded(station, setup)));
-            read_ahead(captures, |ahead| {
-                while let Some(index) = ahead.coming() {
-                    let key = &stations[index];
-                    let result = self.station(key, ahead).and_then(|station| work(index, station));
-                    let guard = turnstile.lock().unwrap_or_else(PoisonError::into_inner);
-                    let mut guard =
-                        turned.wait_while(guard, |(turn, _, _)| *turn != index).unwrap_or_else(PoisonError::into_inner);
-                    let (turn, outcome, take) = &mut *guard;
-                    *turn += 1;
-                    if outcome.is_ok() {
-                        *outcome = result.and_then(take);
-                        if outcome.is_err() {
-                            failed.store(true, Ordering::Relaxed);
-                        } else {
-                            observer.station(&key.name);
-                        }
+            let work_on = |captures: &mut dyn Captures<usize>| {
+                while let Some(index) = captures.coming() {
+                    let result = self.station(&stations[index], captures).and_then(|station| work(index, station));
+                    if !turnstile.pass(index, result) {
+                        failed.store(true, Ordering::Relaxed);
                     }
-                    drop(guard);
-                    turned.notify_all();
                 }
-            });
+            };
+            if workers < processors { read_ahead(captures, work_on) } else { read_along(captures, work_on) }
         };
+        let along = self.recording.checksum();
+        if let Some(checksum) = along {
+            checksum.begin();
+        }
         let inputs = std::thread::scope(|scope| {
-            let checksums = scope.spawn(|| match self.recording.checksum() {
-                Some(_) => Ok(Vec::new()),
-                None => self.recording.inputs().iter().map(|path| Input::of(path)).collect::<Result<Vec<_>>>(),
-            });
+            let apart = || self.recording.inputs().iter().map(|path| Input::of(path)).collect::<Result<Vec<_>>>();
+            let checksums = scope.spawn(move || if along.is_some() { Ok(Vec::new()) } else { apart() });
             for _ in 1..workers {
                 scope.spawn(worker);
             }
             worker();
             checksums.join()
         });
-        let (_, outcome, _) = turnstile.into_inner().unwrap_or_else(PoisonError::into_inner);
-        outcome?;
-        if let Some(checksum) = self.recording.checksum() {
+        turnstile.outcome()?;
+        if let Some(checksum) = along {
             return Ok(vec![checksum.finish()?]);
         }
         inputs.unwrap_or_else(|_| Err(Error::new("checksum", "the inputs", "the thread that read them stopped")))
@@ -114,14 +104,14 @@ impl Line<'_> {
     }
 
     /// Takes all of a station's captures, also behind one that failed.
-    fn station(&self, key: &StationKey, ahead: &mut Ahead<usize>) -> Result<Station> {
+    fn station(&self, key: &StationKey, captures: &mut dyn Captures<usize>) -> Result<Station> {
         let mut profiles = Ok(Vec::with_capacity(self.rig.setups.len()));
         for setup in 0..self.rig.setups.len() {
-            let capture = ahead.open();
+            let capture = captures.open();
             let projection = self.projections.get(setup).and_then(Option::as_ref);
             let wanted = Wanted { hold_out: self.hold_out, projection };
             profiles = profiles.and_then(|mut profiles: Vec<Profile>| {
-                profiles.push(self.averager.average_wanting(Box::new(capture?), wanted)?);
+                profiles.push(self.averager.average_wanting(capture?, wanted)?);
                 Ok(profiles)
             });
         }

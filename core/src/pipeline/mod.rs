@@ -14,6 +14,7 @@ pub mod result;
 pub mod run;
 pub mod summary;
 mod traces;
+mod turnstile;
 
 pub use config::Pipeline;
 pub use registry::Registry;

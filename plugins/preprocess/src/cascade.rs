@@ -1,6 +1,6 @@
 //! Second-order sections run over frames, all channels side by side.
 
-use runout_core::numerics::lanes::{LaneWork, in_lanes, load};
+use runout_core::numerics::lanes::{Arithmetic, LaneWork, in_lanes_fused, load};
 
 use crate::butterworth::Section;
 
@@ -12,7 +12,8 @@ use crate::butterworth::Section;
 struct Step {
     b0: f64,
     p: [f64; 2],
-    a: [f64; 2],
+    /// −a₁ and −a₂.
+    back: [f64; 2],
     /// State in which a constant input of 1 passes unchanged.
     steady: [f64; 2],
 }
@@ -23,7 +24,7 @@ impl From<&Section> for Step {
         Self {
             b0,
             p: [b1 - a1 * b0, b2 - a2 * b0],
-            a: section.a,
+            back: [-a1, -a2],
             // From y = x = 1, as every section has gain 1 at 0 Hz.
             steady: [1.0 - b0, b2 - a2],
         }
@@ -65,7 +66,7 @@ impl Cascade {
     /// Filters frames in place.
     pub(crate) fn run(&mut self, frames: &mut [f64], direction: Direction) {
         let channels = self.channels;
-        in_lanes(channels, &mut Pass { cascade: self, frames, direction });
+        in_lanes_fused(channels, &mut Pass { cascade: self, frames, direction });
     }
 }
 
@@ -78,11 +79,15 @@ struct Pass<'a> {
 #[allow(clippy::inline_always, reason = "see LaneWork")]
 impl LaneWork for Pass<'_> {
     #[inline(always)]
-    fn lanes<const C: usize>(&mut self, offset: usize) {
+    fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize) {
         let count = self.cascade.steps.len();
         // Two sections at a time keep the processor busy while each waits for its own state.
         for first in (0..count).step_by(2) {
-            if first + 1 < count { self.sections::<C, 2>(first, offset) } else { self.sections::<C, 1>(first, offset) }
+            if first + 1 < count {
+                self.sections::<A, C, 2>(first, offset);
+            } else {
+                self.sections::<A, C, 1>(first, offset);
+            }
         }
     }
 }
@@ -90,7 +95,7 @@ impl LaneWork for Pass<'_> {
 #[allow(clippy::inline_always, reason = "see LaneWork")]
 impl Pass<'_> {
     #[inline(always)]
-    fn sections<const C: usize, const S: usize>(&mut self, first: usize, offset: usize) {
+    fn sections<A: Arithmetic, const C: usize, const S: usize>(&mut self, first: usize, offset: usize) {
         let channels = self.cascade.channels;
         let steps: [Step; S] = std::array::from_fn(|section| self.cascade.steps[first + section]);
         let place = |section: usize, term: usize| ((first + section) * 2 + term) * channels;
@@ -100,10 +105,10 @@ impl Pass<'_> {
         if channels == C {
             // A distance between frames that the compiler knows spares the checks of every access.
             let frames = self.frames.chunks_exact_mut(C);
-            run(frames, self.direction, &steps, &mut state);
+            run::<A, C, S>(frames, self.direction, &steps, &mut state);
         } else {
             let frames = self.frames.chunks_exact_mut(channels).map(|frame| &mut frame[offset..offset + C]);
-            run(frames, self.direction, &steps, &mut state);
+            run::<A, C, S>(frames, self.direction, &steps, &mut state);
         }
         for (section, state) in state.iter().enumerate() {
             for (term, lanes) in state.iter().enumerate() {
@@ -117,7 +122,7 @@ impl Pass<'_> {
 /// All instants of some channels through some sections.
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "see LaneWork")]
-fn run<'a, const C: usize, const S: usize>(
+fn run<'a, A: Arithmetic, const C: usize, const S: usize>(
     frames: impl DoubleEndedIterator<Item = &'a mut [f64]>,
     direction: Direction,
     steps: &[Step; S],
@@ -127,12 +132,12 @@ fn run<'a, const C: usize, const S: usize>(
     match direction {
         Direction::Forward => {
             for frame in frames {
-                filter(steps, state, frame);
+                filter::<A, C, S>(steps, state, frame);
             }
         }
         Direction::Backward => {
             for frame in frames.rev() {
-                filter(steps, state, frame);
+                filter::<A, C, S>(steps, state, frame);
             }
         }
     }
@@ -141,19 +146,26 @@ fn run<'a, const C: usize, const S: usize>(
 /// One instant of some channels through some sections.
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "see LaneWork")]
-fn filter<const C: usize, const S: usize>(steps: &[Step; S], state: &mut [[[f64; C]; 2]; S], lanes: &mut [f64]) {
+fn filter<A: Arithmetic, const C: usize, const S: usize>(
+    steps: &[Step; S],
+    state: &mut [[[f64; C]; 2]; S],
+    lanes: &mut [f64],
+) {
     let mut value: [f64; C] = load(lanes, 0);
     for (step, state) in steps.iter().zip(state) {
         let input = value;
         for lane in 0..C {
-            value[lane] = step.b0 * input[lane] + state[0][lane];
+            value[lane] = A::mul_add(step.b0, input[lane], state[0][lane]);
         }
         let [first, second] = *state;
         for lane in 0..C {
-            state[0][lane] = (step.p[0] * input[lane] + second[lane]) - step.a[0] * first[lane];
+            state[0][lane] = A::mul_add(step.p[0], input[lane], second[lane]);
         }
         for lane in 0..C {
-            state[1][lane] = step.p[1] * input[lane] - step.a[1] * first[lane];
+            state[0][lane] = A::mul_add(step.back[0], first[lane], state[0][lane]);
+        }
+        for lane in 0..C {
+            state[1][lane] = A::mul_add(step.back[1], first[lane], step.p[1] * input[lane]);
         }
     }
     lanes.copy_from_slice(&value);

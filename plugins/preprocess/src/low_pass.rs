@@ -205,9 +205,10 @@ impl LowPassStream<'_> {
         self.scratch.extend_from_slice(&self.next.samples[..lookahead]);
         self.backward_over_scratch();
         self.backward.run(&mut self.held.samples, Direction::Backward);
+        // What the block was is read into next; not cleared, it needs no zeros.
         std::mem::swap(block, &mut self.held);
+        std::mem::swap(&mut self.held, &mut self.raw);
         std::mem::swap(&mut self.held, &mut self.next);
-        self.next.clear();
     }
 
     /// Runs the backward pass from its beginning over what is in `scratch`, for its state only.
@@ -278,7 +279,6 @@ impl SampleStream for LowPassStream<'_> {
     }
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
-        block.clear();
         if self.channels() == 0 {
             return self.input.next_block(block);
         }
@@ -288,13 +288,13 @@ impl SampleStream for LowPassStream<'_> {
                 self.hand_on(block);
                 return Ok(true);
             }
-            self.raw.clear();
             if self.input.next_block(&mut self.raw)? {
                 self.take();
             } else {
                 return self.finish(block);
             }
         }
+        block.clear();
         Ok(false)
     }
 }

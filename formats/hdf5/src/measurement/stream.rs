@@ -10,7 +10,7 @@ use runout_core::{
     checksum::Reader,
     encoder::EncoderScan,
     measurement::{Block, Capture, SampleStream},
-    numerics::lanes::{LaneWork, in_lanes},
+    numerics::lanes::{Arithmetic, LaneWork, in_lanes},
     rig::Rig,
 };
 
@@ -21,8 +21,8 @@ use super::{
 };
 use crate::node::Place;
 
-/// Instants in a block: four channels of f64 then take 1 MiB, and threads meet seldom.
-const BLOCK_SAMPLES: usize = 32768;
+/// Elements in a block, about: 256 KiB of f64, which stay in a core's own cache from the file to the average.
+const BLOCK: usize = 1 << 15;
 
 /// A block never takes more elements than this, even where the file's chunks are larger.
 const BLOCK_ELEMENTS: usize = 1 << 24;
@@ -142,7 +142,7 @@ struct Scaling<'a, T> {
 impl<T: Copy + Into<f64>> LaneWork for Scaling<'_, T> {
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "see LaneWork")]
-    fn lanes<const C: usize>(&mut self, offset: usize) {
+    fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize) {
         let columns: [&Column; C] = std::array::from_fn(|lane| &self.columns[offset + lane]);
         let (gain, zero_um) = (columns.map(|column| column.gain), columns.map(|column| column.zero_um));
         let first = columns[0].offset;
@@ -218,10 +218,11 @@ fn missing(id: &str, sensors: &[String], place: &Place) -> Error {
 
 /// Whole chunks at a time, so that none is unpacked twice.
 fn block_samples(chunk: Option<&[usize]>, columns: usize) -> usize {
-    let longest = (BLOCK_ELEMENTS / columns.max(1)).max(1);
+    let columns = columns.max(1);
+    let [usual, longest] = [BLOCK, BLOCK_ELEMENTS].map(|elements| (elements / columns).max(1));
     match chunk {
-        Some([rows, ..]) if *rows >= BLOCK_SAMPLES => (*rows).min(longest),
-        Some([rows, ..]) if *rows > 0 => (BLOCK_SAMPLES - BLOCK_SAMPLES % rows).min(longest),
-        _ => BLOCK_SAMPLES.min(longest),
+        Some([rows, ..]) if *rows >= usual => (*rows).min(longest),
+        Some([rows, ..]) if *rows > 0 => usual - usual % rows,
+        _ => usual,
     }
 }

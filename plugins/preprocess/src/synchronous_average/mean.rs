@@ -6,7 +6,7 @@ use runout_core::{
     Complex64,
     numerics::{
         fourier::Fourier,
-        lanes::{NullaryFnOnce, vectorised},
+        lanes::{Arithmetic, FusedWork, fused},
     },
 };
 
@@ -67,10 +67,10 @@ impl Mean {
         if self.pivot.is_empty() {
             self.pivot.extend_from_slice(&turns[..self.sum.len()]);
         }
-        vectorised(Summing { mean: self, turns });
+        fused(Summing { mean: self, turns });
     }
 
-    /// Takes a turn's harmonics, `[order][channel]`, into the scatter.
+    /// Takes a turn's harmonics, `[channel][order]`, into the scatter.
     pub(super) fn look_at(&mut self, turn: &[Complex64]) {
         self.scatter.add(turn);
     }
@@ -84,8 +84,11 @@ impl Mean {
         }
         let scale = 1.0 / self.turns as f64;
         let readings: Vec<f64> = self.pivot.iter().zip(&self.sum).map(|(pivot, sum)| pivot + sum * scale).collect();
-        let mut analysis = Analysis::new(angles, orders);
-        analysis.take_apart(&readings, &mut mean);
+        let mut harmonics = vec![Complex64::ZERO; orders * channels];
+        Analysis::new(angles, orders).take_apart(&readings, &mut harmonics);
+        for (channel, harmonics) in harmonics.chunks_exact(orders).enumerate() {
+            mean[channel..].iter_mut().step_by(channels).zip(harmonics).for_each(|(to, harmonic)| *to = *harmonic);
+        }
         mean
     }
 
@@ -111,11 +114,9 @@ struct Summing<'a> {
     turns: &'a [f64],
 }
 
-impl NullaryFnOnce for Summing<'_> {
-    type Output = ();
-
+impl FusedWork for Summing<'_> {
     #[inline(always)]
-    fn call(self) {
+    fn call<A: Arithmetic>(self) {
         /// Readings that are worked on at once.
         const LANES: usize = 8;
         let Mean { size, turns, pivot, sum, slow, .. } = self.mean;
@@ -124,10 +125,10 @@ impl NullaryFnOnce for Summing<'_> {
         *turns += phases.len();
         let whole = values - values % LANES;
         for first in (0..whole).step_by(LANES) {
-            slow.add::<LANES>(first, pivot, sum, self.turns, &phases);
+            slow.add::<A, LANES>(first, pivot, sum, self.turns, &phases);
         }
         for first in whole..values {
-            slow.add::<1>(first, pivot, sum, self.turns, &phases);
+            slow.add::<A, 1>(first, pivot, sum, self.turns, &phases);
         }
     }
 }
@@ -135,25 +136,25 @@ impl NullaryFnOnce for Summing<'_> {
 /// Takes turns apart.
 pub(super) struct Analysis {
     fourier: Fourier,
+    orders: usize,
     /// One channel's readings, which the transform uses up.
     readings: Vec<f64>,
-    harmonics: Vec<Complex64>,
 }
 
 impl Analysis {
     pub(super) fn new(angles: usize, orders: usize) -> Self {
-        Self { fourier: Fourier::new(angles), readings: vec![0.0; angles], harmonics: vec![Complex64::ZERO; orders] }
+        Self { fourier: Fourier::new(angles), orders, readings: vec![0.0; angles] }
     }
 
-    /// Readings on equal angles, `[channel][angle]`, as harmonics, `[order][channel]`.
+    /// Readings on equal angles, `[channel][angle]`, as harmonics, `[channel][order]`.
     pub(super) fn take_apart(&mut self, readings: &[f64], turn: &mut [Complex64]) {
-        let channels = turn.len() / self.harmonics.len();
-        for (channel, readings) in readings.chunks_exact(self.readings.len()).enumerate() {
+        for (readings, harmonics) in readings.chunks_exact(self.readings.len()).zip(turn.chunks_exact_mut(self.orders))
+        {
             self.readings.copy_from_slice(readings);
-            self.fourier.analyse_in_place(&mut self.readings, &mut self.harmonics);
-            for (harmonic, turn) in self.harmonics.iter().zip(turn[channel..].iter_mut().step_by(channels)) {
-                // Profiles are Re Σ cₙ e^{−inΦ}.
-                *turn = harmonic.conj();
+            self.fourier.analyse_in_place(&mut self.readings, harmonics);
+            // Profiles are Re Σ cₙ e^{−inΦ}.
+            for harmonic in harmonics {
+                harmonic.im = -harmonic.im;
             }
         }
     }

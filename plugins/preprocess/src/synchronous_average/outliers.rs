@@ -23,7 +23,7 @@ pub(super) struct Held {
     pub turn: Turn,
     /// `[channel][angle]`.
     pub readings: Vec<f64>,
-    /// `[order][channel]`.
+    /// `[channel][order]`.
     pub harmonics: Vec<Complex64>,
     pub motion: Vec<f64>,
 }
@@ -81,6 +81,7 @@ const NOTHING_UM: f64 = 1e-9;
 fn distances_um(turns: &[Held], channels: usize) -> Vec<Vec<f64>> {
     let mut squares = vec![vec![0.0; channels]; turns.len()];
     let length = turns.first().map_or(0, |turn| turn.harmonics.len());
+    let orders = (length / channels.max(1)).max(1);
     let mut parts = vec![0.0; turns.len()];
     for at in 0..length {
         let mut middle = |part: fn(&Complex64) -> f64| {
@@ -90,9 +91,9 @@ fn distances_um(turns: &[Held], channels: usize) -> Vec<Vec<f64>> {
         };
         let middle = Complex64::new(middle(|value| value.re), middle(|value| value.im));
         // A harmonic's mean square over the turn is half of its amplitude's square; that of the level is all of it.
-        let share = if at < channels { 1.0 } else { 0.5 };
+        let share = if at % orders == 0 { 1.0 } else { 0.5 };
         for (turn, squares) in turns.iter().zip(&mut squares) {
-            squares[at % channels] += share * (turn.harmonics[at] - middle).norm_sqr();
+            squares[at / orders] += share * (turn.harmonics[at] - middle).norm_sqr();
         }
     }
     squares.iter_mut().flatten().for_each(|square| *square = square.sqrt());

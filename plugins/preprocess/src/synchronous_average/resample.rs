@@ -57,7 +57,7 @@ pub(super) struct Resampling<'a> {
     /// Where channels look into an interruption of the surface.
     bridges: Bridges,
     analysis: Analysis,
-    /// One turn's harmonics, `[order][channel]`.
+    /// One turn's harmonics, `[channel][order]`.
     harmonics: Vec<Complex64>,
     /// Motion of the axis in single turns, where wanted.
     motion: Option<Motion>,

@@ -4,11 +4,11 @@
 
 use runout_core::{
     Complex64,
-    numerics::lanes::{NullaryFnOnce, load, vectorised},
+    numerics::lanes::{Arithmetic, FusedWork, fused, load},
 };
 
 /// Orders that are worked on at once.
-const LANES: usize = 4;
+const LANES: usize = 8;
 
 /// Sums and products over turns, taken from the first one: what is left is the turns' scatter, so that no digits are lost
 /// where the scatter is far below the signal.
@@ -20,7 +20,7 @@ pub(super) struct Scatter {
     /// Length of a plane: the orders, and as many zeros as fill the last lanes.
     plane: usize,
     turns: usize,
-    /// The first turn, `[order][channel]`.
+    /// The first turn, `[channel][order]`.
     pivot: Vec<Complex64>,
     /// The turn under work less the pivot, d.
     turn: Vec<f64>,
@@ -46,23 +46,22 @@ impl Scatter {
         }
     }
 
-    /// Takes one turn's harmonics, `[order][channel]`.
+    /// Takes one turn's harmonics, `[channel][order]`.
     pub(super) fn add(&mut self, turn: &[Complex64]) {
         self.turns += 1;
         if self.pivot.is_empty() {
             self.pivot.extend_from_slice(turn);
             return;
         }
-        let (channels, plane) = (self.channels, self.plane);
-        for (channel, planes) in self.turn.chunks_exact_mut(2 * plane).enumerate() {
-            let (re, im) = planes.split_at_mut(plane);
-            let pairs = turn[channel..].iter().step_by(channels).zip(self.pivot[channel..].iter().step_by(channels));
-            for ((turn, pivot), (re, im)) in pairs.zip(re.iter_mut().zip(im)) {
+        let turns = turn.chunks_exact(self.orders).zip(self.pivot.chunks_exact(self.orders));
+        for ((turn, pivot), planes) in turns.zip(self.turn.chunks_exact_mut(2 * self.plane)) {
+            let (re, im) = planes.split_at_mut(self.plane);
+            for ((turn, pivot), (re, im)) in turn.iter().zip(pivot).zip(re.iter_mut().zip(im)) {
                 *re = turn.re - pivot.re;
                 *im = turn.im - pivot.im;
             }
         }
-        vectorised(Summing(self));
+        fused(Summing(self));
     }
 
     /// 1/(T−1) Σ (cₜ − mean)(cₜ − mean)ᴴ, `[order][channel][channel]`; `None` below two turns.
@@ -97,11 +96,9 @@ impl Scatter {
 /// A turn on its way into the sums.
 struct Summing<'a>(&'a mut Scatter);
 
-impl NullaryFnOnce for Summing<'_> {
-    type Output = ();
-
+impl FusedWork for Summing<'_> {
     #[inline(always)]
-    fn call(self) {
+    fn call<A: Arithmetic>(self) {
         let Scatter { channels, plane, turn, sum, products, .. } = self.0;
         for (sum, value) in sum.iter_mut().zip(&*turn) {
             *sum += value;
@@ -113,11 +110,21 @@ impl NullaryFnOnce for Summing<'_> {
                 let [a, b] = [row, column].map(|channel| turn[2 * channel * *plane..][..2 * *plane].split_at(*plane));
                 for first in (0..*plane).step_by(LANES) {
                     let [a_re, a_im, b_re, b_im] = [a.0, a.1, b.0, b.1].map(|part| load::<LANES>(part, first));
-                    let (re, im) = (&mut re[first..first + LANES], &mut im[first..first + LANES]);
+                    let (mut real, mut imaginary): ([f64; LANES], [f64; LANES]) = (load(re, first), load(im, first));
                     for lane in 0..LANES {
-                        re[lane] += a_re[lane] * b_re[lane] + a_im[lane] * b_im[lane];
-                        im[lane] += a_im[lane] * b_re[lane] - a_re[lane] * b_im[lane];
+                        real[lane] = A::mul_add(a_re[lane], b_re[lane], real[lane]);
                     }
+                    for lane in 0..LANES {
+                        real[lane] = A::mul_add(a_im[lane], b_im[lane], real[lane]);
+                    }
+                    for lane in 0..LANES {
+                        imaginary[lane] = A::mul_add(a_im[lane], b_re[lane], imaginary[lane]);
+                    }
+                    for lane in 0..LANES {
+                        imaginary[lane] = A::mul_add(-a_re[lane], b_im[lane], imaginary[lane]);
+                    }
+                    re[first..first + LANES].copy_from_slice(&real);
+                    im[first..first + LANES].copy_from_slice(&imaginary);
                 }
             }
         }

@@ -11,7 +11,10 @@
 
 use std::{cell::RefCell, f64::consts::TAU};
 
-use runout_core::{Complex64, numerics::lanes::load};
+use runout_core::{
+    Complex64,
+    numerics::lanes::{Arithmetic, load},
+};
 use rustfft::FftPlanner;
 
 use super::mean::Size;
@@ -60,7 +63,7 @@ impl Slow {
 
     /// Takes the readings `first..first + C` of several turns, less the pivot, into the sums here and into the plain `sum`.
     #[inline(always)]
-    pub(super) fn add<const C: usize>(
+    pub(super) fn add<A: Arithmetic, const C: usize>(
         &mut self,
         first: usize,
         pivot: &[f64],
@@ -79,7 +82,7 @@ impl Slow {
             }
             for (sum, phase) in slow.iter_mut().zip(phases) {
                 for lane in 0..C {
-                    sum[lane] += phase * turn[lane];
+                    sum[lane] = A::mul_add(*phase, turn[lane], sum[lane]);
                 }
             }
         }

@@ -90,7 +90,7 @@ impl Means {
     }
 
     /// Takes the turn of this number, whose readings are where the [next](Self::next) turn's are to be, with its
-    /// harmonics, `[order][channel]`, and its motion.
+    /// harmonics, `[channel][order]`, and its motion.
     pub fn add(&mut self, number: usize, harmonics: &[Complex64], motion: &[f64]) {
         let looked_at = self.looks_at_next();
         let taken = self.turns();
@@ -103,7 +103,8 @@ impl Means {
             let part = if taken < *fitted { fit } else { held_out };
             part.look_at(harmonics);
             turns.numbers.push(number);
-            turns.harmonics.extend(&harmonics[..turns.orders * turns.channels]);
+            let orders = harmonics.len() / turns.channels;
+            turns.harmonics.extend((0..turns.orders).flat_map(|order| harmonics[order..].iter().step_by(orders)));
             full |= taken + 1 == *fitted;
         }
         if let Some(extremes) = &mut self.extremes {

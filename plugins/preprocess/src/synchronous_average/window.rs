@@ -4,7 +4,7 @@
 
 use runout_core::{
     measurement::Block,
-    numerics::lanes::{LaneWork, in_lanes, load},
+    numerics::lanes::{Arithmetic, LaneWork, in_lanes, load},
 };
 
 use super::kernel::REACH;
@@ -123,13 +123,27 @@ struct Parting<'a> {
 
 impl LaneWork for Parting<'_> {
     #[inline(always)]
-    fn lanes<const C: usize>(&mut self, offset: usize) {
+    fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize) {
+        /// Frames that change places together, with one look at the room for them.
+        const TOGETHER: usize = 4;
         let channels = self.samples.len();
+        let count = self.frames.len() / channels;
         let mut targets: [&mut [f64]; C] = std::array::from_fn(|_| &mut [][..]);
         for (target, samples) in targets.iter_mut().zip(&mut self.samples[offset..offset + C]) {
-            *target = &mut samples[self.kept..];
+            *target = &mut samples[self.kept..][..count];
         }
-        for (index, frame) in self.frames.chunks_exact(channels).enumerate() {
+        for (block, frames) in self.frames.chunks_exact(TOGETHER * channels).enumerate() {
+            let mut together = [[0.0; C]; TOGETHER];
+            for (values, frame) in together.iter_mut().zip(frames.chunks_exact(channels)) {
+                *values = load(frame, offset);
+            }
+            for (lane, target) in targets.iter_mut().enumerate() {
+                let column = [together[0][lane], together[1][lane], together[2][lane], together[3][lane]];
+                target[block * TOGETHER..][..TOGETHER].copy_from_slice(&column);
+            }
+        }
+        let rest = count - count % TOGETHER;
+        for (index, frame) in self.frames.chunks_exact(channels).enumerate().skip(rest) {
             let frame: [f64; C] = load(frame, offset);
             for (target, value) in targets.iter_mut().zip(frame) {
                 target[index] = value;
