@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn expected_squares_are_those_of_what_is_left() {
         let blocks = [covariance(0.7), covariance(1.9)];
-        let spread = Spread::new(SENSORS, blocks.iter().map(Vec::as_slice).collect());
+        let spread = Spread::new(SENSORS, &blocks, 0);
         let mut weights = vec![Complex64::ZERO; COUNT * COUNT];
         for (setup, block) in [covariance(2.3), covariance(0.2)].iter().enumerate() {
             let Some(factor) = cholesky(SENSORS, block) else { panic!("it is positive definite") };

@@ -110,43 +110,52 @@ impl Readings {
     #[must_use]
     pub fn spread(&self, order: usize) -> Option<Spread<'_>> {
         let setups = self.covariance.as_ref()?;
-        let sensors = self.count / setups.len();
-        let block = sensors * sensors;
-        Some(Spread::new(sensors, setups.iter().map(|orders| &orders[order * block..(order + 1) * block]).collect()))
+        Some(Spread::new(self.count / setups.len(), setups, order))
     }
 }
 
 /// Covariance Σ of one order's readings: setups are independent of each other.
 pub struct Spread<'a> {
     sensors: usize,
-    /// `[sensor][sensor]` of each setup.
-    setups: Vec<&'a [Complex64]>,
+    /// Matrices of all orders in each setup.
+    setups: &'a [Vec<Complex64>],
+    order: usize,
 }
 
 impl<'a> Spread<'a> {
-    /// From the matrices of the setups, `[sensor][sensor]`.
+    /// From the matrices of the setups, `[order][sensor][sensor]`.
     #[must_use]
-    pub fn new(sensors: usize, setups: Vec<&'a [Complex64]>) -> Self {
-        Self { sensors, setups }
+    pub fn new(sensors: usize, setups: &'a [Vec<Complex64>], order: usize) -> Self {
+        Self { sensors, setups, order }
+    }
+
+    /// The matrix of each setup, `[sensor][sensor]`.
+    fn blocks(&self) -> impl Iterator<Item = &'a [Complex64]> + Clone {
+        let block = self.sensors * self.sensors;
+        let place = self.order * block..(self.order + 1) * block;
+        self.setups.iter().map(move |orders| &orders[place.clone()])
     }
 
     /// tr Σ.
     #[must_use]
     pub fn trace(&self) -> f64 {
-        self.setups.iter().flat_map(|block| block.iter().step_by(self.sensors + 1)).map(|entry| entry.re).sum()
+        self.blocks().flat_map(|block| block.iter().step_by(self.sensors + 1)).map(|entry| entry.re).sum()
     }
 
     /// M·Σ for M, both `[row][reading]`.
     #[must_use]
     pub fn times(&self, matrix: &[Complex64]) -> Vec<Complex64> {
-        let sensors = self.sensors;
+        let (sensors, count) = (self.sensors, self.sensors * self.setups.len());
         let mut product = vec![Complex64::ZERO; matrix.len()];
-        let rows = matrix.chunks_exact(sensors).zip(product.chunks_exact_mut(sensors));
-        for ((row, target), block) in rows.zip(self.setups.iter().cycle()) {
-            // A matrix of weights is 0 from one setup to another.
-            let there = row.iter().zip(block.chunks_exact(sensors)).filter(|(entry, _)| **entry != Complex64::ZERO);
-            for (entry, source) in there {
-                target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
+        for (row, target) in matrix.chunks_exact(count).zip(product.chunks_exact_mut(count)) {
+            let parts = row.chunks_exact(sensors).zip(target.chunks_exact_mut(sensors));
+            for ((row, target), block) in parts.zip(self.blocks()) {
+                // A matrix of weights is 0 from one setup to another.
+                for (entry, source) in row.iter().zip(block.chunks_exact(sensors)) {
+                    if *entry != Complex64::ZERO {
+                        target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
+                    }
+                }
             }
         }
         product
