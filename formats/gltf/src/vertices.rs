@@ -39,16 +39,19 @@ impl Layout {
     /// Of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
         let (rings, angles, caps) = (mesh.rings(), mesh.angles(), mesh.caps().len());
-        let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let centres = mesh.caps().into_iter().map(|cap| [0.0, 0.0, cap.z_mm]);
-        for position in (0..rings).flat_map(|ring| mesh.rim(ring)).chain(centres) {
-            let position = metres_y_up(position);
+        (0..rings).flat_map(|ring| mesh.rim(ring)).chain(centres).for_each(|position| {
             for axis in 0..3 {
-                // Comparisons compile to single instructions; f32::min has to look after NaN, which a mesh never holds.
-                min[axis] = if position[axis] < min[axis] { position[axis] } else { min[axis] };
-                max[axis] = if position[axis] > max[axis] { position[axis] } else { max[axis] };
+                // Comparisons compile to single instructions; f64::min has to look after NaN, which a mesh never holds.
+                low[axis] = if position[axis] < low[axis] { position[axis] } else { low[axis] };
+                high[axis] = if position[axis] > high[axis] { position[axis] } else { high[axis] };
             }
-        }
+        });
+        // Rounding keeps the order, so that these are the extremes of what is written; the turn swaps those of one axis.
+        let corners = [metres_y_up(low), metres_y_up(high)];
+        let [min, max] =
+            [f32::min, f32::max].map(|of| std::array::from_fn(|axis| of(corners[0][axis], corners[1][axis])));
         Self {
             vertices: rings * angles + caps * (angles + 1),
             indices: 6 * (rings - 1) * angles + 3 * caps * angles,

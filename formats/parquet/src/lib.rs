@@ -165,8 +165,8 @@ impl Export for Tables {
         let entries = self.content.entries(summary);
         self.values.append(values::rows(summary))?;
         let had_motion = self.motion.is_some();
-        let tables = [Some(self.form), self.motion, Some(self.harmonics), Some(self.values)].into_iter().flatten();
-        let complete: Vec<PendingFile> = tables.map(|table| table.close(&entries)).collect::<Result<_>>()?;
+        let tables = [Some(self.form), self.motion, Some(self.harmonics), Some(self.values)];
+        let complete = close_all(tables.into_iter().flatten(), &entries)?;
         if !had_motion && self.motion_path.is_file() {
             // An earlier run's motion beside this run's form would be taken for this run's.
             std::fs::remove_file(&self.motion_path)
@@ -174,4 +174,13 @@ impl Export for Tables {
         }
         Ok(complete)
     }
+}
+
+/// Completes tables side by side: each has rows that were not packed yet, and nothing else is left to do meanwhile.
+fn close_all(tables: impl Iterator<Item = Table>, entries: &[(String, String)]) -> Result<Vec<PendingFile>> {
+    let stopped = |_| Err(Error::new("write", "the tables", "a thread that wrote them stopped"));
+    std::thread::scope(|scope| {
+        let closing: Vec<_> = tables.map(|table| scope.spawn(|| table.close(entries))).collect();
+        closing.into_iter().map(|table| table.join().unwrap_or_else(stopped)).collect()
+    })
 }
