@@ -94,6 +94,7 @@ for workers in WORKERS:
         f"{theirs / ours:.2f}",
         f"{median(run_values, workers, 'seconds'):.2f}",
         f"{median(run_runout, workers, 'peak_mib'):.0f}",
+        f"{median(run_values, workers, 'peak_mib'):.0f}",
         f"{median(run_peers, workers, 'peak_mib'):.0f}",
     ]
     rows.append(f"| {' | '.join(cells)} |")
@@ -101,9 +102,9 @@ crowd = f"others kept {elsewhere:.1f} processors busy" if elsewhere > 0.3 else "
 said = f"{stations} stations, {os.cpu_count()} processors, median of {rounds} rounds in turns; {crowd}"
 head = (
     "| samples | workers | runout, s | its CPU, s | peers, s | peers / runout | runout with values, s "
-    "| runout, peak MiB | peers, peak MiB |"
+    "| runout, peak MiB | with values, peak MiB | peers, peak MiB |"
 )
-print("\n".join(["", said, "", head, "| --- " * 9 + "|", *rows]))
+print("\n".join(["", said, "", head, "| --- " * 10 + "|", *rows]))
 # For `cargo xtask bench-peers`, which joins the tables.
 (scratch / f"table-{name}.md").write_text("\n".join([said, head, *rows]) + "\n")
 checked = answer(python("check.py", out / "result.h5"))

@@ -62,12 +62,13 @@ fn main() -> Outcome {
             clocked(|| stages.averager.average_wanting(record, wanted).map(black_box).map_err(Into::into))
         })?;
     }
-    report("hdf5-read", || {
-        clocked(|| {
-            (0..CAPTURES / 2)
-                .try_for_each(|station| (0..2).try_for_each(|setup| drain(&mut *recording.open(station, setup)?)))
-        })
-    })?;
+    let read_all = || {
+        (0..CAPTURES / 2)
+            .try_for_each(|station| (0..2).try_for_each(|setup| drain(&mut *recording.open(station, setup)?)))
+    };
+    report("hdf5-read", || clocked(read_all))?;
+    recording.checksum().ok_or("the record is not read straight from the file")?.begin();
+    report("hdf5-read-and-checksum", || clocked(read_all))?;
     let csv = built(&pipeline, &csv_settings(&folder, &out))?;
     report("csv-read", || clocked(|| drain(&mut *opened(&csv)?.open(0, 0)?)))?;
 
