@@ -7,7 +7,7 @@ const EXACT_POWERS: [f64; 23] = [
 ];
 
 /// Powers of ten that a fraction's digits ask for.
-const WHOLE_POWERS: [u64; HALF + 1] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
+const WHOLE_POWERS: [u64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
 
 /// Whole numbers up to here are exact in f64.
 const EXACT_WHOLE: u64 = 1 << 53;
@@ -17,7 +17,8 @@ const EXACT_WHOLE: u64 = 1 << 53;
 ///
 /// Where the digits make a whole number up to 2^53 and the power of ten is at most 22, both are exact and their quotient
 /// or product is rounded once, as it should be (W. D. Clinger, How to read floating point numbers accurately, 1990).
-#[inline]
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "five calls a row cost a tenth of reading it")]
 pub(crate) fn leading(bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
     let negative = bytes.first() == Some(&b'-');
     let (value, length) = at_once(bytes, negative, decimal).or_else(|| one_by_one(bytes, negative, decimal))?;
@@ -25,62 +26,56 @@ pub(crate) fn leading(bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
     Some((f64::from_bits(value.to_bits() | (u64::from(negative) << 63)), length))
 }
 
-/// Characters that are looked at together.
-const TOGETHER: usize = 16;
-/// Digits on either side of the decimal mark that eight bytes hold.
-const HALF: usize = 8;
-/// So many digits are always below 2^53.
-const EXACT_DIGITS: usize = 15;
+/// Characters that a number looked at at once is to be in, with what is behind it: two times seven digits, sign and mark.
+const WINDOW: usize = 16;
 
-/// A number that ends within 16 characters, with so many to look at: as most are, and without a branch for each digit.
-#[inline]
+/// A number with at most seven characters on either side of the decimal mark, sign included: as most are, and without a branch
+/// for each digit.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "as `leading`")]
 fn at_once(bytes: &[u8], negative: bool, decimal: u8) -> Option<(f64, usize)> {
-    let window: &[u8; TOGETHER] = bytes.first_chunk()?;
+    let window: &[u8; WINDOW] = bytes.first_chunk()?;
     // A minus sign is taken for a zero in front.
-    let characters = u128::from_le_bytes(*window) ^ (u128::from(negative) * u128::from(b'-' ^ b'0'));
-    let others = not_digits(characters);
-    let whole = place_of_lowest(others);
-    if whole > HALF {
-        return None;
-    }
-    let (length, fraction) = if (characters >> (8 * whole)) as u8 == decimal {
-        let end = place_of_lowest(others & (others - 1));
-        (end, end - whole - 1)
+    let front = eight(window, 0)? ^ (u64::from(negative) * u64::from(b'-' ^ b'0'));
+    let whole = digits(front)?;
+    let (back, fraction, length) = if window[whole] == decimal {
+        let back = eight(window, whole + 1)?;
+        let fraction = digits(back)?;
+        (back, fraction, whole + 1 + fraction)
     } else {
-        (whole, 0)
+        (0, 0, whole)
     };
-    let digits = whole + fraction;
-    if length == TOGETHER || fraction > HALF || digits > EXACT_DIGITS || digits == usize::from(negative) {
+    if whole + fraction == usize::from(negative) {
         return None;
     }
-    let [before, behind] = [(0, whole), (whole + 1, fraction)];
-    let value = |(begin, count): (usize, usize)| joined((characters >> (8 * begin)) as u64, count);
-    let number = value(before) * WHOLE_POWERS[fraction] + value(behind);
+    // 14 digits are below 2^53.
+    let number = joined(front, whole) * WHOLE_POWERS[fraction] + joined(back, fraction);
     // Signed numbers have an instruction for it.
     Some((number.cast_signed() as f64 / EXACT_POWERS[fraction], length))
 }
 
-/// The top bit of each byte that is no digit.
+/// Eight characters, the first in the lowest byte.
 #[inline]
-fn not_digits(characters: u128) -> u128 {
-    const EACH: u128 = u128::MAX / 0xFF;
+fn eight(window: &[u8; WINDOW], begin: usize) -> Option<u64> {
+    Some(u64::from_le_bytes(*window.get(begin..)?.first_chunk()?))
+}
+
+/// How many of eight characters are digits before the first that is none; `None` where all are.
+#[inline]
+fn digits(characters: u64) -> Option<usize> {
+    const EACH: u64 = u64::MAX / 0xFF;
     let digits = characters ^ (EACH * 0x30);
     // A digit's low half is at most 9 and stays below 0x80 with 0x76 added; nothing is carried into the next byte.
-    (((digits & (EACH * 0x7F)) + EACH * 0x76) | digits) & (EACH * 0x80)
+    let others = (((digits & (EACH * 0x7F)) + EACH * 0x76) | digits) & (EACH * 0x80);
+    (others != 0).then(|| others.trailing_zeros() as usize / 8)
 }
 
-/// The byte of the lowest bit that is set; 16 where none is.
-#[inline]
-fn place_of_lowest(bits: u128) -> usize {
-    bits.trailing_zeros() as usize / 8
-}
-
-/// The number that the first `count` of eight digits make, the first in the lowest byte: neighbours are joined to pairs, pairs
-/// to fours, fours to eight.
+/// The number that the first `count` of eight digits make, fewer than eight, the first in the lowest byte: neighbours are
+/// joined to pairs, pairs to fours, fours to eight.
 #[inline]
 fn joined(characters: u64, count: usize) -> u64 {
     // What stands behind them goes out at the top; zeros come in before them.
-    let digits = characters.checked_shl(64 - 8 * count as u32).unwrap_or(0) & 0x0F0F_0F0F_0F0F_0F0F;
+    let digits = ((characters << 8) << (56 - 8 * count)) & 0x0F0F_0F0F_0F0F_0F0F;
     let odd = 0x00FF_00FF_00FF_00FF;
     let pairs = (digits & odd) * 10 + ((digits >> 8) & odd);
     let odd = 0x0000_FFFF_0000_FFFF;
@@ -89,6 +84,7 @@ fn joined(characters: u64, count: usize) -> u64 {
 }
 
 /// A number of any length, digit by digit.
+#[inline(never)]
 fn one_by_one(bytes: &[u8], negative: bool, decimal: u8) -> Option<(f64, usize)> {
     let begin = usize::from(negative);
     let mut place = begin;
