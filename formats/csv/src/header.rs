@@ -42,6 +42,14 @@ impl Phase {
             Self::Index(column) | Self::Angle(column) => column,
         }
     }
+
+    /// What to do where a value cannot be.
+    pub(crate) fn help(self) -> &'static str {
+        match self {
+            Self::Index(_) => "the mark is 1 while it is up, and 0 otherwise",
+            Self::Angle(_) => "let the angle go on beyond 360° from turn to turn",
+        }
+    }
 }
 
 impl Header {
@@ -66,6 +74,10 @@ impl Header {
         let names: Vec<String> = cells(line, delimiter).map(decode).collect();
         let object = format!("{shown}, line {number}");
         let error = |problem: String| Error::new("read", &object, problem);
+        if line.trim_ascii_end().contains(&b'\r') {
+            let problem = "expected lines that end with a line feed, found carriage returns alone".to_owned();
+            return Err(error(problem).help("save the file with the line ends of Unix or Windows"));
+        }
         let find = |name: &str| -> Result<Option<usize>> {
             let mut found = names.iter().enumerate().filter(|(_, known)| *known == name).map(|(column, _)| column);
             match (found.next(), found.next()) {
@@ -76,7 +88,7 @@ impl Header {
         let mut sensors = Vec::with_capacity(rig.sensors.len());
         for sensor in &rig.sensors {
             sensors.push(find(&sensor.id)?.ok_or_else(|| {
-                error(format!("expected a column for the sensor `{}`, found {}", sensor.id, names.join(", ")))
+                error(format!("expected a column for the sensor `{}`, found {}", sensor.id, listed(&names)))
                     .help("the header has to name the rig's sensors by their ids")
             })?);
         }
@@ -84,7 +96,10 @@ impl Header {
         let mut remarks = Vec::new();
         let phase = match (index, angle) {
             (None, None) => {
-                return Err(error(format!("expected a column `{INDEX}` or `{ANGLE}`, found {}", names.join(", "))));
+                let problem = format!("expected a column `{INDEX}` or `{ANGLE}`, found {}", listed(&names));
+                let help =
+                    "name the column with the once-per-turn mark (0 or 1), or with the encoder's unwrapped angle";
+                return Err(error(problem).help(help));
             }
             (Some(column), None) => Phase::Index(column),
             (index, Some(column)) => {
@@ -118,6 +133,16 @@ impl Header {
         let kind = if decimal == b',' { "a number with a decimal comma" } else { "a number" };
         self.error(line, column, format!("expected {kind}, found `{shown}`"))
     }
+}
+
+/// Names for a message, which a strange file is not to fill.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 12;
+    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| name.chars().take(40).collect()).collect();
+    if names.len() > SHOWN {
+        shown.push(format!("and {} more", names.len() - SHOWN));
+    }
+    shown.join(", ")
 }
 
 /// UTF-8, or else Latin-1, whose bytes are the first 256 characters.

@@ -6,7 +6,7 @@ use runout_core::{Error, Result, rig::Rig};
 
 use crate::{
     header::Header,
-    lines::{Line, Lines},
+    lines::{Line, Lines, cells},
     row::{Instant, Role, Row},
 };
 
@@ -63,7 +63,7 @@ impl Rows {
                 return Err(self.header.line_error(number, "expected a row, found a blank line between rows"));
             }
             if self.decimal == UNKNOWN {
-                self.decimal = memchr::memchr2(b',', b'.', line.bytes).map_or(UNKNOWN, |place| line.bytes[place]);
+                self.decimal = decimal_of(&self.roles, line.bytes, self.header.delimiter);
             }
             let row = Row { header: &self.header, roles: &self.roles, decimal: self.decimal };
             return read(&row, line).map(Some);
@@ -74,5 +74,31 @@ impl Rows {
     /// An error in a column of the row that was read last.
     pub(crate) fn error(&self, column: usize, problem: impl ToString) -> Error {
         self.header.error(self.lines.number(), column, problem)
+    }
+}
+
+/// The decimal mark of a line's numbers, where one has it; other columns may hold dates and sentences.
+fn decimal_of(roles: &[Role], line: &[u8], delimiter: u8) -> u8 {
+    let mut numbers =
+        cells(line, delimiter).zip(roles).filter(|(_, role)| !matches!(role, Role::Skip)).map(|(cell, _)| cell);
+    let mark = |cell: &[u8]| memchr::memchr2(b',', b'.', cell).map(|place| cell[place]);
+    numbers.find_map(mark).unwrap_or(UNKNOWN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_decimal_mark_is_that_of_the_numbers() {
+        let roles = [Role::Skip, Role::Phase, Role::Sensor { channel: 0, sign: 1.0 }, Role::Skip];
+        for (line, mark) in [
+            ("01.02.2024 12:00:00;0;5,58606;3.5", b','),
+            ("12:00:00,123;0;5.58606;a, b", b'.'),
+            ("12:00:00,123;0;5;\"a; b.\"", UNKNOWN),
+            ("\"1.5;2\";0;-0,25;", b','),
+        ] {
+            assert_eq!(decimal_of(&roles, line.as_bytes(), b';'), mark, "{line}");
+        }
     }
 }

@@ -8,6 +8,8 @@ use crate::{header::Phase, rows::Rows};
 /// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
 pub(crate) const BLOCK_SAMPLES: usize = 16_384;
 
+const TIME_HELP: &str = "write the time with more digits, or leave it out and state `sample_rate_hz` in [load]";
+
 /// What the first pass finds.
 pub(crate) struct Scan {
     pub(crate) samples: u64,
@@ -37,9 +39,9 @@ impl Scan {
                 Some(encoder) => encoder.push(instant.phase).map_err(|fault| fault.problem),
                 None => index.push(instant.phase),
             };
-            taken.map_err(|problem| rows.error(phase.column(), problem))?;
+            taken.map_err(|problem| rows.error(phase.column(), problem).help(phase.help()))?;
             if let Some(column) = rows.header.time {
-                time.push(instant.time_s).map_err(|problem| rows.error(column, problem))?;
+                time.push(instant.time_s).map_err(|problem| rows.error(column, problem).help(TIME_HELP))?;
             }
             if encoder.is_some() {
                 kept.angle(instant.phase);

@@ -175,17 +175,17 @@ impl Layout {
     #[must_use]
     pub fn coefficient(&self, reading: &Reading, quantity: Quantity, order: usize) -> Complex64 {
         // Both sines come from the same function, so that sensors at right angles are exactly so.
-        let (cosine, sine) = (exact_cos(reading.angle_rad), exact_cos(reading.angle_rad - FRAC_PI_2));
+        let (cosine, sine) = (|| exact_cos(reading.angle_rad), || exact_cos(reading.angle_rad - FRAC_PI_2));
         let lever = reading.lever_mm * UM_PER_MM_URAD;
         let motion = match quantity {
             Quantity::Form(section) if section == reading.section => {
                 return self.part_phase(reading, order);
             }
             Quantity::Form(_) => return Complex64::ZERO,
-            Quantity::X => cosine,
-            Quantity::Y => sine,
-            Quantity::TiltX => -lever * sine,
-            Quantity::TiltY => lever * cosine,
+            Quantity::X => cosine(),
+            Quantity::Y => sine(),
+            Quantity::TiltX => -lever * sine(),
+            Quantity::TiltY => lever * cosine(),
         };
         Complex64::from(self.motion_sign(reading.setup, order) * reading.motion_ratio * motion)
     }

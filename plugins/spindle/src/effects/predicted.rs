@@ -62,24 +62,32 @@ impl<'a> Predicted<'a> {
             let found = first.iter().position(|known| *known == wanted);
             found.and_then(|index| estimate.first.get(index)).copied().unwrap_or_default()
         };
+        // What is the same at every order.
+        let fixed: Vec<_> = layout
+            .readings
+            .iter()
+            .map(|reading| {
+                let lever = reading.lever_mm * UM_PER_MM_URAD;
+                (reading.angle_rad.sin_cos(), lever, predicted.neighbour(reading.section))
+            })
+            .collect();
         for order in 1..readings.len() / count {
             let of = |unknown: Option<usize>| unknown.map_or(Complex64::ZERO, |unknown| estimate.told(order, unknown));
             let form = |setup: usize, section: usize| {
                 if order == 1 { eccentricity(setup, section) } else { of(position(Quantity::Form(section))) }
             };
-            for (index, reading) in layout.readings.iter().enumerate() {
+            for (index, (reading, ((sine, cosine), lever, neighbour))) in layout.readings.iter().zip(&fixed).enumerate()
+            {
                 let at = order * count + index;
                 let phase = layout.part_phase(reading, order);
                 predicted.part[at] = form(reading.setup, reading.section) * phase;
-                let (sine, cosine) = reading.angle_rad.sin_cos();
-                let lever = reading.lever_mm * UM_PER_MM_URAD;
                 let moves = layout.motion_sign(reading.setup, order) * reading.motion_ratio;
                 let (shift_x, shift_y) = (of(x) + of(tilt_y) * lever, of(y) - of(tilt_x) * lever);
                 predicted.along[at] = (shift_x * cosine + shift_y * sine) * moves;
                 predicted.across[at] = (shift_y * cosine - shift_x * sine) * moves;
                 predicted.tilt[at] = (of(tilt_y) * cosine - of(tilt_x) * sine) * moves;
-                if let Some((other, distance_mm)) = predicted.neighbour(reading.section) {
-                    let change = form(reading.setup, other) - form(reading.setup, reading.section);
+                if let Some((other, distance_mm)) = neighbour {
+                    let change = form(reading.setup, *other) - form(reading.setup, reading.section);
                     predicted.along_z[at] = change * phase / distance_mm;
                 }
             }
