@@ -239,6 +239,18 @@ mod tests {
         }
     }
 
+    /// What a recorder leaves that lost its power, also before any row has told the decimal mark.
+    #[test]
+    fn zero_bytes_are_no_number() {
+        for row in ["1;2;0\0", "1\0;2;0", "1\x005;2;0", "\0\0\0\0"] {
+            for most_kept in [MOST_KEPT, 0] {
+                let error =
+                    read(&format!("S1;S2;index\n1;2;0\n{row}\n"), most_kept).map(|_| ()).unwrap_err().to_string();
+                assert!(error.contains("line 3"), "{row:?}: {error}");
+            }
+        }
+    }
+
     #[test]
     fn mistakes_are_the_same_either_way() {
         for row in ["1.0,2.0", "1.0,2.0,0,4.0", "x,2.0,0", "1.0,2.0,", "1.0,2.0,7", "", "1.0,2.0,\"0"] {

@@ -40,7 +40,7 @@ impl Role {
 pub(crate) struct Row<'a> {
     pub(crate) header: &'a Header,
     pub(crate) roles: &'a [Role],
-    /// `.` or `,`; what is in no number where that is not known.
+    /// `.` or `,`.
     pub(crate) decimal: u8,
 }
 

@@ -10,16 +10,13 @@ use crate::{
     row::{Instant, Role, Row},
 };
 
-/// In no text.
-const UNKNOWN: u8 = 0;
-
 /// A file below its header.
 pub(crate) struct Rows {
     pub(crate) header: Header,
     lines: Lines,
     roles: Vec<Role>,
     /// `.` or `,`, once a row told.
-    decimal: u8,
+    decimal: Option<u8>,
     /// The first of the blank lines that the file seems to end with.
     blank: Option<u64>,
 }
@@ -30,14 +27,14 @@ impl Rows {
         let (header, lines) = Header::open(path, rig)?;
         let roles = Role::of_columns(&header, rig);
         // Where the comma delimits, it cannot be in a number.
-        let decimal = if header.delimiter == b',' { b'.' } else { UNKNOWN };
+        let decimal = (header.delimiter == b',').then_some(b'.');
         Ok(Self { header, lines, roles, decimal, blank: None })
     }
 
     /// Fills the channels from the next row; `None` at the end.
     pub(crate) fn next(&mut self, channels: &mut [f64]) -> Result<Option<Instant>> {
-        if self.blank.is_none() {
-            let row = Row { header: &self.header, roles: &self.roles, decimal: self.decimal };
+        if let (None, Some(decimal)) = (self.blank, self.decimal) {
+            let row = Row { header: &self.header, roles: &self.roles, decimal };
             if let Some((instant, length)) = row.plain(self.lines.ahead(), channels) {
                 self.lines.pass(length);
                 return Ok(Some(instant));
@@ -62,10 +59,8 @@ impl Rows {
             if let Some(number) = self.blank {
                 return Err(self.header.line_error(number, "expected a row, found a blank line between rows"));
             }
-            if self.decimal == UNKNOWN {
-                self.decimal = decimal_of(&self.roles, line.bytes, self.header.delimiter);
-            }
-            let row = Row { header: &self.header, roles: &self.roles, decimal: self.decimal };
+            self.decimal = self.decimal.or_else(|| decimal_of(&self.roles, line.bytes, self.header.delimiter));
+            let row = Row { header: &self.header, roles: &self.roles, decimal: self.decimal.unwrap_or(b'.') };
             return read(&row, line).map(Some);
         }
         Ok(None)
@@ -78,11 +73,11 @@ impl Rows {
 }
 
 /// The decimal mark of a line's numbers, where one has it; other columns may hold dates and sentences.
-fn decimal_of(roles: &[Role], line: &[u8], delimiter: u8) -> u8 {
+fn decimal_of(roles: &[Role], line: &[u8], delimiter: u8) -> Option<u8> {
     let mut numbers =
         cells(line, delimiter).zip(roles).filter(|(_, role)| !matches!(role, Role::Skip)).map(|(cell, _)| cell);
     let mark = |cell: &[u8]| memchr::memchr2(b',', b'.', cell).map(|place| cell[place]);
-    numbers.find_map(mark).unwrap_or(UNKNOWN)
+    numbers.find_map(mark)
 }
 
 #[cfg(test)]
@@ -93,10 +88,10 @@ mod tests {
     fn the_decimal_mark_is_that_of_the_numbers() {
         let roles = [Role::Skip, Role::Phase, Role::Sensor { channel: 0, sign: 1.0 }, Role::Skip];
         for (line, mark) in [
-            ("01.02.2024 12:00:00;0;5,58606;3.5", b','),
-            ("12:00:00,123;0;5.58606;a, b", b'.'),
-            ("12:00:00,123;0;5;\"a; b.\"", UNKNOWN),
-            ("\"1.5;2\";0;-0,25;", b','),
+            ("01.02.2024 12:00:00;0;5,58606;3.5", Some(b',')),
+            ("12:00:00,123;0;5.58606;a, b", Some(b'.')),
+            ("12:00:00,123;0;5;\"a; b.\"", None),
+            ("\"1.5;2\";0;-0,25;", Some(b',')),
         ] {
             assert_eq!(decimal_of(&roles, line.as_bytes(), b';'), mark, "{line}");
         }
