@@ -13,6 +13,7 @@
 //!
 //! The C library behind it is not safe for threads; the `hdf5-metno` crate lets one thread in at a time.
 
+mod heaps;
 mod inspect;
 mod measurement;
 mod node;

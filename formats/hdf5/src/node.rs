@@ -9,6 +9,8 @@ use hdf5_metno::{
 };
 use runout_core::{Error, Result};
 
+use crate::heaps;
+
 /// Where something stands: `shaft.h5:/initial/s01`.
 #[derive(Debug, Clone)]
 pub(crate) struct Place {
@@ -52,6 +54,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, Place)> {
         Error::new("open", &shown, format!("no HDF5 file, or a damaged one: {error}"))
             .help("a file whose writing was interrupted is often truncated")
     })?;
+    heaps::check(&file, path)?;
     Ok((file, place))
 }
 
