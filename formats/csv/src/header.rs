@@ -129,20 +129,32 @@ impl Header {
 
     /// An error of a cell that holds no number.
     pub(crate) fn no_number(&self, line: u64, column: usize, cell: &[u8], decimal: u8) -> Error {
-        let shown: String = decode(cell).chars().take(40).collect();
+        let shown = shown(&decode(cell));
         let kind = if decimal == b',' { "a number with a decimal comma" } else { "a number" };
-        self.error(line, column, format!("expected {kind}, found `{shown}`"))
+        let help = if cell.starts_with(b"#") {
+            "comments are understood above the header only"
+        } else if cell.iter().any(u8::is_ascii_digit) {
+            "numbers are written as 1.5, 1,5 or 1.5e-3: without units, and without marks between thousands"
+        } else {
+            "take out rows of units; where a reading is missing, leave its cell empty or write NaN"
+        };
+        self.error(line, column, format!("expected {kind}, found `{shown}`")).help(help)
     }
 }
 
 /// Names for a message, which a strange file is not to fill.
 fn listed(names: &[String]) -> String {
     const SHOWN: usize = 12;
-    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| name.chars().take(40).collect()).collect();
+    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| shown(name)).collect();
     if names.len() > SHOWN {
         shown.push(format!("and {} more", names.len() - SHOWN));
     }
     shown.join(", ")
+}
+
+/// The beginning of a text, which is not to write over the terminal.
+fn shown(text: &str) -> String {
+    text.chars().take(40).map(|character| if character.is_control() { '\u{FFFD}' } else { character }).collect()
 }
 
 /// UTF-8, or else Latin-1, whose bytes are the first 256 characters.

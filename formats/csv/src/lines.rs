@@ -126,11 +126,14 @@ pub(crate) fn cells(line: &[u8], delimiter: u8) -> impl Iterator<Item = &[u8]> {
 
 /// The first cell, and what follows its delimiter, where there is one.
 pub(crate) fn split(line: &[u8], delimiter: u8) -> (&[u8], Option<&[u8]>) {
-    let quoted = line.strip_prefix(b"\"").and_then(|inner| {
-        let end = memchr::memchr(b'"', inner)?;
-        match inner.get(end + 1) {
-            None => Some((&inner[..end], None)),
-            Some(next) if *next == delimiter => Some((&inner[..end], Some(&inner[end + 2..]))),
+    // A tab may be the delimiter.
+    let behind_blanks = |bytes: &[u8]| bytes.iter().take_while(|byte| **byte == b' ').count();
+    let quoted = line[behind_blanks(line)..].strip_prefix(b"\"").and_then(|inner| {
+        let (cell, after) = inner.split_at(memchr::memchr(b'"', inner)?);
+        let end = 1 + behind_blanks(&after[1..]);
+        match after.get(end) {
+            None => Some((cell, None)),
+            Some(next) if *next == delimiter => Some((cell, Some(&after[end + 1..]))),
             Some(_) => None,
         }
     });

@@ -1,10 +1,19 @@
 //! Numbers in cells.
 
-/// Powers of ten that f64 holds exactly.
-const EXACT_POWERS: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
-    1e21, 1e22,
-];
+#![allow(clippy::inline_always, reason = "calls would cost a tenth of reading a row, and leave wide registers")]
+
+/// Powers of ten that f64 holds exactly; what a negative number's digits are divided by, for its sign also where it is 0.
+const EXACT_POWERS: [[f64; 23]; 2] = {
+    let mut powers = [[1e0; 23], [-1e0; 23]];
+    let (mut power, mut whole) = (1, 1_u128);
+    while power < 23 {
+        whole *= 10;
+        powers[0][power] = whole as f64;
+        powers[1][power] = -(whole as f64);
+        power += 1;
+    }
+    powers
+};
 
 /// Powers of ten that a fraction's digits ask for.
 const WHOLE_POWERS: [u64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
@@ -18,40 +27,47 @@ const EXACT_WHOLE: u64 = 1 << 53;
 /// Where the digits make a whole number up to 2^53 and the power of ten is at most 22, both are exact and their quotient
 /// or product is rounded once, as it should be (W. D. Clinger, How to read floating point numbers accurately, 1990).
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "five calls a row cost a tenth of reading it")]
-pub(crate) fn leading(bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
-    let negative = bytes.first() == Some(&b'-');
-    let (value, length) = at_once(bytes, negative, decimal).or_else(|| one_by_one(bytes, negative, decimal))?;
-    // Signs come as they like: no branch foresees them.
-    Some((f64::from_bits(value.to_bits() | (u64::from(negative) << 63)), length))
+pub(crate) fn leading(reading: impl Reading, bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
+    let at_once = bytes.first_chunk().and_then(|window| reading.at_once(window, decimal));
+    at_once.or_else(|| one_by_one(bytes, decimal))
+}
+
+/// How the characters of a number are looked at together.
+pub(crate) trait Reading: Copy {
+    /// Value and length of the number at the beginning of a window; `None` where it is too long for this.
+    fn at_once(self, window: &[u8; WINDOW], decimal: u8) -> Option<(f64, usize)>;
 }
 
 /// Characters that a number looked at at once is to be in, with what is behind it: two times seven digits, sign and mark.
-const WINDOW: usize = 16;
+pub(crate) const WINDOW: usize = 16;
 
-/// A number with at most seven characters on either side of the decimal mark, sign included: as most are, and without a branch
-/// for each digit.
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "as `leading`")]
-fn at_once(bytes: &[u8], negative: bool, decimal: u8) -> Option<(f64, usize)> {
-    let window: &[u8; WINDOW] = bytes.first_chunk()?;
-    // A minus sign is taken for a zero in front.
-    let front = eight(window, 0)? ^ (u64::from(negative) * u64::from(b'-' ^ b'0'));
-    let whole = digits(front)?;
-    let (back, fraction, length) = if window[whole] == decimal {
-        let back = eight(window, whole + 1)?;
-        let fraction = digits(back)?;
-        (back, fraction, whole + 1 + fraction)
-    } else {
-        (0, 0, whole)
-    };
-    if whole + fraction == usize::from(negative) {
-        return None;
+/// Eight characters at a time, in whole numbers: at most seven on either side of the decimal mark, sign included, as most
+/// numbers have. There is no branch for each digit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Eights;
+
+impl Reading for Eights {
+    #[inline(always)]
+    fn at_once(self, window: &[u8; WINDOW], decimal: u8) -> Option<(f64, usize)> {
+        let negative = window[0] == b'-';
+        // A minus sign is taken for a zero in front.
+        let front = eight(window, 0)? ^ (u64::from(negative) * u64::from(b'-' ^ b'0'));
+        let whole = digits(front)?;
+        let (back, fraction, length) = if window[whole] == decimal {
+            let back = eight(window, whole + 1)?;
+            let fraction = digits(back)?;
+            (back, fraction, whole + 1 + fraction)
+        } else {
+            (0, 0, whole)
+        };
+        if whole + fraction == usize::from(negative) {
+            return None;
+        }
+        // 14 digits are below 2^53.
+        let number = joined(front, whole) * WHOLE_POWERS[fraction] + joined(back, fraction);
+        // Signed numbers have an instruction for it.
+        Some((number.cast_signed() as f64 / EXACT_POWERS[usize::from(negative)][fraction], length))
     }
-    // 14 digits are below 2^53.
-    let number = joined(front, whole) * WHOLE_POWERS[fraction] + joined(back, fraction);
-    // Signed numbers have an instruction for it.
-    Some((number.cast_signed() as f64 / EXACT_POWERS[fraction], length))
 }
 
 /// Eight characters, the first in the lowest byte.
@@ -83,10 +99,64 @@ fn joined(characters: u64, count: usize) -> u64 {
     (fours & 0xFFFF_FFFF) * 10_000 + (fours >> 32)
 }
 
+/// Sixteen characters in one register: a number of up to 15 with its sign, and what is behind it.
+///
+/// Of the characters that are no digits, the first is the decimal mark or the end. One shuffle puts the digits on the right,
+/// without the mark; then neighbours are joined as by [`joined`].
+#[cfg(target_arch = "x86_64")]
+impl Reading for pulp::x86::V3 {
+    #[inline(always)]
+    fn at_once(self, window: &[u8; WINDOW], decimal: u8) -> Option<(f64, usize)> {
+        let (sse2, ssse3, sse4_1) = (self.sse2, self.ssse3, self.sse4_1);
+        let negative = window[0] == b'-';
+        let digits = sse2._mm_sub_epi8(pulp::cast(*window), sse2._mm_set1_epi8(b'0'.cast_signed()));
+        let are_digits = sse2._mm_cmpeq_epi8(sse2._mm_min_epu8(digits, sse2._mm_set1_epi8(9)), digits);
+        // A minus sign is taken for a zero in front. Where no character is, all are ones.
+        let others = !sse2._mm_movemask_epi8(are_digits).cast_unsigned() & !u32::from(negative);
+        let digits = sse2._mm_and_si128(digits, are_digits);
+        let whole = others.trailing_zeros() as usize;
+        let marked = *window.get(whole)? == decimal;
+        let behind = (others & (others - 1)).trailing_zeros() as usize;
+        let length = if marked { behind } else { whole };
+        let count = length - usize::from(marked);
+        if length == WINDOW || count == usize::from(negative) {
+            return None;
+        }
+        let places = pulp::cast(SHUFFLES[count][whole]);
+        let pairs = ssse3._mm_maddubs_epi16(ssse3._mm_shuffle_epi8(digits, places), sse2._mm_set1_epi16(0x010A));
+        let fours = sse2._mm_madd_epi16(pairs, sse2._mm_set1_epi32(0x0001_0064));
+        let packed = sse4_1._mm_packus_epi32(fours, fours);
+        let [eights, _]: [i64; 2] = pulp::cast(sse2._mm_madd_epi16(packed, sse2._mm_set1_epi32(0x0001_2710)));
+        // Both halves are below 10⁸, the number below 10¹⁵.
+        let number = (eights & 0xFFFF_FFFF) * 100_000_000 + (eights >> 32);
+        Some((number as f64 / EXACT_POWERS[usize::from(negative)][count - whole], length))
+    }
+}
+
+/// Where each of sixteen characters comes from for a count of digits to be on the right, without the mark behind the first
+/// `whole` of them, `[count][whole]`. From beyond come zeros.
+#[cfg(target_arch = "x86_64")]
+static SHUFFLES: [[[u8; WINDOW]; WINDOW]; WINDOW] = {
+    let mut shuffles = [[[0x80; WINDOW]; WINDOW]; WINDOW];
+    let (mut count, mut whole, mut digit) = (0, 0, 0);
+    while count < WINDOW {
+        let from = if digit < whole { digit } else { digit + 1 };
+        if digit < count {
+            shuffles[count][whole][WINDOW - count + digit] = from as u8;
+            digit += 1;
+        } else if whole + 1 < WINDOW {
+            (whole, digit) = (whole + 1, 0);
+        } else {
+            (count, whole, digit) = (count + 1, 0, 0);
+        }
+    }
+    shuffles
+};
+
 /// A number of any length, digit by digit.
 #[inline(never)]
-fn one_by_one(bytes: &[u8], negative: bool, decimal: u8) -> Option<(f64, usize)> {
-    let begin = usize::from(negative);
+fn one_by_one(bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
+    let begin = usize::from(bytes.first() == Some(&b'-'));
     let mut place = begin;
     let mut digits: u64 = 0;
     let mut separator = None;
@@ -107,7 +177,7 @@ fn one_by_one(bytes: &[u8], negative: bool, decimal: u8) -> Option<(f64, usize)>
     if count == 0 || count > 19 || digits > EXACT_WHOLE {
         return None;
     }
-    Some((digits as f64 / EXACT_POWERS[fraction], place))
+    Some((digits as f64 / EXACT_POWERS[begin][fraction], place))
 }
 
 /// The number of a whole cell; NaN where it is empty, `None` where it holds none.
@@ -115,7 +185,7 @@ pub(crate) fn of_cell(cell: &[u8], decimal: u8) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
     }
-    if let Some((value, _)) = leading(cell, decimal).filter(|(_, length)| *length == cell.len()) {
+    if let Some((value, _)) = leading(Eights, cell, decimal).filter(|(_, length)| *length == cell.len()) {
         return Some(value);
     }
     let text = std::str::from_utf8(cell).ok()?;
@@ -130,6 +200,16 @@ pub(crate) fn of_cell(cell: &[u8], decimal: u8) -> Option<f64> {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
+
+    /// Each way of reading, where the processor has it, as a number in a line.
+    fn every_way(bytes: &[u8], decimal: u8) -> Vec<Option<(f64, usize)>> {
+        let mut found = vec![leading(Eights, bytes, decimal)];
+        #[cfg(target_arch = "x86_64")]
+        if let Some(wide) = pulp::x86::V3::try_new() {
+            found.push(wide.vectorize(|| leading(wide, bytes, decimal)));
+        }
+        found
+    }
 
     #[test]
     fn every_spelling_gives_the_nearest_number() {
@@ -172,7 +252,7 @@ mod tests {
             let found = of_cell(text.replace('.', ",").as_bytes(), b',').unwrap();
             assert_eq!(found.to_bits(), expected.to_bits(), "{text} with a comma");
             // With more of the line behind it, eight bytes at a time can be looked at.
-            if let Some((found, length)) = leading(format!("{text};1.0000000").as_bytes(), b'.') {
+            for (found, length) in every_way(format!("{text};1.0000000").as_bytes(), b'.').into_iter().flatten() {
                 let plain = text.split(['e', 'E']).next().unwrap();
                 assert_eq!((found, length), (plain.parse().unwrap(), plain.len()), "{text} in a line");
             }
@@ -190,7 +270,7 @@ mod tests {
             let text = format!("{value:.places$}");
             let expected: f64 = text.parse().unwrap();
             assert_eq!(of_cell(text.as_bytes(), b'.').unwrap().to_bits(), expected.to_bits(), "{text}");
-            if let Some((found, length)) = leading(format!("{text},-12345678").as_bytes(), b'.') {
+            for (found, length) in every_way(format!("{text},-12345678").as_bytes(), b'.').into_iter().flatten() {
                 assert_eq!((found.to_bits(), length), (expected.to_bits(), text.len()), "{text} in a line");
             }
         }

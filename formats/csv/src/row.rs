@@ -5,7 +5,7 @@ use runout_core::{Result, rig::Rig};
 use crate::{
     header::Header,
     lines::{Line, cell_at, split},
-    number,
+    number::{self, Reading},
 };
 
 /// What a column is read for.
@@ -55,8 +55,9 @@ pub(crate) struct Instant {
 impl Row<'_> {
     /// A row of plain numbers, as most are, that begins where `bytes` do and ends somewhere in them: fills the channels, and
     /// gives its length with the line's end. `None` where only a look at each cell tells.
-    #[inline]
-    pub(crate) fn plain(&self, bytes: &[u8], channels: &mut [f64]) -> Option<(Instant, usize)> {
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "what is not inlined leaves wide registers")]
+    pub(crate) fn plain(&self, reading: impl Reading, bytes: &[u8], channels: &mut [f64]) -> Option<(Instant, usize)> {
         let delimiter = self.header.delimiter;
         let mut found = Instant { phase: f64::NAN, time_s: f64::NAN };
         let mut end = 0;
@@ -75,7 +76,7 @@ impl Row<'_> {
                 end += memchr::memchr3(delimiter, b'\n', b'\r', rest)?;
                 continue;
             }
-            let (value, length) = number::leading(rest, self.decimal)?;
+            let (value, length) = number::leading(reading, rest, self.decimal)?;
             end += length;
             match role {
                 Role::Sensor { channel, sign } => channels[*channel] = value * sign,

@@ -7,6 +7,7 @@ use runout_core::{Error, Result, rig::Rig};
 use crate::{
     header::Header,
     lines::{Line, Lines, cells},
+    number::Eights,
     row::{Instant, Role, Row},
 };
 
@@ -15,6 +16,7 @@ pub(crate) struct Rows {
     pub(crate) header: Header,
     lines: Lines,
     roles: Vec<Role>,
+    processor: Processor,
     /// `.` or `,`, once a row told.
     decimal: Option<u8>,
     /// The first of the blank lines that the file seems to end with.
@@ -28,14 +30,14 @@ impl Rows {
         let roles = Role::of_columns(&header, rig);
         // Where the comma delimits, it cannot be in a number.
         let decimal = (header.delimiter == b',').then_some(b'.');
-        Ok(Self { header, lines, roles, decimal, blank: None })
+        Ok(Self { header, lines, roles, processor: Processor::here(), decimal, blank: None })
     }
 
     /// Fills the channels from the next row; `None` at the end.
     pub(crate) fn next(&mut self, channels: &mut [f64]) -> Result<Option<Instant>> {
         if let (None, Some(decimal)) = (self.blank, self.decimal) {
             let row = Row { header: &self.header, roles: &self.roles, decimal };
-            if let Some((instant, length)) = row.plain(self.lines.ahead(), channels) {
+            if let Some((instant, length)) = self.processor.plain(&row, self.lines.ahead(), channels) {
                 self.lines.pass(length);
                 return Ok(Some(instant));
             }
@@ -69,6 +71,53 @@ impl Rows {
     /// An error in a column of the row that was read last.
     pub(crate) fn error(&self, column: usize, problem: impl ToString) -> Error {
         self.header.error(self.lines.number(), column, problem)
+    }
+}
+
+/// What this processor can do.
+#[derive(Clone, Copy)]
+struct Processor {
+    /// With AVX2.
+    #[cfg(target_arch = "x86_64")]
+    wide: Option<pulp::x86::V3>,
+}
+
+impl Processor {
+    fn here() -> Self {
+        Self {
+            #[cfg(target_arch = "x86_64")]
+            wide: pulp::x86::V3::try_new(),
+        }
+    }
+
+    /// See [`Row::plain`].
+    #[inline]
+    fn plain(self, row: &Row, bytes: &[u8], channels: &mut [f64]) -> Option<(Instant, usize)> {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(wide) = self.wide {
+            return wide.vectorize(Plain { wide, row, bytes, channels });
+        }
+        row.plain(Eights, bytes, channels)
+    }
+}
+
+/// A row that is read in wide registers. (A closure would not be inlined.)
+#[cfg(target_arch = "x86_64")]
+struct Plain<'a> {
+    wide: pulp::x86::V3,
+    row: &'a Row<'a>,
+    bytes: &'a [u8],
+    channels: &'a mut [f64],
+}
+
+#[cfg(target_arch = "x86_64")]
+impl pulp::NullaryFnOnce for Plain<'_> {
+    type Output = Option<(Instant, usize)>;
+
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "what is not inlined leaves wide registers")]
+    fn call(self) -> Self::Output {
+        self.row.plain(self.wide, self.bytes, self.channels)
     }
 }
 

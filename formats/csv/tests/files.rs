@@ -82,12 +82,27 @@ fn delimiters_decimals_and_encodings_are_told_apart() {
     let crlf = tab.replace('\n', "\r\n");
     let latin1: Vec<u8> = tab.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect();
     let quoted = semicolon.replace("S1;index;Fühler", "\"S1\";\"index\";\"Fühler\"").replace("1.5", "\"1.5\"");
+    let quoted_between_blanks = quoted.replace("\"1.5\"", " \"1.5\" ").replace("-0.25", "  \"-0.25\"");
     let remarked = format!("# a remark; with, all\tof them\n\n#\n{comma}\n\n");
     let padded = comma.replace(',', " , ");
     let ended = semicolon.replace(".5\n", ".5;\n");
     let unended = comma.trim_end();
     let bom = format!("\u{feff}{comma}");
-    let texts = [comma, &semicolon, &decimal_comma, &tab, &crlf, &quoted, &remarked, &padded, &ended, unended, &bom];
+    let quoted = [quoted, quoted_between_blanks];
+    let texts = [
+        comma,
+        &semicolon,
+        &decimal_comma,
+        &tab,
+        &crlf,
+        &quoted[0],
+        &quoted[1],
+        &remarked,
+        &padded,
+        &ended,
+        unended,
+        &bom,
+    ];
     for bytes in texts.iter().map(|text| text.as_bytes()).chain([latin1.as_slice()]) {
         let (capture, samples, _) = read(bytes).unwrap();
         let shown = String::from_utf8_lossy(bytes);
@@ -174,6 +189,17 @@ fn mistakes_are_told_with_their_place() {
     expect(&refusal("index,S1,Fühler\n0,1,2\n\n0,1,2\n"), &["line 3", "blank line"]);
     expect(&refusal(b"\xff\xfei\0n\0d\0"), &["UTF-16"]);
     expect(&refusal(vec![b'7'; 3 << 20]), &["line 1", "line end"]);
+    for (cell, shown, advice) in [
+        ("µm", "µm", "rows of units"),
+        ("NA", "NA", "write NaN"),
+        ("# noise", "# noise", "above the header"),
+        ("1 000", "1 000", "thousands"),
+        ("\u{1b}[2J", "\u{fffd}[2J", "1.5e-3"),
+    ] {
+        let error = read(format!("S1,Fühler,index\n{cell},1,0\n")).map(|_| ()).unwrap_err();
+        expect(&error.to_string(), &[&format!("found `{shown}`")]);
+        expect(error.advice().unwrap(), &[advice]);
+    }
     let folder = tempfile::tempdir().unwrap();
     let missing = open(folder.path(), config(Some("none.csv")), &rig(&["one"]));
     expect(&missing.map(|_| ()).unwrap_err().to_string(), &["none.csv", "No such file"]);
