@@ -26,6 +26,7 @@ ROWS = (
     ("the same and motion of every turn from three points", "average-and-motion-of-every-turn", "average-and-motion", 3),
     ("read CSV; peer: polars, one thread", "csv-read", "csv-read", 2),
     ("read CSV; peer: polars, all threads", "csv-read", "csv-read-all-threads", 2),
+    ("read two CSV files, a thread each; peer: polars, all threads", "csv-read-two-files", "csv-read-two-files", 2),
     ("read HDF5, contiguous; peer: h5py", "hdf5-read", "hdf5-read", 1),
     ("the same with the file's checksum; peer: h5py, without", "hdf5-read-and-checksum", "hdf5-read", None),
     ("write Parquet; peer: pyarrow", "parquet-write", "parquet-write", 1),
@@ -67,7 +68,7 @@ for _ in range(rounds):
 ours, theirs = medians(ours), medians(theirs)
 theirs["average-and-motion"] = theirs["average"] + theirs["motion-of-every-turn"]
 lines = [
-    f"One thread, the least of 7 runs, median of {rounds} rounds in turns; {os.cpu_count()} processors, nothing else ran",
+    f"One thread but where two are named, the least of 7 runs, median of {rounds} rounds in turns; {os.cpu_count()} processors, nothing else ran",
     "",
     "| stage | runout, ms | peer, ms | peer / runout | wanted |",
     "| --- | --- | --- | --- | --- |",

@@ -25,6 +25,7 @@ sys.path.insert(0, peers)
 import pipeline as P  # noqa: E402
 
 ROUNDS = 7
+PACKINGS = ("BYTE_STREAM_SPLIT", "DELTA_BINARY_PACKED")
 CAPTURES = 10
 csv = f"{scratch}/stages/capture.csv"
 record = f"{scratch}/record-f64-{stations}.h5"
@@ -45,6 +46,7 @@ def read_csv():
 
 if THREADS["POLARS_MAX_THREADS"] != "1":
     report("csv-read-all-threads", read_csv)
+    report("csv-read-two-files", lambda: (read_csv(), read_csv()))
     sys.exit()
 
 pyarrow.set_cpu_count(1)
@@ -75,9 +77,9 @@ packing = {}
 for name, table in tables.items():
     column = pyarrow.parquet.ParquetFile(f"{out}/{name}.parquet").metadata.row_group(0).column
     columns = [column(place) for place in range(table.num_columns)]
-    split = {one.path_in_schema: "BYTE_STREAM_SPLIT" for one in columns if "BYTE_STREAM_SPLIT" in one.encodings}
-    rest = [one.path_in_schema for one in columns if one.path_in_schema not in split]
-    packing[name] = {"use_dictionary": rest, "column_encoding": split, "compression": columns[0].compression.lower()}
+    encodings = {one.path_in_schema: encoding for one in columns for encoding in PACKINGS if encoding in one.encodings}
+    rest = [one.path_in_schema for one in columns if one.path_in_schema not in encodings]
+    packing[name] = {"use_dictionary": rest, "column_encoding": encodings, "compression": columns[0].compression.lower()}
 
 
 def write_parquet():

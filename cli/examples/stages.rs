@@ -70,7 +70,18 @@ fn main() -> Outcome {
     recording.checksum().ok_or("the record is not read straight from the file")?.begin();
     report("hdf5-read-and-checksum", || clocked(read_all))?;
     let csv = built(&pipeline, &csv_settings(&folder, &out))?;
-    report("csv-read", || clocked(|| drain(&mut *opened(&csv)?.open(0, 0)?)))?;
+    let read_csv = || -> Outcome { drain(&mut *opened(&csv)?.open(0, 0)?) };
+    report("csv-read", || clocked(read_csv))?;
+    report("csv-read-two-files", || {
+        clocked(|| {
+            std::thread::scope(|scope| {
+                // An error of one thread is told in the other one's words.
+                let beside = scope.spawn(|| read_csv().map_err(|error| error.to_string()));
+                read_csv()?;
+                beside.join().map_err(|_| "the thread that read a file stopped")?.map_err(Into::into)
+            })
+        })
+    })?;
 
     let profiles: Vec<Profile> =
         captures.into_iter().map(|record| stages.averager.average(Box::new(record))).collect::<Result<_, _>>()?;

@@ -4,10 +4,7 @@ use std::{collections::HashMap, iter::repeat_n, sync::Arc};
 
 use arrow_array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt32Array};
 use arrow_schema::{DataType, Field, Schema};
-use runout_core::{
-    pipeline::run::StationResult,
-    separation::{Quantity, Separation},
-};
+use runout_core::{pipeline::run::StationResult, separation::Quantity};
 
 /// Motions in the order of their columns, with those columns' names.
 const MOTIONS: [(Quantity, &str, &str); 4] = [
@@ -114,57 +111,40 @@ pub fn harmonics_schema() -> Schema {
 /// One station's rows of `harmonics.parquet`: orders from 1, and 0 where a level is known.
 pub fn harmonics(result: &StationResult) -> Vec<ArrayRef> {
     let separation = &result.separation;
-    let rows: Vec<Row> = (separation.unknowns.iter().enumerate())
-        .flat_map(|(unknown, quantity)| {
-            (0..=separation.max_order()).filter_map(move |order| Row::of(separation, *quantity, unknown, order))
+    let width = separation.unknowns.len();
+    let orders = separation.estimate.len() / width.max(1);
+    // The places of each unknown's rows in the separation.
+    let rows: Vec<_> = (0..width)
+        .map(|unknown| {
+            let level = separation.estimate.get(unknown).is_some_and(|level| level.re != 0.0);
+            (usize::from(!level)..orders).map(move |order| order * width + unknown)
         })
         .collect();
-    vec![
-        Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.quantity))),
-        Arc::new(rows.iter().map(|row| row.section).collect::<StringArray>()),
-        Arc::new(StringArray::from_iter_values(repeat_n(result.station.as_str(), rows.len()))),
-        Arc::new(UInt32Array::from_iter_values(rows.iter().map(|row| row.order))),
-        numbers(rows.iter().map(|row| row.re)),
-        numbers(rows.iter().map(|row| row.im)),
-        numbers(rows.iter().map(|row| row.std)),
-        Arc::new(rows.iter().map(|row| Some(row.observable)).collect::<BooleanArray>()),
-    ]
-}
-
-/// One coefficient.
-struct Row<'a> {
-    quantity: &'static str,
-    section: Option<&'a str>,
-    order: u32,
-    re: f64,
-    im: f64,
-    std: f64,
-    observable: bool,
-}
-
-impl<'a> Row<'a> {
-    fn of(separation: &'a Separation, quantity: Quantity, unknown: usize, order: usize) -> Option<Self> {
-        let place = order * separation.unknowns.len() + unknown;
-        let value = *separation.estimate.get(place)?;
-        if order == 0 && value.re == 0.0 {
-            return None;
+    let lengths = || rows.iter().map(ExactSizeIterator::len);
+    let count = lengths().sum();
+    let section = |quantity: &Quantity| match quantity {
+        Quantity::Form(section) => separation.sections.get(*section).map(|at| at.id.as_str()),
+        _ => None,
+    };
+    let observable = |place: usize| separation.observable.get(place).copied().unwrap_or(false);
+    let number = |value: &dyn Fn(usize) -> f64| -> ArrayRef {
+        let mut numbers = Vec::with_capacity(count);
+        for places in &rows {
+            numbers.extend(places.clone().map(|place| if observable(place) { value(place) } else { f64::NAN }));
         }
-        let observable = separation.observable.get(place).copied().unwrap_or(false);
-        let known = |value: f64| if observable { value } else { f64::NAN };
-        let section = match quantity {
-            Quantity::Form(section) => separation.sections.get(section).map(|at| at.id.as_str()),
-            _ => None,
-        };
-        Some(Self {
-            quantity: quantity.id(),
-            section,
-            order: order as u32,
-            re: known(value.re),
-            im: known(value.im),
-            std: known(separation.variance.get(place).map_or(f64::NAN, |variance| variance.sqrt())),
-            observable,
-        })
-    }
+        Arc::new(Float64Array::from(numbers))
+    };
+    let each = || separation.unknowns.iter().zip(lengths());
+    vec![
+        Arc::new(StringArray::from_iter_values(each().flat_map(|(quantity, length)| repeat_n(quantity.id(), length)))),
+        Arc::new(each().flat_map(|(quantity, length)| repeat_n(section(quantity), length)).collect::<StringArray>()),
+        Arc::new(StringArray::from_iter_values(repeat_n(result.station.as_str(), count))),
+        Arc::new(UInt32Array::from_iter_values(lengths().flat_map(|length| (orders - length) as u32..orders as u32))),
+        number(&|place| separation.estimate[place].re),
+        number(&|place| separation.estimate[place].im),
+        number(&|place| separation.variance.get(place).map_or(f64::NAN, |variance| variance.sqrt())),
+        Arc::new(rows.iter().cloned().flatten().map(|place| Some(observable(place))).collect::<BooleanArray>()),
+    ]
 }
 
 fn angles_deg(angles: usize) -> impl Iterator<Item = f64> {

@@ -64,19 +64,22 @@ impl Table {
     }
 }
 
-/// Dictionaries for names and orders, which repeat; BYTE_STREAM_SPLIT for floats, which do not, but whose high bytes do.
+/// Dictionaries for names, which repeat; BYTE_STREAM_SPLIT for floats, which do not, but whose high bytes do; differences
+/// for orders, which go up by one.
 fn properties(schema: &Schema) -> WriterPropertiesBuilder {
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_max_row_group_row_count(Some(ROWS_PER_GROUP))
         .set_created_by(format!("runout {}", runout_core::provenance::VERSION));
     for field in schema.fields() {
-        if *field.data_type() == DataType::Float64 {
-            let column = ColumnPath::from(field.name().as_str());
-            properties = properties
-                .set_column_dictionary_enabled(column.clone(), false)
-                .set_column_encoding(column, Encoding::BYTE_STREAM_SPLIT);
-        }
+        let encoding = match field.data_type() {
+            DataType::Float64 => Encoding::BYTE_STREAM_SPLIT,
+            DataType::UInt32 => Encoding::DELTA_BINARY_PACKED,
+            _ => continue,
+        };
+        let column = ColumnPath::from(field.name().as_str());
+        properties =
+            properties.set_column_dictionary_enabled(column.clone(), false).set_column_encoding(column, encoding);
     }
     properties
 }
