@@ -1,11 +1,11 @@
 //! The binary chunk: vertices, all attributes of one side by side, then triangles.
 //!
-//! It is made on all processors, in portions that stay in their caches: a chunk held whole would first have to be given its
+//! It is made beside the writing, in portions that stay in the caches: a chunk held whole would first have to be given its
 //! memory page by page, which takes longer than filling it.
 
 use std::io::{self, Write};
 
-use runout_mesh::{COLOUR_STEPS, Mesh, UNMEASURED, Vertex, in_order, linear, palette};
+use runout_mesh::{COLOUR_STEPS, LANES, Mesh, UNMEASURED, Vertices, in_order, linear, palette, processors};
 
 /// Bytes from one vertex to the next.
 pub const STRIDE: usize = 32;
@@ -20,7 +20,7 @@ pub const DEVIATION: usize = 28;
 /// Bytes of an index.
 const INDEX: usize = 4;
 /// Bytes that are handed on at a time, about.
-const PORTION: usize = 1 << 18;
+const PORTION: usize = 1 << 20;
 
 /// What the binary chunk holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,17 +39,8 @@ impl Layout {
     /// Of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
         let (rings, angles, caps) = (mesh.rings(), mesh.angles(), mesh.caps().len());
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        let centres = mesh.caps().into_iter().map(|cap| [0.0, 0.0, cap.z_mm]);
-        (0..rings).flat_map(|ring| mesh.rim(ring)).chain(centres).for_each(|position| {
-            for axis in 0..3 {
-                // Comparisons compile to single instructions; f64::min has to look after NaN, which a mesh never holds.
-                low[axis] = if position[axis] < low[axis] { position[axis] } else { low[axis] };
-                high[axis] = if position[axis] > high[axis] { position[axis] } else { high[axis] };
-            }
-        });
         // Rounding keeps the order, so that these are the extremes of what is written; the turn swaps those of one axis.
-        let corners = [metres_y_up(low), metres_y_up(high)];
+        let corners = mesh.bounds_mm().map(|corner| y_up(corner.map(metres)));
         let [min, max] =
             [f32::min, f32::max].map(|of| std::array::from_fn(|axis| of(corners[0][axis], corners[1][axis])));
         Self {
@@ -71,21 +62,23 @@ impl Layout {
     }
 }
 
-/// From mm with z up to metres with y up: a turn about x.
-fn metres_y_up([x, y, z]: [f64; 3]) -> [f32; 3] {
-    y_up([1e-3 * x, 1e-3 * y, 1e-3 * z])
+fn metres(mm: f64) -> f32 {
+    (1e-3 * mm) as f32
 }
 
-fn y_up([x, y, z]: [f64; 3]) -> [f32; 3] {
-    [x as f32, z as f32, -y as f32]
+/// From z up to y up: a turn about x.
+fn y_up([x, y, z]: [f32; 3]) -> [f32; 3] {
+    [x, z, -y]
 }
 
 /// Writes the chunk: the wall ring by ring, then each cap's rim and centre, then the triangles.
 pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     let colours: [[u8; 4]; COLOUR_STEPS] = palette().map(linear_rgba);
     let together = PORTION / (STRIDE * mesh.angles());
-    in_order(mesh.rings(), together, to, |ring, bytes| {
-        mesh.ring(ring, |vertex| put_vertex(bytes, &vertex, colours[vertex.colour]));
+    // Writing keeps a processor as busy as making what is written.
+    let threads = processors().saturating_sub(1);
+    in_order(mesh.rings(), together, threads, to, |ring, bytes| {
+        mesh.ring(ring, |vertices| put_vertices(bytes, vertices, &colours));
     })?;
     let caps = mesh.caps();
     let mut bytes = Vec::new();
@@ -93,49 +86,45 @@ pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
         // glTF has no "not measured": a cap's deviation is 0 and its colour says so.
         let normal = [0.0, 0.0, cap.normal_z];
         for position_mm in mesh.rim(cap.ring).chain([[0.0, 0.0, cap.z_mm]]) {
-            let vertex = Vertex { position_mm, normal, deviation_um: 0.0, colour: 0 };
-            put_vertex(&mut bytes, &vertex, linear_rgba(UNMEASURED));
+            put_vertices(&mut bytes, &Vertices::one(position_mm, normal), &[linear_rgba(UNMEASURED)]);
         }
     }
     to.write_all(&bytes)?;
-    in_order(mesh.rings() - 1, together, to, |ring, bytes| {
-        for triangle in mesh.band(ring).flatten() {
-            put_triangle(bytes, triangle);
+    // Every band's triangles are the first one's, so many rings on.
+    let band: Vec<u32> = mesh.band(0).flatten().flatten().collect();
+    in_order(mesh.rings() - 1, together, threads, to, |ring, bytes| {
+        let (begin, on) = (bytes.len(), (ring * mesh.angles()) as u32);
+        bytes.resize(begin + INDEX * band.len(), 0);
+        for (place, vertex) in bytes[begin..].as_chunks_mut().0.iter_mut().zip(&band) {
+            *place = (vertex + on).to_le_bytes();
         }
     })?;
     bytes.clear();
     let angles = mesh.angles() as u32;
     for (index, cap) in caps.iter().enumerate() {
         let rim = mesh.rings() as u32 * angles + index as u32 * (angles + 1);
-        cap.triangles(angles, rim + angles, rim).for_each(|triangle| put_triangle(&mut bytes, triangle));
+        let triangles = cap.triangles(angles, rim + angles, rim);
+        triangles.for_each(|triangle| bytes.extend_from_slice(triangle.map(u32::to_le_bytes).as_flattened()));
     }
     to.write_all(&bytes)
 }
 
-#[inline]
-fn put_vertex(bytes: &mut Vec<u8>, vertex: &Vertex, colour: [u8; 4]) {
-    let mut record = [0; STRIDE];
-    put_vector(&mut record[POSITION..NORMAL], metres_y_up(vertex.position_mm));
-    put_vector(&mut record[NORMAL..COLOUR], y_up(vertex.normal));
-    record[COLOUR..DEVIATION].copy_from_slice(&colour);
-    record[DEVIATION..].copy_from_slice(&(vertex.deviation_um as f32).to_le_bytes());
-    bytes.extend_from_slice(&record);
-}
-
-#[inline]
-fn put_triangle(bytes: &mut Vec<u8>, triangle: [u32; 3]) {
-    let mut record = [0; 3 * INDEX];
-    for (place, vertex) in record.chunks_exact_mut(INDEX).zip(triangle) {
-        place.copy_from_slice(&vertex.to_le_bytes());
+/// Not inlined: together with the arithmetic before it, the compiler shuffles single numbers between wide registers, and a
+/// mesh takes half as long again.
+#[inline(never)]
+fn put_vertices(bytes: &mut Vec<u8>, vertices: &Vertices, colours: &[[u8; 4]]) {
+    let [x, y, z] = vertices.position_mm.map(|axis| axis.map(metres));
+    let normal = vertices.normal.map(|axis| axis.map(|part| part as f32));
+    let deviation = vertices.deviation_um.map(|deviation| deviation as f32);
+    let mut records = [[[0; 4]; STRIDE / 4]; LANES];
+    for (lane, record) in records.iter_mut().enumerate() {
+        let [position, normal] = [[x, y, z], normal].map(|vector| y_up(vector.map(|axis| axis[lane])));
+        record[..NORMAL / 4].copy_from_slice(&position.map(f32::to_le_bytes));
+        record[NORMAL / 4..COLOUR / 4].copy_from_slice(&normal.map(f32::to_le_bytes));
+        record[COLOUR / 4] = colours[vertices.colour[lane]];
+        record[DEVIATION / 4] = deviation[lane].to_le_bytes();
     }
-    bytes.extend_from_slice(&record);
-}
-
-#[inline]
-fn put_vector(place: &mut [u8], vector: [f32; 3]) {
-    for (place, value) in place.chunks_exact_mut(4).zip(vector) {
-        place.copy_from_slice(&value.to_le_bytes());
-    }
+    bytes.extend_from_slice(records[..vertices.count].as_flattened().as_flattened());
 }
 
 /// glTF wants COLOR_0 in linear light (2.0 specification, 3.9.2).

@@ -26,10 +26,14 @@ impl ColourScale {
 
     /// Place in the [`palette`], below [`STEPS`].
     #[must_use]
+    #[inline]
     pub fn index(self, deviation_um: f64) -> usize {
+        /// Beside it, numbers are whole ones: sums end up in their lowest bits. (A cast has to look after what does not fit.)
+        const WHOLE: f64 = (1_u64 << 52) as f64;
         let half = (STEPS / 2) as f64;
-        // The cast rounds down and turns NaN into 0.
-        ((deviation_um * self.steps_per_um).clamp(-half, half) + half + 0.5) as usize
+        let place = (deviation_um * self.steps_per_um).clamp(-half, half) + half;
+        // NaN gives 0.
+        ((place + WHOLE).to_bits() & 0xFFFF) as usize
     }
 }
 
@@ -65,6 +69,7 @@ mod tests {
         assert_eq!((scale.index(-5.0), scale.index(5.0)), (0, STEPS - 1));
         assert_eq!((scale.index(-1e9), scale.index(1e9)), (0, STEPS - 1));
         assert_eq!(ColourScale::new(0.0).index(3.0), STEPS / 2);
+        assert_eq!(scale.index(f64::NAN), 0);
         let colours = palette();
         assert_eq!(colours[0], [28, 58, 148]);
         assert_eq!(colours[STEPS / 2], [236, 236, 236]);

@@ -1,6 +1,6 @@
 //! The exporter around a format.
 
-use std::{fs::File, io, path::PathBuf};
+use std::{fs::File, io, path::PathBuf, thread};
 
 use runout_core::{
     Error, Result,
@@ -83,9 +83,14 @@ impl Export for MeshExport {
         let surface = surface.ok_or_else(|| {
             Error::new("write", self.config.path.display().to_string(), "the run built no surface to draw")
         })?;
-        let checksum = surface.checksum();
-        for Target { place, file, scale } in &mut self.files {
-            let mesh = Mesh::new(surface, *scale, self.config.capped, self.config.colour_range_um)?;
+        let draw = |target: &Target| Mesh::new(surface, target.scale, self.config.capped, self.config.colour_range_um);
+        let (meshes, checksum) = thread::scope(|scope| {
+            let checksum = scope.spawn(|| surface.checksum());
+            let meshes: Result<Vec<Mesh>> = self.files.iter().map(draw).collect();
+            (meshes, checksum.join())
+        });
+        let checksum = checksum.map_err(|_| Error::new("draw", "the surface", "the thread of its checksum stopped"))?;
+        for (Target { place, file, .. }, mesh) in self.files.iter_mut().zip(meshes?) {
             let notes = Notes::new(&self.format, &mesh, surface, &checksum, &self.band, summary);
             (self.format.write)(&mesh, &notes, file).map_err(|error| place.failure(error))?;
         }

@@ -14,6 +14,6 @@ mod portions;
 pub use colour::{ColourScale, STEPS as COLOUR_STEPS, UNMEASURED, linear, palette};
 pub use config::MeshConfig;
 pub use export::Format;
-pub use mesh::{Cap, Mesh, Vertex};
+pub use mesh::{Cap, LANES, Mesh, Vertices};
 pub use notes::{InputNote, Notes};
-pub use portions::in_order;
+pub use portions::{in_order, processors};

@@ -1,8 +1,14 @@
 //! The surface as vertices and triangles.
 
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
+
 use std::f64::consts::TAU;
 
-use runout_core::{Error, Result, surface::Surface};
+use runout_core::{
+    Error, Result,
+    numerics::lanes::{NullaryFnOnce, load, vectorised},
+    surface::Surface,
+};
 
 use crate::colour::ColourScale;
 
@@ -17,21 +23,43 @@ pub struct Mesh<'a> {
     capped: bool,
     colours: ColourScale,
     range_um: f64,
-    /// (cos, sin) of each angle.
-    directions: Vec<[f64; 2]>,
+    /// Of each angle, [padded].
+    cosines: Vec<f64>,
+    sines: Vec<f64>,
+    bounds_mm: [[f64; 3]; 2],
 }
 
-/// A point of the wall.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vertex {
-    /// Where it is drawn, magnified.
-    pub position_mm: [f64; 3],
-    /// Outward unit normal of what is drawn.
-    pub normal: [f64; 3],
-    /// True deviation, whatever the magnification.
-    pub deviation_um: f64,
-    /// Place in the [`palette`](crate::palette).
-    pub colour: usize,
+/// Vertices that are worked out side by side.
+pub const LANES: usize = 8;
+
+/// Neighbouring points of a ring, worked out side by side: those of the places below `count` are some.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vertices {
+    /// At most [`LANES`].
+    pub count: usize,
+    /// Where they are drawn, magnified: x, y and z of each.
+    pub position_mm: [[f64; LANES]; 3],
+    /// Outward unit normals of what is drawn.
+    pub normal: [[f64; LANES]; 3],
+    /// True deviations, whatever the magnification.
+    pub deviation_um: [f64; LANES],
+    /// Places in the [`palette`](crate::palette).
+    pub colour: [usize; LANES],
+}
+
+impl Vertices {
+    /// One point.
+    #[must_use]
+    pub fn one(position_mm: [f64; 3], normal: [f64; 3]) -> Self {
+        let first = |value| std::array::from_fn(|lane| if lane == 0 { value } else { 0.0 });
+        Self {
+            count: 1,
+            position_mm: position_mm.map(first),
+            normal: normal.map(first),
+            deviation_um: [0.0; LANES],
+            colour: [0; LANES],
+        }
+    }
 }
 
 /// A flat end, from the axis to a ring. Drawn, not measured.
@@ -76,13 +104,8 @@ impl<'a> Mesh<'a> {
         if !surface.z_mm.windows(2).all(|pair| pair[0] < pair[1]) {
             return Err(failure("its rings do not ascend along z".into()));
         }
-        let (mut lowest, mut highest, mut finite) = (f64::INFINITY, f64::NEG_INFINITY, true);
-        for deviation in &surface.deviation_um {
-            lowest = lowest.min(*deviation);
-            highest = highest.max(*deviation);
-            finite &= deviation.is_finite();
-        }
-        if !finite {
+        let [lowest, highest] = vectorised(Extremes(&surface.deviation_um));
+        if !(lowest.is_finite() && highest.is_finite()) {
             return Err(failure("a deviation is not a number".into()));
         }
         let narrowest = surface.radius_mm + 1e-3 * scale * lowest;
@@ -98,14 +121,13 @@ impl<'a> Mesh<'a> {
             return Err(failure("it has more points than 32 bits can count".into()).help("take fewer angles"));
         }
         let range_um = range_um.unwrap_or(highest.max(-lowest));
-        let pitch = TAU / surface.angles as f64;
-        let directions = (0..surface.angles)
-            .map(|angle| {
-                let (sine, cosine) = (pitch * angle as f64).sin_cos();
-                [cosine, sine]
-            })
-            .collect();
-        Ok(Self { surface, scale, capped, colours: ColourScale::new(range_um), range_um, directions })
+        let angle = |index: usize| TAU / surface.angles as f64 * index as f64;
+        let (sines, cosines): (Vec<f64>, Vec<f64>) = (0..surface.angles).map(|index| angle(index).sin_cos()).unzip();
+        let [cosines, sines] = [&cosines, &sines].map(|values| padded(values));
+        let colours = ColourScale::new(range_um);
+        let mut mesh = Self { surface, scale, capped, colours, range_um, cosines, sines, bounds_mm: [[0.0; 3]; 2] };
+        mesh.bounds_mm = vectorised(Bounds(&mesh));
+        Ok(mesh)
     }
 
     /// Rings along z, at least two.
@@ -145,43 +167,43 @@ impl<'a> Mesh<'a> {
     /// Positions of one ring in mm, angle by angle.
     pub fn rim(&self, ring: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
         let z_mm = self.surface.z_mm[ring];
-        self.surface.ring(ring).iter().zip(&self.directions).map(move |(deviation, [cosine, sine])| {
-            let radius = self.surface.radius_mm + 1e-3 * self.scale * deviation;
+        let directions = self.cosines.iter().zip(&self.sines);
+        self.surface.ring(ring).iter().zip(directions).map(move |(deviation_um, (cosine, sine))| {
+            let radius = self.radius_mm(*deviation_um);
             [radius * cosine, radius * sine, z_mm]
         })
     }
 
-    /// Visits the vertices of one ring, angle by angle.
+    /// Where a deviation is drawn.
+    #[inline(always)]
+    fn radius_mm(&self, deviation_um: f64) -> f64 {
+        self.surface.radius_mm + 1e-3 * self.scale * deviation_um
+    }
+
+    /// Smallest and largest x, y and z of the wall, in mm.
+    #[must_use]
+    pub fn bounds_mm(&self) -> [[f64; 3]; 2] {
+        self.bounds_mm
+    }
+
+    /// Visits the vertices of one ring, some angles at a time.
     ///
     /// With r(α, z), the outward normal has the direction (r, −∂r/∂α, −r ∂r/∂z) along (radial, tangential, z); the
     /// derivatives are those of the parabola through the neighbours, around the seam as anywhere.
-    pub fn ring(&self, ring: usize, mut visit: impl FnMut(Vertex)) {
+    pub fn ring(&self, ring: usize, visit: impl FnMut(&Vertices)) {
         let z = &self.surface.z_mm;
         let (below, above) = (ring.saturating_sub(1), (ring + 1).min(z.len() - 1));
-        let [weight_below, weight_here, weight_above] = slope_weights(z[ring] - z[below], z[above] - z[ring]);
-        let angles = self.directions.len();
-        let here = &self.surface.ring(ring)[..angles];
-        let below = &self.surface.ring(below)[..angles];
-        let above = &self.surface.ring(above)[..angles];
-        let mm = 1e-3 * self.scale;
-        let per_angle = mm * angles as f64 / (2.0 * TAU);
-        for angle in 0..angles {
-            let next = here[if angle + 1 == angles { 0 } else { angle + 1 }];
-            let previous = here[if angle == 0 { angles - 1 } else { angle - 1 }];
-            let deviation_um = here[angle];
-            let [cosine, sine] = self.directions[angle];
-            let radius = self.surface.radius_mm + mm * deviation_um;
-            let along = mm * (weight_below * below[angle] + weight_here * deviation_um + weight_above * above[angle]);
-            let (tangential, axial) = (-per_angle * (next - previous), -radius * along);
-            let length = (radius * radius + tangential * tangential + axial * axial).sqrt().recip();
-            let (radial, tangential) = (radius * length, tangential * length);
-            visit(Vertex {
-                position_mm: [radius * cosine, radius * sine, z[ring]],
-                normal: [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial * length],
-                deviation_um,
-                colour: self.colours.index(deviation_um),
-            });
-        }
+        let here = self.surface.ring(ring);
+        let seam = here.len() - 1;
+        vectorised(Ring {
+            mesh: self,
+            z_mm: z[ring],
+            around: padded(&[&here[seam..], here, &here[..1]].concat()),
+            below: padded(self.surface.ring(below)),
+            above: padded(self.surface.ring(above)),
+            slope: slope_weights(z[ring] - z[below], z[above] - z[ring]),
+            visit,
+        });
     }
 
     /// Triangles of the wall between a ring and the next, counter-clockwise seen from outside.
@@ -194,6 +216,159 @@ impl<'a> Mesh<'a> {
             [[lower + angle, lower + next, upper + next], [lower + angle, upper + next, upper + angle]]
         })
     }
+}
+
+/// A ring on its way to its vertices.
+struct Ring<'a, V> {
+    mesh: &'a Mesh<'a>,
+    z_mm: f64,
+    /// Its deviations, between the last and the first once more; [padded].
+    around: Vec<f64>,
+    /// Those of its neighbours along z; [padded].
+    below: Vec<f64>,
+    above: Vec<f64>,
+    /// See [`slope_weights`].
+    slope: [f64; 3],
+    visit: V,
+}
+
+impl<V: FnMut(&Vertices)> NullaryFnOnce for Ring<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(mut self) {
+        // Not `for_each`, which would be a call.
+        for first in (0..self.mesh.angles()).step_by(LANES) {
+            self.vertices(first);
+        }
+    }
+}
+
+impl<V: FnMut(&Vertices)> Ring<'_, V> {
+    /// The vertices at some angles.
+    #[inline(always)]
+    fn vertices(&mut self, first: usize) {
+        let mesh = self.mesh;
+        let [previous, here, next]: [[f64; LANES]; 3] = std::array::from_fn(|ahead| load(&self.around, first + ahead));
+        let [below, above, cosine, sine]: [[f64; LANES]; 4] =
+            [&self.below, &self.above, &mesh.cosines, &mesh.sines].map(|values| load(values, first));
+        let mm = 1e-3 * mesh.scale;
+        let per_angle = mm * mesh.angles() as f64 / (2.0 * TAU);
+        let mut found = Vertices {
+            count: LANES.min(mesh.angles() - first),
+            position_mm: [[self.z_mm; LANES]; 3],
+            normal: [[0.0; LANES]; 3],
+            deviation_um: here,
+            colour: [0; LANES],
+        };
+        for lane in 0..LANES {
+            let radius = mesh.radius_mm(here[lane]);
+            let along = mm * (self.slope[0] * below[lane] + self.slope[1] * here[lane] + self.slope[2] * above[lane]);
+            let (tangential, axial) = (-per_angle * (next[lane] - previous[lane]), -radius * along);
+            let length = (radius * radius + tangential * tangential + axial * axial).sqrt().recip();
+            found.position_mm[0][lane] = radius * cosine[lane];
+            found.position_mm[1][lane] = radius * sine[lane];
+            let (radial, tangential) = (radius * length, tangential * length);
+            found.normal[0][lane] = radial * cosine[lane] - tangential * sine[lane];
+            found.normal[1][lane] = radial * sine[lane] + tangential * cosine[lane];
+            found.normal[2][lane] = axial * length;
+        }
+        for lane in 0..LANES {
+            found.colour[lane] = mesh.colours.index(here[lane]);
+        }
+        (self.visit)(&found);
+    }
+}
+
+/// Smallest and largest of numbers; NaN where one of them is not finite.
+struct Extremes<'a>(&'a [f64]);
+
+impl NullaryFnOnce for Extremes<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn call(self) -> [f64; 2] {
+        let mut range = [[f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]];
+        let (eights, rest) = self.0.as_chunks::<LANES>();
+        // Becomes NaN with what is not finite.
+        let mut nothing = [0.0; LANES];
+        for values in eights {
+            for lane in 0..LANES {
+                nothing[lane] += 0.0 * values[lane];
+            }
+            widen(&mut range, *values);
+        }
+        let nothing = nothing.into_iter().chain(rest.iter().map(|value| 0.0 * value)).sum::<f64>();
+        let [low, high] = ends(range);
+        [rest.iter().copied().fold(low, lower) + nothing, rest.iter().copied().fold(high, higher) + nothing]
+    }
+}
+
+/// See [`Mesh::bounds_mm`].
+struct Bounds<'a>(&'a Mesh<'a>);
+
+impl NullaryFnOnce for Bounds<'_> {
+    type Output = [[f64; 3]; 2];
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let mesh = self.0;
+        // The axis is always between them.
+        let mut range = [[[0.0; LANES]; 2]; 2];
+        for ring in 0..mesh.rings() {
+            let (eights, rest) = mesh.surface.ring(ring).as_chunks();
+            // What is behind the last angle has no direction: it stays on the axis.
+            let mut last = [0.0; LANES];
+            last[..rest.len()].copy_from_slice(rest);
+            for (index, deviations) in eights.iter().chain([&last]).enumerate() {
+                for (directions, range) in [&mesh.cosines, &mesh.sines].into_iter().zip(&mut range) {
+                    let mut places: [f64; LANES] = load(directions, LANES * index);
+                    for lane in 0..LANES {
+                        places[lane] *= mesh.radius_mm(deviations[lane]);
+                    }
+                    widen(range, places);
+                }
+            }
+        }
+        let [x, y] = range.map(ends);
+        let z = [mesh.surface.z_mm[0], mesh.surface.z_mm[mesh.rings() - 1]];
+        [0, 1].map(|end| [x[end], y[end], z[end]])
+    }
+}
+
+/// Takes values between the lowest and the highest in each lane.
+#[inline(always)]
+fn widen([low, high]: &mut [[f64; LANES]; 2], values: [f64; LANES]) {
+    for lane in 0..LANES {
+        low[lane] = lower(values[lane], low[lane]);
+    }
+    for lane in 0..LANES {
+        high[lane] = higher(values[lane], high[lane]);
+    }
+}
+
+/// Of all lanes together.
+fn ends([low, high]: [[f64; LANES]; 2]) -> [f64; 2] {
+    [low.into_iter().fold(f64::INFINITY, lower), high.into_iter().fold(f64::NEG_INFINITY, higher)]
+}
+
+/// Comparisons compile to single instructions; `f64::min` has to look after NaN.
+#[inline(always)]
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn higher(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Values and, behind them, enough zeros for [`LANES`] to begin at each.
+fn padded(values: &[f64]) -> Vec<f64> {
+    let mut padded = Vec::with_capacity(values.len() + LANES);
+    padded.extend_from_slice(values);
+    padded.resize(values.len() + LANES, 0.0);
+    padded
 }
 
 /// Weights of the values below, here and above in the slope here of the parabola through them; at an end (a distance
@@ -237,19 +412,21 @@ mod tests {
         let mesh = Mesh::new(&surface, 1000.0, false, None).unwrap();
         for ring in [1, 2] {
             let mut angle = 0.0_f64;
-            mesh.ring(ring, |vertex| {
-                let radius = 20.0 + form(angle, z[ring]);
-                let (around, along) = ((2.0 * angle).cos(), 0.04 * z[ring]);
-                let (sine, cosine) = angle.sin_cos();
-                // Cross product of the tangents ∂p/∂α and ∂p/∂z.
-                let t = [around * cosine - radius * sine, around * sine + radius * cosine];
-                let cross = [t[1], -t[0], t[0] * along * sine - t[1] * along * cosine];
-                let length = cross.iter().map(|value| value * value).sum::<f64>().sqrt();
-                for (found, exact) in vertex.normal.iter().zip(cross) {
-                    // (nΔ)²/6 = 5e-5 of a slope of 1/20 at n = 2 and Δ = 0.5°.
-                    assert!((found - exact / length).abs() < 3e-6, "{vertex:?}");
+            mesh.ring(ring, |vertices| {
+                for lane in 0..vertices.count {
+                    let radius = 20.0 + form(angle, z[ring]);
+                    let (around, along) = ((2.0 * angle).cos(), 0.04 * z[ring]);
+                    let (sine, cosine) = angle.sin_cos();
+                    // Cross product of the tangents ∂p/∂α and ∂p/∂z.
+                    let t = [around * cosine - radius * sine, around * sine + radius * cosine];
+                    let cross = [t[1], -t[0], t[0] * along * sine - t[1] * along * cosine];
+                    let length = cross.iter().map(|value| value * value).sum::<f64>().sqrt();
+                    for (found, exact) in vertices.normal.iter().map(|axis| axis[lane]).zip(cross) {
+                        // (nΔ)²/6 = 5e-5 of a slope of 1/20 at n = 2 and Δ = 0.5°.
+                        assert!((found - exact / length).abs() < 3e-6, "{vertices:?}");
+                    }
+                    angle += TAU / 720.0;
                 }
-                angle += TAU / 720.0;
             });
         }
     }

@@ -8,9 +8,16 @@ use std::{
 };
 
 /// Portions that wait for the file, a thread.
-const WAITING: usize = 2;
+const WAITING: usize = 4;
 
-/// Writes what `make` appends for each of `count` parts, `together` of them at a time, one after the other.
+/// Threads that the machine runs side by side.
+#[must_use]
+pub fn processors() -> usize {
+    thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+/// Writes what `make` appends for each of `count` parts, `together` of them at a time, one after the other; so many `threads`
+/// make them beside the one that writes.
 ///
 /// A portion that is written lends its memory to a later one: fresh memory costs more than what is put into it.
 ///
@@ -19,12 +26,13 @@ const WAITING: usize = 2;
 pub fn in_order(
     count: usize,
     together: usize,
+    threads: usize,
     to: &mut impl Write,
     make: impl Fn(usize, &mut Vec<u8>) + Sync,
 ) -> io::Result<()> {
     let together = together.max(1);
     let portions = count.div_ceil(together);
-    let workers = thread::available_parallelism().map_or(1, NonZeroUsize::get).clamp(1, portions.max(1));
+    let workers = threads.clamp(1, portions.max(1));
     thread::scope(|scope| {
         let made = (0..workers).map(|first| {
             let (sender, receiver) = sync_channel::<Vec<u8>>(WAITING);
@@ -67,12 +75,12 @@ mod tests {
         let make = |part: usize, bytes: &mut Vec<u8>| bytes.extend_from_slice(format!("{part} ").as_bytes());
         for (count, together) in [(0, 4), (1, 4), (1003, 1), (1003, 7), (5, 0)] {
             let mut written = Vec::new();
-            in_order(count, together, &mut written, make).unwrap();
+            in_order(count, together, 2, &mut written, make).unwrap();
             let mut expected = Vec::new();
             (0..count).for_each(|part| make(part, &mut expected));
             assert_eq!(written, expected);
         }
         let mut full = &mut [0_u8; 100][..];
-        assert_eq!(in_order(1000, 3, &mut full, make).unwrap_err().kind(), io::ErrorKind::WriteZero);
+        assert_eq!(in_order(1000, 3, 2, &mut full, make).unwrap_err().kind(), io::ErrorKind::WriteZero);
     }
 }

@@ -17,7 +17,7 @@ use runout_core::{
     },
     stage::Exporter,
 };
-use runout_mesh::{COLOUR_STEPS, Format, Mesh, MeshConfig, Notes, UNMEASURED, in_order, palette};
+use runout_mesh::{COLOUR_STEPS, Format, Mesh, MeshConfig, Notes, UNMEASURED, in_order, palette, processors};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -59,11 +59,15 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
     text.raw("o ").raw(&object_name(&notes.title)).raw("\n");
     file.write_all(&bytes)?;
     let colours: [String; COLOUR_STEPS] = palette().map(colour_text);
-    in_order(mesh.rings(), TOGETHER, file, |ring, bytes| {
+    in_order(mesh.rings(), TOGETHER, processors(), file, |ring, bytes| {
         let mut text = Text::behind(bytes);
-        mesh.ring(ring, |vertex| {
-            text.raw("v").vector(vertex.position_mm).raw(&colours[vertex.colour]);
-            text.raw("vn").vector(vertex.normal).raw("\n");
+        mesh.ring(ring, |vertices| {
+            for lane in 0..vertices.count {
+                let [position_mm, normal] =
+                    [&vertices.position_mm, &vertices.normal].map(|of| of.map(|axis| axis[lane]));
+                text.raw("v").vector(position_mm).raw(&colours[vertices.colour[lane]]);
+                text.raw("vn").vector(normal).raw("\n");
+            }
         });
     })?;
     let caps = mesh.caps();
@@ -74,7 +78,7 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
         text.raw("vn").vector([0.0, 0.0, cap.normal_z]).raw("\n");
     }
     file.write_all(&bytes)?;
-    in_order(mesh.rings() - 1, TOGETHER, file, |ring, bytes| {
+    in_order(mesh.rings() - 1, TOGETHER, processors(), file, |ring, bytes| {
         let mut text = Text::behind(bytes);
         for triangle in mesh.band(ring).flatten() {
             // OBJ counts from 1.
