@@ -210,6 +210,8 @@ pub struct Defect {
 pub enum DefectKind {
     /// Not a number, or infinite.
     NotFinite,
+    /// Farther than [`FARTHEST_UM`](crate::inspection::FARTHEST_UM).
+    OutOfReach,
     /// At the converter's limit, or flat at the channel's extreme.
     Clipped,
     /// Exactly equal for a good part of a turn, anywhere.
@@ -220,6 +222,7 @@ impl std::fmt::Display for DefectKind {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.write_str(match self {
             Self::NotFinite => "not a number",
+            Self::OutOfReach => "farther than 1 m",
             Self::Clipped => "clipped",
             Self::Stuck => "stuck at one value",
         })

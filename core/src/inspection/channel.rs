@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS};
+use super::{FARTHEST_UM, FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS};
 use crate::{
     measurement::{Block, Defect, DefectKind},
     numerics::lanes::{Arithmetic, LaneWork, load},
@@ -27,16 +27,16 @@ pub(super) enum Rule {
 }
 
 impl Rule {
-    /// Readings between which a channel is certainly not clipped.
+    /// Readings between which a channel is certainly neither clipped nor out of reach.
     fn inside(&self, channel: usize) -> [f64; 2] {
         match self {
             // Readings and limits come from the same integers; the margin covers their rounding.
             Self::Limits(limits) => {
                 let [low, high] = limits[channel];
                 let margin = 1e-9 * (high - low).abs();
-                [low.min(high) + margin, low.max(high) - margin]
+                [(low.min(high) + margin).max(-FARTHEST_UM), (low.max(high) - margin).min(FARTHEST_UM)]
             }
-            Self::Flat { .. } | Self::None => [f64::NEG_INFINITY, f64::INFINITY],
+            Self::Flat { .. } | Self::None => [-FARTHEST_UM, FARTHEST_UM],
         }
     }
 }
@@ -106,7 +106,7 @@ impl Channel {
         if self.seen < 2 || self.lowest < self.highest {
             None
         } else if self.last.is_none() {
-            Some(format!("none of its {} samples is a number", self.seen))
+            Some(format!("none of its {} samples is a number up to 1 m", self.seen))
         } else {
             Some(format!("all {} samples read {} µm", self.seen, self.lowest))
         }
@@ -128,9 +128,10 @@ impl Channel {
             let at = frame * channels + index;
             let value = block.samples[at];
             self.seen += 1;
-            if !value.is_finite() {
+            if !value.is_finite() || value.abs() > FARTHEST_UM {
                 block.samples[at] = self.last.unwrap_or(0.0);
-                mark(&mut block.defects, index, DefectKind::NotFinite, place..place + 1);
+                let kind = if value.is_finite() { DefectKind::OutOfReach } else { DefectKind::NotFinite };
+                mark(&mut block.defects, index, kind, place..place + 1);
                 self.run = Run::default();
                 self.same = Same::default();
                 continue;

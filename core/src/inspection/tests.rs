@@ -80,16 +80,25 @@ fn good_samples_pass_untouched() {
 }
 
 #[test]
-fn what_is_not_finite_is_bridged_by_the_last_good_value() {
+fn what_is_not_finite_or_absurd_is_bridged_by_the_last_good_value() {
     let mut channels = vec![sine(3 * TURN, 3.0, 0.1), sine(3 * TURN, 3.0, 0.4)];
     let good = channels[1][1499];
     channels[1][1500..1503].fill(f64::NAN);
     channels[0][0] = f64::INFINITY;
+    channels[0][2000] = -1e300;
+    channels[0][2001] = 0.999e6;
     let (samples, defects) = inspect_in_blocks(&channels, None);
     assert!(samples.iter().all(|value| value.is_finite()));
     assert_eq!(samples[0].to_bits(), 0.0_f64.to_bits(), "nothing good before");
     assert!((1500..1503).all(|frame| samples[2 * frame + 1].to_bits() == good.to_bits()));
-    assert_eq!(defects, [defect(0, 0..1, DefectKind::NotFinite), defect(1, 1500..1503, DefectKind::NotFinite)]);
+    assert_eq!(samples[2 * 2000].to_bits(), channels[0][1999].to_bits());
+    assert_eq!(samples[2 * 2001].to_bits(), 0.999e6_f64.to_bits(), "a sensor far from its zero may read so much");
+    let expected = [
+        defect(0, 0..1, DefectKind::NotFinite),
+        defect(0, 2000..2001, DefectKind::OutOfReach),
+        defect(1, 1500..1503, DefectKind::NotFinite),
+    ];
+    assert_eq!(defects, expected);
 }
 
 #[test]
@@ -146,7 +155,8 @@ fn a_sensor_pegged_from_the_start_is_clipped() {
 
 #[test]
 fn a_dead_channel_is_an_error_that_names_it() {
-    for (value, said) in [(2.5, "all 3000 samples read 2.5 µm"), (f64::NAN, "none of its 3000 samples is a number")] {
+    let none = "none of its 3000 samples is a number up to 1 m";
+    for (value, said) in [(2.5, "all 3000 samples read 2.5 µm"), (f64::NAN, none), (1e9, none)] {
         for limits in [None, Some([-10.0, 10.0])] {
             let channels = vec![sine(3 * TURN, 3.0, 0.0), vec![value; 3 * TURN]];
             let error = inspect(stream(&channels, limits, 100)).unwrap_err().to_string();

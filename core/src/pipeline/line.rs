@@ -17,7 +17,7 @@ use crate::{
     profile::Profile,
     provenance::Input,
     rig::Rig,
-    separation::Separation,
+    separation::{Quantity, Separation},
     spread::Projection,
     stage::{Averager, Conditioner, Station, StationSeparator, Wanted},
 };
@@ -119,18 +119,29 @@ impl Line<'_> {
     }
 }
 
-/// Separates a station, and refuses what is not a number where the layout could tell one.
-pub fn separate(separator: &dyn StationSeparator, station: &Station) -> Result<Separation> {
+/// Separates a station, and refuses what is not a number where the layout could tell one, and a form that no part of
+/// `radius_mm` has.
+pub fn separate(separator: &dyn StationSeparator, station: &Station, radius_mm: f64) -> Result<Separation> {
     let separation = separator.separate(station)?;
     let width = separation.unknowns.len().max(1);
     let told = separation.estimate.iter().zip(&separation.observable);
-    match told.enumerate().find(|(_, (value, told))| **told && !value.is_finite()) {
-        None => Ok(separation),
+    let number = told.enumerate().find(|(_, (value, told))| **told && !value.is_finite());
+    let problem = match number {
         Some((index, _)) => {
             let quantity = separation.unknowns[index % width].id();
-            let problem = format!("{quantity} of order {} comes out as no number", index / width);
-            Err(Error::new("separate", format!("station {}", station.name), problem)
-                .help("look for absurd readings, and check the rig's radius and positions"))
+            Some(format!("{quantity} of order {} comes out as no number", index / width))
         }
-    }
+        None => separation.sections.iter().enumerate().find_map(|(section, at)| {
+            let unknown = separation.position(Quantity::Form(section))?;
+            let squares: f64 = separation.coefficients(unknown).skip(1).map(|value| value.norm_sqr()).sum();
+            let rms_mm = 1e-3 * (0.5 * squares).sqrt();
+            let problem =
+                format!("the form of section {} comes out as {rms_mm:.3e} mm rms on {radius_mm} mm radius", at.id);
+            (rms_mm > radius_mm).then_some(problem)
+        }),
+    };
+    problem.map_or(Ok(separation), |problem| {
+        Err(Error::new("separate", format!("station {}", station.name), problem)
+            .help("look for absurd readings, and check the rig's radius and positions"))
+    })
 }

@@ -86,7 +86,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
             };
             let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
             let work = |index, station: Station| {
-                let separation = separate(&**separator, &station)?;
+                let separation = separate(&**separator, &station, rig.part_radius_mm)?;
                 let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
                 let truth = recording.truth(index)?;
                 let profiles = station.profiles;

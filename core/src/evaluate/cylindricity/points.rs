@@ -96,13 +96,14 @@ impl Points {
     }
 
     /// The reference cylinder; `None` where it is not determined: fewer than five points, all at one height, or, but for
-    /// MCCY, points that do not surround an axis.
+    /// MCCY, points that do not surround an axis; or deviations as large as the radius, beside which they are taken to be
+    /// small.
     ///
-    /// MZCY, MICY and MCCY are reached downhill from LSCY; deviations are taken to be small beside the radius.
+    /// MZCY, MICY and MCCY are reached downhill from LSCY.
     #[must_use]
     pub fn reference(&self, reference: Reference) -> Option<Cylinder> {
         let determined = self.radius_um > 0.0 && self.half_um > 0.0 && self.half_um.is_finite();
-        if !determined || self.there().count() < 5 {
+        if !determined || self.span_um >= self.radius_um || self.there().count() < 5 {
             return None;
         }
         let (axis, deviation) = least_squares::axis(self)?;
