@@ -3,14 +3,21 @@
 use std::{
     fs,
     path::{Component, Path, PathBuf},
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use crate::{Error, Result};
 
+/// Folders that this process made.
+static MADE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
 /// A file being written under a temporary name beside its final one.
 ///
-/// [`commit`](Self::commit) renames it; dropped without, it is removed. Whatever was there before stays until then.
+/// [`commit`](Self::commit) renames it; dropped without, it is removed, and with it the folders that were made for it, where
+/// nothing else came into them. Whatever was there before stays until then.
 #[derive(Debug)]
 pub struct PendingFile {
     temporary: PathBuf,
@@ -40,7 +47,7 @@ impl PendingFile {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        fs::create_dir_all(folder).map_err(|error| {
+        make(folder).map_err(|error| {
             let file = folder.ancestors().find(|above| above.is_file());
             let failure = Error::new("create the folder", folder.display().to_string(), error);
             match file {
@@ -112,8 +119,22 @@ impl Drop for PendingFile {
         if !self.committed {
             // Nothing more can be done about a temporary file that will not go.
             let _ = fs::remove_file(&self.temporary);
+            let made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+            let folders =
+                self.temporary.ancestors().skip(1).take_while(|folder| made.iter().any(|made| made == folder));
+            // Folders with something in them do not go.
+            let _ = folders.map(fs::remove_dir).take_while(std::result::Result::is_ok).count();
         }
     }
+}
+
+/// Makes a folder, and remembers which of those on the way to it are new.
+fn make(folder: &Path) -> std::io::Result<()> {
+    let missing = folder.ancestors().take_while(|above| !above.as_os_str().is_empty() && !above.exists());
+    let missing: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
+    fs::create_dir_all(folder)?;
+    MADE.lock().unwrap_or_else(PoisonError::into_inner).extend(missing);
+    Ok(())
 }
 
 /// Removes what runs that were killed left of the same file: temporary files of processes that are no more. Where the
@@ -189,5 +210,26 @@ mod tests {
         fs::write(folder.path().join("file"), "").unwrap();
         let error = PendingFile::new(folder.path().join("file/deeper/x.csv")).unwrap_err();
         assert!(error.advice().is_some_and(|advice| advice.contains("file is a file")), "{error:?}");
+    }
+
+    #[test]
+    fn folders_made_for_nothing_go_again() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("old")).unwrap();
+        let reserve = |name: &str| PendingFile::new(folder.path().join(name)).unwrap();
+        let files = ["old/a", "new/deep/b", "new/c", "new/kept/d"].map(reserve);
+        for file in &files {
+            file.create().unwrap();
+        }
+        let [old, deep, new, kept] = files;
+        drop(old);
+        drop(new);
+        kept.commit().unwrap();
+        assert!(folder.path().join("new/deep").exists());
+        drop(deep);
+        assert!(!folder.path().join("new/deep").exists() && folder.path().join("new/kept/d").exists());
+        assert!(folder.path().join("old").exists(), "somebody else made it");
+        drop(reserve("other/e"));
+        assert!(!folder.path().join("other").exists());
     }
 }
