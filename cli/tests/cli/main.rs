@@ -11,4 +11,5 @@ mod other_rigs;
 mod safety;
 mod schemas;
 mod straightness;
+mod text_recording;
 mod values;
