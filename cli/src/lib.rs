@@ -17,10 +17,13 @@ mod failure;
 mod progress;
 mod render;
 
-use std::process::ExitCode;
+use std::{
+    io::{self, Write},
+    process::ExitCode,
+};
 
 use clap::Parser;
-use runout_core::pipeline::Registry;
+use runout_core::{atomic_file::abandon_all, pipeline::Registry};
 
 use args::CommandLine;
 use failure::Failure;
@@ -28,6 +31,7 @@ use failure::Failure;
 /// Does what the command line asks for with what is registered.
 #[must_use]
 pub fn main_with(registry: &Registry) -> ExitCode {
+    leave_nothing_half();
     let (json, outcome) = match CommandLine::try_parse() {
         Ok(line) => (line.json, commands::execute(line.command, line.json, registry)),
         Err(error) if error.use_stderr() => (std::env::args_os().any(|word| word == "--json"), Err(error.into())),
@@ -38,4 +42,16 @@ pub fn main_with(registry: &Registry) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(json),
     }
+}
+
+/// Has an interrupted program take away what it has begun.
+fn leave_nothing_half() {
+    /// As shells count: 128 and the signal.
+    const INTERRUPTED: i32 = 130;
+    // Where no handler can be set, a later run takes it away.
+    let _ = ctrlc::set_handler(|| {
+        abandon_all();
+        let _ = writeln!(io::stderr(), "\ninterrupted: nothing was written");
+        std::process::exit(INTERRUPTED);
+    });
 }

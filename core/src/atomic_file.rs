@@ -4,15 +4,56 @@ use std::{
     fs,
     path::{Component, Path, PathBuf},
     sync::{
-        Mutex, PoisonError,
+        Mutex, MutexGuard, PoisonError,
         atomic::{AtomicU64, Ordering},
     },
 };
 
 use crate::{Error, Result};
 
-/// Folders that this process made.
-static MADE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// What this process has begun and not finished.
+static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new() });
+
+struct UnderWay {
+    /// Temporary files.
+    files: Vec<PathBuf>,
+    /// Folders that were made.
+    folders: Vec<PathBuf>,
+}
+
+impl UnderWay {
+    fn now() -> MutexGuard<'static, Self> {
+        UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Removes a temporary file, and the folders made for it where nothing else came into them.
+    fn remove(&mut self, temporary: &Path) {
+        self.files.retain(|file| file != temporary);
+        // Nothing more can be done about a temporary file that will not go.
+        let _ = fs::remove_file(temporary);
+        let made = temporary.ancestors().skip(1).take_while(|folder| self.folders.iter().any(|made| made == folder));
+        // Folders with something in them do not go.
+        let _ = made.map(fs::remove_dir).take_while(std::result::Result::is_ok).count();
+    }
+
+    /// Gives a file its final name.
+    fn finish(&mut self, file: &mut PendingFile) -> Result<PathBuf> {
+        fs::rename(&file.temporary, &file.destination).map_err(|error| file.failure(error))?;
+        self.files.retain(|pending| *pending != file.temporary);
+        file.committed = true;
+        Ok(file.destination.clone())
+    }
+}
+
+/// Removes all that was begun and not finished, for a program that ends now: nothing can be begun or finished afterwards.
+pub fn abandon_all() {
+    let mut under_way = UnderWay::now();
+    while let Some(file) = under_way.files.pop() {
+        under_way.remove(&file);
+    }
+    // Whoever is still at work waits for the end.
+    std::mem::forget(under_way);
+}
 
 /// A file being written under a temporary name beside its final one.
 ///
@@ -58,6 +99,7 @@ impl PendingFile {
         remove_stale(folder, &name);
         let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
         let temporary = folder.join(format!(".{name}.{}-{serial}.partial", std::process::id()));
+        UnderWay::now().files.push(temporary.clone());
         Ok(Self { temporary, destination, committed: false })
     }
 
@@ -108,22 +150,14 @@ impl PendingFile {
     /// # Errors
     /// When the file system refuses the rename.
     pub fn commit(mut self) -> Result<PathBuf> {
-        fs::rename(&self.temporary, &self.destination).map_err(|error| self.failure(error))?;
-        self.committed = true;
-        Ok(self.destination.clone())
+        UnderWay::now().finish(&mut self)
     }
 }
 
 impl Drop for PendingFile {
     fn drop(&mut self) {
         if !self.committed {
-            // Nothing more can be done about a temporary file that will not go.
-            let _ = fs::remove_file(&self.temporary);
-            let made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-            let folders =
-                self.temporary.ancestors().skip(1).take_while(|folder| made.iter().any(|made| made == folder));
-            // Folders with something in them do not go.
-            let _ = folders.map(fs::remove_dir).take_while(std::result::Result::is_ok).count();
+            UnderWay::now().remove(&self.temporary);
         }
     }
 }
@@ -133,7 +167,7 @@ fn make(folder: &Path) -> std::io::Result<()> {
     let missing = folder.ancestors().take_while(|above| !above.as_os_str().is_empty() && !above.exists());
     let missing: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
     fs::create_dir_all(folder)?;
-    MADE.lock().unwrap_or_else(PoisonError::into_inner).extend(missing);
+    UnderWay::now().folders.extend(missing);
     Ok(())
 }
 
@@ -158,8 +192,12 @@ fn remove_stale(folder: &Path, name: &str) {
 ///
 /// # Errors
 /// When the file system refuses a rename.
-pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
-    files.into_iter().map(PendingFile::commit).collect()
+pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
+    let mut under_way = UnderWay::now();
+    let finished = files.iter_mut().map(|file| under_way.finish(file)).collect();
+    // Files that are left need it for their removal.
+    drop(under_way);
+    finished
 }
 
 /// One spelling of a path, by which two paths to the same file can be told to be so, whether or not it exists yet.

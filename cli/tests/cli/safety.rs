@@ -97,3 +97,31 @@ fn what_a_killed_run_left_goes_with_the_next() {
     let left: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert!(left.iter().all(|name| !name.to_string_lossy().ends_with(".partial")), "{left:?}");
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_interrupted_program_leaves_nothing() {
+    use std::{
+        process::{Command, Stdio},
+        time::Duration,
+    };
+
+    let folder = campaign(&pipeline());
+    let out = folder.path().join("out");
+    let begun = || fs::read_dir(&out).is_ok_and(|mut entries| entries.next().is_some());
+    // Long enough to be interrupted.
+    let long = ["recording.stations={ first_z_mm = 0, step_mm = 0.001, count = 4000 }", "output=out/long.h5"];
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("runout"));
+    let command =
+        command.current_dir(folder.path()).args(["simulate", "scenario.toml", "--set", long[0], "--set", long[1]]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while !begun() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(said.contains("interrupted: nothing was written"), "{said}");
+    assert!(!out.exists());
+}
