@@ -110,7 +110,12 @@ const MANY: usize = 48;
 /// Any campaign fits into this much of resident memory.
 const RESIDENT_BYTES: usize = 150_000_000;
 /// What a station may leave behind: its lines in the summary and in the tables' indices, as values, then as text.
-const LEFT_BYTES: usize = 64 * 1024;
+const LEFT_BYTES: usize = 8 * 1024;
+/// Threads that read ahead and write behind meet as chance has it: of more stations, more meet at their worst. In a dozen runs
+/// of 48 stations the peaks were 24.6 to 28.0 MB.
+const CHANCE_BYTES: usize = 3 * STATION_BYTES;
+/// Runs, of which the least peak counts.
+const RUNS: usize = 2;
 
 fn registry() -> Registry {
     let mut registry = Registry::default();
@@ -151,14 +156,19 @@ fn measure(stations: usize, folder: &Path) -> Peaks {
     let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY).unwrap();
     let pipeline = Pipeline::from_sources(&sources, &registry()).unwrap();
 
-    // Writing 5 there sets the process's peak back to what it holds now (proc(5)).
-    let told = fs::write("/proc/self/clear_refs", "5").is_ok();
-    let before = HELD.load(Ordering::Relaxed);
-    PEAK.store(before, Ordering::Relaxed);
-    let summary = run(&pipeline, NonZeroUsize::new(1), &Silent).unwrap();
-    let counted = PEAK.load(Ordering::Relaxed) - before;
-    assert_eq!(summary.stations.len(), stations);
-    Peaks { counted, resident: told.then(resident_peak).flatten() }
+    let mut least = Peaks { counted: usize::MAX, resident: None };
+    for _ in 0..RUNS {
+        // Writing 5 there sets the process's peak back to what it holds now (proc(5)).
+        let told = fs::write("/proc/self/clear_refs", "5").is_ok();
+        let before = HELD.load(Ordering::Relaxed);
+        PEAK.store(before, Ordering::Relaxed);
+        let summary = run(&pipeline, NonZeroUsize::new(1), &Silent).unwrap();
+        let counted = PEAK.load(Ordering::Relaxed) - before;
+        assert_eq!(summary.stations.len(), stations);
+        least.counted = least.counted.min(counted);
+        least.resident = [least.resident, told.then(resident_peak).flatten()].into_iter().flatten().min();
+    }
+    least
 }
 
 fn resident_peak() -> Option<usize> {
@@ -176,10 +186,9 @@ fn peak_memory_does_not_grow_with_stations() {
     let more = MANY - FEW;
     println!("counted: {} bytes with {FEW} stations, {} with {MANY}", few.counted, many.counted);
     let grown = many.counted.saturating_sub(few.counted);
-    // Threads that read ahead and write behind meet as chance has it: of more stations, more meet at their worst.
-    assert!(grown < STATION_BYTES + more * LEFT_BYTES, "{grown} bytes more with {more} stations more");
+    assert!(grown < CHANCE_BYTES + more * LEFT_BYTES, "{grown} bytes more with {more} stations more");
     // Samples that were kept would be far more than what is allowed; else this would show nothing.
-    const { assert!((MANY - FEW) * STATION_BYTES > 10 * (STATION_BYTES + (MANY - FEW) * LEFT_BYTES)) };
+    const { assert!((MANY - FEW) * STATION_BYTES > 10 * (CHANCE_BYTES + (MANY - FEW) * LEFT_BYTES)) };
 
     if let (Some(few), Some(many)) = (few.resident, many.resident) {
         println!("resident: {few} bytes with {FEW} stations, {many} with {MANY}");
