@@ -51,7 +51,7 @@ fn leave_nothing_half() {
     // Where no handler can be set, a later run takes it away.
     let _ = ctrlc::set_handler(|| {
         abandon_all();
-        let _ = writeln!(io::stderr(), "\ninterrupted: nothing was written");
+        let _ = writeln!(io::stderr(), "\ninterrupted: what was not finished is taken away");
         std::process::exit(INTERRUPTED);
     });
 }

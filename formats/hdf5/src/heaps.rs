@@ -21,6 +21,9 @@ const SIGNATURE: &[u8] = b"GCOL\x01\0\0\0";
 const HEADER: usize = 16;
 /// Bytes that are looked through at once.
 const PIECE: usize = 1 << 20;
+/// Most bytes of a collection that are looked at: the library makes them of 4 to 64 kB, or for one longer text. A damaged length
+/// is not to fill the memory.
+const LONGEST: u64 = 1 << 24;
 /// In larger files, data are passed over, which costs a look at every dataset.
 const SMALL: u64 = 1 << 24;
 /// Groups in groups that data are looked for in.
@@ -78,7 +81,7 @@ fn find(source: &mut (impl Read + Seek), range: Range<u64>) -> std::io::Result<O
         let places: Vec<u64> = memmem::find_iter(&bytes, SIGNATURE).map(|place| from + place as u64).collect();
         for place in places {
             read(source, place, HEADER as u64, &mut bytes)?;
-            let length = number(&bytes, 8).unwrap_or(0);
+            let length = number(&bytes, 8).unwrap_or(0).min(LONGEST);
             read(source, place, length, &mut bytes)?;
             if is_endless(&bytes) {
                 return Ok(Some(place));

@@ -1,4 +1,4 @@
-//! Parts of a file that are made on all processors and written in their order.
+//! Parts of a file that are made side by side and written in their order.
 
 use std::{
     io::{self, Write},
