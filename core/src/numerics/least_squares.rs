@@ -84,28 +84,24 @@ impl PivotedQr {
         self.rank
     }
 
-    /// The operator P (`[col][row]`) with x = P·b the (basic) least-squares solution.
-    ///
-    /// `weights` is W (`[row][row]`), where the factored matrix was W·A: then P belongs to A and the unweighted b.
+    /// The operator P (`[col][row]`) with x = P·b the (basic) least-squares solution: S·Π·R⁻¹·Qᴴ.
     #[must_use]
-    pub fn operator(&self, weights: Option<&[Complex64]>) -> Vec<Complex64> {
+    pub fn operator(&self) -> Vec<Complex64> {
         let (rows, cols) = (self.rows, self.cols);
-        // Qᴴ·W, `[row][row]`, all columns side by side.
-        let mut work = weights.map_or_else(|| identity(rows), <[Complex64]>::to_vec);
-        let mut dots = vec![Complex64::ZERO; rows];
-        for (step, (lead, tau)) in self.reflectors.iter().enumerate() {
-            let reflector = |row: usize| if row == step { *lead } else { self.factors[row * cols + step] };
-            dots.fill(Complex64::ZERO);
-            for (row, source) in work.chunks_exact(rows).enumerate().skip(step) {
-                let factor = reflector(row).conj() * *tau;
-                dots.iter_mut().zip(source).for_each(|(dot, value)| *dot += factor * value);
+        // The first rows of Qᴴ, each the adjoint of H₀·…·Hₛ·eₛ: later reflectors leave eₛ as it is.
+        let mut work = vec![Complex64::ZERO; self.rank * rows];
+        for (unit, column) in work.chunks_exact_mut(rows.max(1)).enumerate() {
+            column[unit] = Complex64::ONE;
+            for (step, (lead, tau)) in self.reflectors.iter().enumerate().take(unit + 1).rev() {
+                let below = || self.factors[step..].iter().step_by(cols).skip(step + 1);
+                let (head, rest) = column[step..].split_at_mut(1);
+                let dot = lead.conj() * head[0] + below().zip(&*rest).map(|(v, q)| v.conj() * q).sum::<Complex64>();
+                let dot = dot * *tau;
+                head[0] -= lead * dot;
+                rest.iter_mut().zip(below()).for_each(|(q, v)| *q -= v * dot);
             }
-            for (row, target) in work.chunks_exact_mut(rows).enumerate().skip(step) {
-                let factor = reflector(row);
-                target.iter_mut().zip(&dots).for_each(|(value, dot)| *value -= factor * dot);
-            }
+            column.iter_mut().for_each(|entry| *entry = entry.conj());
         }
-        // R⁻¹ of the first rows.
         let mut operator = vec![Complex64::ZERO; cols * rows];
         for row in (0..self.rank).rev() {
             let (above, below) = work.split_at_mut((row + 1) * rows);
@@ -185,12 +181,6 @@ impl PivotedQr {
     }
 }
 
-fn identity(size: usize) -> Vec<Complex64> {
-    let mut identity = vec![Complex64::ZERO; size * size];
-    identity.iter_mut().step_by(size + 1).for_each(|entry| *entry = Complex64::ONE);
-    identity
-}
-
 /// Lower Cholesky factor L (`[row][col]`) of a Hermitian matrix, L·Lᴴ; `None` where it is not positive definite.
 #[must_use]
 pub fn cholesky(size: usize, matrix: &[Complex64]) -> Option<Vec<Complex64>> {
@@ -252,7 +242,7 @@ mod tests {
         let (rows, cols) = (8, 6);
         let matrix = random(rows, cols, &mut seed);
         let qr = PivotedQr::new(rows, cols, &matrix, 1e-12);
-        let operator = qr.operator(None);
+        let operator = qr.operator();
         let identity = times(cols, rows, cols, &operator, &matrix);
         for (index, entry) in identity.iter().enumerate() {
             let expected = if index % (cols + 1) == 0 { 1.0 } else { 0.0 };
@@ -284,7 +274,7 @@ mod tests {
         assert_eq!(qr.observable(1e-8), [false, true, false, true]);
         let truth = random(cols, 1, &mut seed);
         let right = times(rows, cols, 1, &matrix, &truth);
-        let found = times(cols, rows, 1, &qr.operator(None), &right);
+        let found = times(cols, rows, 1, &qr.operator(), &right);
         assert!((found[1] - truth[1]).norm() < 1e-12 && (found[3] - truth[3]).norm() < 1e-12);
     }
 

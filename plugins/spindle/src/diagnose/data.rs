@@ -15,7 +15,7 @@ use crate::{
     layout::Layout,
     selection::Selection,
     separators::{
-        Readings, apply, expected_weighted_squares, harmonic_least_squares::order_operators, smooth, whitening,
+        Blocks, Readings, apply, expected_weighted_squares, harmonic_least_squares::order_operators, smooth, whitening,
     },
 };
 
@@ -71,7 +71,7 @@ pub struct StationData {
     /// Turns that the fit does not see.
     pub held_out: Option<Readings>,
     /// W of each order from 1; nothing without a scatter.
-    pub weights: Option<Vec<Vec<Complex64>>>,
+    pub weights: Option<Vec<Blocks>>,
     /// Mean square of a weighted residual's degree of freedom, by order from 1: 1 for independent turns.
     pub floor: Vec<f64>,
     /// What the single turns show.
@@ -169,19 +169,12 @@ impl StationData {
     }
 
     /// W of an order from 1 for displacements: that of the readings times what they respond with.
-    pub fn weights_of(&self, order: usize, layout: &Layout, alterations: &Alterations) -> Vec<Complex64> {
-        let count = self.readings.count;
+    pub fn weights_of(&self, order: usize, layout: &Layout, alterations: &Alterations) -> Blocks {
         let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order);
-        let Some(weights) = &self.weights else {
-            let mut identity = vec![Complex64::ZERO; count * count];
-            (0..count).for_each(|index| identity[index * count + index] = response(index));
-            return identity;
-        };
-        let mut scaled = weights[order - 1].clone();
-        for row in scaled.chunks_exact_mut(count) {
-            row.iter_mut().enumerate().for_each(|(index, entry)| *entry *= response(index));
-        }
-        scaled
+        let setups = self.readings.turns.len();
+        let unweighted = || Blocks::identity(self.readings.count / setups, setups);
+        let weights = self.weights.as_ref().map_or_else(unweighted, |weights| weights[order - 1].clone());
+        weights.with_columns_scaled(response)
     }
 
     /// Noise of the residual's degrees of freedom at an order from 1, as a standard deviation of weighted residuals.
@@ -191,7 +184,7 @@ impl StationData {
 }
 
 /// The covariance of the mean, projected to where the fit cannot reach, beside that of independent turns.
-fn floor(layout: &Layout, readings: &Readings, weights: &[Vec<Complex64>]) -> Vec<f64> {
+fn floor(layout: &Layout, readings: &Readings, weights: &[Blocks]) -> Vec<f64> {
     let operators = order_operators(layout, readings.max_order, Some(weights));
     let count = readings.count;
     let (mut sums, mut dofs) = (vec![0.0; readings.max_order], vec![0.0; readings.max_order]);

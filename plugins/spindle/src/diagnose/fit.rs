@@ -18,9 +18,7 @@ use super::{
 use crate::{
     effects::{ActsOn, Alterations, Predicted},
     layout::Layout,
-    separators::{
-        Estimate, Operators, Readings, Solver, apply, harmonic_least_squares::order_operators, leftover, product,
-    },
+    separators::{Estimate, Operators, Readings, Solver, apply, harmonic_least_squares::order_operators, leftover},
 };
 
 /// A fit, and what its partials need.
@@ -124,8 +122,7 @@ impl Solved {
         alterations.correct(layout, &mut corrected);
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.
-        let weights: Vec<Vec<Complex64>> =
-            (1..=max_order).map(|order| data.weights_of(order, layout, alterations)).collect();
+        let weights: Vec<_> = (1..=max_order).map(|order| data.weights_of(order, layout, alterations)).collect();
         let operators = Operators {
             orders: order_operators(layout, max_order, Some(&weights)),
             observable: (1..=max_order).map(|order| layout.observable(order)).collect(),
@@ -140,7 +137,7 @@ impl Solved {
             .map(|order| {
                 let system = layout.system(order);
                 let left = leftover(&system.matrix, &operators.orders[order - 1].operator, count);
-                let mut left = product(&weights[order - 1], &left, count);
+                let mut left = weights[order - 1].times(&left, count);
                 // A real degree of freedom has half of a complex one's square.
                 let scale = std::f64::consts::SQRT_2 / data.floor_std(order);
                 for entry in &mut left {
@@ -258,7 +255,7 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
         // Readings were recorded, not displacements.
         let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order).norm_sqr();
         squares += left.iter().enumerate().map(|(index, value)| value.norm_sqr() * response(index)).sum::<f64>();
-        let weighted = apply(&data.weights_of(order, layout, alterations), &left);
+        let weighted = data.weights_of(order, layout, alterations).times(&left, 1);
         chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / data.floor_std(order).powi(2);
     }
     Some((chi2, squares))

@@ -10,12 +10,114 @@ pub fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
     matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
 }
 
-/// Product of two square matrices.
-pub fn product(left: &[Complex64], right: &[Complex64], size: usize) -> Vec<Complex64> {
-    let mut product = vec![Complex64::ZERO; size * size];
-    for (row, target) in left.chunks_exact(size).zip(product.chunks_exact_mut(size)) {
-        for (factor, source) in row.iter().zip(right.chunks_exact(size)) {
-            target.iter_mut().zip(source).for_each(|(to, from)| *to += factor * from);
+/// A square matrix over the readings that is 0 from one setup to another.
+#[derive(Debug, Clone)]
+pub struct Blocks {
+    size: usize,
+    /// `[setup][sensor][sensor]`.
+    entries: Vec<Complex64>,
+}
+
+impl Blocks {
+    /// Of blocks with `size` rows each, `[setup][sensor][sensor]`.
+    #[must_use]
+    pub fn new(size: usize, entries: Vec<Complex64>) -> Self {
+        Self { size, entries }
+    }
+
+    /// 1 on the diagonal.
+    #[must_use]
+    pub fn identity(size: usize, setups: usize) -> Self {
+        let mut entries = vec![Complex64::ZERO; size * size * setups];
+        for block in entries.chunks_exact_mut(size * size) {
+            block.iter_mut().step_by(size + 1).for_each(|entry| *entry = Complex64::ONE);
+        }
+        Self { size, entries }
+    }
+
+    fn blocks(&self) -> impl ExactSizeIterator<Item = &[Complex64]> + Clone {
+        self.entries.chunks_exact(self.size * self.size)
+    }
+
+    /// B·A for A, `[reading][column]`.
+    #[must_use]
+    pub fn times(&self, matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
+        let mut product = vec![Complex64::ZERO; matrix.len()];
+        let setups = self.size * columns;
+        for (block, (source, target)) in
+            self.blocks().zip(matrix.chunks_exact(setups).zip(product.chunks_exact_mut(setups)))
+        {
+            for (row, target) in block.chunks_exact(self.size).zip(target.chunks_exact_mut(columns)) {
+                for (entry, source) in row.iter().zip(source.chunks_exact(columns)) {
+                    target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
+                }
+            }
+        }
+        product
+    }
+
+    /// Bᴴ·A for A, `[reading][column]`.
+    fn adjoint_times(&self, matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
+        let mut product = vec![Complex64::ZERO; matrix.len()];
+        let setups = self.size * columns;
+        for (block, (source, target)) in
+            self.blocks().zip(matrix.chunks_exact(setups).zip(product.chunks_exact_mut(setups)))
+        {
+            for (row, source) in block.chunks_exact(self.size).zip(source.chunks_exact(columns)) {
+                for (entry, target) in row.iter().zip(target.chunks_exact_mut(columns)) {
+                    target.iter_mut().zip(source).for_each(|(to, from)| *to += entry.conj() * from);
+                }
+            }
+        }
+        product
+    }
+
+    /// M·B for M, `[row][reading]`.
+    #[must_use]
+    pub fn after(&self, rows: &[Complex64]) -> Vec<Complex64> {
+        times_blocks(rows, self.size, self.blocks())
+    }
+
+    /// Each reading's column times a factor.
+    #[must_use]
+    pub fn with_columns_scaled(mut self, factor: impl Fn(usize) -> Complex64) -> Self {
+        let size = self.size;
+        for (setup, block) in self.entries.chunks_exact_mut(size * size).enumerate() {
+            for row in block.chunks_exact_mut(size) {
+                row.iter_mut().enumerate().for_each(|(index, entry)| *entry *= factor(setup * size + index));
+            }
+        }
+        self
+    }
+
+    /// The trace of B·Σ·Bᴴ.
+    fn trace_about(&self, spread: &Spread<'_>) -> f64 {
+        let mut trace = 0.0;
+        for (block, spread) in self.blocks().zip(spread.blocks()) {
+            for row in block.chunks_exact(self.size) {
+                for (entry, spread) in row.iter().zip(spread.chunks_exact(self.size)) {
+                    trace += (entry * dot(row, spread)).re;
+                }
+            }
+        }
+        trace
+    }
+}
+
+/// M·B for M (`[row][reading]`) and the blocks of B, each with `size` rows.
+pub fn times_blocks<'a>(
+    rows: &[Complex64],
+    size: usize,
+    blocks: impl ExactSizeIterator<Item = &'a [Complex64]> + Clone,
+) -> Vec<Complex64> {
+    let readings = size * blocks.len();
+    let mut product = vec![Complex64::ZERO; rows.len()];
+    for (row, target) in rows.chunks_exact(readings).zip(product.chunks_exact_mut(readings)) {
+        let parts = row.chunks_exact(size).zip(target.chunks_exact_mut(size));
+        for ((row, target), block) in parts.zip(blocks.clone()) {
+            for (entry, source) in row.iter().zip(block.chunks_exact(size)) {
+                target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
+            }
         }
     }
     product
@@ -36,8 +138,11 @@ pub fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usize) -> V
 
 /// A·Bᴴ for A and B (`[row][reading]`), `[row of A][row of B]`.
 pub fn times_adjoint(left: &[Complex64], right: &[Complex64], count: usize) -> Vec<Complex64> {
-    let rows = left.chunks_exact(count);
-    rows.flat_map(|row| right.chunks_exact(count).map(move |other| dot(other, row))).collect()
+    let mut product = Vec::with_capacity(left.len() / count * (right.len() / count));
+    for row in left.chunks_exact(count) {
+        product.extend(right.chunks_exact(count).map(|other| dot(other, row)));
+    }
+    product
 }
 
 /// bᴴ·a.
@@ -64,54 +169,15 @@ pub fn expected_squares(system: &System, operator: &[Complex64], spread: &Spread
 
 /// The same of the residual weighted by W, P being the least-squares operator of W·A: the trace of
 /// W·(I − A·P)·Σ·(I − A·P)ᴴ·Wᴴ.
-pub fn expected_weighted_squares(
-    system: &System,
-    weights: &[Complex64],
-    spread: &Spread<'_>,
-    passed: &[Complex64],
-) -> f64 {
+pub fn expected_weighted_squares(system: &System, weights: &Blocks, spread: &Spread<'_>, passed: &[Complex64]) -> f64 {
     let count = system.matrix.len() / system.columns;
     // W·A·P is the projector on the columns of W·A, times W, which leaves tr(WΣWᴴ) − Re tr(PΣ·WᴴW·A).
-    let weighted = trace(weights, &spread.times(weights), count);
-    let normal = weighted_normal(weights, &system.matrix, system.columns);
+    let normal = weights.adjoint_times(&weights.times(&system.matrix, system.columns), system.columns);
     let fitted: f64 = (passed.chunks_exact(count).enumerate())
         .flat_map(|(unknown, row)| row.iter().zip(normal.iter().skip(unknown).step_by(system.columns)))
         .map(|(passed, entry)| (passed * entry).re)
         .sum();
-    (weighted - fitted).max(0.0)
-}
-
-/// The trace of A·Bᴴ for square A and B.
-fn trace(b: &[Complex64], a: &[Complex64], count: usize) -> f64 {
-    a.chunks_exact(count).zip(b.chunks_exact(count)).map(|(a, b)| dot(b, a).re).sum()
-}
-
-/// WᴴW·A, `[reading][unknown]`.
-fn weighted_normal(weights: &[Complex64], matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
-    let count = matrix.len() / columns;
-    let mut normal = vec![Complex64::ZERO; matrix.len()];
-    for (row, weighted) in weights.chunks_exact(count).zip(weigh(weights, matrix, columns).chunks_exact(columns)) {
-        for (entry, target) in row.iter().zip(normal.chunks_exact_mut(columns)) {
-            if *entry != Complex64::ZERO {
-                target.iter_mut().zip(weighted).for_each(|(to, from)| *to += entry.conj() * from);
-            }
-        }
-    }
-    normal
-}
-
-/// W·A, `[reading][unknown]`; most of W is 0, as setups are independent.
-pub fn weigh(weights: &[Complex64], matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
-    let count = matrix.len() / columns;
-    let mut weighted = vec![Complex64::ZERO; matrix.len()];
-    for (row, target) in weights.chunks_exact(count).zip(weighted.chunks_exact_mut(columns)) {
-        for (entry, source) in row.iter().zip(matrix.chunks_exact(columns)) {
-            if *entry != Complex64::ZERO {
-                target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
-            }
-        }
-    }
-    weighted
+    (weights.trace_about(spread) - fitted).max(0.0)
 }
 
 #[cfg(test)]
@@ -140,21 +206,19 @@ mod tests {
 
     /// The trace of M·Σ·Mᴴ, written out.
     fn squares(matrix: &[Complex64], spread: &Spread<'_>) -> f64 {
-        trace(matrix, &spread.times(matrix), COUNT)
+        let passed = spread.times(matrix);
+        passed.chunks_exact(COUNT).zip(matrix.chunks_exact(COUNT)).map(|(a, b)| dot(b, a).re).sum()
     }
 
     #[test]
     fn expected_squares_are_those_of_what_is_left() {
         let blocks = [covariance(0.7), covariance(1.9)];
         let spread = Spread::new(SENSORS, &blocks, 0);
-        let mut weights = vec![Complex64::ZERO; COUNT * COUNT];
-        for (setup, block) in [covariance(2.3), covariance(0.2)].iter().enumerate() {
-            let Some(factor) = cholesky(SENSORS, block) else { panic!("it is positive definite") };
-            for (row, entries) in invert_lower(SENSORS, &factor).chunks_exact(SENSORS).enumerate() {
-                let start = (setup * SENSORS + row) * COUNT + setup * SENSORS;
-                weights[start..start + SENSORS].copy_from_slice(entries);
-            }
-        }
+        let whitening = |phase| {
+            let Some(factor) = cholesky(SENSORS, &covariance(phase)) else { panic!("it is positive definite") };
+            invert_lower(SENSORS, &factor)
+        };
+        let weights = Blocks::new(SENSORS, [whitening(2.3), whitening(0.2)].concat());
         let mut matrix = some(COUNT * COLUMNS, 1.3);
         for deficient in [false, true] {
             if deficient {
@@ -163,16 +227,15 @@ mod tests {
                 }
             }
             let system = System { columns: COLUMNS, matrix: matrix.clone(), observable: vec![true; COLUMNS] };
-            let weighted = weigh(&weights, &matrix, COLUMNS);
-            let qr = PivotedQr::new(COUNT, COLUMNS, &weighted, 1e-9);
+            let qr = PivotedQr::new(COUNT, COLUMNS, &weights.times(&matrix, COLUMNS), 1e-9);
             assert_eq!(qr.rank(), if deficient { 2 } else { 3 });
-            let operator = qr.operator(Some(&weights));
+            let operator = weights.after(&qr.operator());
             let left = leftover(&matrix, &operator, COUNT);
             let (found, expected) =
                 (expected_squares(&system, &operator, &spread, &spread.times(&operator)), squares(&left, &spread));
             assert!((found / expected - 1.0).abs() < 1e-10, "{found} {expected}");
             let found = expected_weighted_squares(&system, &weights, &spread, &spread.times(&operator));
-            let expected = squares(&product(&weights, &left, COUNT), &spread);
+            let expected = squares(&weights.times(&left, COUNT), &spread);
             assert!((found / expected - 1.0).abs() < 1e-10, "{found} {expected}");
         }
     }

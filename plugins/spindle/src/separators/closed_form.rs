@@ -157,7 +157,7 @@ impl ClosedFormSeparator {
         for order in 2..=readings.max_order {
             let qr = self.layout.factor(order);
             // What is left of a lost order is still a residual: any least-squares solution shows it.
-            let operator = self.method.operator(&self.layout, order).unwrap_or_else(|| qr.operator(None));
+            let operator = self.method.operator(&self.layout, order).unwrap_or_else(|| qr.operator());
             orders.push(OrderOperator { operator, rank: qr.rank() });
         }
         let observable = (1..=readings.max_order).map(|order| self.layout.observable(order)).collect();

@@ -1,7 +1,7 @@
 //! The general separator: any rig, one complex least-squares problem an order.
 
 use runout_core::{
-    Complex64, Result,
+    Result,
     model::foresight::Foresight,
     pipeline::{
         effects::EffectCatalogue,
@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    algebra::weigh,
+    algebra::Blocks,
     closed_form::{checked_gain, yes},
     projection::projection,
     readings::Readings,
@@ -150,17 +150,16 @@ pub fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> 
 
 /// Least-squares operators of orders from 1, with W of each order where readings are weighted.
 #[must_use]
-pub fn order_operators(layout: &Layout, max_order: usize, weights: Option<&[Vec<Complex64>]>) -> Vec<OrderOperator> {
+pub fn order_operators(layout: &Layout, max_order: usize, weights: Option<&[Blocks]>) -> Vec<OrderOperator> {
     let solve = |order: usize| {
         let system = layout.system(order);
         let (columns, matrix) = (system.columns, &system.matrix);
         let Some(weights) = weights.map(|weights| &weights[order - 1]) else {
             let qr = layout.factor_matrix(columns, matrix);
-            return OrderOperator { operator: qr.operator(None), rank: qr.rank() };
+            return OrderOperator { operator: qr.operator(), rank: qr.rank() };
         };
-        let weighted = weigh(weights, matrix, columns);
-        let qr = layout.factor_matrix(columns, &weighted);
-        OrderOperator { operator: qr.operator(Some(weights)), rank: qr.rank() }
+        let qr = layout.factor_matrix(columns, &weights.times(matrix, columns));
+        OrderOperator { operator: weights.after(&qr.operator()), rank: qr.rank() }
     };
     (1..=max_order).map(solve).collect()
 }

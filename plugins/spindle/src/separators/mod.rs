@@ -15,7 +15,7 @@ mod swapped_setups;
 pub mod three_point;
 mod weights;
 
-pub(crate) use algebra::{apply, expected_weighted_squares, leftover, product};
+pub(crate) use algebra::{Blocks, apply, expected_weighted_squares, leftover};
 pub(crate) use readings::Readings;
 pub(crate) use second_order::{OVERSAMPLING, interpolate};
 pub(crate) use solution::{Estimate, Operators, Solver};

@@ -24,7 +24,7 @@ pub(super) fn projection(selection: &Selection, layout: &Layout, setup: usize) -
     let row = |reading| motions.iter().map(move |motion| coefficient(reading, *motion));
     let matrix: Vec<_> = readings.iter().flat_map(|reading| row(reading)).collect();
     let qr = PivotedQr::new(readings.len(), motions.len(), &matrix, RANK_TOLERANCE);
-    let operator = qr.operator(None);
+    let operator = qr.operator();
     let told = qr.observable(NULL_TOLERANCE).into_iter();
     let rows = motions.iter().zip(operator.chunks_exact(readings.len())).zip(told).filter(|(_, told)| *told);
     let rows: Vec<_> = rows

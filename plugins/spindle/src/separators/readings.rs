@@ -2,6 +2,7 @@
 
 use runout_core::{Complex64, Error, Result, profile::Profile, stage::Station};
 
+use super::algebra::times_blocks;
 use crate::{layout::Layout, selection::Selection};
 
 /// Averaged readings of one station: Re Σ uₙ e^{−inΦ}, with their covariance.
@@ -130,7 +131,7 @@ impl<'a> Spread<'a> {
     }
 
     /// The matrix of each setup, `[sensor][sensor]`.
-    fn blocks(&self) -> impl Iterator<Item = &'a [Complex64]> + Clone {
+    pub fn blocks(&self) -> impl ExactSizeIterator<Item = &'a [Complex64]> + Clone {
         let block = self.sensors * self.sensors;
         let place = self.order * block..(self.order + 1) * block;
         self.setups.iter().map(move |orders| &orders[place.clone()])
@@ -144,20 +145,7 @@ impl<'a> Spread<'a> {
 
     /// M·Σ for M, both `[row][reading]`.
     #[must_use]
-    pub fn times(&self, matrix: &[Complex64]) -> Vec<Complex64> {
-        let (sensors, count) = (self.sensors, self.sensors * self.setups.len());
-        let mut product = vec![Complex64::ZERO; matrix.len()];
-        for (row, target) in matrix.chunks_exact(count).zip(product.chunks_exact_mut(count)) {
-            let parts = row.chunks_exact(sensors).zip(target.chunks_exact_mut(sensors));
-            for ((row, target), block) in parts.zip(self.blocks()) {
-                // A matrix of weights is 0 from one setup to another.
-                for (entry, source) in row.iter().zip(block.chunks_exact(sensors)) {
-                    if *entry != Complex64::ZERO {
-                        target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
-                    }
-                }
-            }
-        }
-        product
+    pub fn times(&self, rows: &[Complex64]) -> Vec<Complex64> {
+        times_blocks(rows, self.sensors, self.blocks())
     }
 }

@@ -8,7 +8,7 @@ use runout_core::{
 };
 
 use super::{
-    algebra::{apply, expected_squares, expected_weighted_squares, times_adjoint},
+    algebra::{Blocks, apply, expected_squares, expected_weighted_squares, times_adjoint},
     readings::Readings,
     second_order::SecondOrder,
     swapped_setups, weights,
@@ -40,7 +40,7 @@ pub struct Operators {
     /// Whether each unknown can be told, `[order − 1][unknown]`.
     pub observable: Vec<Vec<bool>>,
     /// W of each order where readings were weighted.
-    pub weights: Option<Vec<Vec<Complex64>>>,
+    pub weights: Option<Vec<Blocks>>,
 }
 
 /// The unknowns at all orders, motion at the sensors' mean z.
@@ -210,7 +210,7 @@ impl Solver<'_> {
                     let passed = spread.times(operator);
                     expected += expected_squares(&system, operator, &spread, &passed);
                     if let Some(weights) = operators.weights.as_ref().map(|weights| &weights[order - 1]) {
-                        weighted += apply(weights, &residual).iter().map(Complex64::norm_sqr).sum::<f64>();
+                        weighted += weights.times(&residual, 1).iter().map(Complex64::norm_sqr).sum::<f64>();
                         weighted_expected += expected_weighted_squares(&system, weights, &spread, &passed);
                     }
                 }

@@ -6,7 +6,7 @@ use runout_core::{
     profile::{self, SMOOTHING},
 };
 
-use super::readings::Readings;
+use super::{algebra::Blocks, readings::Readings};
 
 /// With fewer independent samples a channel than this, correlations are shrunk towards none.
 const SAMPLES_A_CHANNEL: f64 = 10.0;
@@ -19,26 +19,21 @@ pub fn smooth(readings: &mut Readings) {
     }
 }
 
-/// W with Wᴴ·W = Σ⁻¹ for one order's scatter Σ, `[reading][reading]`: with independent turns it makes errors uncorrelated
-/// and of size 1.
+/// W with Wᴴ·W = Σ⁻¹ for one order's scatter Σ: with independent turns it makes errors uncorrelated and of size 1.
 ///
 /// `None` where there is no scatter to weigh by (one turn, or turns that are all alike).
 #[must_use]
-pub fn whitening(readings: &Readings, order: usize) -> Option<Vec<Complex64>> {
+pub fn whitening(readings: &Readings, order: usize) -> Option<Blocks> {
     let setups = readings.scatter.as_ref()?;
     let sensors = readings.count / setups.len();
     let size = sensors * sensors;
-    let mut weights = vec![Complex64::ZERO; readings.count * readings.count];
+    let mut weights = Vec::with_capacity(size * setups.len());
     for (setup, matrices) in setups.iter().enumerate() {
         let mut matrix = matrices[order * size..(order + 1) * size].to_vec();
         regularise(&mut matrix, sensors, readings.turns[setup], if order == 1 { 1 } else { 2 * SMOOTHING + 1 });
-        let inverse = invert_lower(sensors, &cholesky(sensors, &matrix)?);
-        for row in 0..sensors {
-            let start = (setup * sensors + row) * readings.count + setup * sensors;
-            weights[start..start + sensors].copy_from_slice(&inverse[row * sensors..(row + 1) * sensors]);
-        }
+        weights.extend(invert_lower(sensors, &cholesky(sensors, &matrix)?));
     }
-    Some(weights)
+    Some(Blocks::new(sensors, weights))
 }
 
 fn regularise(matrix: &mut [Complex64], sensors: usize, turns: usize, window: usize) {
