@@ -205,6 +205,14 @@ impl Separation {
         picked.zip(seen).map(|(value, seen)| if *seen { *value } else { Complex64::ZERO })
     }
 
+    /// Whether no order (from 1) of an unknown can be told.
+    #[must_use]
+    pub fn is_lost(&self, unknown: usize) -> bool {
+        let width = self.unknowns.len();
+        let mut seen = self.observable.iter().skip(unknown).step_by(width).skip(1);
+        self.max_order() > 0 && !seen.any(|seen| *seen)
+    }
+
     /// Orders (from 1) at which one unknown cannot be told.
     #[must_use]
     pub fn lost_orders(&self, unknown: usize) -> Vec<usize> {
@@ -219,6 +227,9 @@ impl Separation {
     /// every angle. NaN where no variance is known.
     #[must_use]
     pub fn angle_std(&self, unknown: usize) -> f64 {
+        if self.is_lost(unknown) {
+            return f64::NAN;
+        }
         let width = self.unknowns.len();
         let seen = self.observable.iter().skip(unknown).step_by(width);
         let sum: f64 = self

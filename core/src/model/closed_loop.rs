@@ -4,7 +4,7 @@ use super::{
     Effect, Fit, Model, Parameter, Remainder, Setting,
     confounded::ConfoundedSet,
     diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Estimated, Level, Moved, Refused, Step, Verdict},
-    evidence::Evidence,
+    evidence::{Evidence, agreement},
     fit::{Prior, Refit, dot, norm, refit},
 };
 use crate::Result;
@@ -22,6 +22,8 @@ const FLOOR_CHI2: f64 = 1.5;
 /// Where something stays unexplained, an effect is believed only if it takes away this share of what was: a stranger lets
 /// the least bad effect take a part.
 const OWN_SHARE: f64 = 0.8;
+/// Chance of independent data agreeing as well on an effect that is not there, above which it is refused.
+const AGREEMENT: f64 = 0.01;
 /// Held-out data must improve by more than this share, so that rounding is no improvement.
 const HELD_OUT_GAIN: f64 = 1e-3;
 /// No effect is this many times larger than its tolerance.
@@ -235,8 +237,17 @@ impl<M: Model> Tracing<'_, M> {
         let mut trials = trials.into_iter();
         let (effect, trial, evidence) = trials.next()?;
         let after = trial.fit.remainder().clone();
+        let columns = independent(current.fit.signature(effect), &basis);
+        let each = (trial.chi2 - before.chi2()) / before.stretches.len().max(1) as f64;
+        let chance = agreement(&columns, &before.residual, &before.stretches);
         let reason = if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
             Some(format!("its evidence is weak: p {:.2e}, ΔBIC {:.1}", evidence.p_value, evidence.delta_bic))
+        } else if before.stretches.len() > 1 && !above_chance(&before) && before.noise_is_known() && each > BIC_LIMIT {
+            // Noise may be all that is left, and in each part it is not known better because there are more parts.
+            Some(format!(
+                "it would explain too little of each of {} parts of the data: Δχ² {each:.1}",
+                before.stretches.len()
+            ))
         } else if worse(before.held_out_chi2, after.held_out_chi2) {
             let [from, to] = if before.noise_is_known() {
                 [before.held_out_chi2, after.held_out_chi2].map(|chi2| format!("χ² {chi2:.1}"))
@@ -244,6 +255,9 @@ impl<M: Model> Tracing<'_, M> {
                 [before.held_out_rms, after.held_out_rms].map(|rms| format!("{rms:.4} {}", before.unit))
             };
             Some(format!("it does not lower the error of data left out of the fit: {from} → {to}"))
+        } else if let Some(chance) = chance.filter(|chance| *chance > AGREEMENT) {
+            let stretches = before.stretches.len();
+            Some(format!("{stretches} independent parts of the data do not agree on it: p {chance:.2}"))
         } else if let Some((parameter, value)) = self.beyond_belief(effect, &trial) {
             Some(format!("it would have to be larger than can be: {} = {value:.3e} {}", parameter.name, parameter.unit))
         } else {

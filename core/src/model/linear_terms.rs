@@ -158,6 +158,7 @@ impl Model for LinearTerms {
             held_out_rms: mean_square(&held_out).sqrt(),
             held_out_chi2: dot(&held_out, &held_out) / (scale * scale),
             residual: residual.iter().map(|value| value / scale).collect(),
+            stretches: Vec::new(),
             dof,
             unit: unit.clone(),
         };

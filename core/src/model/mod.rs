@@ -126,6 +126,9 @@ pub struct Remainder {
     /// In standard deviations of its noise, projected to where nothing that is fitted can reach; of mean square 1 for each
     /// degree of freedom where only noise is left.
     pub residual: Vec<f64>,
+    /// Lengths of the stretches of `residual` that come from independent data (stations), one after the other; nothing where it
+    /// is one.
+    pub stretches: Vec<usize>,
     /// Its degrees of freedom.
     pub dof: usize,
     /// Root mean square of what is left, in the data's unit.

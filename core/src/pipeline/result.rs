@@ -62,11 +62,25 @@ pub struct StationResult {
 }
 
 impl StationResult {
+    /// The lowest order of which a filter before the averages passes half; `None` without one.
+    #[must_use]
+    pub fn half_power_upr(&self) -> Option<f64> {
+        let of = |profile: &Profile| {
+            let speed_rpm = profile.speed_rpm?;
+            let orders = profile.responses.iter().map(|response| response.half_power_hz * 60.0 / speed_rpm);
+            orders.reduce(f64::min)
+        };
+        self.profiles.iter().filter_map(of).reduce(f64::min)
+    }
+
     /// One unknown on [`angles`](Self::angles) equal angles from 0: form over the part's, motion over the spindle's.
-    /// Orders that the layout cannot tell are left out; where nothing is known of a section, its form is NaN.
+    /// Orders that the layout cannot tell are left out; where nothing is known, values are NaN.
     #[must_use]
     pub fn over_angle(&self, unknown: usize) -> Vec<f64> {
         let quantity = self.separation.unknowns[unknown];
+        if self.separation.is_lost(unknown) {
+            return vec![f64::NAN; self.angles];
+        }
         let turned = |value: Complex64| if quantity.is_form() { value } else { value.conj() };
         let mut values =
             Fourier::new(self.angles).synthesise(self.separation.coefficients(unknown).map(turned)).to_vec();

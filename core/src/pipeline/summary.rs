@@ -234,7 +234,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
     let known = |value: f64| value.is_finite().then_some(value);
     let sections = separation.sections.iter().enumerate().map(|(section, at)| {
         let unknown = separation.position(Quantity::Form(section));
-        let rms = unknown.map_or(f64::NAN, |unknown| {
+        let rms = unknown.filter(|unknown| !separation.is_lost(*unknown)).map_or(f64::NAN, |unknown| {
             (0.5 * separation.coefficients(unknown).skip(2).map(|value| value.norm_sqr()).sum::<f64>()).sqrt()
         });
         SectionSummary {

@@ -36,6 +36,8 @@ pub(crate) struct Section {
     pub(crate) z_mm: f64,
     pub(crate) gaps: Gaps,
     pub(crate) used: f64,
+    /// Order of which filters before the average pass half.
+    pub(crate) half_power_upr: Option<f64>,
     pub(crate) orders: Vec<Option<Order>>,
 }
 
@@ -81,7 +83,8 @@ impl SurfaceBuilder {
             self.band_limited |= orders.iter().skip(fitting).flatten().any(|order| order.value != Complex64::ZERO);
             orders.truncate(fitting);
             let SectionAt { id, z_mm, gaps, used } = at.clone();
-            self.sections.push(Section { id, station: result.station.clone(), z_mm, gaps, used, orders });
+            let (station, half_power_upr) = (result.station.clone(), result.half_power_upr());
+            self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, orders });
         }
     }
 

@@ -261,6 +261,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         source: "ISO 12181-1:2011".into(),
         band_upr: [2, 50],
         lost_orders: vec![LOST],
+        weakened_above_upr: None,
         filter: "Gaussian 50 UPR".into(),
         reference: "MZCI".into(),
         coverage: 0.75,

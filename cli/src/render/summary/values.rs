@@ -62,6 +62,7 @@ fn decided(limit: &LimitSummary, worst: Option<&LimitValue>) -> String {
         (Decision::Conforms, _) => "conforms".into(),
         (Decision::DoesNotConform, _) => "does not conform".into(),
         (Decision::Undecided, None) => "undecided: no value".into(),
+        (Decision::Undecided, Some(LimitValue { missing: Some(missing), .. })) => format!("undecided: {missing}"),
         (Decision::Undecided, Some(LimitValue { interval_95: None, within, .. })) => {
             format!("undecided: {}, without uncertainty", if *within { "within" } else { "beyond" })
         }

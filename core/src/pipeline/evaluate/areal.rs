@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Evaluate, Filter, Label, PartSummary, labelled};
+use super::{Evaluate, Filter, Held, Label, PartSummary, labelled};
 use crate::{
     Result,
     evaluate::{
@@ -54,14 +54,17 @@ pub fn add_areal(
         Label::new(symbol, unit, format!("ISO 25178-2:2021, {clause}"), "LSCY removed, mean")
     };
     let lost: BTreeSet<usize> = sections.iter().flat_map(Section::lost_orders).collect();
-    let lost: Vec<usize> = lost.into_iter().collect();
+    let held = Held {
+        highest: max_order(surface.angles),
+        lost: lost.into_iter().collect(),
+        half_power_upr: sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min),
+    };
     let used = sections.iter().map(|section| section.used).sum::<f64>() / sections.len().max(1) as f64;
     part.values.extend(labelled(
         areal::PARAMETERS.iter().map(label).collect(),
         values,
         &Filter::between(evaluate.lambda_s_mm, evaluate.lambda_c_mm, surface.radius_mm),
-        max_order(surface.angles),
-        &lost,
+        &held,
         (found.points as f64 / (found.points + found.missing) as f64).min(used),
     ));
     if draws_made {

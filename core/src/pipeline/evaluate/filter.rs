@@ -47,6 +47,11 @@ impl Filter {
         [low.min(high), high]
     }
 
+    /// Whether half of an order above this one would pass it. What lets everything pass asks for nothing.
+    pub fn asks_for_more_than(&self, order: f64) -> bool {
+        self.band.below_upr.is_some_and(|cutoff| cutoff > order)
+    }
+
     /// The highest order that it passes, of those up to `highest`.
     pub fn highest(&self, highest: usize) -> usize {
         (0..=highest).rev().find(|order| self.band.weight(*order) >= MATTERS).unwrap_or(0)

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Evaluate, PlacedValue, ascii_unit};
 use crate::{
+    evaluate::Value,
     pipeline::error::{Fault, known_names},
     rig::Rig,
 };
@@ -38,7 +39,8 @@ pub enum Decision {
     Conforms,
     /// Non-conformity is proven: the whole interval lies beyond a limit.
     DoesNotConform,
-    /// Neither is proven: the interval holds a limit, or there is no uncertainty to decide with.
+    /// Neither is proven: the interval holds a limit, there is no uncertainty to decide with, or something of the value's band
+    /// is not in it.
     Undecided,
 }
 
@@ -72,6 +74,9 @@ pub struct LimitValue {
     pub within: bool,
     /// What that proves.
     pub decision: Decision,
+    /// What of its band is not in the value, so that nothing is proven; null where all of it is.
+    #[serde(default)]
+    pub missing: Option<String>,
 }
 
 impl Limit {
@@ -168,7 +173,9 @@ impl Limit {
         let value = placed.value;
         let [low, high] = [self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY)];
         let interval_95 = value.uncertainty.as_ref().map(|uncertainty| uncertainty.interval_95);
+        let missing = missing(value);
         let decision = match interval_95 {
+            _ if missing.is_some() => Decision::Undecided,
             Some([from, to]) if from >= low && to <= high => Decision::Conforms,
             Some([from, to]) if to < low || from > high => Decision::DoesNotConform,
             _ => Decision::Undecided,
@@ -182,8 +189,19 @@ impl Limit {
             interval_95,
             within: value.value >= low && value.value <= high,
             decision,
+            missing,
         }
     }
+}
+
+/// What of a value's band is not in it.
+fn missing(value: &Value) -> Option<String> {
+    if let [first, others @ ..] = &value.lost_orders[..] {
+        let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+        return Some(format!("order {first}{more} of its band cannot be told"));
+    }
+    let above = value.weakened_above_upr?;
+    Some(format!("of its band, a low-pass has weakened what is above {above:.1} undulations"))
 }
 
 /// Holds all values against all limits. Besides, what the user should know: limits that name no value.

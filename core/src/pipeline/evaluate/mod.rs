@@ -64,6 +64,24 @@ impl Label {
     }
 }
 
+/// What a profile holds.
+#[derive(Debug, Clone, Default)]
+struct Held {
+    /// Highest order.
+    highest: usize,
+    /// Orders that the layout cannot tell.
+    lost: Vec<usize>,
+    /// Order of which filters before the average pass half.
+    half_power_upr: Option<f64>,
+}
+
+impl Held {
+    /// Highest order of which at least half is there.
+    fn highest_passed(&self) -> usize {
+        self.half_power_upr.map_or(self.highest, |half| self.highest.min(half as usize))
+    }
+}
+
 /// Units as files write them.
 fn ascii_unit(unit: &str) -> String {
     unit.replace('µ', "u").replace('°', "deg")
@@ -74,11 +92,11 @@ fn labelled(
     labels: Vec<Label>,
     found: Vec<(f64, Option<Uncertainty>)>,
     filter: &Filter,
-    highest: usize,
-    lost: &[usize],
+    held: &Held,
     coverage: f64,
 ) -> Vec<Value> {
-    let lost_orders = filter.lost(lost);
+    let lost_orders = filter.lost(&held.lost);
+    let weakened_above_upr = held.half_power_upr.filter(|half| filter.asks_for_more_than(*half));
     let known = labels.into_iter().zip(found).filter(|(_, (value, _))| value.is_finite());
     known
         .map(|(label, (value, uncertainty))| Value {
@@ -86,8 +104,9 @@ fn labelled(
             unit: ascii_unit(label.unit),
             value,
             source: label.source,
-            band_upr: filter.band_upr(highest),
+            band_upr: filter.band_upr(held.highest_passed()),
             lost_orders: lost_orders.clone(),
+            weakened_above_upr,
             filter: filter.name.clone(),
             reference: label.reference,
             coverage,

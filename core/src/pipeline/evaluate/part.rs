@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluate, Filter, Group, Label, labelled};
+use super::{Evaluate, Filter, Group, Held, Label, labelled};
 use crate::{
     Complex64,
     evaluate::{
@@ -61,7 +61,7 @@ pub fn part_summary(
     let wall = Wall::of(&there, angles.min(MOST_ANGLES), radius_mm, placed);
     let mut part = PartSummary { sections: there.len(), z_mm, angles: wall.count, ..PartSummary::default() };
     if evaluate.has(Group::Cylindricity) {
-        for cutoff in evaluate.cutoffs_upr(wall.highest) {
+        for cutoff in evaluate.cutoffs_upr(wall.held.highest) {
             part.values.extend(wall.cylindricity(&Filter::low_pass(cutoff), &evaluate.references));
         }
         if placed {
@@ -87,8 +87,7 @@ struct Wall {
     radius_mm: f64,
     placed: bool,
     rings: Vec<Ring>,
-    highest: usize,
-    lost: Vec<usize>,
+    held: Held,
 }
 
 struct Ring {
@@ -120,8 +119,9 @@ impl Wall {
             }
         });
         let rings = rings.collect();
-        let (angles, lost) = (Angles::equal(count), lost.into_iter().collect());
-        Self { angles, count, radius_mm, placed, rings, highest, lost }
+        let half_power_upr = sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min);
+        let held = Held { highest, lost: lost.into_iter().collect(), half_power_upr };
+        Self { angles: Angles::equal(count), count, radius_mm, placed, rings, held }
     }
 
     fn cylindricity(&self, filter: &Filter, references: &[Reference]) -> Vec<Value> {
@@ -232,6 +232,6 @@ impl Wall {
                 sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles: &self.angles, form_um }).collect();
             values(&sections, largest_um, found);
         });
-        labelled(labels, found, filter, self.highest, &self.lost, self.coverage())
+        labelled(labels, found, filter, &self.held, self.coverage())
     }
 }

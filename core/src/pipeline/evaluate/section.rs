@@ -1,6 +1,6 @@
 //! Values of one section: roundness and texture around the part.
 
-use super::{Evaluate, Filter, Group, Label, labelled};
+use super::{Evaluate, Filter, Group, Held, Label, labelled};
 use crate::{
     Complex64,
     evaluate::{
@@ -18,7 +18,7 @@ use crate::{
 pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<Value> {
     let Some(form) = Form::of(result, section, radius_mm) else { return Vec::new() };
     let mut values = Vec::new();
-    for cutoff in evaluate.cutoffs_upr(form.highest) {
+    for cutoff in evaluate.cutoffs_upr(form.held.highest) {
         let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
         let papers_ra = cutoff.is_none() && evaluate.has(Group::Texture);
         values.extend(form.round(&Filter::low_pass(cutoff), references, papers_ra));
@@ -53,8 +53,7 @@ pub(in crate::pipeline) fn steepest_um_per_deg(profile_um: &[f64]) -> f64 {
 struct Form {
     harmonics: Vec<Complex64>,
     variance: Vec<f64>,
-    highest: usize,
-    lost: Vec<usize>,
+    held: Held,
     angles: usize,
     radius_mm: f64,
     at: SectionAt,
@@ -68,11 +67,16 @@ impl Form {
         let harmonics = separation.coefficients(unknown).enumerate();
         let width = separation.unknowns.len();
         let at = separation.sections.get(section)?.clone();
-        (result.angles > 1).then(|| Self {
-            harmonics: harmonics.map(|(order, value)| if order < 2 { Complex64::ZERO } else { value }).collect(),
-            variance: separation.variance.iter().skip(unknown).step_by(width).copied().collect(),
+        let held = Held {
             highest: separation.max_order(),
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
+            half_power_upr: result.half_power_upr(),
+        };
+        // Of a form of which nothing can be told, nothing is a value.
+        (result.angles > 1 && held.lost.len() < held.highest.saturating_sub(1)).then(|| Self {
+            harmonics: harmonics.map(|(order, value)| if order < 2 { Complex64::ZERO } else { value }).collect(),
+            variance: separation.variance.iter().skip(unknown).step_by(width).copied().collect(),
+            held,
             angles: result.angles,
             radius_mm,
             seed: seed(&[&result.station, &at.id]),
@@ -115,7 +119,7 @@ impl Form {
     }
 
     fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {
-        labelled(labels, found, filter, self.highest, &self.lost, self.at.coverage(self.angles))
+        labelled(labels, found, filter, &self.held, self.at.coverage(self.angles))
     }
 
     fn round(&self, filter: &Filter, references: &[Reference], papers_ra: bool) -> Vec<Value> {
@@ -149,16 +153,14 @@ impl Form {
                 }
             })
         };
-        let fewer = (POINTS_A_WAVE * filter.highest(self.highest)).next_power_of_two();
-        let found = if fewer < self.angles {
-            let drawn = on_angles(fewer, DRAWS);
-            let found = on_angles(self.angles, 0).into_iter().zip(drawn);
-            let moved =
-                found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
-            moved.collect()
-        } else {
-            on_angles(self.angles, DRAWS)
-        };
+        let waves = filter.highest(self.held.highest);
+        let fewer = (DRAWN_POINTS_A_WAVE * waves).next_power_of_two().min(self.angles);
+        // The given angles and others between them, so that no crest is far from one.
+        let finer = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
+        let drawn = on_angles(fewer, DRAWS);
+        let found = on_angles(finer, 0).into_iter().zip(drawn);
+        let found = found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
+        let found = found.collect();
         self.labelled(labels, found, filter)
     }
 
@@ -175,8 +177,11 @@ impl Form {
     }
 }
 
-/// Angles on which errors are drawn, per wave of the highest order: where a value's error is sought, not the value.
-const POINTS_A_WAVE: usize = 6;
+/// Angles on which a form is evaluated, per wave of the highest order, at least: its crests are then missed by less than a
+/// fiftieth of that wave's amplitude, 1 − cos(π/16).
+const POINTS_A_WAVE: usize = 16;
+/// The same where errors are drawn: there a value's error is sought, not the value.
+const DRAWN_POINTS_A_WAVE: usize = 6;
 
 /// One section's values about its reference circles.
 struct Circles<'a> {

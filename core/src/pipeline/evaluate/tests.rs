@@ -297,6 +297,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
         source: String::new(),
         band_upr: [2, 50],
         lost_orders: Vec::new(),
+        weakened_above_upr: None,
         filter: "none".into(),
         reference: reference.into(),
         coverage: 1.0,

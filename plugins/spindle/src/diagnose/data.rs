@@ -7,7 +7,7 @@ use runout_core::{Complex64, Result, model::Effect, stage::Station};
 use super::{
     TRACED_ORDERS,
     changes::{self, Change},
-    drift::{self, Creeping},
+    drift::Creeping,
     lines::{self, Line},
 };
 use crate::{
@@ -94,13 +94,13 @@ pub struct Seen {
 }
 
 impl Seen {
-    pub fn new(selection: &Selection, layout: &Layout, station: &Station) -> Self {
-        let creeping = drift::creeping(selection, station);
+    /// `creeping` is what the levels of all stations say of each sensor.
+    pub fn new(selection: &Selection, layout: &Layout, station: &Station, creeping: &[Option<Creeping>]) -> Self {
         let max_order = station.profiles.iter().map(runout_core::profile::Profile::max_order).min().unwrap_or(0);
         Self {
-            changes: changes::changes(selection, station, &creeping),
+            changes: changes::changes(selection, station, creeping),
             lines: lines::lines(selection, layout, station, max_order),
-            creeping,
+            creeping: creeping.to_vec(),
         }
     }
 }

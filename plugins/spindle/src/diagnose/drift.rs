@@ -1,7 +1,10 @@
-//! Drift from the levels of the turns: what a sensor creeps over a capture, in all setups alike.
+//! Drift from the levels of the turns: what a sensor creeps over a capture, in all captures alike.
 
 use runout_core::{
-    model::diagnosis::{Diagnosis, Estimated},
+    model::{
+        diagnosis::{Diagnosis, Estimated},
+        evidence::f_tail,
+    },
     profile::{Profile, Split},
     stage::Station,
 };
@@ -32,14 +35,18 @@ pub struct Creeping {
     /// Turns of the first part that is fitted, and of a capture.
     fitted: usize,
     turns: usize,
+    /// Stations that it is taken from.
+    stations: usize,
 }
 
 /// Levels wander with asynchronous motion: neighbours depend on each other, over some turns.
 const TURNS_ALIKE: f64 = 4.0;
 /// Share of a variance that stays whatever is taken out of it.
 const LEAST_LEFT: f64 = 0.05;
-/// A drift is certain above this many standard uncertainties of its rate.
+/// A drift is certain above this many standard uncertainties of its rate,
 const CERTAIN: f64 = 6.0;
+/// and where captures that only wander would agree on it so well with less than this chance.
+const AGREEMENT: f64 = 0.01;
 
 impl Creeping {
     /// Mean creep a turn over a range of turns, in µm.
@@ -53,10 +60,10 @@ impl Creeping {
         self.over(turn, turn + 1)
     }
 
-    /// Mean creep a turn over the turns fitted (or all), and its standard uncertainty, in µm.
+    /// Mean creep a turn over the turns fitted (or all), and its standard uncertainty as one of the stations tells it, in µm.
     pub fn observed(&self, whole: bool) -> (f64, f64) {
         let creep = self.over(0, if whole { self.turns } else { self.fitted });
-        (creep, (creep * self.rate_std / self.rate_um_per_rev).abs())
+        (creep, (creep * self.rate_std / self.rate_um_per_rev).abs() * (self.stations as f64).sqrt())
     }
 
     /// Takes out of covariances what a drift that is certain puts into them: over the record it is no noise.
@@ -97,9 +104,9 @@ impl Creeping {
 }
 
 /// What the levels of the turns say of each sensor.
-pub fn creeping(selection: &Selection, station: &Station) -> Vec<Option<Creeping>> {
+pub fn creeping(selection: &Selection, stations: &[Station]) -> Vec<Option<Creeping>> {
     let levels: Vec<Option<Levels>> =
-        selection.sensors.iter().map(|sensor| Levels::of_sensor(*sensor, station)).collect();
+        selection.sensors.iter().map(|sensor| Levels::of_sensor(*sensor, stations)).collect();
     let known: Vec<&Levels> = levels.iter().flatten().collect();
     levels.iter().map(|levels| levels.as_ref()?.fit(&known)).collect()
 }
@@ -111,21 +118,23 @@ struct Levels {
     /// Their mean, `[turn]`.
     mean: Vec<f64>,
     fitted: usize,
+    stations: usize,
 }
 
 impl Levels {
-    fn of_sensor(sensor: usize, station: &Station) -> Option<Self> {
-        let splits: Option<Vec<_>> = station.profiles.iter().map(|profile| profile.split.as_ref()).collect();
+    fn of_sensor(sensor: usize, stations: &[Station]) -> Option<Self> {
+        let profiles = || stations.iter().flat_map(|station| &station.profiles);
+        let splits: Option<Vec<_>> = profiles().map(|profile| profile.split.as_ref()).collect();
         let splits = splits?;
         let turns = splits.iter().map(|split| split.turns.count()).min().filter(|turns| *turns >= FEWEST)?;
         let capture = |(profile, split): (&Profile, &&Split)| {
             let channel = profile.sensors.iter().position(|known| *known == sensor)?;
             Some(about_mean(split.turns.levels(channel).take(turns).collect()))
         };
-        let captures: Vec<Vec<f64>> = station.profiles.iter().zip(&splits).map(capture).collect::<Option<_>>()?;
+        let captures: Vec<Vec<f64>> = profiles().zip(&splits).map(capture).collect::<Option<_>>()?;
         let share = 1.0 / captures.len() as f64;
         let mean = (0..turns).map(|turn| captures.iter().map(|capture| capture[turn]).sum::<f64>() * share).collect();
-        Some(Self { captures, mean, fitted: splits.last()?.fit.turns.len() })
+        Some(Self { captures, mean, fitted: splits.last()?.fit.turns.len(), stations: stations.len() })
     }
 
     /// Rate and time constant of the mean over the captures; what all sensors wander from one to the other gives their
@@ -155,8 +164,7 @@ impl Levels {
             None => [0, 1].map(|which| partials.std(noise, which)),
         };
         // A drift comes with every capture; what wanders does not.
-        let rates = self.captures.iter().map(|capture| dot(&partials.by_rate, capture) / partials.normal[0]);
-        let alike = rates.into_iter().all(|found| (found / rate - 1.0).abs() < 0.5);
+        let alike = partials.chance_of_agreement(rate, all) * (all.len() as f64) < AGREEMENT;
         Some(Creeping {
             certain: alike && rate.abs() > CERTAIN * partials.std(noise, 0),
             rate_um_per_rev: rate,
@@ -165,6 +173,7 @@ impl Levels {
             time_constant_std,
             fitted: self.fitted,
             turns,
+            stations: self.stations,
         })
     }
 }
@@ -201,6 +210,23 @@ impl Partials {
         [(a * bb - b * ab) / self.determinant, (b * aa - a * ab) / self.determinant]
     }
 
+    /// Chance of captures that only wander agreeing so well on a rate, with τ as it is: Student's distribution, with how far
+    /// the rates of all sensors differ from one capture to the other. 0 for a single one, which has none to agree with.
+    fn chance_of_agreement(&self, rate: f64, all: &[&Levels]) -> f64 {
+        let captures = all.iter().map(|levels| levels.captures.len()).min().unwrap_or(0);
+        if captures < 2 {
+            return 0.0;
+        }
+        let of = |curve: &[f64]| dot(&self.by_rate, curve) / self.normal[0];
+        let off = |levels: &Levels| {
+            let mean = of(&levels.mean);
+            levels.captures.iter().map(|capture| (of(capture) - mean).powi(2)).sum::<f64>()
+        };
+        let squares: f64 = all.iter().map(|levels| off(levels)).sum();
+        let variance = squares / (captures * (captures - 1) * all.len()) as f64;
+        f_tail(rate * rate / variance.max(f64::MIN_POSITIVE), 1.0, freedom(captures, all) as f64)
+    }
+
     /// Standard uncertainty of the mean of rate and τ, from how captures differ in all sensors: for few degrees of freedom
     /// as much larger as Student's distribution is wider, so that twice it holds 95 %.
     fn between(&self, all: &[&Levels]) -> Option<[f64; 2]> {
@@ -212,12 +238,15 @@ impl Partials {
                 squares.iter_mut().zip(self.solve(&off)).for_each(|(sum, value)| *sum += value * value);
             }
         }
-        // Sensors see two directions between them.
-        let freedom = (captures - 1) * all.len().min(2);
-        let wider = STUDENT_95.get(freedom - 1).map_or(1.0, |quantile| 0.5 * quantile);
+        let wider = STUDENT_95.get(freedom(captures, all) - 1).map_or(1.0, |quantile| 0.5 * quantile);
         let count = (captures * (captures - 1) * all.len()) as f64;
         Some(squares.map(|sum| wider * (sum / count).sqrt()))
     }
+}
+
+/// Independent differences between captures: sensors see two directions between them.
+fn freedom(captures: usize, all: &[&Levels]) -> usize {
+    (captures - 1) * all.len().min(2)
 }
 
 /// τ(1 − e^{−t/τ}) at the turns' middles, about its mean.

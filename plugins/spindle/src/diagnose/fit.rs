@@ -179,7 +179,7 @@ fn axial(
 }
 
 fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations: &Alterations) -> Remainder {
-    let mut residual = Vec::new();
+    let (mut residual, mut stretches) = (Vec::new(), Vec::with_capacity(stations.len()));
     let (mut dof, mut squares, mut expected, mut readings) = (0, 0.0, 0.0, 0);
     let (mut held_squares, mut held_chi2, mut held_readings) = (0.0, 0.0, 0);
     let solver = shared.solver(layout, alterations);
@@ -196,6 +196,7 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
             residual.push(if alterations.lines.contains(&number) { 0.0 } else { line.evidence.sqrt() });
             dof += 1;
         }
+        stretches.push(residual.len() - stretches.iter().sum::<usize>());
         let level = solver.residual(&solved.operators, &solved.corrected, &solved.linear);
         if level.dof > 0 {
             dof += level.dof;
@@ -213,6 +214,7 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
     let share = |sum: f64, count: usize| if count > 0 { (sum / count as f64).sqrt() } else { f64::NAN };
     Remainder {
         residual,
+        stretches,
         dof,
         rms: share(squares, readings),
         noise_floor: if known { share(expected, readings) } else { f64::NAN },

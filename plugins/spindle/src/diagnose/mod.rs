@@ -55,8 +55,9 @@ impl SpindleModel {
     ) -> Result<Self> {
         let effects: Arc<[Arc<dyn SpindleEffect>]> = effects.into();
         let places = places(&effects, &selection, &layout, second_order);
-        let seen: Vec<Arc<Seen>> =
-            stations.iter().map(|station| Arc::new(Seen::new(&selection, &layout, station))).collect();
+        let creeping = drift::creeping(&selection, stations);
+        let seen = |station| Arc::new(Seen::new(&selection, &layout, station, &creeping));
+        let seen: Vec<Arc<Seen>> = stations.iter().map(seen).collect();
         let each = |data: fn(&Selection, &Layout, &Station, &Arc<Seen>) -> Result<StationData>| {
             let stations = stations.iter().zip(&seen);
             stations.map(|(station, seen)| data(&selection, &layout, station, seen)).collect::<Result<Vec<_>>>()
@@ -155,7 +156,14 @@ pub fn diagnose(
         model.traced.kinds[place.kind].about().acts_on == ActsOn::Sensor
             && changes.iter().any(|change| section(change.sensor) == section(place.index))
     };
-    let places = model.traced.places.iter().enumerate().filter(|(_, place)| slipped(place));
+    // Turns that tell how a sensor's level goes tell whether it drifts: a wander leaks into the mean as a drift does.
+    let creeping = model.traced.data.first().map_or(&[][..], |station| &station.seen.creeping);
+    let steady = |place: &data::Place| {
+        let creeping = creeping.get(place.index).and_then(Option::as_ref);
+        model.traced.kinds[place.kind].about().id == "thermal-drift"
+            && creeping.is_some_and(|creeping| !creeping.certain)
+    };
+    let places = model.traced.places.iter().enumerate().filter(|(_, place)| slipped(place) || steady(place));
     let left_out = places.map(|(index, _)| index).chain(settings.left_out.iter().copied()).collect();
     let closed = closed_loop::diagnose(&model, &Settings { left_out, ..settings.clone() })?;
     let mut diagnosis = closed.diagnosis;
