@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// What the turns of one capture say together: Re Σ cₙ e^{−inΦ} for each channel, Φ the spindle angle.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Profile {
     /// Where it came from, for messages.
     pub object: String,

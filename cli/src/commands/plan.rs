@@ -89,11 +89,25 @@ fn assess(rig: &Rig, orders: &RangeInclusive<usize>) -> Separability {
     Separability::new(&assessment, Some(rig))
 }
 
+/// A tolerance that turns the highest order by more leaves open whether the layout sees it at all.
+const MOST_TURNED_DEG: f64 = 45.0;
+
 fn better_angles(rig: &Rig, args: &PlanArgs) -> Result<Optimum, Failure> {
     if rig.sensors.len() < 2 {
         return Err(Failure::Name {
             message: "one sensor has no angle to choose: the first sensor stays where it is".into(),
             help: "add sensors to the rig, or leave out --optimise to see which one helps most".into(),
+        });
+    }
+    let turned_deg = args.angle_tolerance * *args.orders.end() as f64;
+    if turned_deg > MOST_TURNED_DEG {
+        let (tolerance, order) = (args.angle_tolerance, args.orders.end());
+        return Err(Failure::Name {
+            message: format!(
+                "an angle tolerance of {tolerance}° turns order {order} by {turned_deg:.0}°, more than {MOST_TURNED_DEG}°: somewhere \
+                 within it, any layout may be blind"
+            ),
+            help: format!("lower --angle-tolerance to {:.2}deg, or the highest order", MOST_TURNED_DEG / *order as f64),
         });
     }
     let search = Search {

@@ -131,7 +131,8 @@ impl Header {
     pub(crate) fn no_number(&self, line: u64, column: usize, cell: &[u8], decimal: u8) -> Error {
         let shown = shown(&decode(cell));
         let kind = if decimal == b',' { "a number with a decimal comma" } else { "a number" };
-        let help = if cell.starts_with(b"#") {
+        // A spreadsheet's "#DIV/0!" stands among readings, a comment at the beginning of its line.
+        let help = if cell.starts_with(b"#") && column == 0 {
             "comments are understood above the header only"
         } else if cell.iter().any(u8::is_ascii_digit) {
             "numbers are written as 1.5, 1,5 or 1.5e-3: without units, and without marks between thousands"

@@ -8,7 +8,8 @@ use crate::{header::Phase, rows::Rows};
 /// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
 pub(crate) const BLOCK_SAMPLES: usize = 16_384;
 
-const TIME_HELP: &str = "write the time with more digits, or leave it out and state `sample_rate_hz` in [load]";
+const TIME_HELP: &str = "samples have to be taken at equal times: where some are missing, record anew; where the time has too few digits, write it with \
+    more, or leave it out and state `sample_rate_hz` in [load]";
 
 /// What the first pass finds.
 pub(crate) struct Scan {

@@ -121,8 +121,10 @@ impl SynchronousAverage {
         if !reasons.is_empty() {
             problem = format!("{problem}; {}", reasons.join("; "));
         }
-        let help = if capture.marks.is_empty() && turns.recorded == 0 {
-            "record a once-per-turn mark or the encoder's angle: without them there are no turns"
+        let help = if capture.encoder && turns.recorded == 0 {
+            "does the encoder's angle go round, and is it in degrees? An angle in radians or in turns grows too slowly"
+        } else if turns.recorded == 0 {
+            "record a once-per-turn mark or the encoder's angle: a turn is what lies between two marks"
         } else {
             "record more turns, mend what is named above, or lower min_turns"
         };

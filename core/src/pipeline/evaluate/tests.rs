@@ -9,11 +9,13 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::{
     Complex64,
+    measurement::Response,
     pipeline::{
         error::{Fault, Place, Step},
         result::StationResult,
         summary::{SectionSummary, StationSummary},
     },
+    profile::Profile,
     rig::Gaps,
     separation::{Quantity, Residual, SectionAt, Separation},
     surface::{SurfaceBuilder, SurfaceConfig},
@@ -332,6 +334,56 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
     let (decided, remarks) = decide(evaluate.limits(), &placed(&[station], None));
     let of = |value: &LimitValue| (value.decision, value.within);
     decided.iter().map(|one| (one.decision, one.values.iter().map(of).collect(), remarks.len())).collect()
+}
+
+#[test]
+fn a_crest_between_two_angles_is_not_missed() {
+    // Orders 299 and 301 are 3 µm high together where they meet, at 0.61 of the way between two of 720 angles.
+    let crest = 0.61 * 2.0 * PI / 720.0;
+    let waves = [299, 301].map(|order: usize| (order, Complex64::from_polar(1.5, -(order as f64) * crest)));
+    let evaluate = evaluate("references = ['LSCI']\nfilter_upr = []").unwrap();
+    let values = section_values(&station(0.0, &waves, 359, f64::NAN, &[]), 0, &evaluate, RADIUS_MM);
+    let ronp = find(&values, "RONp", "LSCI", "none").value;
+    assert!((ronp - 3.0).abs() < 0.02 * 3.0, "{ronp}");
+}
+
+#[test]
+fn a_form_that_cannot_be_told_has_no_values() {
+    let all: Vec<usize> = (1..=60).collect();
+    let lost = station(0.0, &[lobes(3, 2.0)], 60, 1e-6, &all);
+    assert_eq!(section_values(&lost, 0, &Evaluate::default(), RADIUS_MM), []);
+    assert!(lost.over_angle(0).iter().all(|value| value.is_nan()));
+    assert!(lost.separation.angle_std(0).is_nan());
+}
+
+/// 4 µm keep 9 µm, but not if an order of their band is not in them.
+#[test]
+fn nothing_is_proven_of_a_value_that_lacks_orders() {
+    let evaluate = evaluate("references = ['LSCI']").unwrap();
+    let limit: Limit = toml::from_str("symbol = 'RONt'\nunit = 'um'\nupper = 9.0").unwrap();
+    let decided = |lost: &[usize], half_power_hz: Option<f64>| {
+        let mut result = station(0.0, &[lobes(3, 2.0)], 60, 1e-6, lost);
+        result.profiles = half_power_hz.into_iter().map(weakened).collect();
+        let values = section_values(&result, 0, &evaluate, RADIUS_MM);
+        let placed = values.iter().map(|value| PlacedValue { station: None, section: None, z_mm: None, value });
+        let (found, _) = decide(std::slice::from_ref(&limit), &placed.collect::<Vec<_>>());
+        found[0].values.iter().map(|value| (value.filter.clone(), value.decision)).collect::<Vec<_>>()
+    };
+    let of = |none, filtered| vec![("none".to_owned(), none), ("Gaussian 50 UPR".to_owned(), filtered)];
+    assert_eq!(decided(&[], None), of(Decision::Conforms, Decision::Conforms));
+    assert_eq!(decided(&[20], None), of(Decision::Undecided, Decision::Undecided));
+    // At 600 rpm 400 Hz are order 40: less than the Gaussian asks for. What is unfiltered says which band it has.
+    assert_eq!(decided(&[], Some(400.0)), of(Decision::Conforms, Decision::Undecided));
+    assert_eq!(decided(&[], Some(800.0)), of(Decision::Conforms, Decision::Conforms));
+}
+
+/// The average behind a low-pass.
+fn weakened(half_power_hz: f64) -> Profile {
+    Profile {
+        speed_rpm: Some(600.0),
+        responses: vec![Response { description: "low-pass".into(), half_power_hz }],
+        ..Profile::default()
+    }
 }
 
 /// 4.0 ± 0.5 µm and 3.8 ± 0.5 µm of section a, 4.0 µm without uncertainty of section b.

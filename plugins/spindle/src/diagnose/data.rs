@@ -56,6 +56,10 @@ impl Shared {
         if self.data.iter().any(|station| station.weights.is_none()) {
             warnings.push("there is no scatter over the turns to measure the noise by: record more turns".into());
         }
+        if self.data.iter().any(|station| !station.creeps.is_empty() || !station.seen.lines.is_empty()) {
+            let beside = "chi squared counts the drifts and lines that single turns show, beside what the fit leaves of the averages";
+            warnings.push(beside.into());
+        }
         if self.data.iter().any(|station| station.held_out.is_none()) {
             warnings.push("too few turns to hold any out: effects were accepted on the fitted turns alone".into());
         }

@@ -22,6 +22,8 @@ const NEIGHBOURS_WITHIN_TOLERANCE: usize = 300;
 const LONGEST_STEP: f64 = 500.0;
 /// With more sensors than this, corners of the tolerance are drawn instead of all being tried.
 const ALL_CORNERS: usize = 6;
+/// Placements inside the tolerance that a result is looked at besides.
+const INSIDE: usize = 500;
 /// Two arrangements are different when some distance between two sensors differs by this much, in degrees.
 const DIFFERENT_DEG: f64 = 2.0;
 /// Arrangements reported.
@@ -73,7 +75,8 @@ pub struct Optimum {
 /// Looks for angles of all sensors but the first that give form a lower noise gain, with the rig's setups as they are.
 ///
 /// Arrangements are ranked by lost orders, then by the criterion, at the worst placement within the tolerance: the
-/// nominal one and the corners ±tolerance of every sensor (64 drawn corners for more than six sensors).
+/// nominal one and the corners ±tolerance of every sensor (64 drawn corners for more than six sensors). What is said of an
+/// arrangement holds 500 drawn placements inside the tolerance besides.
 ///
 /// # Errors
 /// When a section has no room for its sensors.
@@ -140,6 +143,8 @@ struct Bench<'a> {
     gain: FormGain,
     /// What is added to the sensors' angles, in rad, the nominal placement (nothing) among them.
     corners: Vec<Vec<f64>>,
+    /// The same inside the tolerance, where a high order may be worse than at any corner.
+    inside: Vec<Vec<f64>>,
 }
 
 type Judge<'a> = fn(&mut Bench<'a>, &[i64], Option<Score>) -> Option<Score>;
@@ -160,8 +165,10 @@ impl<'a> Bench<'a> {
                 }
             }));
         }
+        let somewhere = |_| (0..sensors).map(|_| tolerance_rad * random.random_range(-1.0..=1.0)).collect();
+        let inside = (0..if tolerance_rad > 0.0 { INSIDE } else { 0 }).map(somewhere).collect();
         let spacing = Spacing::new(rig, search.clearance_deg)?;
-        Ok(Self { rig, search, spacing, gain: FormGain::new(rig), corners })
+        Ok(Self { rig, search, spacing, gain: FormGain::new(rig), corners, inside })
     }
 
     fn nominal(&mut self, steps: &[i64], limit: Option<Score>) -> Option<Score> {
@@ -238,8 +245,8 @@ impl<'a> Bench<'a> {
         let orders = &self.search.orders;
         let nominal = self.gain.score(&angles, orders);
         let mut within_tolerance = nominal;
-        for corner in &self.corners {
-            let placed: Vec<f64> = angles.iter().zip(corner).map(|(angle, off)| angle + off).collect();
+        for off in self.corners.iter().chain(&self.inside) {
+            let placed: Vec<f64> = angles.iter().zip(off).map(|(angle, off)| angle + off).collect();
             within_tolerance = within_tolerance.or_worse(self.gain.score(&placed, orders));
         }
         Arrangement { angles_deg, nominal, within_tolerance }

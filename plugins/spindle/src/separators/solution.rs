@@ -20,6 +20,8 @@ use crate::{
 
 /// Three passes settle the second order; more are allowed for large eccentricities.
 const MAX_PASSES: usize = 8;
+/// What lost orders may carry into others is said from so many standard uncertainties on.
+const CARRIED: f64 = 3.0;
 /// Passes end when the readings move less than this, rms.
 const SETTLED_UM: f64 = 1e-9;
 
@@ -85,7 +87,54 @@ impl Solver<'_> {
         if residual.chi2_per_dof > swapped_setups::SUSPICIOUS_CHI2 {
             warnings.extend(swapped_setups::suspect(&self.selection.rig, self.layout, &operators, &readings));
         }
-        Ok(self.report(station, &operators, &readings, &estimate, residual, warnings))
+        let mut separation = self.report(station, &operators, &readings, &estimate, residual, warnings);
+        let carried = self.second_order.then(|| self.carried(&readings, &separation)).flatten();
+        separation.warnings.extend(carried);
+        Ok(separation)
+    }
+
+    /// What a large eccentricity carries into orders that are told, of what is not: a surface that goes sideways by e turns
+    /// under the sensor by e/R, and order n is then seen by n·e/R of its amplitude one order lower and higher.
+    fn carried(&self, readings: &Readings, separation: &Separation) -> Option<String> {
+        let width = separation.unknowns.len();
+        let eccentricity_um = readings.order(1).iter().map(|reading| reading.norm()).fold(0.0, f64::max);
+        let share = eccentricity_um / (1e3 * self.selection.rig.part_radius_mm);
+        let sees = |wanted| self.layout.unknowns.contains(&wanted);
+        let sideways_unseen = !(sees(Quantity::X) && sees(Quantity::Y));
+        let mut worst = (CARRIED, 0);
+        for unknown in self.layout.forms() {
+            let at = |order: usize| order * width + unknown;
+            let told = |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
+            for order in 2..=readings.max_order {
+                let beside = [order - 1, order + 1];
+                // A lost order may be as large as those beside it.
+                let amplitude_um = if !told(&order) {
+                    beside
+                        .iter()
+                        .filter(|near| told(near))
+                        .map(|near| separation.estimate[at(*near)].norm())
+                        .fold(0.0, f64::max)
+                } else if sideways_unseen {
+                    separation.estimate[at(order)].norm()
+                } else {
+                    continue;
+                };
+                for near in beside.iter().filter(|near| told(near)) {
+                    let ratio = 0.5 * order as f64 * share * amplitude_um / separation.variance[at(*near)].sqrt();
+                    if ratio > worst.0 {
+                        worst = (ratio, *near);
+                    }
+                }
+            }
+        }
+        let (ratio, order) = worst;
+        let unknown = if sideways_unseen { "the surface goes sideways unseen" } else { "orders of form are lost" };
+        (order > 0).then(|| {
+            format!(
+                "{unknown}, and an eccentricity of {eccentricity_um:.0} µm carries that into the other orders: order {order} of form \
+                 may be off by {ratio:.0} times its stated uncertainty, and motion with it; centre the part better"
+            )
+        })
     }
 
     /// Solves, adds what exact geometry and `beyond` add to linear readings at that solution, and solves again until it

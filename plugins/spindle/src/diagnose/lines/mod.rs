@@ -66,8 +66,18 @@ pub fn lines(selection: &Selection, layout: &Layout, station: &Station, orders: 
     let Some(captures) = captures.filter(|captures| captures.iter().all(|one| one.fitted >= FEWEST)) else {
         return Vec::new();
     };
-    let found = spectrum::peaks(&captures);
-    found.into_iter().filter_map(|order| fitted(&captures, layout, order, orders)).collect()
+    let found = spectrum::peaks(&captures).into_iter().map(|order| likeliest(&captures, order));
+    found.filter_map(|order| fitted(&captures, layout, order, orders)).collect()
+}
+
+/// Of all lines that a turn shows at the same phase, n ± f for the same f, the one that explains most: their turns differ by
+/// how they go within a turn only.
+fn likeliest(captures: &[Capture], order: f64) -> f64 {
+    let fraction = (order - order.round()).abs();
+    let low = captures.iter().map(|one| one.turns.orders).min().unwrap_or(0);
+    let alike = (0..low).flat_map(|order| [order as f64 - fraction, order as f64 + fraction]);
+    let alike = alike.filter(|order| *order > spectrum::SLOWEST);
+    alike.max_by(|a, b| amplitudes(captures, *a).1.total_cmp(&amplitudes(captures, *b).1)).unwrap_or(order)
 }
 
 /// Harmonics of one turn of e^{iνθ}'s real and imaginary part: cₙ for a = 1 and a = i of Re(a e^{iνθ}), the turn beginning
