@@ -64,6 +64,10 @@ impl Label {
     }
 }
 
+/// Angles on which a form is evaluated, per wave of the highest order, at least: its crests are then missed by less than a
+/// fiftieth of that wave's amplitude, 1 − cos(π/16).
+const POINTS_A_WAVE: usize = 16;
+
 /// What a profile holds.
 #[derive(Debug, Clone, Default)]
 struct Held {

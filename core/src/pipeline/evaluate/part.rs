@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluate, Filter, Group, Held, Label, labelled};
+use super::{Evaluate, Filter, Group, Held, Label, POINTS_A_WAVE, labelled};
 use crate::{
     Complex64,
     evaluate::{
         Value,
         cylindricity::{Disturbed, Generatrices, MedianLine, Points, Reference, Section, Values},
         roundness::Angles,
-        uncertainty::{DRAWS, Errors, LARGEST, monte_carlo_of, seed},
+        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
     },
     numerics::fourier::{Fourier, max_order},
     rig::Gaps,
@@ -25,6 +25,8 @@ const MOST_ANGLES: usize = 720;
 /// [`FEWEST_DRAWS`].
 const POINTS_DRAWN: usize = 2_000_000;
 const FEWEST_DRAWS: usize = 50;
+/// Points at which a wall itself is looked at, at most: angles for [`POINTS_A_WAVE`] of its highest order, where there is room.
+const POINTS_FOUND: usize = 500_000;
 /// Draws of what is fitted to each of a wall's generatrices.
 const DRAWS_OF_LINES: usize = 100;
 
@@ -35,7 +37,7 @@ pub struct PartSummary {
     pub sections: usize,
     /// First and last place of a section along the axis, in mm.
     pub z_mm: [f64; 2],
-    /// Equal angles at which each section was looked at.
+    /// Equal angles at which errors of each section were drawn; itself it is looked at on more.
     pub angles: usize,
     /// The standards' values.
     pub values: Vec<Value>,
@@ -148,7 +150,9 @@ impl Wall {
                 let about = if let (None, Some(points)) = (largest_um, &points) {
                     let prepare =
                         |usual_um| Disturbed::new(*reference, sections, self.radius_mm, usual_um, !self.placed);
-                    disturbed.push(usual_um.and_then(prepare));
+                    if disturbed.len() < references.len() {
+                        disturbed.push(usual_um.and_then(prepare));
+                    }
                     points.reference(*reference).map(|cylinder| points.values(&cylinder))
                 } else {
                     let prepared = disturbed.get(index).and_then(Option::as_ref);
@@ -201,7 +205,8 @@ impl Wall {
         each.sum::<f64>() / self.rings.len().max(1) as f64
     }
 
-    /// Everything that is computed from one filtered wall. `values` gets its sections and, of a drawn one, its largest error.
+    /// Everything that is computed from one filtered wall: on many angles, so that no crest is far from one, with what draws of
+    /// its errors make of it on fewer. `values` gets its sections and, of a drawn one, its largest error.
     fn evaluate(
         &self,
         filter: &Filter,
@@ -209,7 +214,26 @@ impl Wall {
         draws: usize,
         mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<Value> {
-        let mut fourier = Fourier::new(self.count);
+        let drawn = self.on_angles(&self.angles, filter, draws, &mut values);
+        let room = POINTS_FOUND / (self.rings.len() * self.count).max(1);
+        let times = (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.count).min(room);
+        if times < 2 {
+            return labelled(labels, drawn, filter, &self.held, self.coverage());
+        }
+        let found = self.on_angles(&Angles::equal(times * self.count), filter, 0, &mut values).into_iter().zip(drawn);
+        let found = found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
+        labelled(labels, found.collect(), filter, &self.held, self.coverage())
+    }
+
+    /// The same on these angles only.
+    fn on_angles(
+        &self,
+        angles: &Angles,
+        filter: &Filter,
+        draws: usize,
+        mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
+    ) -> Vec<(f64, Option<Uncertainty>)> {
+        let mut fourier = Fourier::new(angles.len());
         let forms = self.rings.iter().map(|ring| {
             let mut form_um = fourier.synthesise(filter.harmonics(&ring.harmonics)).to_vec();
             ring.gaps.blank(&mut form_um);
@@ -219,7 +243,7 @@ impl Wall {
         let mut errors = self.errors(filter).unwrap_or_default();
         let draws = if errors.is_empty() { 0 } else { draws };
         let mut drawn = forms.clone();
-        let found = monte_carlo_of(draws, |disturbed, found| {
+        monte_carlo_of(draws, |disturbed, found| {
             let mut largest_um = disturbed.then_some(0.0);
             if disturbed {
                 for ((errors, form), drawn) in errors.iter_mut().zip(&forms).zip(&mut drawn) {
@@ -229,9 +253,8 @@ impl Wall {
             }
             let sections = self.rings.iter().zip(&drawn);
             let sections: Vec<Section> =
-                sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles: &self.angles, form_um }).collect();
+                sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles, form_um }).collect();
             values(&sections, largest_um, found);
-        });
-        labelled(labels, found, filter, &self.held, self.coverage())
+        })
     }
 }

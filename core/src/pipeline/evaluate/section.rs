@@ -1,6 +1,6 @@
 //! Values of one section: roundness and texture around the part.
 
-use super::{Evaluate, Filter, Group, Held, Label, labelled};
+use super::{Evaluate, Filter, Group, Held, Label, POINTS_A_WAVE, labelled};
 use crate::{
     Complex64,
     evaluate::{
@@ -177,10 +177,7 @@ impl Form {
     }
 }
 
-/// Angles on which a form is evaluated, per wave of the highest order, at least: its crests are then missed by less than a
-/// fiftieth of that wave's amplitude, 1 − cos(π/16).
-const POINTS_A_WAVE: usize = 16;
-/// The same where errors are drawn: there a value's error is sought, not the value.
+/// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
 const DRAWN_POINTS_A_WAVE: usize = 6;
 
 /// One section's values about its reference circles.

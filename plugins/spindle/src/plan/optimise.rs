@@ -76,7 +76,7 @@ pub struct Optimum {
 ///
 /// Arrangements are ranked by lost orders, then by the criterion, at the worst placement within the tolerance: the
 /// nominal one and the corners ±tolerance of every sensor (64 drawn corners for more than six sensors). What is said of an
-/// arrangement holds 500 drawn placements inside the tolerance besides.
+/// arrangement holds 500 drawn placements inside the tolerance besides, and 500 near the worst of these.
 ///
 /// # Errors
 /// When a section has no room for its sensors.
@@ -244,10 +244,29 @@ impl<'a> Bench<'a> {
         let angles = radians(&angles_deg);
         let orders = &self.search.orders;
         let nominal = self.gain.score(&angles, orders);
-        let mut within_tolerance = nominal;
-        for off in self.corners.iter().chain(&self.inside) {
+        let mut score = |off: &[f64]| {
             let placed: Vec<f64> = angles.iter().zip(off).map(|(angle, off)| angle + off).collect();
-            within_tolerance = within_tolerance.or_worse(self.gain.score(&placed, orders));
+            self.gain.score(&placed, orders)
+        };
+        let mut within_tolerance = nominal;
+        let mut worst = (nominal, vec![0.0; angles.len()]);
+        let mut look = |off: &[f64], worst: &mut (Score, Vec<f64>)| {
+            let found = score(off);
+            within_tolerance = within_tolerance.or_worse(found);
+            if worst.0.compare(&found, self.search.criterion) == Ordering::Less {
+                *worst = (found, off.to_vec());
+            }
+        };
+        for off in self.corners.iter().chain(&self.inside) {
+            look(off, &mut worst);
+        }
+        // From the worst of them on, in ever shorter steps.
+        let tolerance_rad = self.search.angle_tolerance_deg.to_radians();
+        for (step, towards) in self.inside.iter().enumerate() {
+            let share = 0.5 * (1.0 - step as f64 / self.inside.len() as f64);
+            let near =
+                worst.1.iter().zip(towards).map(|(at, step)| (at + share * step).clamp(-tolerance_rad, tolerance_rad));
+            look(&near.collect::<Vec<f64>>(), &mut worst);
         }
         Arrangement { angles_deg, nominal, within_tolerance }
     }
