@@ -154,7 +154,8 @@ mod tests {
         let everywhere: Vec<f64> = column.iter().zip(&noise).map(|(value, noise)| 20.0 * value + noise).collect();
         let only_here = |at: usize, value: &f64| if at < 10 { 160.0 * value } else { 0.0 };
         let once: Vec<f64> = column.iter().enumerate().map(|(at, value)| only_here(at, value) + noise[at]).collect();
-        let [agree, differ] = [everywhere, once].map(|residual| agreement(&[column.clone()], &residual, &stretches));
+        let [agree, differ] =
+            [everywhere, once].map(|residual| agreement(std::slice::from_ref(&column), &residual, &stretches));
         assert!(agree.unwrap() < 1e-6 && differ.unwrap() > 0.1, "{agree:?} {differ:?}");
         assert_eq!(agreement(&[column], &noise, &[80]), None);
     }

@@ -100,7 +100,9 @@ impl PivotedQr {
                 head[0] -= lead * dot;
                 rest.iter_mut().zip(below()).for_each(|(q, v)| *q -= v * dot);
             }
-            column.iter_mut().for_each(|entry| *entry = entry.conj());
+            for entry in column {
+                *entry = entry.conj();
+            }
         }
         let mut operator = vec![Complex64::ZERO; cols * rows];
         for row in (0..self.rank).rev() {

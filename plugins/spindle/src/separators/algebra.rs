@@ -75,7 +75,7 @@ impl Blocks {
     /// M·B for M, `[row][reading]`.
     #[must_use]
     pub fn after(&self, rows: &[Complex64]) -> Vec<Complex64> {
-        times_blocks(rows, self.size, self.blocks())
+        times_blocks(rows, self.size, &self.blocks())
     }
 
     /// Each reading's column times a factor.
@@ -108,7 +108,7 @@ impl Blocks {
 pub fn times_blocks<'a>(
     rows: &[Complex64],
     size: usize,
-    blocks: impl ExactSizeIterator<Item = &'a [Complex64]> + Clone,
+    blocks: &(impl ExactSizeIterator<Item = &'a [Complex64]> + Clone),
 ) -> Vec<Complex64> {
     let readings = size * blocks.len();
     let mut product = vec![Complex64::ZERO; rows.len()];

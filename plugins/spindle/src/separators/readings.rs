@@ -146,6 +146,6 @@ impl<'a> Spread<'a> {
     /// M·Σ for M, both `[row][reading]`.
     #[must_use]
     pub fn times(&self, rows: &[Complex64]) -> Vec<Complex64> {
-        times_blocks(rows, self.sensors, self.blocks())
+        times_blocks(rows, self.sensors, &self.blocks())
     }
 }
