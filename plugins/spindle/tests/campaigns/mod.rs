@@ -6,12 +6,12 @@ use std::path::Path;
 
 use runout_core::{
     inspection::Inspection,
-    measurement::{Recording, StationTruth},
+    measurement::{Recording, SampleStream, StationTruth},
     pipeline::registry::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     stage::{Preprocessor, Station, Wanted},
 };
-use runout_preprocess::SynchronousAverageConfig;
+use runout_preprocess::{LowPassConfig, SynchronousAverageConfig};
 use runout_spindle::simulate::{self, SpindleConfig};
 
 /// `physics.md` section 4: sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm, motion 1.5 µm rms, 8 µm off centre.
@@ -51,6 +51,11 @@ pub fn campaign(seed: u64, effects: &str) -> SpindleConfig {
 
 /// The station that a campaign records, a fifth of its turns held out, and its truth.
 pub fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
+    averaged_behind(None, config, rig)
+}
+
+/// The same behind a low-pass.
+pub fn averaged_behind(cutoff_hz: Option<f64>, config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     let simulator = simulate::simulator(config).unwrap();
     let recording = simulator.spindle_recording();
     let average = SynchronousAverageConfig {
@@ -63,9 +68,18 @@ pub fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     let Preprocessor::Averager(averager) = average.check(&Context { folder: Path::new(""), rig: None }).unwrap() else {
         panic!("no averager");
     };
+    let low_pass = cutoff_hz.map(|cutoff_hz| {
+        let checked = LowPassConfig { cutoff_hz, order: 4 }.check(&Context { folder: Path::new(""), rig: None });
+        let Preprocessor::Conditioner(low_pass) = checked.unwrap() else { panic!("no filter") };
+        low_pass
+    });
     let profile = |setup| {
-        let stream = Inspection::new(recording.open(0, setup).unwrap());
-        averager.average_wanting(Box::new(stream), Wanted { hold_out: Some(0.2), ..Wanted::default() }).unwrap()
+        let inspected: Box<dyn SampleStream> = Box::new(Inspection::new(recording.open(0, setup).unwrap()));
+        let stream = match &low_pass {
+            Some(low_pass) => low_pass.attach(inspected).unwrap(),
+            None => inspected,
+        };
+        averager.average_wanting(stream, Wanted { hold_out: Some(0.2), ..Wanted::default() }).unwrap()
     };
     let profiles = (0..rig.setups.len()).map(profile).collect();
     let station = Station { name: "s001".into(), z_mm: 0.0, profiles };
