@@ -137,6 +137,8 @@ pub(super) struct Gathering {
     evaluate: Evaluate,
     /// Whether the sections' centres and mean radii are known.
     placed: bool,
+    /// Whether the part's surface is interrupted somewhere.
+    interrupted: bool,
     summary: Summary,
     summary_path: Option<PathBuf>,
 }
@@ -156,12 +158,14 @@ impl Gathering {
             angles: pipeline.surface.angles,
             evaluate,
             placed: matches!(&pipeline.route, Route::Points { .. }),
+            interrupted: false,
             summary_path: pipeline.summary_path(),
             summary: begun(pipeline),
         })
     }
 
     pub(super) fn take(&mut self, result: &StationResult, rig: Option<&Rig>) -> Result<()> {
+        self.interrupted |= result.separation.sections.iter().any(|section| !section.gaps.is_empty());
         for export in &mut self.exports {
             export.station(result)?;
         }
@@ -208,7 +212,7 @@ impl Gathering {
     ) -> Result<Summary> {
         self.summary.provenance.inputs = inputs;
         self.summary.warnings.extend(remarks);
-        self.summary.warnings.extend(misfit(&self.summary.stations));
+        self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
         let (limits, unmatched) = decide(self.evaluate.limits(), &self.summary.values());
         self.summary.limits = limits;
         self.summary.warnings.extend(unmatched);
@@ -267,16 +271,18 @@ pub(super) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<()
 }
 
 /// What a rig that is not as declared looks like: a residual far above what the noise lets expect.
-fn misfit(stations: &[StationSummary]) -> Option<String> {
+fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
     let beyond = stations.iter().filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > MISFIT_CHI2));
     let count = beyond.clone().count();
     let worst =
         beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;
     let left = worst.residual_rms_um.unwrap_or(f64::NAN);
     let expected = worst.expected_residual_rms_um.unwrap_or(f64::NAN);
+    let bridged =
+        if interrupted { " (or readings go astray where its interruptions are bridged: make them wider)" } else { "" };
     Some(format!(
         "at {count} of {} stations the readings contradict each other: the fit leaves up to {left:.4} µm rms ({}), where \
-         the noise measured over the turns lets expect {expected:.4}; something is not as the rig declares it, and the stated \
+         the noise measured over the turns lets expect {expected:.4}; something is not as the rig declares it{bridged}, and the stated \
          uncertainties, which come from that noise alone, do not cover it",
         stations.len(),
         worst.station,
