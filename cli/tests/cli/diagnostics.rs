@@ -210,6 +210,14 @@ fn plan_with_too_much_clearance() {
 }
 
 #[test]
+fn plan_with_a_tolerance_that_leaves_the_highest_order_open() {
+    let arguments = ["--orders", "2..50", "--optimise", "angles", "--angle-tolerance", "1deg"];
+    let shown = plan_with(&arguments);
+    assert!(shown.contains("an angle tolerance of 1° turns order 50 by 50°, more than 45°"), "{shown}");
+    assert!(shown.contains("lower --angle-tolerance to 0.90deg"), "{shown}");
+}
+
+#[test]
 fn plan_of_a_clearance_in_radians() {
     assert_snapshot!(plan_with(&["--clearance", "0.3rad"]));
 }

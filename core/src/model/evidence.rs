@@ -42,7 +42,7 @@ impl Evidence {
 ///
 /// Within a stretch, errors may depend on each other as no covariance says: a slow wander leaks into all orders alike. So the
 /// effect's size is set against how far its sizes in the stretches differ. (The sandwich estimator with clusters: Liang, Zeger,
-/// Biometrika 73 (1986) 13, equation 7; with Student's distribution for few of them.)
+/// Biometrika 73 (1986) 13; with Student's distribution for few of them.)
 #[must_use]
 pub fn agreement(columns: &[Vec<f64>], residual: &[f64], stretches: &[usize]) -> Option<f64> {
     if stretches.len() < FEWEST_STRETCHES || columns.is_empty() {

@@ -132,9 +132,10 @@ impl Header {
         let shown = shown(&decode(cell));
         let kind = if decimal == b',' { "a number with a decimal comma" } else { "a number" };
         // A spreadsheet's "#DIV/0!" stands among readings, a comment at the beginning of its line.
-        let help = if cell.starts_with(b"#") && column == 0 {
+        let marked = cell.starts_with(b"#");
+        let help = if marked && column == 0 {
             "comments are understood above the header only"
-        } else if cell.iter().any(u8::is_ascii_digit) {
+        } else if !marked && cell.iter().any(u8::is_ascii_digit) {
             "numbers are written as 1.5, 1,5 or 1.5e-3: without units, and without marks between thousands"
         } else {
             "take out rows of units; where a reading is missing, leave its cell empty or write NaN"

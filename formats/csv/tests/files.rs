@@ -116,6 +116,9 @@ fn delimiters_decimals_and_encodings_are_told_apart() {
 fn an_empty_cell_is_a_missing_reading() {
     let (_, samples, _) = read("index;S1;Fühler\n0;1;\n1;;2\n").unwrap();
     assert!((samples[0] - 1.0).abs() < 1e-15 && samples[1].is_nan() && samples[2].is_nan());
+    let divided = read("index,S1,Fühler\n0,1,1\n0,#DIV/0!,2\n").map(|_| ()).unwrap_err();
+    expect(&divided.to_string(), &["line 3, column 2 (`S1`)", "#DIV/0!"]);
+    expect(divided.advice().unwrap(), &["leave its cell empty or write NaN"]);
     expect(&refusal("index;S1;Fühler\n0;1;1\n;1;2\n"), &["line 3, column 1 (`index`)", "expected a number"]);
 }
 

@@ -2,10 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
+mod campaigns;
 mod common;
 
 use std::f64::consts::TAU;
 
+use campaigns::{averaged, campaign};
 use common::{FOUR_SENSORS, Truth, disturb, linear_station, random_sum, rig, value};
 use runout_core::{
     Complex64,
@@ -229,4 +231,32 @@ fn setups_in_another_order_are_suspected() {
     let warnings = separator.separate(&station).unwrap().warnings;
     println!("{warnings:?}");
     assert!(warnings.iter().any(|warning| warning.contains("swapped")), "{warnings:?}");
+}
+
+/// Sensors fixed and the part reversed: even orders are lost. Simulated in the time domain; what the warning is about is measured
+/// against the truth of the simulator.
+#[test]
+fn lost_orders_that_a_large_eccentricity_carries_are_said() {
+    for (offset_um, far) in [(150.0, true), (0.5, false)] {
+        let mut config = campaign(1, "[]");
+        config.rig.setups.truncate(2);
+        config.rig.setups[1].part_deg = 180.0;
+        config.eccentricity.offset_um = offset_um;
+        let rig = config.rig.clone().check().unwrap();
+        let (station, truth) = averaged(&config, &rig);
+        let found = HarmonicLeastSquares::new(&rig, true, Weighting::TurnCovariance).separate(&station).unwrap();
+        let mut fourier = Fourier::new(truth.form_um[0].len());
+        let mut harmonics = vec![Complex64::ZERO; 61];
+        fourier.analyse(truth.form_um[0].iter().copied(), &mut harmonics);
+        let (unknown, width) = (found.position(Quantity::Form(0)).unwrap(), found.unknowns.len());
+        let off = (3..60).step_by(2).map(|order: usize| {
+            let place = order * width + unknown;
+            (found.estimate[place] - harmonics[order]).norm() / found.variance[place].sqrt()
+        });
+        let off = off.fold(0.0, f64::max);
+        println!("simulated, {offset_um} µm off centre: form off by up to {off:.1} stated std, {:?}", found.warnings);
+        let said = found.warnings.iter().any(|warning| warning.contains("orders of form are lost"));
+        assert_eq!(said, far, "{:?}", found.warnings);
+        assert_eq!(off > 5.0, far, "{off}");
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! For each place between two samples, the weights of the samples around are those with the least squared error over all
 //! sines below half of the recording's Nyquist frequency ([`PASS_BAND`]). (Laakso, Välimäki, Karjalainen, Laine, IEEE Signal
-//! Process. Mag. 13(1), 1996, section "Least squared integral error".) Low frequencies count for more, as form and motion are
+//! Process. Mag. 13(1), 1996: least squared integral error.) Low frequencies count for more, as form and motion are
 //! large at low orders and fade towards high ones: [`ERRORS`] says what is met. Above the pass band the interpolation
 //! weakens, halfway between two samples to nothing at Nyquist. Between two samples each weight is a parabola in each of
 //! [`STRETCHES`] stretches, interpolated at the zeros of a Chebyshev polynomial; at these, the weights are scaled to the sum 1.

@@ -43,29 +43,12 @@ impl Blocks {
     #[must_use]
     pub fn times(&self, matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
         let mut product = vec![Complex64::ZERO; matrix.len()];
-        let setups = self.size * columns;
-        for (block, (source, target)) in
-            self.blocks().zip(matrix.chunks_exact(setups).zip(product.chunks_exact_mut(setups)))
-        {
+        let length = self.size * columns;
+        let parts = matrix.chunks_exact(length).zip(product.chunks_exact_mut(length));
+        for (block, (source, target)) in self.blocks().zip(parts) {
             for (row, target) in block.chunks_exact(self.size).zip(target.chunks_exact_mut(columns)) {
                 for (entry, source) in row.iter().zip(source.chunks_exact(columns)) {
                     target.iter_mut().zip(source).for_each(|(to, from)| *to += entry * from);
-                }
-            }
-        }
-        product
-    }
-
-    /// Bᴴ·A for A, `[reading][column]`.
-    fn adjoint_times(&self, matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
-        let mut product = vec![Complex64::ZERO; matrix.len()];
-        let setups = self.size * columns;
-        for (block, (source, target)) in
-            self.blocks().zip(matrix.chunks_exact(setups).zip(product.chunks_exact_mut(setups)))
-        {
-            for (row, source) in block.chunks_exact(self.size).zip(source.chunks_exact(columns)) {
-                for (entry, target) in row.iter().zip(target.chunks_exact_mut(columns)) {
-                    target.iter_mut().zip(source).for_each(|(to, from)| *to += entry.conj() * from);
                 }
             }
         }
@@ -172,11 +155,11 @@ pub fn expected_squares(system: &System, operator: &[Complex64], spread: &Spread
 pub fn expected_weighted_squares(system: &System, weights: &Blocks, spread: &Spread<'_>, passed: &[Complex64]) -> f64 {
     let count = system.matrix.len() / system.columns;
     // W·A·P is the projector on the columns of W·A, times W, which leaves tr(WΣWᴴ) − Re tr(PΣ·WᴴW·A).
-    let normal = weights.adjoint_times(&weights.times(&system.matrix, system.columns), system.columns);
-    let fitted: f64 = (passed.chunks_exact(count).enumerate())
-        .flat_map(|(unknown, row)| row.iter().zip(normal.iter().skip(unknown).step_by(system.columns)))
-        .map(|(passed, entry)| (passed * entry).re)
-        .sum();
+    // That trace is the sum of W·A times the conjugate of W·(PΣ)ᴴ, entry by entry.
+    let passed: Vec<Complex64> =
+        (0..count).flat_map(|reading| passed.iter().skip(reading).step_by(count).map(Complex64::conj)).collect();
+    let whitened = |matrix: &[Complex64]| weights.times(matrix, system.columns);
+    let fitted = dot(&whitened(&passed), &whitened(&system.matrix)).re;
     (weights.trace_about(spread) - fitted).max(0.0)
 }
 
