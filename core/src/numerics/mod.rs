@@ -7,3 +7,4 @@ pub mod fourier;
 pub mod height_map;
 pub mod lanes;
 pub mod least_squares;
+pub mod side_by_side;

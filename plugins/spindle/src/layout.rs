@@ -244,10 +244,10 @@ impl Layout {
         self.readings.iter().flat_map(row).collect()
     }
 
-    /// The equations of an order from 1; worked out once.
+    /// The equations of the orders from 1 to `max_order`; worked out once.
     #[must_use]
-    pub fn system(&self, order: usize) -> Arc<System> {
-        self.systems.of(self, order)
+    pub fn systems(&self, max_order: usize) -> Vec<Arc<System>> {
+        self.systems.up_to(self, max_order)
     }
 
     /// Factors one order's matrix, rows weighted where `weights` (`[reading][reading]`) is given.

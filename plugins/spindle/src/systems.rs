@@ -31,8 +31,8 @@ impl Clone for Systems {
 }
 
 impl Systems {
-    /// The equations of an order from 1.
-    pub(crate) fn of(&self, layout: &Layout, order: usize) -> Arc<System> {
+    /// The equations of the orders from 1 to `max_order`.
+    pub(crate) fn up_to(&self, layout: &Layout, max_order: usize) -> Vec<Arc<System>> {
         let work_out = |order: usize| {
             let (columns, matrix) = if order == 1 {
                 (layout.first_order_unknowns().len(), layout.first_order_matrix())
@@ -41,14 +41,12 @@ impl Systems {
             };
             Arc::new(System { columns, matrix, observable: layout.observable(order) })
         };
-        if order > KEPT {
-            return work_out(order);
-        }
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        while known.len() < order {
+        while known.len() < max_order.min(KEPT) {
             let next = known.len() + 1;
             known.push(work_out(next));
         }
-        Arc::clone(&known[order - 1])
+        let kept = known.iter().take(max_order).cloned();
+        kept.chain((known.len() + 1..=max_order).map(work_out)).collect()
     }
 }

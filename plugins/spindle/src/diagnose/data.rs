@@ -14,9 +14,7 @@ use crate::{
     effects::{Alterations, SpindleEffect},
     layout::Layout,
     selection::Selection,
-    separators::{
-        Blocks, Readings, apply, expected_weighted_squares, harmonic_least_squares::order_operators, smooth, whitening,
-    },
+    separators::{Blocks, Operators, Propagation, Readings, apply, smooth, whitening},
 };
 
 /// Orders to each side over which the noise in the residual's space is averaged, beyond what covariances are.
@@ -161,8 +159,7 @@ impl StationData {
         smooth(&mut readings);
         seen.changes.iter().for_each(|change| change.widen(&mut readings));
         let held_out = held_out.map(|station| Readings::gather(selection, layout, station)).transpose()?;
-        let orders = 1..=readings.max_order;
-        let weights: Option<Vec<_>> = orders.map(|order| whitening(&readings, order)).collect();
+        let weights = whitening(&readings);
         let floor = weights.as_ref().map_or_else(Vec::new, |weights| floor(layout, &readings, weights));
         Ok(Self { name: whole.name.clone(), z_mm: whole.z_mm, seen, leaks, creeps, readings, held_out, weights, floor })
     }
@@ -189,17 +186,14 @@ impl StationData {
 
 /// The covariance of the mean, projected to where the fit cannot reach, beside that of independent turns.
 fn floor(layout: &Layout, readings: &Readings, weights: &[Blocks]) -> Vec<f64> {
-    let operators = order_operators(layout, readings.max_order, Some(weights));
+    let operators = Operators::least_squares(layout, readings.max_order, Some(weights.to_vec()));
     let count = readings.count;
     let (mut sums, mut dofs) = (vec![0.0; readings.max_order], vec![0.0; readings.max_order]);
-    for order in 1..=readings.max_order {
-        let operator = &operators[order - 1];
-        let dof = count - operator.rank;
-        let Some(spread) = readings.spread(order).filter(|_| dof > 0) else { continue };
-        let system = layout.system(order);
-        sums[order - 1] =
-            expected_weighted_squares(&system, &weights[order - 1], &spread, &spread.times(&operator.operator));
-        dofs[order - 1] = dof as f64;
+    if let Some(propagation) = Propagation::of(readings, &operators) {
+        for (index, operator) in operators.orders.iter().enumerate().filter(|(_, operator)| operator.rank < count) {
+            sums[index] = propagation.weighted_squares[index];
+            dofs[index] = (count - operator.rank) as f64;
+        }
     }
     let mean = |from: usize, to: usize| {
         let dof: f64 = dofs[from..to].iter().sum();

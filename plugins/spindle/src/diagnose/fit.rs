@@ -7,7 +7,7 @@ use runout_core::{
     evaluate::{roundness::ront_lsci_um, uncertainty},
     model::{Bias, Fit, Outcome, Remainder, Setting, diagnosis::Unexplained},
     numerics::fourier::Fourier,
-    separation::{Quantity, Separation},
+    separation::{Quantity, Residual, Separation},
     stage::Station,
 };
 
@@ -18,7 +18,7 @@ use super::{
 use crate::{
     effects::{ActsOn, Alterations, Predicted},
     layout::Layout,
-    separators::{Estimate, Operators, Readings, Solver, apply, harmonic_least_squares::order_operators, leftover},
+    separators::{Estimate, Operators, Propagation, Readings, Solver, apply, leftover, residual},
 };
 
 /// A fit, and what its partials need.
@@ -33,6 +33,7 @@ pub struct SpindleFit {
 /// One station's solution.
 pub(super) struct Solved {
     pub operators: Operators,
+    propagation: Option<Propagation>,
     pub estimate: Estimate,
     /// Readings taken back to displacements.
     pub corrected: Readings,
@@ -97,9 +98,9 @@ impl SpindleFit {
     pub fn separations(&self, stations: &[Station]) -> Vec<Separation> {
         let solver = self.shared.solver(&self.layout, &self.alterations);
         let each = self.stations.iter().zip(stations).map(|(solved, station)| {
-            let residual = solver.residual(&solved.operators, &solved.corrected, &solved.linear);
-            let mut separation =
-                solver.report(station, &solved.operators, &solved.corrected, &solved.estimate, residual, Vec::new());
+            let propagation = solved.propagation.as_ref();
+            let residual = solved.residual();
+            let mut separation = solver.report(station, &solved.operators, &solved.estimate, propagation, residual);
             separation.variance.iter_mut().zip(&solved.widened).for_each(|(variance, more)| *variance += more);
             separation
         });
@@ -123,11 +124,10 @@ impl Solved {
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.
         let weights: Vec<_> = (1..=max_order).map(|order| data.weights_of(order, layout, alterations)).collect();
-        let operators = Operators {
-            orders: order_operators(layout, max_order, Some(&weights)),
-            observable: (1..=max_order).map(|order| layout.observable(order)).collect(),
-            weights: data.weights.is_some().then(|| weights.clone()),
-        };
+        let mut operators = Operators::least_squares(layout, max_order, Some(weights.clone()));
+        if data.weights.is_none() {
+            operators.weights = None;
+        }
         let solver = shared.solver(layout, alterations);
         let (estimate, linear) = solver.iterate(&corrected, &operators, |estimate, excess| {
             axial(layout, alterations, &corrected, estimate, excess);
@@ -135,7 +135,7 @@ impl Solved {
         let count = corrected.count;
         let whitened = (1..=max_order)
             .map(|order| {
-                let system = layout.system(order);
+                let system = &operators.systems[order - 1];
                 let left = leftover(&system.matrix, &operators.orders[order - 1].operator, count);
                 let mut left = weights[order - 1].times(&left, count);
                 // A real degree of freedom has half of a complex one's square.
@@ -147,7 +147,12 @@ impl Solved {
             })
             .collect();
         let widened = vec![0.0; (max_order + 1) * layout.unknowns.len()];
-        Self { operators, estimate, corrected, linear, whitened, widened }
+        let propagation = Propagation::of(&corrected, &operators);
+        Self { operators, propagation, estimate, corrected, linear, whitened, widened }
+    }
+
+    fn residual(&self) -> Residual {
+        residual(&self.operators, &self.corrected, &self.linear, self.propagation.as_ref())
     }
 }
 
@@ -182,7 +187,6 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
     let (mut residual, mut stretches) = (Vec::new(), Vec::with_capacity(stations.len()));
     let (mut dof, mut squares, mut expected, mut readings) = (0, 0.0, 0.0, 0);
     let (mut held_squares, mut held_chi2, mut held_readings) = (0.0, 0.0, 0);
-    let solver = shared.solver(layout, alterations);
     for (solved, data) in stations.iter().zip(&shared.data) {
         let count = solved.corrected.count;
         project(&solved.whitened, &solved.linear, count, |_, values| {
@@ -197,7 +201,7 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
             dof += 1;
         }
         stretches.push(residual.len() - stretches.iter().sum::<usize>());
-        let level = solver.residual(&solved.operators, &solved.corrected, &solved.linear);
+        let level = solved.residual();
         if level.dof > 0 {
             dof += level.dof;
             squares += level.rms_um.powi(2) * count as f64;
@@ -244,7 +248,7 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
     for order in 1..=held.max_order.min(solved.corrected.max_order) {
         let at = order * count..(order + 1) * count;
         let operator = &solved.operators.orders[order - 1].operator;
-        let system = layout.system(order);
+        let system = &solved.operators.systems[order - 1];
         let solution = apply(operator, &solved.linear[at.clone()]);
         let predicted = apply(&system.matrix, &solution);
         let beyond = solved.corrected.mean[at.clone()].iter().zip(&solved.linear[at.clone()]).map(|(a, b)| a - b);
@@ -416,7 +420,7 @@ impl Solved {
 
     /// Orders from 2 at which an unknown can be told.
     fn told_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
-        (2..=self.corrected.max_order).filter(move |order| self.operators.observable[order - 1][unknown])
+        (2..=self.corrected.max_order).filter(move |order| self.operators.observable(*order)[unknown])
     }
 }
 

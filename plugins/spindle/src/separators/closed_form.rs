@@ -20,9 +20,10 @@ use serde::Deserialize;
 
 use super::{
     harmonic_least_squares::{Weighting, operators},
+    operators::{Operators, OrderOperator},
     projection::projection,
     readings::Readings,
-    solution::{Operators, OrderOperator, Solver},
+    solution::Solver,
 };
 use crate::{
     diagnose::DeclaredSpindle,
@@ -160,8 +161,7 @@ impl ClosedFormSeparator {
             let operator = self.method.operator(&self.layout, order).unwrap_or_else(|| qr.operator());
             orders.push(OrderOperator { operator, rank: qr.rank() });
         }
-        let observable = (1..=readings.max_order).map(|order| self.layout.observable(order)).collect();
-        Operators { orders, observable, weights: None }
+        Operators { orders, systems: self.layout.systems(readings.max_order), weights: None }
     }
 }
 

@@ -17,11 +17,11 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    algebra::Blocks,
     closed_form::{checked_gain, yes},
+    operators::Operators,
     projection::projection,
     readings::Readings,
-    solution::{Operators, OrderOperator, Solver},
+    solution::Solver,
     weights,
 };
 use crate::{diagnose::DeclaredSpindle, layout::Layout, plan, selection::Selection};
@@ -135,31 +135,9 @@ impl StationSeparator for HarmonicLeastSquares {
 /// Least-squares operators of all orders.
 #[must_use]
 pub fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> Operators {
-    let weights: Option<Vec<_>> = match weighting {
-        Weighting::TurnCovariance => {
-            (1..=readings.max_order).map(|order| weights::whitening(readings, order)).collect()
-        }
+    let weights = match weighting {
+        Weighting::TurnCovariance => weights::whitening(readings),
         Weighting::None => None,
     };
-    Operators {
-        orders: order_operators(layout, readings.max_order, weights.as_deref()),
-        observable: (1..=readings.max_order).map(|order| layout.system(order).observable.clone()).collect(),
-        weights,
-    }
-}
-
-/// Least-squares operators of orders from 1, with W of each order where readings are weighted.
-#[must_use]
-pub fn order_operators(layout: &Layout, max_order: usize, weights: Option<&[Blocks]>) -> Vec<OrderOperator> {
-    let solve = |order: usize| {
-        let system = layout.system(order);
-        let (columns, matrix) = (system.columns, &system.matrix);
-        let Some(weights) = weights.map(|weights| &weights[order - 1]) else {
-            let qr = layout.factor_matrix(columns, matrix);
-            return OrderOperator { operator: qr.operator(), rank: qr.rank() };
-        };
-        let qr = layout.factor_matrix(columns, &weights.times(matrix, columns));
-        OrderOperator { operator: weights.after(&qr.operator()), rank: qr.rank() }
-    };
-    (1..=max_order).map(solve).collect()
+    Operators::least_squares(layout, readings.max_order, weights)
 }

@@ -2,7 +2,6 @@
 
 use runout_core::{Complex64, Error, Result, profile::Profile, stage::Station};
 
-use super::algebra::times_blocks;
 use crate::{layout::Layout, selection::Selection};
 
 /// Averaged readings of one station: Re Σ uₙ e^{−inΦ}, with their covariance.
@@ -105,47 +104,5 @@ impl Readings {
     #[must_use]
     pub fn order(&self, order: usize) -> &[Complex64] {
         &self.mean[order * self.count..(order + 1) * self.count]
-    }
-
-    /// Covariance of one order's readings, where it is known.
-    #[must_use]
-    pub fn spread(&self, order: usize) -> Option<Spread<'_>> {
-        let setups = self.covariance.as_ref()?;
-        Some(Spread::new(self.count / setups.len(), setups, order))
-    }
-}
-
-/// Covariance Σ of one order's readings: setups are independent of each other.
-pub struct Spread<'a> {
-    sensors: usize,
-    /// Matrices of all orders in each setup.
-    setups: &'a [Vec<Complex64>],
-    order: usize,
-}
-
-impl<'a> Spread<'a> {
-    /// From the matrices of the setups, `[order][sensor][sensor]`.
-    #[must_use]
-    pub fn new(sensors: usize, setups: &'a [Vec<Complex64>], order: usize) -> Self {
-        Self { sensors, setups, order }
-    }
-
-    /// The matrix of each setup, `[sensor][sensor]`.
-    pub fn blocks(&self) -> impl ExactSizeIterator<Item = &'a [Complex64]> + Clone {
-        let block = self.sensors * self.sensors;
-        let place = self.order * block..(self.order + 1) * block;
-        self.setups.iter().map(move |orders| &orders[place.clone()])
-    }
-
-    /// tr Σ.
-    #[must_use]
-    pub fn trace(&self) -> f64 {
-        self.blocks().flat_map(|block| block.iter().step_by(self.sensors + 1)).map(|entry| entry.re).sum()
-    }
-
-    /// M·Σ for M, both `[row][reading]`.
-    #[must_use]
-    pub fn times(&self, rows: &[Complex64]) -> Vec<Complex64> {
-        times_blocks(rows, self.sensors, &self.blocks())
     }
 }

@@ -8,7 +8,9 @@ use runout_core::{
 };
 
 use super::{
-    algebra::{Blocks, apply, expected_squares, expected_weighted_squares, times_adjoint},
+    algebra::apply,
+    operators::{Operators, OrderOperator},
+    propagation::Propagation,
     readings::Readings,
     second_order::SecondOrder,
     swapped_setups, weights,
@@ -24,26 +26,6 @@ const MAX_PASSES: usize = 8;
 const CARRIED: f64 = 3.0;
 /// Passes end when the readings move less than this, rms.
 const SETTLED_UM: f64 = 1e-9;
-
-/// The linear solution of one order: unknowns = operator · readings.
-#[derive(Debug, Clone)]
-pub struct OrderOperator {
-    /// `[unknown][reading]`.
-    pub operator: Vec<Complex64>,
-    /// Independent columns of the layout's matrix.
-    pub rank: usize,
-}
-
-/// Linear solutions of all orders; entry 0 belongs to order 1 and its own unknowns.
-#[derive(Debug, Clone)]
-pub struct Operators {
-    /// From order 1.
-    pub orders: Vec<OrderOperator>,
-    /// Whether each unknown can be told, `[order − 1][unknown]`.
-    pub observable: Vec<Vec<bool>>,
-    /// W of each order where readings were weighted.
-    pub weights: Option<Vec<Blocks>>,
-}
 
 /// The unknowns at all orders, motion at the sensors' mean z.
 #[derive(Debug, Clone)]
@@ -83,11 +65,13 @@ impl Solver<'_> {
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
         let mut warnings = Vec::new();
-        let residual = self.residual(&operators, &readings, &linear);
+        let propagation = Propagation::of(&readings, &operators);
+        let residual = residual(&operators, &readings, &linear, propagation.as_ref());
         if residual.chi2_per_dof > swapped_setups::SUSPICIOUS_CHI2 {
             warnings.extend(swapped_setups::suspect(&self.selection.rig, self.layout, &operators, &readings));
         }
-        let mut separation = self.report(station, &operators, &readings, &estimate, residual, warnings);
+        let mut separation = self.report(station, &operators, &estimate, propagation.as_ref(), residual);
+        separation.warnings = warnings;
         let carried = self.second_order.then(|| self.carried(&readings, &separation)).flatten();
         separation.warnings.extend(carried);
         Ok(separation)
@@ -190,7 +174,7 @@ impl Solver<'_> {
             let mut rows = self.order_operator(&operators, order, count);
             to_reference.apply(&mut rows);
             for (unknown, row) in rows.chunks_exact(count).enumerate() {
-                if operators.observable[order - 1][unknown] {
+                if operators.observable(order)[unknown] {
                     let start = (order * width + unknown) * all;
                     row.iter().zip(&readings.places).for_each(|(entry, place)| operator[start + place] = *entry);
                 }
@@ -206,7 +190,7 @@ impl Solver<'_> {
         let mut first = Vec::new();
         for order in 1..=max_order {
             let solution = apply(&operators.orders[order - 1].operator, &readings[order * count..(order + 1) * count]);
-            told[order * width..(order + 1) * width].copy_from_slice(&operators.observable[order - 1]);
+            told[order * width..(order + 1) * width].copy_from_slice(operators.observable(order));
             if order == 1 {
                 let motion = self.first_order_motion(&solution);
                 values[width..2 * width].copy_from_slice(&motion);
@@ -236,85 +220,39 @@ impl Solver<'_> {
         self.layout.unknowns.iter().map(value).collect()
     }
 
-    pub fn residual(&self, operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Residual {
-        let count = readings.count;
-        let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
-        // Weighted as the fit is; set against what the covariance lets expect of it.
-        let (mut weighted, mut weighted_expected) = (0.0, 0.0);
-        let mut known = readings.covariance.is_some();
-        for order in 1..=readings.max_order {
-            let OrderOperator { operator, rank } = &operators.orders[order - 1];
-            if *rank == count {
-                continue;
-            }
-            dof += count - rank;
-            let system = self.layout.system(order);
-            let recorded = &linear[order * count..(order + 1) * count];
-            let fitted = apply(&system.matrix, &apply(operator, recorded));
-            let residual: Vec<Complex64> =
-                recorded.iter().zip(fitted).map(|(recorded, fitted)| recorded - fitted).collect();
-            squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
-            match readings.spread(order) {
-                Some(spread) => {
-                    let passed = spread.times(operator);
-                    expected += expected_squares(&system, operator, &spread, &passed);
-                    if let Some(weights) = operators.weights.as_ref().map(|weights| &weights[order - 1]) {
-                        weighted += weights.times(&residual, 1).iter().map(Complex64::norm_sqr).sum::<f64>();
-                        weighted_expected += expected_weighted_squares(&system, weights, &spread, &passed);
-                    }
-                }
-                None => known = false,
-            }
-        }
-        if dof == 0 {
-            return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0 };
-        }
-        // A coefficient of size c is a wave of mean square c²/2.
-        let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
-        let chi2_per_dof = match &operators.weights {
-            _ if !known || expected <= 0.0 => f64::NAN,
-            Some(_) => weighted / weighted_expected,
-            None => squares / expected,
-        };
-        Residual {
-            rms_um: rms(squares),
-            expected_rms_um: if known { rms(expected) } else { f64::NAN },
-            chi2_per_dof,
-            dof: 2 * dof,
-        }
-    }
-
     pub fn report(
         &self,
         station: &Station,
         operators: &Operators,
-        readings: &Readings,
         estimate: &Estimate,
+        propagation: Option<&Propagation>,
         residual: Residual,
-        warnings: Vec<String>,
     ) -> Separation {
         let layout = self.layout;
-        let (width, count) = (layout.unknowns.len(), readings.count);
+        let (width, max_order) = (layout.unknowns.len(), operators.orders.len());
         let to_reference = layout.to_reference(layout.mean_z_mm + station.z_mm);
-        let mut values = vec![Complex64::ZERO; (readings.max_order + 1) * width];
+        let mut values = vec![Complex64::ZERO; (max_order + 1) * width];
         let mut variance = vec![0.0; values.len()];
         let mut observable = vec![true; values.len()];
         let motions: Vec<usize> = (0..width).filter(|unknown| !layout.unknowns[*unknown].is_form()).collect();
-        let mut motion_covariance =
-            readings.covariance.as_ref().map(|_| vec![Complex64::ZERO; motions.len() * motions.len()]);
-        for order in 1..=readings.max_order {
+        let mut motion_covariance = propagation.map(|_| vec![Complex64::ZERO; motions.len() * motions.len()]);
+        for order in 1..=max_order {
             let row = order * width..(order + 1) * width;
             let mut solved = estimate.values[row.clone()].to_vec();
             to_reference.apply(&mut solved);
-            let told = &operators.observable[order - 1];
+            let told = &operators.observable(order);
             if layout.direction < 0.0 {
                 let forms = layout.unknowns.iter().zip(&mut solved).filter(|(unknown, _)| unknown.is_form());
                 forms.for_each(|(_, form)| *form = form.conj());
             }
-            let spread = readings.spread(order).map(|spread| {
-                let mut operator = self.order_operator(operators, order, count);
-                to_reference.apply(&mut operator);
-                times_adjoint(&spread.times(&operator), &operator, count)
+            let spread = propagation.map(|propagation| {
+                let covariance = &propagation.covariance[order - 1];
+                let covariance = about(covariance, |rows, length| self.named_alike(rows, order, length));
+                about(&covariance, |rows, _| {
+                    let mut rows = rows.to_vec();
+                    to_reference.apply(&mut rows);
+                    rows
+                })
             });
             if let (Some(spread), Some(joint)) = (&spread, &mut motion_covariance) {
                 let entry = |row: &usize, column: &usize| spread[row * width + column];
@@ -344,25 +282,84 @@ impl Solver<'_> {
             motion_covariance,
             motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
-            warnings,
+            warnings: Vec::new(),
         }
     }
 
     /// The operator of an order, with the unknowns of orders from 2 as rows.
     pub fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
-        let operator = &operators.orders[order - 1].operator;
-        if order == 1 { self.first_order_operator(operator, count) } else { operator.clone() }
+        self.named_alike(&operators.orders[order - 1].operator, order, count)
     }
 
-    /// The operator of order 1 with the other orders' unknowns as rows.
-    fn first_order_operator(&self, operator: &[Complex64], count: usize) -> Vec<Complex64> {
-        let columns: Vec<Vec<Complex64>> = (0..count)
-            .map(|reading| {
-                let column: Vec<Complex64> = operator.iter().skip(reading).step_by(count).copied().collect();
+    /// Rows, `[unknown][length]`, with the unknowns of orders from 2 also at order 1.
+    fn named_alike(&self, rows: &[Complex64], order: usize, length: usize) -> Vec<Complex64> {
+        if order > 1 {
+            return rows.to_vec();
+        }
+        let columns: Vec<Vec<Complex64>> = (0..length)
+            .map(|place| {
+                let column: Vec<Complex64> = rows.iter().skip(place).step_by(length).copied().collect();
                 self.first_order_motion(&column)
             })
             .collect();
         let width = self.layout.unknowns.len();
         (0..width).flat_map(|unknown| columns.iter().map(move |column| column[unknown])).collect()
     }
+}
+
+/// What the solution leaves of linear readings, `[order][reading]`, and what noise lets expect of that.
+pub fn residual(
+    operators: &Operators,
+    readings: &Readings,
+    linear: &[Complex64],
+    propagation: Option<&Propagation>,
+) -> Residual {
+    let count = readings.count;
+    let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
+    // Weighted as the fit is; set against what the covariance lets expect of it.
+    let (mut weighted, mut weighted_expected) = (0.0, 0.0);
+    for (index, (OrderOperator { operator, rank }, system)) in
+        operators.orders.iter().zip(&operators.systems).enumerate()
+    {
+        if *rank == count {
+            continue;
+        }
+        dof += count - rank;
+        let recorded = &linear[(index + 1) * count..(index + 2) * count];
+        let fitted = apply(&system.matrix, &apply(operator, recorded));
+        let residual: Vec<Complex64> =
+            recorded.iter().zip(fitted).map(|(recorded, fitted)| recorded - fitted).collect();
+        squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let Some(propagation) = propagation else { continue };
+        expected += propagation.squares[index];
+        if let Some(weights) = &operators.weights {
+            weighted += weights[index].times(&residual, 1).iter().map(Complex64::norm_sqr).sum::<f64>();
+            weighted_expected += propagation.weighted_squares[index];
+        }
+    }
+    if dof == 0 {
+        return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0 };
+    }
+    // A coefficient of size c is a wave of mean square c²/2.
+    let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
+    let chi2_per_dof = match &operators.weights {
+        _ if expected <= 0.0 => f64::NAN,
+        Some(_) => weighted / weighted_expected,
+        None => squares / expected,
+    };
+    Residual {
+        rms_um: rms(squares),
+        expected_rms_um: if propagation.is_some() { rms(expected) } else { f64::NAN },
+        chi2_per_dof,
+        dof: 2 * dof,
+    }
+}
+
+/// M·C·Mᴴ for a covariance C, where `times` gives M·rows for rows of a length.
+fn about(covariance: &[Complex64], times: impl Fn(&[Complex64], usize) -> Vec<Complex64>) -> Vec<Complex64> {
+    let size = covariance.len().isqrt();
+    let rows = times(covariance, size);
+    let adjoint: Vec<Complex64> =
+        (0..size).flat_map(|column| rows.iter().skip(column).step_by(size).map(Complex64::conj)).collect();
+    times(&adjoint, rows.len() / size)
 }

@@ -4,8 +4,8 @@ use runout_core::{Complex64, rig::Rig};
 
 use super::{
     algebra::{apply, leftover},
+    operators::Operators,
     readings::Readings,
-    solution::Operators,
 };
 use crate::layout::Layout;
 
