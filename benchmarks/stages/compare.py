@@ -25,7 +25,7 @@ ROWS = (
     ("resample and average; peer: linear", "average", "average", 8),
     ("the same and motion of every turn from three points", "average-and-motion-of-every-turn", "average-and-motion", 3),
     ("read CSV; peer: polars, one thread", "csv-read", "csv-read", 2),
-    ("read CSV; peer: polars, all threads", "csv-read", "csv-read-all-threads", 2),
+    ("read CSV, all threads; peer: polars, all threads", "csv-read-all-threads", "csv-read-all-threads", 2),
     ("read two CSV files, a thread each; peer: polars, all threads", "csv-read-two-files", "csv-read-two-files", 2),
     ("read HDF5, contiguous; peer: h5py", "hdf5-read", "hdf5-read", 1),
     ("the same with the file's checksum; peer: h5py, without", "hdf5-read-and-checksum", "hdf5-read", None),

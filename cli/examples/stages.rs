@@ -72,6 +72,8 @@ fn main() -> Outcome {
     let csv = built(&pipeline, &csv_settings(&folder, &out))?;
     let read_csv = || -> Outcome { drain(&mut *opened(&csv)?.open(0, 0)?) };
     report("csv-read", || clocked(read_csv))?;
+    let threads = std::thread::available_parallelism()?;
+    report("csv-read-all-threads", || clocked(|| drain(&mut *opened(&csv)?.open_with(threads, 0, 0)?)))?;
     report("csv-read-two-files", || {
         clocked(|| {
             std::thread::scope(|scope| {

@@ -1,6 +1,6 @@
 //! Recorded turns: what a loader offers, read in blocks so that a station may be larger than memory.
 
-use std::{ops::Range, path::PathBuf};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use crate::{Result, checksum::Checksum};
 
@@ -14,6 +14,14 @@ pub trait Recording: Send + Sync {
     /// # Errors
     /// When the capture is missing or cannot be read.
     fn open(&self, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>>;
+
+    /// The same, where so many threads may work on it.
+    ///
+    /// # Errors
+    /// When the capture is missing or cannot be read.
+    fn open_with(&self, _threads: NonZeroUsize, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
+        self.open(station, setup)
+    }
 
     /// The files behind it, for their checksums.
     fn inputs(&self) -> Vec<PathBuf>;

@@ -50,7 +50,10 @@ impl Line<'_> {
         let stations = self.recording.stations();
         observer.begin(stations.len());
         let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-        let workers = threads.map_or(processors, NonZeroUsize::get).clamp(1, stations.len().max(1));
+        let threads = threads.map_or(processors, NonZeroUsize::get);
+        let workers = threads.clamp(1, stations.len().max(1));
+        // Where there are fewer stations than threads, some can help to read.
+        let readers = NonZeroUsize::new(threads / workers).unwrap_or(NonZeroUsize::MIN);
         let next = AtomicUsize::new(0);
         let failed = AtomicBool::new(false);
         let turnstile = Turnstile::new(|index: usize, result| {
@@ -66,7 +69,7 @@ impl Line<'_> {
             });
             let captures = claimed
                 .flat_map(|station| (0..setups).map(move |setup| (station, setup)))
-                .map(|(station, setup)| (station, self.recorded(station, setup)));
+                .map(|(station, setup)| (station, self.recorded(readers, station, setup)));
             let work_on = |captures: &mut dyn Captures<usize>| {
                 while let Some(index) = captures.coming() {
                     let result = self.station(&stations[index], captures).and_then(|station| work(index, station));
@@ -98,8 +101,9 @@ impl Line<'_> {
     }
 
     /// A capture as it is read and conditioned; every sample is looked at before anything else touches it.
-    fn recorded(&self, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
-        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::new(self.recording.open(station, setup)?));
+    fn recorded(&self, threads: NonZeroUsize, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
+        let opened = self.recording.open_with(threads, station, setup)?;
+        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::new(opened));
         self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))
     }
 

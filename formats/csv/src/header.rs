@@ -4,7 +4,7 @@ use std::path::Path;
 
 use runout_core::{Error, Result, rig::Rig};
 
-use crate::lines::{Lines, cells};
+use crate::lines::{Stretch, Stretches, cells};
 
 /// Column of the once-per-turn mark.
 const INDEX: &str = "index";
@@ -53,19 +53,23 @@ impl Phase {
 }
 
 impl Header {
-    /// Opens a file, reads its header, and leaves the lines at the first row.
-    pub(crate) fn open(path: &Path, rig: &Rig) -> Result<(Self, Lines)> {
-        let mut lines = Lines::open(path)?;
+    /// Opens a file and reads its header; gives the stretch that it is in, from the first row on, and those behind.
+    pub(crate) fn open(path: &Path, rig: &Rig) -> Result<(Self, Stretch, Stretches)> {
+        let (mut stretches, mut stretch) = (Stretches::open(path)?, Stretch::default());
         let shown = path.display().to_string();
-        let header = loop {
-            let Some(line) = lines.next()? else {
-                return Err(Error::new("read", shown, "expected a header that names the columns, found none"));
-            };
-            if !line.is_blank() && !line.bytes.starts_with(b"#") {
-                break Self::parse(line.bytes, line.number, shown, rig)?;
+        while stretches.next(&mut stretch)? {
+            let mut lines = stretch.lines();
+            let length = lines.ahead().len();
+            while let Some(line) = lines.next() {
+                if !line.is_blank() && !line.bytes.starts_with(b"#") {
+                    let header = Self::parse(line.bytes, line.number, shown, rig)?;
+                    let (passed, number) = (length - lines.ahead().len(), lines.number());
+                    stretch.pass(passed, number);
+                    return Ok((header, stretch, stretches));
+                }
             }
-        };
-        Ok((header, lines))
+        }
+        Err(Error::new("read", shown, "expected a header that names the columns, found none"))
     }
 
     fn parse(line: &[u8], number: u64, shown: String, rig: &Rig) -> Result<Self> {

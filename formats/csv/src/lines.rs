@@ -1,21 +1,131 @@
-//! A text file, line after line, in a buffer of its own.
+//! A text file in stretches of whole lines, and their lines and cells.
 
 use std::{fs::File, io::Read, path::Path};
 
 use runout_core::{Error, Result};
 
-const BUFFER: usize = 1 << 18;
+/// Text that is read at a time: what it holds, as numbers, stays in a core's own cache.
+const STRETCH: usize = 1 << 18;
 /// No row of readings is longer; a file without line ends is no table.
 const LONGEST_LINE: usize = 1 << 20;
 
-/// Reads lines without their ends.
-pub(crate) struct Lines {
+/// Reads a file stretch by stretch.
+pub(crate) struct Stretches {
     file: File,
     shown: String,
+    /// The beginning of a line whose end is still to be read.
+    rest: Vec<u8>,
+    /// Lines handed on.
+    lines: u64,
+}
+
+/// Lines of a file, whole ones.
+#[derive(Debug, Default)]
+pub(crate) struct Stretch {
     buffer: Vec<u8>,
-    /// What is in the buffer and not yet handed on.
+    /// What of the buffer it is.
     start: usize,
     end: usize,
+    /// Number of the line before it.
+    lines_before: u64,
+    /// Line ends in it.
+    ends: usize,
+}
+
+impl Stretches {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let shown = path.display().to_string();
+        let file = File::open(path).map_err(|error| Error::new("open", &shown, error))?;
+        Ok(Self { file, shown, rest: Vec::new(), lines: 0 })
+    }
+
+    /// Reads the next stretch in place of another one; false at the end.
+    pub(crate) fn next(&mut self, stretch: &mut Stretch) -> Result<bool> {
+        let Stretch { buffer, start, end, .. } = stretch;
+        buffer.resize(buffer.len().max(self.rest.len() + STRETCH), 0);
+        buffer[..self.rest.len()].copy_from_slice(&self.rest);
+        (*start, *end) = (0, self.rest.len());
+        self.rest.clear();
+        loop {
+            if *end == buffer.len() {
+                buffer.resize(2 * *end, 0);
+            }
+            let count = self.read(&mut buffer[*end..])?;
+            let searched = *end;
+            *end += count;
+            if let Some(place) = memchr::memrchr(b'\n', &buffer[searched..*end]) {
+                let whole = searched + place + 1;
+                self.rest.extend_from_slice(&buffer[whole..*end]);
+                *end = whole;
+                break;
+            }
+            if count == 0 {
+                break;
+            }
+            if *end > LONGEST_LINE {
+                let object = format!("{}, line {}", self.shown, self.lines + 1);
+                return Err(Error::new("read", object, format!("expected a line end within {LONGEST_LINE} bytes")));
+            }
+        }
+        if self.lines == 0 {
+            let begin = &buffer[..*end];
+            if begin.starts_with(&[0xFF, 0xFE]) || begin.starts_with(&[0xFE, 0xFF]) {
+                let error = Error::new("read", &self.shown, "expected text in UTF-8 or Latin-1, found UTF-16");
+                return Err(error.help("save it as UTF-8"));
+            }
+            if begin.starts_with(&[0xEF, 0xBB, 0xBF]) {
+                *start = 3;
+            }
+        }
+        stretch.lines_before = self.lines;
+        stretch.ends = memchr::memchr_iter(b'\n', &stretch.buffer[stretch.start..stretch.end]).count();
+        self.lines += stretch.ends as u64;
+        Ok(stretch.start < stretch.end)
+    }
+
+    fn read(&mut self, into: &mut [u8]) -> Result<usize> {
+        loop {
+            match self.file.read(into) {
+                Ok(count) => return Ok(count),
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(Error::new("read", &self.shown, error)),
+            }
+        }
+    }
+}
+
+impl Stretch {
+    /// Its lines.
+    pub(crate) fn lines(&self) -> Lines<'_> {
+        Lines { text: &self.buffer[self.start..self.end], number: self.lines_before }
+    }
+
+    /// Number of the line before it.
+    pub(crate) fn lines_before(&self) -> u64 {
+        self.lines_before
+    }
+
+    /// Lines to its end, counted from the beginning of the file.
+    pub(crate) fn lines_so_far(&self) -> u64 {
+        self.lines_before + self.most_lines() as u64
+    }
+
+    /// How many lines it has, or one more: the last one of a file may lack its end.
+    pub(crate) fn most_lines(&self) -> usize {
+        self.ends + 1
+    }
+
+    /// Leaves out what was read of its lines.
+    pub(crate) fn pass(&mut self, length: usize, lines: u64) {
+        self.start += length;
+        self.ends = self.ends.saturating_sub((lines - self.lines_before) as usize);
+        self.lines_before = lines;
+    }
+}
+
+/// Lines without their ends.
+pub(crate) struct Lines<'a> {
+    text: &'a [u8],
     number: u64,
 }
 
@@ -32,85 +142,37 @@ impl Line<'_> {
     }
 }
 
-impl Lines {
-    pub(crate) fn open(path: &Path) -> Result<Self> {
-        let shown = path.display().to_string();
-        let file = File::open(path).map_err(|error| Error::new("open", &shown, error))?;
-        let mut lines = Self { file, shown, buffer: vec![0; BUFFER], start: 0, end: 0, number: 0 };
-        lines.fill()?;
-        let begin = &lines.buffer[..lines.end];
-        if begin.starts_with(&[0xFF, 0xFE]) || begin.starts_with(&[0xFE, 0xFF]) {
-            let error = Error::new("read", &lines.shown, "expected text in UTF-8 or Latin-1, found UTF-16");
-            return Err(error.help("save it as UTF-8"));
-        }
-        if begin.starts_with(&[0xEF, 0xBB, 0xBF]) {
-            lines.start = 3;
-        }
-        Ok(lines)
-    }
-
+impl<'a> Lines<'a> {
     /// The next line; `None` at the end.
-    pub(crate) fn next(&mut self) -> Result<Option<Line<'_>>> {
-        let mut searched = 0;
-        let (length, ended) = loop {
-            let waiting = &self.buffer[self.start..self.end];
-            if let Some(place) = memchr::memchr(b'\n', &waiting[searched..]) {
-                break (searched + place, 1);
-            }
-            searched = waiting.len();
-            if searched > LONGEST_LINE {
-                let object = format!("{}, line {}", self.shown, self.number + 1);
-                return Err(Error::new("read", object, format!("expected a line end within {LONGEST_LINE} bytes")));
-            }
-            if self.fill()? == 0 {
-                if searched == 0 {
-                    return Ok(None);
-                }
-                break (searched, 0);
-            }
+    pub(crate) fn next(&mut self) -> Option<Line<'a>> {
+        if self.text.is_empty() {
+            return None;
+        }
+        let (bytes, rest) = match memchr::memchr(b'\n', self.text) {
+            Some(end) => (&self.text[..end], &self.text[end + 1..]),
+            None => (self.text, &[][..]),
         };
-        let line = &self.buffer[self.start..self.start + length];
-        self.start += length + ended;
+        self.text = rest;
         self.number += 1;
-        Ok(Some(Line { number: self.number, bytes: line.strip_suffix(b"\r").unwrap_or(line) }))
+        Some(Line { number: self.number, bytes: bytes.strip_suffix(b"\r").unwrap_or(bytes) })
     }
 
-    /// What is in memory of the lines to come: often many of them, but it may end within one.
+    /// The text of the lines to come.
     #[inline]
-    pub(crate) fn ahead(&self) -> &[u8] {
-        &self.buffer[self.start..self.end]
+    pub(crate) fn ahead(&self) -> &'a [u8] {
+        self.text
     }
 
     /// Passes over a line of so many bytes, its end included.
     #[inline]
     pub(crate) fn pass(&mut self, length: usize) {
-        self.start += length;
+        self.text = &self.text[length..];
         self.number += 1;
     }
 
     /// The number of the line that was handed on last.
     pub(crate) fn number(&self) -> u64 {
         self.number
-    }
-
-    /// Reads more, behind what is waiting; gives the number of bytes.
-    fn fill(&mut self) -> Result<usize> {
-        self.buffer.copy_within(self.start..self.end, 0);
-        self.end -= self.start;
-        self.start = 0;
-        if self.end == self.buffer.len() {
-            self.buffer.resize(2 * self.end, 0);
-        }
-        loop {
-            match self.file.read(&mut self.buffer[self.end..]) {
-                Ok(count) => {
-                    self.end += count;
-                    return Ok(count);
-                }
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(Error::new("read", &self.shown, error)),
-            }
-        }
     }
 }
 

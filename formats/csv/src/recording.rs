@@ -1,6 +1,6 @@
 //! The files of a measurement, and the samples of each.
 
-use std::path::PathBuf;
+use std::{num::NonZeroUsize, path::PathBuf};
 
 use runout_core::{
     Error, Result,
@@ -12,8 +12,8 @@ use runout_core::{
 use crate::{
     config::Stated,
     header::Header,
-    rows::Rows,
-    scan::{BLOCK_SAMPLES, Scan},
+    rows::{Piece, Rows},
+    scan::Scan,
 };
 
 /// Readings of a file that are kept from the first look at it, at most: 32 MiB. A file that has more is read twice.
@@ -39,7 +39,7 @@ impl CsvRecording {
         let mut remarks = Vec::new();
         let mut unknown: Vec<String> = Vec::new();
         for path in paths.iter().flatten() {
-            let (header, _) = Header::open(path, rig)?;
+            let (header, ..) = Header::open(path, rig)?;
             remarks.extend(header.remarks);
             for name in header.unknown {
                 if !unknown.contains(&name) {
@@ -60,18 +60,22 @@ impl Recording for CsvRecording {
     }
 
     fn open(&self, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
+        self.open_with(NonZeroUsize::MIN, station, setup)
+    }
+
+    fn open_with(&self, threads: NonZeroUsize, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
         let path = self.paths.get(station).and_then(|setups| setups.get(setup));
         let (Some(key), Some(path)) = (self.stations.get(station), path) else {
             return Err(Error::new("open", format!("station {station} in setup {setup}"), "there is no such file"));
         };
-        let mut rows = Rows::open(path, &self.rig)?;
-        let mut scan = Scan::of(&mut rows, self.most_kept)?;
-        let header = &rows.header;
+        let rows = Rows::open(path, &self.rig)?;
+        let shown = rows.format.header.shown.clone();
+        let mut scan = Scan::of(rows, threads, self.most_kept)?;
         let sample_rate_hz = match (self.stated.sample_rate_hz, scan.sample_rate_hz) {
             (Some(stated), Some(found)) if (found / stated - 1.0).abs() > SAME_RATE => {
                 return Err(Error::new(
                     "read",
-                    &header.shown,
+                    shown,
                     format!("`time_s` gives {found} Hz, the configuration {stated} Hz"),
                 )
                 .help("leave `sample_rate_hz` out of [load], or correct it"));
@@ -79,7 +83,7 @@ impl Recording for CsvRecording {
             (stated, found) => stated.or(found),
         };
         let capture = Capture {
-            object: header.shown.clone(),
+            object: shown,
             setup,
             station: key.name.clone(),
             z_mm: key.z_mm,
@@ -98,7 +102,7 @@ impl Recording for CsvRecording {
             return Ok(Box::new(KeptStream { capture, blocks: kept.into_iter(), encoder: scan.encoder }));
         }
         let rows = Rows::open(path, &self.rig)?;
-        Ok(Box::new(CsvStream { capture, rows, encoder: scan.encoder, next: 0 }))
+        Ok(Box::new(CsvStream { capture, rows, piece: Piece::default(), encoder: scan.encoder, next: 0 }))
     }
 
     fn inputs(&self) -> Vec<PathBuf> {
@@ -139,6 +143,7 @@ impl SampleStream for KeptStream {
 struct CsvStream {
     capture: Capture,
     rows: Rows,
+    piece: Piece,
     encoder: Option<EncoderScan>,
     next: u64,
 }
@@ -149,29 +154,23 @@ impl SampleStream for CsvStream {
     }
 
     fn next_block(&mut self, block: &mut Block) -> Result<bool> {
-        // Not cleared: what is written over needs no zeros.
-        let mut samples = std::mem::take(&mut block.samples);
+        // What is written over needs no zeros.
+        self.piece.samples = Some(std::mem::take(&mut block.samples));
         block.clear();
         block.start = self.next;
-        let channels = self.capture.channels();
-        samples.resize(BLOCK_SAMPLES * channels, 0.0);
-        let mut filled = 0;
-        for frame in samples.chunks_exact_mut(channels.max(1)) {
-            let Some(instant) = self.rows.next(frame)? else { break };
+        let more = self.rows.next(&mut self.piece)?;
+        if more {
+            block.samples = self.piece.samples.take().unwrap_or_default();
             if let Some(encoder) = &self.encoder {
-                block.angle_rev.push(encoder.turns(instant.phase));
+                block.angle_rev.extend(self.piece.phases().map(|angle_deg| encoder.turns(angle_deg)));
             }
-            filled += 1;
+            self.next += self.piece.instants.len() as u64;
         }
-        samples.truncate(filled * channels);
-        block.samples = samples;
-        self.next += filled as u64;
-        let ended = filled < BLOCK_SAMPLES;
-        if self.next > self.capture.samples || (ended && self.next != self.capture.samples) {
+        if self.next > self.capture.samples || (!more && self.next != self.capture.samples) {
             let problem = format!("it had {} rows at first and {} now", self.capture.samples, self.next);
-            return Err(Error::new("read", &self.rows.header.shown, problem).help("something writes to it"));
+            return Err(Error::new("read", &self.rows.format.header.shown, problem).help("something writes to it"));
         }
-        Ok(filled > 0)
+        Ok(more && !block.samples.is_empty())
     }
 }
 
@@ -198,8 +197,12 @@ mod tests {
         config.check().unwrap()
     }
 
-    /// Capture, readings and angles, and in how many blocks they came.
-    fn read(text: &str, most_kept: usize) -> Result<(Capture, Vec<f64>, Vec<f64>, usize)> {
+    /// How a file is read: with how many threads, and how many readings are kept from the first look.
+    const WAYS: [(usize, usize); 7] =
+        [(1, MOST_KEPT), (1, 0), (1, 40_001), (2, MOST_KEPT), (2, 40_001), (3, 0), (7, MOST_KEPT)];
+
+    /// Capture, readings and angles.
+    fn read(text: &str, (threads, most_kept): (usize, usize)) -> Result<(Capture, Vec<f64>, Vec<f64>)> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.csv");
         std::fs::write(&path, text).unwrap();
@@ -207,34 +210,51 @@ mod tests {
         let stated = Stated { sample_rate_hz: None, speed_rpm: None };
         let mut recording = CsvRecording::open(&rig(), vec![station], vec![vec![path]], stated)?;
         recording.most_kept = most_kept;
-        let mut stream = recording.open(0, 0)?;
-        let (mut samples, mut angles, mut block, mut blocks) = (Vec::new(), Vec::new(), Block::default(), 0);
+        let mut stream = recording.open_with(NonZeroUsize::new(threads).unwrap(), 0, 0)?;
+        let (mut samples, mut angles, mut block) = (Vec::new(), Vec::new(), Block::default());
         while stream.next_block(&mut block)? {
             assert_eq!(block.start as usize * 2, samples.len());
             samples.append(&mut block.samples);
             angles.append(&mut block.angle_rev);
-            blocks += 1;
         }
         let capture = Capture { object: String::new(), ..stream.capture().clone() };
-        Ok((capture, samples, angles, blocks))
+        Ok((capture, samples, angles))
     }
 
+    /// The problem, without the name of the file.
+    fn problem(text: &str, way: (usize, usize)) -> String {
+        let error = read(text, way).map(|_| ()).unwrap_err().to_string();
+        error.rsplit("x.csv").next().unwrap().to_owned()
+    }
+
+    /// Rows that are some stretches of text, and their readings. Whole numbers leave open for long what the decimal mark is.
+    fn long(phase: &str, whole: usize) -> (String, Vec<f64>) {
+        let mut text = format!("time_s;S2;other;{phase};S1\n");
+        let mut samples = Vec::new();
+        for row in 0..ROWS {
+            let phase = if phase == "index" { f64::from(u8::from(row % 500 == 3)) } else { 72.0 * row as f64 };
+            let reading = if row < whole { (row % 100) as f64 } else { (row % 1000) as f64 / 8.0 };
+            let written = reading.to_string().replace('.', ",");
+            writeln!(text, "{row};{written};\"a;b\";{phase};-{row}").unwrap();
+            samples.extend([-(row as f64), -reading]);
+        }
+        (text, samples)
+    }
+
+    const ROWS: usize = 40_000;
+
     #[test]
-    fn a_file_that_is_kept_and_one_that_is_read_twice_are_the_same() {
-        let rows = 2 * BLOCK_SAMPLES + 100;
-        for phase in ["index", "angle_deg"] {
-            let mut text = format!("time_s;S2;other;{phase};S1\n");
-            for row in 0..rows {
-                let phase = if phase == "index" { f64::from(u8::from(row % 500 == 3)) } else { 0.72 * row as f64 };
-                let reading = (0.01 * row as f64).sin();
-                writeln!(text, "{:.4};{reading:.6};\"a;b\";{phase};{:.3}", 1e-4 * row as f64, -reading).unwrap();
-            }
-            let kept = read(&text, MOST_KEPT).unwrap();
-            assert_eq!((kept.1.len(), kept.3), (2 * rows, 3));
-            assert_eq!(kept.2.len(), if phase == "index" { 0 } else { rows });
-            assert_eq!(kept.0.marks.len(), rows / 500 + 1);
-            for most_kept in [0, 1001] {
-                assert!(read(&text, most_kept).unwrap() == kept, "{phase}, {most_kept} kept");
+    fn however_a_file_is_read_it_is_the_same() {
+        for (phase, whole) in [("index", 0), ("angle_deg", 0), ("index", ROWS - 100)] {
+            let (text, samples) = long(phase, whole);
+            for way in WAYS {
+                let (capture, found, angles) = read(&text, way).unwrap();
+                assert!(found == samples, "{phase}, {way:?}");
+                let turns = if phase == "index" { ROWS / 500 } else { ROWS / 5 };
+                assert_eq!((capture.samples, capture.marks.len()), (ROWS as u64, turns), "{way:?}");
+                assert_eq!(capture.sample_rate_hz, Some(1.0));
+                assert_eq!(angles.len(), if phase == "index" { 0 } else { ROWS });
+                assert!(angles.iter().enumerate().all(|(row, angle)| (angle - 0.2 * row as f64).abs() < 1e-9));
             }
         }
     }
@@ -243,23 +263,63 @@ mod tests {
     #[test]
     fn zero_bytes_are_no_number() {
         for row in ["1;2;0\0", "1\0;2;0", "1\x005;2;0", "\0\0\0\0"] {
-            for most_kept in [MOST_KEPT, 0] {
-                let error =
-                    read(&format!("S1;S2;index\n1;2;0\n{row}\n"), most_kept).map(|_| ()).unwrap_err().to_string();
-                assert!(error.contains("line 3"), "{row:?}: {error}");
+            for way in WAYS {
+                let problem = problem(&format!("S1;S2;index\n1;2;0\n{row}\n"), way);
+                assert!(problem.contains("line 3"), "{row:?}: {problem}");
             }
         }
     }
 
     #[test]
-    fn mistakes_are_the_same_either_way() {
+    fn mistakes_are_the_same_however_a_file_is_read() {
         for row in ["1.0,2.0", "1.0,2.0,0,4.0", "x,2.0,0", "1.0,2.0,", "1.0,2.0,7", "", "1.0,2.0,\"0"] {
             let text = format!("S1,S2,index\n1.0,2.0,0\n{row}\n1.0,2.0,1\n");
-            let told = |most_kept| {
-                let error = read(&text, most_kept).map(|_| ()).unwrap_err().to_string();
-                error.rsplit("x.csv").next().map(str::to_owned)
-            };
-            assert_eq!(told(MOST_KEPT), told(0), "{row}");
+            for way in WAYS {
+                assert_eq!(problem(&text, way), problem(&text, WAYS[0]), "{row}, {way:?}");
+            }
+        }
+    }
+
+    /// Wherever a stretch of text ends: of two mistakes the first one is told, with its line.
+    #[test]
+    fn the_first_mistake_is_told_with_its_line() {
+        let (text, _) = long("index", 0);
+        let lines: Vec<&str> = text.lines().collect();
+        for (line, row, words) in [
+            (17_000, "16998;1;;0;x", "expected a number"),
+            (17_001, "16999;1;;3;1", "expected 0 or 1, found 3"),
+            (17_002, "16999;1;;0;1", "expected a time above"),
+            (17_003, "", "expected a row, found a blank line between rows"),
+            (ROWS, "1;2", "expected 5 cells as in the header, found 2"),
+        ] {
+            let mut lines = lines.clone();
+            lines[line - 1] = row;
+            if line < ROWS {
+                lines[line + 12_000] = "something else";
+            }
+            let text = lines.join("\n");
+            for way in WAYS {
+                // Cells of readings are not looked at where they are not kept: that is left to the second look.
+                let problem = problem(&text, way);
+                let told = problem.starts_with(&format!(", line {line}")) && problem.contains(words);
+                let later = row.ends_with('x') && problem.starts_with(&format!(", line {}", line + 12_001));
+                assert!(told || (later && way.1 < MOST_KEPT), "{line}, {way:?}: {problem}");
+            }
+        }
+    }
+
+    /// Blank lines may end a file, whether a line end ends them or not, and however many there are.
+    #[test]
+    fn blank_lines_at_the_end_are_passed_over() {
+        for end in ["", "\n", "\r\n\r\n", "\n \t\n   "] {
+            let text = format!("S1,S2,index\n1.5,2,0\n3,4,1{end}");
+            assert_eq!(read(&text, WAYS[0]).unwrap().1, [1.5, -2.0, 3.0, -4.0], "{end:?}");
+        }
+        let text = format!("S1,S2,index\n1.5,2,0\n{}", "\n".repeat(1 << 20));
+        for way in WAYS {
+            assert_eq!(read(&text, way).unwrap().1, [1.5, -2.0]);
+            let text = format!("{text}1.5,2,0");
+            assert_eq!(problem(&text, way), ", line 3: expected a row, found a blank line between rows");
         }
     }
 }

@@ -45,6 +45,7 @@ pub(crate) struct Row<'a> {
 }
 
 /// What a row holds besides readings.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Instant {
     /// The mark, 0 or 1, or the encoder's angle in degrees.
     pub(crate) phase: f64,

@@ -1,77 +1,269 @@
-//! The rows of a file, one after the other.
+//! The rows of a file, piece by piece.
 
-use std::path::Path;
+use std::{
+    num::NonZeroUsize,
+    path::Path,
+    sync::mpsc::{Receiver, SyncSender, sync_channel},
+};
 
 use runout_core::{Error, Result, rig::Rig};
 
 use crate::{
     header::Header,
-    lines::{Line, Lines, cells},
+    lines::{Line, Lines, Stretch, Stretches, cells},
     number::Eights,
     row::{Instant, Role, Row},
 };
 
+/// Stretches that each thread has to work on, or has worked on, at most.
+const WAITING: usize = 2;
+
 /// A file below its header.
 pub(crate) struct Rows {
+    pub(crate) format: Format,
+    text: Text,
+}
+
+/// How rows are written.
+pub(crate) struct Format {
     pub(crate) header: Header,
-    lines: Lines,
     roles: Vec<Role>,
     processor: Processor,
+}
+
+/// Where the rows come from, and what those before tell.
+struct Text {
+    stretches: Stretches,
+    /// The stretch that comes next, where it is read already.
+    next: Option<Stretch>,
     /// `.` or `,`, once a row told.
     decimal: Option<u8>,
     /// The first of the blank lines that the file seems to end with.
     blank: Option<u64>,
 }
 
+/// A stretch of the file and its rows.
+#[derive(Default)]
+pub(crate) struct Piece {
+    stretch: Stretch,
+    /// Whether more than phases and times are wanted.
+    with_readings: bool,
+    decimal: Option<u8>,
+    /// Phase and time of each row.
+    pub(crate) instants: Vec<Instant>,
+    /// Readings, `[row][channel]`; `None` where they were not wanted.
+    pub(crate) samples: Option<Vec<f64>>,
+    /// The first of the blank lines that it ends with.
+    blank: Option<u64>,
+    /// Why its rows end before it does.
+    error: Option<Error>,
+}
+
+impl Piece {
+    /// Number of the line that holds a row: nothing is between rows.
+    pub(crate) fn line(&self, row: usize) -> u64 {
+        self.stretch.lines_before() + 1 + row as u64
+    }
+
+    /// The mark, 0 or 1, or the encoder's angle in degrees, of each row.
+    pub(crate) fn phases(&self) -> impl Iterator<Item = f64> {
+        self.instants.iter().map(|instant| instant.phase)
+    }
+}
+
 impl Rows {
     /// Opens a file and reads its header.
     pub(crate) fn open(path: &Path, rig: &Rig) -> Result<Self> {
-        let (header, lines) = Header::open(path, rig)?;
+        let (header, next, stretches) = Header::open(path, rig)?;
         let roles = Role::of_columns(&header, rig);
         // Where the comma delimits, it cannot be in a number.
         let decimal = (header.delimiter == b',').then_some(b'.');
-        Ok(Self { header, lines, roles, processor: Processor::here(), decimal, blank: None })
+        let format = Format { header, roles, processor: Processor::here() };
+        Ok(Self { format, text: Text { stretches, next: Some(next), decimal, blank: None } })
     }
 
-    /// Fills the channels from the next row; `None` at the end.
-    pub(crate) fn next(&mut self, channels: &mut [f64]) -> Result<Option<Instant>> {
-        if let (None, Some(decimal)) = (self.blank, self.decimal) {
+    /// The next rows in place of others; false at the end.
+    pub(crate) fn next(&mut self, piece: &mut Piece) -> Result<bool> {
+        let more = self.text.read(piece, true)?;
+        if more {
+            self.format.parse(piece);
+            self.text.accept(&self.format.header, piece)?;
+            piece.error.take().map_or(Ok(()), Err)?;
+        }
+        Ok(more)
+    }
+
+    /// Takes all rows, in order, as so many threads read them: with their readings as long as `wanted` says so of the number
+    /// of lines.
+    pub(crate) fn each(
+        self,
+        threads: NonZeroUsize,
+        wanted: impl Fn(u64) -> bool,
+        mut take: impl FnMut(&Header, &mut Piece) -> Result<()>,
+    ) -> Result<()> {
+        let Self { format, mut text } = self;
+        let read = |text: &mut Text, piece: &mut Piece| {
+            let more = text.read(piece, true)?;
+            piece.with_readings = wanted(piece.stretch.lines_so_far());
+            Ok(more)
+        };
+        let mut accept = |text: &mut Text, piece: &mut Piece| {
+            text.accept(&format.header, piece)?;
+            take(&format.header, piece)?;
+            piece.error.take().map_or(Ok(()), Err)
+        };
+        let mut spare = vec![Piece::default()];
+        let threads = threads.get();
+        // The first rows tell how the others are to be read.
+        while threads == 1 || text.decimal.is_none() {
+            let piece = &mut spare[0];
+            if !read(&mut text, piece)? {
+                return Ok(());
+            }
+            format.parse(piece);
+            accept(&mut text, piece)?;
+        }
+        let stopped = || Error::new("read", &format.header.shown, "a thread that read it stopped");
+        std::thread::scope(|scope| {
+            let parse = |_| {
+                let (sender, pieces) = sync_channel::<Piece>(WAITING);
+                let (done, parsed) = sync_channel(WAITING);
+                let format = &format;
+                scope.spawn(move || {
+                    for mut piece in pieces {
+                        format.parse(&mut piece);
+                        // Nobody takes it behind an error.
+                        let _ = done.send(piece);
+                    }
+                });
+                (sender, parsed)
+            };
+            let parsers: Vec<(SyncSender<Piece>, Receiver<Piece>)> = (0..threads).map(parse).collect();
+            let (mut given, mut taken) = (0, 0);
+            loop {
+                while given < taken + WAITING * threads {
+                    let mut piece = spare.pop().unwrap_or_default();
+                    if !read(&mut text, &mut piece)? {
+                        break;
+                    }
+                    parsers[given % threads].0.send(piece).map_err(|_| stopped())?;
+                    given += 1;
+                }
+                if taken == given {
+                    return Ok(());
+                }
+                let mut piece = parsers[taken % threads].1.recv().map_err(|_| stopped())?;
+                taken += 1;
+                accept(&mut text, &mut piece)?;
+                spare.push(piece);
+            }
+        })
+    }
+}
+
+impl Text {
+    /// Reads the next piece; false at the end.
+    fn read(&mut self, piece: &mut Piece, with_readings: bool) -> Result<bool> {
+        piece.with_readings = with_readings;
+        piece.decimal = self.decimal;
+        match self.next.take() {
+            Some(next) => {
+                piece.stretch = next;
+                Ok(true)
+            }
+            None => self.stretches.next(&mut piece.stretch),
+        }
+    }
+
+    /// Takes note of what a piece tells, once those before it are taken.
+    fn accept(&mut self, header: &Header, piece: &Piece) -> Result<()> {
+        let goes_on = !piece.instants.is_empty() || piece.error.is_some();
+        if let Some(number) = self.blank.filter(|_| goes_on) {
+            return Err(blank_between(header, number));
+        }
+        self.blank = self.blank.or(piece.blank);
+        self.decimal = piece.decimal;
+        Ok(())
+    }
+}
+
+impl Format {
+    /// Reads a piece's rows.
+    fn parse(&self, piece: &mut Piece) {
+        let Piece { stretch, with_readings, decimal, instants, samples, blank, error } = piece;
+        let channels = self.header.sensors.len();
+        let mut readings = samples.take().filter(|_| *with_readings).unwrap_or_default();
+        if *with_readings {
+            readings.resize(stretch.most_lines() * channels, 0.0);
+        }
+        instants.clear();
+        (*blank, *error) = (None, None);
+        let mut lines = stretch.lines();
+        let mut frames = readings.chunks_exact_mut(channels.max(1));
+        loop {
+            let frame = frames.next();
+            match self.row(&mut lines, frame, decimal, blank) {
+                Ok(Some(instant)) => instants.push(instant),
+                Ok(None) => break,
+                Err(found) => {
+                    *error = Some(found);
+                    break;
+                }
+            }
+        }
+        readings.truncate(instants.len() * channels);
+        *samples = with_readings.then_some(readings);
+    }
+
+    /// The next row, its readings into a frame where there is one; only blank lines may follow one that is.
+    #[inline]
+    #[allow(clippy::redundant_closure_for_method_calls, reason = "the method alone is one of a single lifetime")]
+    fn row(
+        &self,
+        lines: &mut Lines,
+        frame: Option<&mut [f64]>,
+        decimal: &mut Option<u8>,
+        blank: &mut Option<u64>,
+    ) -> Result<Option<Instant>> {
+        let Some(frame) = frame else {
+            return self.line(lines, decimal, blank, |row, line| row.instant(line));
+        };
+        if let (None, Some(decimal)) = (&blank, *decimal) {
             let row = Row { header: &self.header, roles: &self.roles, decimal };
-            if let Some((instant, length)) = self.processor.plain(&row, self.lines.ahead(), channels) {
-                self.lines.pass(length);
+            if let Some((instant, length)) = self.processor.plain(&row, lines.ahead(), frame) {
+                lines.pass(length);
                 return Ok(Some(instant));
             }
         }
-        self.next_line(|row, line| row.cell_by_cell(line, channels))
+        self.line(lines, decimal, blank, |row, line| row.cell_by_cell(line, frame))
     }
 
-    /// Phase and time of the next row, its readings passed over; `None` at the end.
-    #[allow(clippy::redundant_closure_for_method_calls, reason = "the method alone is one of a single lifetime")]
-    pub(crate) fn next_instant(&mut self) -> Result<Option<Instant>> {
-        self.next_line(|row, line| row.instant(line))
-    }
-
-    /// Reads the next line that is not blank; only blank lines may follow one that is.
-    fn next_line(&mut self, read: impl FnOnce(&Row, Line) -> Result<Instant>) -> Result<Option<Instant>> {
-        while let Some(line) = self.lines.next()? {
+    /// Reads the next line that is not blank.
+    fn line(
+        &self,
+        lines: &mut Lines,
+        decimal: &mut Option<u8>,
+        blank: &mut Option<u64>,
+        read: impl FnOnce(&Row, Line) -> Result<Instant>,
+    ) -> Result<Option<Instant>> {
+        while let Some(line) = lines.next() {
             if line.is_blank() {
-                self.blank.get_or_insert(line.number);
+                blank.get_or_insert(line.number);
                 continue;
             }
-            if let Some(number) = self.blank {
-                return Err(self.header.line_error(number, "expected a row, found a blank line between rows"));
+            if let Some(number) = *blank {
+                return Err(blank_between(&self.header, number));
             }
-            self.decimal = self.decimal.or_else(|| decimal_of(&self.roles, line.bytes, self.header.delimiter));
-            let row = Row { header: &self.header, roles: &self.roles, decimal: self.decimal.unwrap_or(b'.') };
+            *decimal = decimal.or_else(|| decimal_of(&self.roles, line.bytes, self.header.delimiter));
+            let row = Row { header: &self.header, roles: &self.roles, decimal: decimal.unwrap_or(b'.') };
             return read(&row, line).map(Some);
         }
         Ok(None)
     }
+}
 
-    /// An error in a column of the row that was read last.
-    pub(crate) fn error(&self, column: usize, problem: impl ToString) -> Error {
-        self.header.error(self.lines.number(), column, problem)
-    }
+fn blank_between(header: &Header, number: u64) -> Error {
+    header.line_error(number, "expected a row, found a blank line between rows")
 }
 
 /// What this processor can do.

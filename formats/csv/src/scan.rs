@@ -1,12 +1,14 @@
 //! The first pass over a file: how many samples, where turns begin, and how fast they were taken; and the samples themselves
 //! where they are not too many.
 
+use std::num::NonZeroUsize;
+
 use runout_core::{Error, Result, encoder::EncoderScan, measurement::Block};
 
-use crate::{header::Phase, rows::Rows};
-
-/// Instants in a block: four channels of f64 then take 512 KiB, which a core's own cache holds.
-pub(crate) const BLOCK_SAMPLES: usize = 16_384;
+use crate::{
+    header::{Header, Phase},
+    rows::Rows,
+};
 
 const TIME_HELP: &str = "samples have to be taken at equal times: where some are missing, record anew; where the time has too few digits, write it with \
     more, or leave it out and state `sample_rate_hz` in [load]";
@@ -23,82 +25,46 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    /// Keeps up to so many readings.
-    pub(crate) fn of(rows: &mut Rows, most_kept: usize) -> Result<Self> {
-        let channels = rows.header.sensors.len();
-        let phase = rows.header.phase;
+    /// By so many threads; keeps up to so many readings.
+    pub(crate) fn of(rows: Rows, threads: NonZeroUsize, most_kept: usize) -> Result<Self> {
+        let Header { phase, time: time_column, ref shown, .. } = rows.format.header;
+        let (shown, channels) = (shown.clone(), rows.format.header.sensors.len());
         let mut index = IndexScan::default();
         let mut encoder = matches!(phase, Phase::Angle(_)).then(EncoderScan::default);
         let mut time = TimeScan::default();
-        let mut samples: usize = 0;
-        let mut kept = Keeping { channels, most: most_kept, blocks: Some(Vec::new()) };
-        while let Some(instant) = match kept.next(samples) {
-            Some(frame) => rows.next(frame)?,
-            None => rows.next_instant()?,
-        } {
-            let taken = match &mut encoder {
-                Some(encoder) => encoder.push(instant.phase).map_err(|fault| fault.problem),
-                None => index.push(instant.phase),
-            };
-            taken.map_err(|problem| rows.error(phase.column(), problem).help(phase.help()))?;
-            if let Some(column) = rows.header.time {
-                time.push(instant.time_s).map_err(|problem| rows.error(column, problem).help(TIME_HELP))?;
+        let mut samples: u64 = 0;
+        let mut kept = Some(Vec::new());
+        let wanted = |lines: u64| lines.saturating_mul(channels as u64) <= most_kept as u64;
+        rows.each(threads, wanted, |header, piece| {
+            for (row, instant) in piece.instants.iter().enumerate() {
+                let taken = match &mut encoder {
+                    Some(encoder) => encoder.push(instant.phase).map_err(|fault| fault.problem),
+                    None => index.push(instant.phase),
+                };
+                let error = |column, problem| header.error(piece.line(row), column, problem);
+                taken.map_err(|problem| error(phase.column(), problem).help(phase.help()))?;
+                if let Some(column) = time_column {
+                    time.push(instant.time_s).map_err(|problem| error(column, problem).help(TIME_HELP))?;
+                }
             }
-            if encoder.is_some() {
-                kept.angle(instant.phase);
+            match (&mut kept, piece.samples.take()) {
+                (Some(blocks), Some(readings)) => blocks.push(Block {
+                    start: samples,
+                    samples: readings,
+                    angle_rev: if encoder.is_some() { piece.phases().collect() } else { Vec::new() },
+                    defects: Vec::new(),
+                }),
+                _ => kept = None,
             }
-            samples += 1;
-        }
+            samples += piece.instants.len() as u64;
+            Ok(())
+        })?;
         if samples == 0 {
-            let shown = &rows.header.shown;
             return Err(Error::new("read", shown, "expected samples below the header, found none"));
         }
         let marks = encoder.as_ref().map_or(index.marks, |encoder| encoder.marks().to_vec());
-        let (sample_rate_hz, kept) = (time.rate_hz(), kept.blocks(samples));
-        Ok(Self { samples: samples as u64, marks, encoder, sample_rate_hz, kept })
-    }
-}
-
-/// Samples on their way into blocks.
-struct Keeping {
-    channels: usize,
-    /// Readings that are kept, at most.
-    most: usize,
-    /// `None` where there are more.
-    blocks: Option<Vec<Block>>,
-}
-
-impl Keeping {
-    /// Where the next frame, of this number, is to be put.
-    #[inline]
-    fn next(&mut self, sample: usize) -> Option<&mut [f64]> {
-        if (sample + 1) * self.channels > self.most {
-            self.blocks = None;
-        }
-        let blocks = self.blocks.as_mut()?;
-        let place = sample % BLOCK_SAMPLES;
-        if place == 0 {
-            let samples = vec![0.0; BLOCK_SAMPLES * self.channels];
-            blocks.push(Block { start: sample as u64, samples, ..Block::default() });
-        }
-        blocks.last_mut()?.samples.get_mut(place * self.channels..(place + 1) * self.channels)
-    }
-
-    fn angle(&mut self, angle_deg: f64) {
-        if let Some(block) = self.blocks.as_mut().and_then(|blocks| blocks.last_mut()) {
-            block.angle_rev.push(angle_deg);
-        }
-    }
-
-    /// All blocks, with the last one's room taken back.
-    fn blocks(self, samples: usize) -> Option<Vec<Block>> {
-        let mut blocks = self.blocks?;
-        for block in &mut blocks {
-            let frames = (samples - block.start as usize).min(BLOCK_SAMPLES);
-            block.samples.truncate(frames * self.channels);
-        }
-        blocks.retain(|block| !block.samples.is_empty());
-        Some(blocks)
+        let kept = kept.map(|blocks| blocks.into_iter().filter(|block| !block.samples.is_empty()).collect());
+        Ok(Self { samples, marks, encoder, sample_rate_hz: time.rate_hz(), kept })
     }
 }
 
