@@ -151,18 +151,24 @@ pub const SMOOTHING: usize = 2;
 /// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over its neighbours. Order 1
 /// stays by itself: what shakes the eccentricity shakes no other order.
 pub fn smooth(covariance: &mut [Complex64], size: usize) {
+    const WINDOW: usize = 2 * SMOOTHING + 1;
     let raw = covariance.to_vec();
     let max_order = (raw.len() / size.max(1)).saturating_sub(1);
     for order in 2..=max_order {
         let window = order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order);
-        let share = 1.0 / (window.end() + 1 - window.start()) as f64;
+        let count = window.end() + 1 - window.start();
+        let near = &raw[window.start() * size..(window.end() + 1) * size];
         let target = &mut covariance[order * size..(order + 1) * size];
-        target.fill(Complex64::ZERO);
-        for near in window {
-            target.iter_mut().zip(&raw[near * size..(near + 1) * size]).for_each(|(sum, entry)| *sum += entry);
-        }
-        for sum in target {
-            *sum *= share;
+        // Where all are there, their sums need not be kept in memory.
+        if count == WINDOW {
+            let near: [&[Complex64]; WINDOW] = std::array::from_fn(|index| &near[index * size..(index + 1) * size]);
+            for (entry, target) in target.iter_mut().enumerate() {
+                *target = near.iter().map(|near| near[entry]).sum::<Complex64>() / WINDOW as f64;
+            }
+        } else {
+            for (entry, target) in target.iter_mut().enumerate() {
+                *target = near.iter().skip(entry).step_by(size).sum::<Complex64>() / count as f64;
+            }
         }
     }
 }

@@ -64,6 +64,16 @@ impl Fourier {
 
     /// The same of [`length`](Self::length) samples, which are overwritten; all harmonics are 0 with another number.
     pub fn analyse_in_place(&mut self, signal: &mut [f64], harmonics: &mut [Complex64]) {
+        self.scaled(signal, harmonics, 1.0);
+    }
+
+    /// The same for coefficients of e^{−inΦ}.
+    pub fn analyse_reversed_in_place(&mut self, signal: &mut [f64], harmonics: &mut [Complex64]) {
+        self.scaled(signal, harmonics, -1.0);
+    }
+
+    /// Harmonics with their imaginary parts times a sign.
+    fn scaled(&mut self, signal: &mut [f64], harmonics: &mut [Complex64], sign: f64) {
         let length = self.forward.len();
         let scratch = &mut self.scratch[..self.forward.get_scratch_len()];
         if self.forward.process_with_scratch(signal, &mut self.spectrum, scratch).is_err() {
@@ -73,7 +83,7 @@ impl Fourier {
         let scale = 2.0 / length as f64;
         let kept = harmonics.len().min(max_order(length) + 1);
         for (harmonic, bin) in harmonics.iter_mut().zip(&self.spectrum[..kept]) {
-            *harmonic = bin * scale;
+            *harmonic = Complex64::new(scale * bin.re, sign * scale * bin.im);
         }
         harmonics[kept..].fill(Complex64::ZERO);
         if let Some(level) = harmonics.first_mut() {

@@ -1,8 +1,9 @@
 //! Work on neighbouring channels side by side, so that the compiler can use vector registers.
 //!
-//! The program is compiled for any processor of its kind. What is done here is compiled twice, once for vectors of four
-//! numbers (AVX2), and the processor that it runs on decides. Only the width differs, and the results are the same to the
-//! last bit; but in what asks for it ([`fused`]), a product and a sum become one rounding where the processor can do so.
+//! The program is compiled for any processor of its kind. What is done here is compiled again for vectors of four numbers
+//! (AVX2), and some of it for eight (AVX-512), and the processor that it runs on decides. Only the width differs, and the
+//! results are the same to the last bit; but in what asks for it ([`fused`]), a product and a sum become one rounding where
+//! the processor can do so.
 
 #![allow(clippy::inline_always, reason = "what is not inlined is compiled for narrow registers")]
 
@@ -72,6 +73,10 @@ pub trait FusedWork {
 /// it has them.
 pub fn fused(work: impl FusedWork) {
     #[cfg(target_arch = "x86_64")]
+    if let Some(v4) = pulp::x86::V4::try_new() {
+        return v4.vectorize(Calling(work, PhantomData::<Fused>));
+    }
+    #[cfg(target_arch = "x86_64")]
     if let Some(v3) = pulp::x86::V3::try_new() {
         return v3.vectorize(Calling(work, PhantomData::<Fused>));
     }
@@ -113,6 +118,44 @@ impl<W: LaneWork> FusedWork for Groups<'_, W> {
                 _ => work.lanes::<A, 8>(offset),
             }
         }
+    }
+}
+
+/// Rows and columns of four by four numbers change places: in whole registers, where the processor has them, as compilers
+/// take one number after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct Transposition {
+    #[cfg(target_arch = "x86_64")]
+    wide: Option<pulp::x86::V3>,
+}
+
+impl Transposition {
+    /// As this processor can do it.
+    #[must_use]
+    pub fn here() -> Self {
+        Self {
+            #[cfg(target_arch = "x86_64")]
+            wide: pulp::x86::V3::try_new(),
+        }
+    }
+
+    /// Columns as rows; fast only in work that is compiled for wide registers.
+    #[inline(always)]
+    #[must_use]
+    pub fn of(self, rows: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(pulp::x86::V3 { avx, .. }) = self.wide {
+            let [a, b, c, d] = rows.map(|row| pulp::cast(row));
+            let (ab_even, ab_odd) = (avx._mm256_unpacklo_pd(a, b), avx._mm256_unpackhi_pd(a, b));
+            let (cd_even, cd_odd) = (avx._mm256_unpacklo_pd(c, d), avx._mm256_unpackhi_pd(c, d));
+            return [
+                pulp::cast(avx._mm256_permute2f128_pd::<0x20>(ab_even, cd_even)),
+                pulp::cast(avx._mm256_permute2f128_pd::<0x20>(ab_odd, cd_odd)),
+                pulp::cast(avx._mm256_permute2f128_pd::<0x31>(ab_even, cd_even)),
+                pulp::cast(avx._mm256_permute2f128_pd::<0x31>(ab_odd, cd_odd)),
+            ];
+        }
+        std::array::from_fn(|row| rows.map(|column| column[row]))
     }
 }
 
@@ -162,6 +205,15 @@ mod tests {
             Groups { channels, work: &mut Recursion(&mut plain, channels) }.call::<Separate>();
             in_lanes(channels, &mut Recursion(&mut wide, channels));
             assert!(plain.iter().zip(&wide).all(|(plain, wide)| plain.to_bits() == wide.to_bits()));
+        }
+    }
+
+    #[test]
+    fn rows_become_columns() {
+        let rows: [[f64; 4]; 4] = std::array::from_fn(|row| std::array::from_fn(|column| (10 * row + column) as f64));
+        let columns = Transposition::here().of(rows);
+        for (row, numbers) in rows.iter().enumerate() {
+            assert_eq!(*numbers, columns.map(|column| column[row]));
         }
     }
 

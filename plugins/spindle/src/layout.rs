@@ -381,6 +381,22 @@ impl ToReference {
         }
     }
 
+    /// Moves a covariance, `[unknown][unknown]`: T·C·Tᴴ.
+    pub fn apply_about(&self, covariance: &mut [Complex64]) {
+        if self.pairs.is_empty() {
+            return;
+        }
+        for _ in 0..2 {
+            self.apply(covariance);
+            for row in 0..self.width {
+                for column in 0..=row {
+                    let (below, above) = (row * self.width + column, column * self.width + row);
+                    (covariance[below], covariance[above]) = (covariance[above].conj(), covariance[below].conj());
+                }
+            }
+        }
+    }
+
     /// Variances after the move, from the covariance `[unknown][unknown]` before.
     #[must_use]
     pub fn spread(&self, covariance: &[Complex64]) -> Vec<f64> {

@@ -233,13 +233,9 @@ fn several<A: Arithmetic, const C: usize>(
     // Behind one sample after the other: a little less than 0 or more than 1 of a sample serves as well.
     let fraction = |index: usize| positions[index] - below - index as f64;
     let place = kernel.place(fraction(TOGETHER / 2).clamp(0.0, 1.0));
-    let mut across = [0.0; TOGETHER];
-    let mut farthest = 0.0_f64;
-    for (index, across) in across.iter_mut().enumerate() {
-        *across = place.across(fraction(index));
-        farthest = if across.abs() > farthest { across.abs() } else { farthest };
-    }
-    if farthest > SERVES {
+    let across: [f64; TOGETHER] = std::array::from_fn(|index| place.across(fraction(index)));
+    // No `all`: it would look at one after the other.
+    if !across.iter().fold(true, |near, across| near & (across.abs() <= SERVES)) {
         return None;
     }
     let first = (below as i64 as usize + 1).checked_sub(REACH)?;

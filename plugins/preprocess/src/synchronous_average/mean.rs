@@ -151,11 +151,8 @@ impl Analysis {
         for (readings, harmonics) in readings.chunks_exact(self.readings.len()).zip(turn.chunks_exact_mut(self.orders))
         {
             self.readings.copy_from_slice(readings);
-            self.fourier.analyse_in_place(&mut self.readings, harmonics);
             // Profiles are Re Σ cₙ e^{−inΦ}.
-            for harmonic in harmonics {
-                harmonic.im = -harmonic.im;
-            }
+            self.fourier.analyse_reversed_in_place(&mut self.readings, harmonics);
         }
     }
 }

@@ -54,6 +54,8 @@ pub(super) struct Resampling<'a> {
     positions: Vec<f64>,
     /// Equal angles of a turn.
     angles: usize,
+    /// Their numbers: to make them anew for every turn takes longer than to read them.
+    counted: Vec<f64>,
     /// Where channels look into an interruption of the surface.
     bridges: Bridges,
     analysis: Analysis,
@@ -84,6 +86,7 @@ impl<'a> Resampling<'a> {
             defects: Vec::new(),
             positions: Vec::with_capacity(angles),
             angles,
+            counted: (0..angles).map(|angle| angle as f64).collect(),
             bridges: Bridges::new(average.rig.as_ref(), capture, angles),
             analysis: Analysis::new(angles, orders),
             harmonics: vec![Complex64::ZERO; orders * channels],
@@ -179,7 +182,7 @@ impl<'a> Resampling<'a> {
         } else {
             let step = (end - start) / length as f64;
             self.positions.clear();
-            self.positions.extend((0..length).map(|angle| start + angle as f64 * step));
+            self.positions.extend(self.counted.iter().map(|angle| start + angle * step));
         }
         let exact = self.positions.iter().all(|position| on_sample(*position).is_some());
         if let Some(defect) = self.defect(&turn, exact) {

@@ -20,8 +20,8 @@ pub(super) struct Scatter {
     /// Length of a plane: the orders, and as many zeros as fill the last lanes.
     plane: usize,
     turns: usize,
-    /// The first turn, `[channel][order]`.
-    pivot: Vec<Complex64>,
+    /// The first turn.
+    pivot: Vec<f64>,
     /// The turn under work less the pivot, d.
     turn: Vec<f64>,
     /// Σ d.
@@ -39,7 +39,7 @@ impl Scatter {
             orders,
             plane,
             turns: 0,
-            pivot: Vec::new(),
+            pivot: vec![0.0; values],
             turn: vec![0.0; values],
             sum: vec![0.0; values],
             products: vec![0.0; 2 * triangle(channels) * plane],
@@ -49,19 +49,11 @@ impl Scatter {
     /// Takes one turn's harmonics, `[channel][order]`.
     pub(super) fn add(&mut self, turn: &[Complex64]) {
         self.turns += 1;
-        if self.pivot.is_empty() {
-            self.pivot.extend_from_slice(turn);
-            return;
+        if self.turns == 1 {
+            part(turn, self.orders, self.plane, &mut self.pivot);
+        } else {
+            fused(Summing { scatter: self, turn });
         }
-        let turns = turn.chunks_exact(self.orders).zip(self.pivot.chunks_exact(self.orders));
-        for ((turn, pivot), planes) in turns.zip(self.turn.chunks_exact_mut(2 * self.plane)) {
-            let (re, im) = planes.split_at_mut(self.plane);
-            for ((turn, pivot), (re, im)) in turn.iter().zip(pivot).zip(re.iter_mut().zip(im)) {
-                *re = turn.re - pivot.re;
-                *im = turn.im - pivot.im;
-            }
-        }
-        fused(Summing(self));
     }
 
     /// 1/(T−1) Σ (cₜ − mean)(cₜ − mean)ᴴ, `[order][channel][channel]`; `None` below two turns.
@@ -94,14 +86,20 @@ impl Scatter {
 }
 
 /// A turn on its way into the sums.
-struct Summing<'a>(&'a mut Scatter);
+struct Summing<'a> {
+    scatter: &'a mut Scatter,
+    /// `[channel][order]`.
+    turn: &'a [Complex64],
+}
 
 impl FusedWork for Summing<'_> {
     #[inline(always)]
     fn call<A: Arithmetic>(self) {
-        let Scatter { channels, plane, turn, sum, products, .. } = self.0;
-        for (sum, value) in sum.iter_mut().zip(&*turn) {
-            *sum += value;
+        let Scatter { channels, orders, plane, pivot, turn, sum, products, .. } = self.scatter;
+        part(self.turn, *orders, *plane, turn);
+        for ((value, pivot), sum) in turn.iter_mut().zip(&*pivot).zip(&mut *sum) {
+            *value -= pivot;
+            *sum += *value;
         }
         let mut products = products.chunks_exact_mut(2 * *plane);
         for row in 0..*channels {
@@ -125,6 +123,26 @@ impl FusedWork for Summing<'_> {
                     }
                     re[first..first + LANES].copy_from_slice(&real);
                     im[first..first + LANES].copy_from_slice(&imaginary);
+                }
+            }
+        }
+    }
+}
+
+/// Sets real and imaginary parts apart, from `[channel][order]` into planes.
+#[inline(always)]
+fn part(turn: &[Complex64], orders: usize, plane: usize, planes: &mut [f64]) {
+    for (turn, planes) in turn.chunks_exact(orders).zip(planes.chunks_exact_mut(2 * plane)) {
+        let (re, im) = planes.split_at_mut(plane);
+        let lanes = re.chunks_exact_mut(LANES).zip(im.chunks_exact_mut(LANES));
+        for (turn, (re, im)) in turn.chunks(LANES).zip(lanes) {
+            // With a fixed number, whole registers change places.
+            if let Ok(turn) = <&[Complex64; LANES]>::try_from(turn) {
+                re.copy_from_slice(&turn.map(|harmonic| harmonic.re));
+                im.copy_from_slice(&turn.map(|harmonic| harmonic.im));
+            } else {
+                for ((re, im), harmonic) in re.iter_mut().zip(im).zip(turn) {
+                    (*re, *im) = (harmonic.re, harmonic.im);
                 }
             }
         }

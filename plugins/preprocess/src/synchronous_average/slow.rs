@@ -132,9 +132,18 @@ impl Slow {
             for side in &sides {
                 let each = side.chunks_exact(channels).zip(covariance.chunks_exact_mut(channels * channels));
                 for (values, covariance) in each {
-                    for (row, target) in values.iter().zip(covariance.chunks_exact_mut(channels)) {
-                        target.iter_mut().zip(values).for_each(|(to, column)| *to += row * column.conj() * scale);
+                    for (place, (row, target)) in values.iter().zip(covariance.chunks_exact_mut(channels)).enumerate() {
+                        let row = row * scale;
+                        target.iter_mut().zip(&values[..=place]).for_each(|(to, column)| *to += row * column.conj());
                     }
+                }
+            }
+        }
+        for covariance in covariance.chunks_exact_mut(channels * channels) {
+            for row in 0..channels {
+                covariance[row * channels + row].im = 0.0;
+                for column in 0..row {
+                    covariance[column * channels + row] = covariance[row * channels + column].conj();
                 }
             }
         }

@@ -4,7 +4,7 @@
 
 use runout_core::{
     measurement::Block,
-    numerics::lanes::{Arithmetic, LaneWork, in_lanes, load},
+    numerics::lanes::{Arithmetic, LaneWork, Transposition, in_lanes, load},
 };
 
 use super::kernel::REACH;
@@ -124,25 +124,31 @@ struct Parting<'a> {
 impl LaneWork for Parting<'_> {
     #[inline(always)]
     fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize) {
-        /// Frames that change places together, with one look at the room for them.
-        const TOGETHER: usize = 4;
+        /// Frames and channels that change places together.
+        const SIDE: usize = 4;
         let channels = self.samples.len();
         let count = self.frames.len() / channels;
+        let transposition = Transposition::here();
         let mut targets: [&mut [f64]; C] = std::array::from_fn(|_| &mut [][..]);
         for (target, samples) in targets.iter_mut().zip(&mut self.samples[offset..offset + C]) {
             *target = &mut samples[self.kept..][..count];
         }
-        for (block, frames) in self.frames.chunks_exact(TOGETHER * channels).enumerate() {
-            let mut together = [[0.0; C]; TOGETHER];
-            for (values, frame) in together.iter_mut().zip(frames.chunks_exact(channels)) {
-                *values = load(frame, offset);
+        for (block, frames) in self.frames.chunks_exact(SIDE * channels).enumerate() {
+            let place = block * SIDE;
+            let mut squares = targets.chunks_exact_mut(SIDE);
+            for (square, targets) in squares.by_ref().enumerate() {
+                let rows = |row: usize| load::<SIDE>(frames, row * channels + offset + square * SIDE);
+                for (target, column) in targets.iter_mut().zip(transposition.of(std::array::from_fn(rows))) {
+                    target[place..place + SIDE].copy_from_slice(&column);
+                }
             }
-            for (lane, target) in targets.iter_mut().enumerate() {
-                let column = [together[0][lane], together[1][lane], together[2][lane], together[3][lane]];
-                target[block * TOGETHER..][..TOGETHER].copy_from_slice(&column);
+            for (lane, target) in squares.into_remainder().iter_mut().enumerate() {
+                let first = offset + C / SIDE * SIDE + lane;
+                let column: [f64; SIDE] = std::array::from_fn(|row| frames[row * channels + first]);
+                target[place..place + SIDE].copy_from_slice(&column);
             }
         }
-        let rest = count - count % TOGETHER;
+        let rest = count - count % SIDE;
         for (index, frame) in self.frames.chunks_exact(channels).enumerate().skip(rest) {
             let frame: [f64; C] = load(frame, offset);
             for (target, value) in targets.iter_mut().zip(frame) {

@@ -246,13 +246,12 @@ impl Solver<'_> {
                 forms.for_each(|(_, form)| *form = form.conj());
             }
             let spread = propagation.map(|propagation| {
-                let covariance = &propagation.covariance[order - 1];
-                let covariance = about(covariance, |rows, length| self.named_alike(rows, order, length));
-                about(&covariance, |rows, _| {
-                    let mut rows = rows.to_vec();
-                    to_reference.apply(&mut rows);
-                    rows
-                })
+                let mut covariance = propagation.covariance[order - 1].clone();
+                if order == 1 {
+                    covariance = about(&covariance, |rows, length| self.named_alike(rows, order, length));
+                }
+                to_reference.apply_about(&mut covariance);
+                covariance
             });
             if let (Some(spread), Some(joint)) = (&spread, &mut motion_covariance) {
                 let entry = |row: &usize, column: &usize| spread[row * width + column];
