@@ -16,10 +16,14 @@
 //!   may truly stand so long (a sine of amplitude 3.4 steps does, at its crest), so that a channel is not judged while
 //!   its swing so far is at most [`STUCK_STEPS`] of its finest steps, unless it has not moved at all.
 //! - A channel that never moves is an error at the end of the stream.
+//! - A reading far from what the channel reads in all other turns may be a disturbance, or what the part and the spindle did:
+//!   it is handed on, and [told of](Inspection::telling).
 
 mod channel;
+mod spikes;
 
 use channel::{Channel, Look, Rule};
+pub use spikes::Spike;
 
 use crate::{
     Error, Result,
@@ -45,8 +49,8 @@ pub const PEGGED_TURN: f64 = 0.25;
 /// Swing of a channel, in its finest steps, up to which it may truly stand still for long.
 pub const STUCK_STEPS: f64 = 16.0;
 
-/// Frames that are looked over at once.
-const CHUNK: usize = 1024;
+/// Frames that are looked over at once: about a turn, between these.
+const CHUNK: [usize; 2] = [64, 1024];
 
 /// Passes samples on, with defects marked and unusable values bridged so that filters stay finite.
 ///
@@ -62,10 +66,19 @@ pub struct Inspection<'a> {
     rule: Rule,
     /// Equal samples in a row that are stuck; `None` without marks.
     stuck: Option<u64>,
+    /// Frames that are looked over at once.
+    chunk: usize,
     ended: bool,
+    tell: Option<Box<dyn FnOnce(Vec<Spike>) + Send + 'a>>,
 }
 
 impl<'a> Inspection<'a> {
+    /// Wraps a loader's stream; at its end `tell` gets what is far from all other readings.
+    #[must_use]
+    pub fn telling(input: Box<dyn SampleStream + 'a>, tell: impl FnOnce(Vec<Spike>) + Send + 'a) -> Self {
+        Self { tell: Some(Box::new(tell)), ..Self::new(input) }
+    }
+
     /// Wraps a loader's stream.
     #[must_use]
     pub fn new(input: Box<dyn SampleStream + 'a>) -> Self {
@@ -82,9 +95,10 @@ impl<'a> Inspection<'a> {
             },
             _ => Rule::None,
         };
-        let channels = vec![Channel::default(); count];
+        let channels = vec![Channel::new(turn); count];
+        let chunk = turn.map_or(CHUNK[1], |turn| (turn.ceil() as usize).clamp(CHUNK[0], CHUNK[1]));
         let (raw, held, past) = (Block::default(), Block::default(), Vec::new());
-        Self { input, raw, held, past, channels, rule, stuck, ended: false }
+        Self { input, raw, held, past, channels, rule, stuck, chunk, ended: false, tell: None }
     }
 
     /// Looks at the block in `raw` and joins it to those held.
@@ -103,7 +117,7 @@ impl<'a> Inspection<'a> {
         }
         let mut from = first;
         while from < self.held.samples.len() {
-            let to = (from + CHUNK * count).min(self.held.samples.len());
+            let to = (from + self.chunk * count).min(self.held.samples.len());
             let mut look = Look {
                 channels: &mut self.channels,
                 rule: &self.rule,
@@ -193,6 +207,10 @@ impl SampleStream for Inspection<'_> {
             } else {
                 self.ended = true;
                 self.alive()?;
+                if let Some(tell) = self.tell.take() {
+                    let spike = |(index, channel): (usize, &Channel)| channel.spike(index, self.chunk as u64);
+                    tell(self.channels.iter().enumerate().filter_map(spike).collect());
+                }
             }
         }
     }

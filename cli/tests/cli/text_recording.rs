@@ -21,6 +21,29 @@ fn form_and_motion_come_out_of_the_file() {
     assert!(told.contains("Zeit, Temperatur"), "{told}");
 }
 
+/// Ten turns are enough to tell what is usual. A disturbance that is left out need not be told.
+#[test]
+fn a_reading_far_from_all_others_is_told_unless_its_turn_is_left_out() {
+    let mut lines: Vec<String> = RECORDING.lines().map(str::to_owned).collect();
+    let mut cells: Vec<&str> = lines[1300].split(';').collect();
+    cells[2] = "106,221";
+    lines[1300] = cells.join(";");
+    let spiked = lines.join("\n");
+    let folder = Folder::with(&[("pipeline.toml", PIPELINE), ("shaft.csv", &spiked)]);
+    let told = |more: &[&str]| {
+        let ran = folder.run(&[&["run", "pipeline.toml", "--json"], more].concat());
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
+        summary["stations"][0]["warnings"].to_string()
+    };
+    let warnings = told(&[]);
+    for part in ["shaft.csv", "A reads 106.2210 µm near sample", "in other turns at most", "outlier_sigma"] {
+        assert!(warnings.contains(part), "{part}: {warnings}");
+    }
+    let warnings = told(&["--set", "preprocess.0.outlier_sigma=6", "--set", "preprocess.0.min_turns=4"]);
+    assert!(!warnings.contains("near sample"), "{warnings}");
+}
+
 #[test]
 fn a_cell_that_is_no_number_is_named_with_what_to_do() {
     let damaged = RECORDING.replacen("6,221", "NA", 1);

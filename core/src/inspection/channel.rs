@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use super::{FARTHEST_UM, FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS};
+use super::{
+    FARTHEST_UM, FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS,
+    spikes::{Extents, Spike},
+};
 use crate::{
     measurement::{Block, Defect, DefectKind},
     numerics::lanes::{Arithmetic, LaneWork, load},
@@ -51,6 +54,7 @@ pub(super) struct Channel {
     seen: u64,
     run: Run,
     same: Same,
+    extents: Extents,
 }
 
 /// Samples in a row that repeat the one before.
@@ -72,8 +76,9 @@ struct Run {
     steep: Option<bool>,
 }
 
-impl Default for Channel {
-    fn default() -> Self {
+impl Channel {
+    /// For turns of so many samples, where that is known.
+    pub(super) fn new(turn_samples: Option<f64>) -> Self {
         Self {
             last: None,
             lowest: f64::INFINITY,
@@ -82,11 +87,15 @@ impl Default for Channel {
             seen: 0,
             run: Run::default(),
             same: Same::default(),
+            extents: Extents::new(turn_samples),
         }
     }
-}
 
-impl Channel {
+    /// A reading far from all usual ones, where so many samples were looked over at once.
+    pub(super) fn spike(&self, index: usize, chunk: u64) -> Option<Spike> {
+        self.extents.spike(index, chunk)
+    }
+
     /// Where the run begins whose end must be awaited.
     pub(super) fn undecided(&self, rule: &Rule, stuck: Option<u64>) -> Option<u64> {
         let open = match rule {
@@ -273,6 +282,13 @@ impl LaneWork for Look<'_> {
         if !quiet {
             for (lane, channel) in group.iter_mut().enumerate() {
                 channel.look(offset + lane, self.frames.clone(), count, (self.rule, self.stuck), self.block, self.past);
+                // What could not be used is replaced by now.
+                let samples = &self.block.samples[self.frames.start * count..self.frames.end * count];
+                let readings = samples.iter().skip(offset + lane).step_by(count);
+                let (low, high) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| {
+                    (low.min(*reading), high.max(*reading))
+                });
+                channel.extents.note(low, high, self.block.start + self.frames.start as u64, self.frames.len() as u64);
             }
             return;
         }
@@ -283,6 +299,8 @@ impl LaneWork for Look<'_> {
             channel.finest_step = channel.finest_step.min(finest[lane]);
             channel.seen += self.frames.len() as u64;
             let end = self.block.start + self.frames.end as u64;
+            let frames = self.frames.len() as u64;
+            channel.extents.note(lowest[lane], highest[lane], end - frames, frames);
             let repeated = repeats[lane] as u64;
             channel.same = Same { start: end - repeated, repeats: repeated, stuck: false };
             channel.run = Run {

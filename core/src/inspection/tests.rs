@@ -199,3 +199,117 @@ fn a_slow_swing_of_few_steps_is_not_stuck() {
         assert_eq!(defects, [], "{steps} steps");
     }
 }
+
+/// What is told of at the end.
+fn spikes(stream: MemoryStream) -> Vec<Spike> {
+    let (sender, told) = std::sync::mpsc::channel();
+    let mut inspection = Inspection::telling(Box::new(stream), move |spikes| sender.send(spikes).unwrap());
+    let mut block = Block::default();
+    while inspection.next_block(&mut block).unwrap() {}
+    drop(inspection);
+    told.recv().unwrap()
+}
+
+/// Numbers with a Gaussian distribution of deviation 1, the sum of twelve from Knuth's generator.
+fn gaussian(count: usize, seed: u64) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(97);
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..count).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+fn with_noise(mut channel: Vec<f64>, std_um: f64, seed: u64) -> Vec<f64> {
+    let noise = gaussian(channel.len(), seed);
+    channel.iter_mut().zip(noise).for_each(|(value, noise)| *value += std_um * noise);
+    channel
+}
+
+const TURNS: usize = 60;
+
+#[test]
+fn a_reading_far_from_all_others_is_told_with_its_place() {
+    for (seed, place) in [0, 1, 999, 23_456, 40_000, TURNS * TURN - 1].into_iter().enumerate() {
+        for (spike_um, noise_um) in [(40.0, 0.05), (-12.5, 0.05), (500.0, 0.0), (-45.0, 2.0)] {
+            let [quiet, mut marred] = [0.0, 1.0].map(|phase| {
+                with_noise(sine(TURNS * TURN, 10.0, phase), noise_um, seed as u64 + (phase * 50.0) as u64)
+            });
+            marred[place] = spike_um;
+            let usual = |sign: f64| {
+                let others = marred.iter().enumerate().filter(|(index, _)| *index != place);
+                sign * others.map(|(_, value)| sign * value).fold(f64::NEG_INFINITY, f64::max)
+            };
+            for block_samples in [300, 5000, 100_000] {
+                let found = spikes(stream(&[quiet.clone(), marred.clone()], None, block_samples));
+                let [spike] = &found[..] else { panic!("{place}, {spike_um}: {found:?}") };
+                assert_eq!((spike.channel, spike.stretches), (1, 1));
+                assert!(spike.near_sample.abs_diff(place as u64) <= spike.within_samples, "{place}: {spike:?}");
+                assert_eq!(spike.reading_um.to_bits(), spike_um.to_bits());
+                assert!((spike.usual_um - usual(spike_um.signum())).abs() < 1e-12, "{spike:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn readings_far_off_in_some_turns_are_counted() {
+    let mut channel = with_noise(sine(TURNS * TURN, 10.0, 0.3), 0.05, 1);
+    for turn in [5, 11, 29, 43, 44, 58] {
+        channel[turn * TURN + 100] = -25.0 - 0.1 * turn as f64;
+    }
+    let found = spikes(stream(&[channel], None, 4096));
+    let [Spike { near_sample, reading_um, stretches, .. }] = found[..] else { panic!("{found:?}") };
+    assert_eq!(
+        (near_sample.abs_diff(58_100) <= 500, reading_um.to_bits(), stretches),
+        (true, (-30.8_f64).to_bits(), 6)
+    );
+}
+
+/// Noise, drifts however fast, run-ups, steps, beats and coarse converters are courses of the signal.
+#[test]
+fn a_course_of_the_signal_is_no_spike() {
+    let frames = TURNS * TURN;
+    let share = |index: usize| index as f64 / frames as f64;
+    let of = |value: &dyn Fn(usize) -> f64| (0..frames).map(value).collect::<Vec<f64>>();
+    let mut courses = vec![
+        ("drift", of(&|index| 40.0 * share(index))),
+        ("step", of(&|index| if index < 21_300 { 0.0 } else { 25.0 })),
+        ("beats", of(&|index| 6.0 * (TAU * 0.387 * index as f64 / TURN as f64).sin())),
+        ("wander", of(&|index| 15.0 * (TAU * 1.3 * share(index)).sin())),
+        ("growth", of(&|index| 10.0 * share(index) * (TAU * index as f64 / TURN as f64).cos())),
+        ("nothing", vec![0.0; frames]),
+    ];
+    for tau in [0.1, 0.2, 0.5, 1.0] {
+        courses.push(("settling", of(&|index| -50.0 * (-share(index) / tau).exp())));
+    }
+    for (name, course) in courses {
+        for (noise_um, step_um) in [(0.0, 0.0), (0.02, 0.0), (0.5, 0.0), (0.02, 0.3), (3.0, 0.01)] {
+            for seed in 0..5 {
+                let mut channel = with_noise(sine(frames, 10.0, seed as f64), noise_um, seed);
+                channel.iter_mut().zip(&course).for_each(|(value, course)| *value += course);
+                if step_um > 0.0 {
+                    for value in &mut channel {
+                        *value = (*value / step_um).round() * step_um;
+                    }
+                }
+                let found = spikes(stream(&[channel], None, 4096));
+                assert!(found.is_empty(), "{name}, noise {noise_um} µm, steps of {step_um} µm: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn few_turns_or_none_have_no_usual_extremes() {
+    let marred = |frames: usize| {
+        let mut channel = sine(frames, 10.0, 0.3);
+        channel[1234] = 300.0;
+        stream(&[channel], None, 4096)
+    };
+    assert!(spikes(marred(6 * TURN)).is_empty());
+    assert_eq!(spikes(marred(20 * TURN)).len(), 1);
+    let mut unmarked = marred(20 * TURN);
+    unmarked.capture.marks.clear();
+    assert!(spikes(unmarked).is_empty());
+}

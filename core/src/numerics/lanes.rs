@@ -145,7 +145,7 @@ impl Transposition {
     pub fn of(self, rows: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
         #[cfg(target_arch = "x86_64")]
         if let Some(pulp::x86::V3 { avx, .. }) = self.wide {
-            let [a, b, c, d] = rows.map(|row| pulp::cast(row));
+            let [a, b, c, d] = rows.map(pulp::cast);
             let (ab_even, ab_odd) = (avx._mm256_unpacklo_pd(a, b), avx._mm256_unpackhi_pd(a, b));
             let (cd_even, cd_odd) = (avx._mm256_unpacklo_pd(c, d), avx._mm256_unpackhi_pd(c, d));
             return [
@@ -212,9 +212,8 @@ mod tests {
     fn rows_become_columns() {
         let rows: [[f64; 4]; 4] = std::array::from_fn(|row| std::array::from_fn(|column| (10 * row + column) as f64));
         let columns = Transposition::here().of(rows);
-        for (row, numbers) in rows.iter().enumerate() {
-            assert_eq!(*numbers, columns.map(|column| column[row]));
-        }
+        let expected = (0..16).map(|place| f64::from(10 * (place % 4) + place / 4));
+        assert!(columns.as_flattened().iter().copied().eq(expected));
     }
 
     #[test]

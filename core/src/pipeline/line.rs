@@ -2,7 +2,10 @@
 
 use std::{
     num::NonZeroUsize,
-    sync::atomic::{AtomicBool, AtomicUsize, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
 };
 
 use super::{
@@ -12,9 +15,9 @@ use super::{
 };
 use crate::{
     Error, Result,
-    inspection::Inspection,
-    measurement::{Recording, SampleStream, StationKey},
-    profile::Profile,
+    inspection::{Inspection, Spike},
+    measurement::{Capture, Recording, SampleStream, StationKey},
+    profile::{Profile, RejectedTurn},
     provenance::Input,
     rig::Rig,
     separation::{Quantity, Separation},
@@ -62,17 +65,23 @@ impl Line<'_> {
             Ok(())
         });
         let setups = self.rig.setups.len();
+        // What is far from all other readings of a capture, `[station][setup]`.
+        let spikes: Vec<Mutex<Vec<Spike>>> = (0..stations.len() * setups).map(|_| Mutex::default()).collect();
         let worker = || {
             let claimed = std::iter::from_fn(|| {
                 let more = !failed.load(Ordering::Relaxed);
                 more.then(|| next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < stations.len())
             });
-            let captures = claimed
-                .flat_map(|station| (0..setups).map(move |setup| (station, setup)))
-                .map(|(station, setup)| (station, self.recorded(readers, station, setup)));
+            let captures =
+                claimed.flat_map(|station| (0..setups).map(move |setup| (station, setup))).map(|(station, setup)| {
+                    let told = &spikes[station * setups + setup];
+                    (station, self.recorded(readers, station, setup, told))
+                });
             let work_on = |captures: &mut dyn Captures<usize>| {
                 while let Some(index) = captures.coming() {
-                    let result = self.station(&stations[index], captures).and_then(|station| work(index, station));
+                    let told = &spikes[index * setups..(index + 1) * setups];
+                    let result =
+                        self.station(&stations[index], captures, told).and_then(|station| work(index, station));
                     if !turnstile.pass(index, result) {
                         failed.store(true, Ordering::Relaxed);
                     }
@@ -101,26 +110,71 @@ impl Line<'_> {
     }
 
     /// A capture as it is read and conditioned; every sample is looked at before anything else touches it.
-    fn recorded(&self, threads: NonZeroUsize, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
+    fn recorded<'b>(
+        &'b self,
+        threads: NonZeroUsize,
+        station: usize,
+        setup: usize,
+        spikes: &'b Mutex<Vec<Spike>>,
+    ) -> Result<Box<dyn SampleStream + 'b>> {
         let opened = self.recording.open_with(threads, station, setup)?;
-        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::new(opened));
+        let tell = |found| *spikes.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::telling(opened, tell));
         self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))
     }
 
     /// Takes all of a station's captures, also behind one that failed.
-    fn station(&self, key: &StationKey, captures: &mut dyn Captures<usize>) -> Result<Station> {
+    fn station(
+        &self,
+        key: &StationKey,
+        captures: &mut dyn Captures<usize>,
+        spikes: &[Mutex<Vec<Spike>>],
+    ) -> Result<Station> {
         let mut profiles = Ok(Vec::with_capacity(self.rig.setups.len()));
-        for setup in 0..self.rig.setups.len() {
+        for (setup, spikes) in spikes.iter().enumerate() {
             let capture = captures.open();
             let projection = self.projections.get(setup).and_then(Option::as_ref);
             let wanted = Wanted { hold_out: self.hold_out, projection };
             profiles = profiles.and_then(|mut profiles: Vec<Profile>| {
-                profiles.push(self.averager.average_wanting(capture?, wanted)?);
+                let stream = capture?;
+                let capture = stream.capture().clone();
+                let mut profile = self.averager.average_wanting(stream, wanted)?;
+                let spikes = std::mem::take(&mut *spikes.lock().unwrap_or_else(PoisonError::into_inner));
+                profile.warnings.extend(unusual(&spikes, &capture, &profile));
+                profiles.push(profile);
                 Ok(profiles)
             });
         }
         Ok(Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? })
     }
+}
+
+/// Says which readings, far from all others, are in an average.
+fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String> {
+    let turn_samples = capture.median_turn_samples().unwrap_or(0.0);
+    let left_out = |spike: &Spike| {
+        let (sample, within) = (spike.near_sample as f64, spike.within_samples as f64);
+        let rejected = |turn: &RejectedTurn| {
+            let start = turn.start_sample as f64 - within;
+            (start..start + turn_samples + 2.0 * within).contains(&sample)
+        };
+        let marks = capture.marks.first().zip(capture.marks.last());
+        profile.turns.rejected.iter().any(rejected)
+            || marks.is_none_or(|(first, last)| !(*first..*last).contains(&sample))
+    };
+    let in_average = spikes.iter().filter(|spike| !left_out(spike));
+    let told = in_average.map(|spike| {
+        let Spike { channel, near_sample, reading_um, usual_um, stretches, .. } = spike;
+        let sensor = capture.sensor_ids.get(*channel).map_or("", String::as_str);
+        let times = if *stretches > 1 { format!(" ({stretches} turns or so have such readings)") } else { String::new() };
+        let usually = if reading_um > usual_um { "at most" } else { "at least" };
+        format!(
+            "{}: {sensor} reads {reading_um:.4} µm near sample {near_sample}{times}, in other turns {usually} {usual_um:.4} µm; if that is \
+             a disturbance, `outlier_sigma` of the synchronous average leaves such turns out",
+            capture.object
+        )
+    });
+    told.collect()
 }
 
 /// Separates a station, and refuses what is not a number where the layout could tell one, and a form that no part of
