@@ -158,16 +158,14 @@ impl<'a> Lines<'a> {
     }
 
     /// The text of the lines to come.
-    #[inline]
     pub(crate) fn ahead(&self) -> &'a [u8] {
         self.text
     }
 
-    /// Passes over a line of so many bytes, its end included.
-    #[inline]
-    pub(crate) fn pass(&mut self, length: usize) {
+    /// Passes over so many lines of so many bytes, their ends included.
+    pub(crate) fn pass(&mut self, length: usize, lines: usize) {
         self.text = &self.text[length..];
-        self.number += 1;
+        self.number += lines as u64;
     }
 
     /// The number of the line that was handed on last.

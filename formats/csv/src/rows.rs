@@ -10,8 +10,8 @@ use runout_core::{Error, Result, rig::Rig};
 
 use crate::{
     header::Header,
-    lines::{Line, Lines, Stretch, Stretches, cells},
-    number::Eights,
+    lines::{Lines, Stretch, Stretches, cells},
+    number::{Eights, Reading},
     row::{Instant, Role, Row},
 };
 
@@ -197,11 +197,17 @@ impl Format {
             readings.resize(stretch.most_lines() * channels, 0.0);
         }
         instants.clear();
+        instants.reserve(stretch.most_lines());
         (*blank, *error) = (None, None);
         let mut lines = stretch.lines();
-        let mut frames = readings.chunks_exact_mut(channels.max(1));
         loop {
-            let frame = frames.next();
+            if let (true, None, Some(decimal)) = (*with_readings, &blank, *decimal) {
+                let row = Row { header: &self.header, roles: &self.roles, decimal };
+                let (before, rest) = (instants.len(), &mut readings[instants.len() * channels..]);
+                let length = self.processor.plain(PlainRows { row, text: lines.ahead(), readings: rest, instants });
+                lines.pass(length, instants.len() - before);
+            }
+            let frame = readings.chunks_exact_mut(channels.max(1)).nth(instants.len());
             match self.row(&mut lines, frame, decimal, blank) {
                 Ok(Some(instant)) => instants.push(instant),
                 Ok(None) => break,
@@ -215,36 +221,13 @@ impl Format {
         *samples = with_readings.then_some(readings);
     }
 
-    /// The next row, its readings into a frame where there is one; only blank lines may follow one that is.
-    #[inline]
-    #[allow(clippy::redundant_closure_for_method_calls, reason = "the method alone is one of a single lifetime")]
+    /// The next row that is not blank, its readings into a frame where there is one; only blank lines may follow one that is.
     fn row(
         &self,
         lines: &mut Lines,
         frame: Option<&mut [f64]>,
         decimal: &mut Option<u8>,
         blank: &mut Option<u64>,
-    ) -> Result<Option<Instant>> {
-        let Some(frame) = frame else {
-            return self.line(lines, decimal, blank, |row, line| row.instant(line));
-        };
-        if let (None, Some(decimal)) = (&blank, *decimal) {
-            let row = Row { header: &self.header, roles: &self.roles, decimal };
-            if let Some((instant, length)) = self.processor.plain(&row, lines.ahead(), frame) {
-                lines.pass(length);
-                return Ok(Some(instant));
-            }
-        }
-        self.line(lines, decimal, blank, |row, line| row.cell_by_cell(line, frame))
-    }
-
-    /// Reads the next line that is not blank.
-    fn line(
-        &self,
-        lines: &mut Lines,
-        decimal: &mut Option<u8>,
-        blank: &mut Option<u64>,
-        read: impl FnOnce(&Row, Line) -> Result<Instant>,
     ) -> Result<Option<Instant>> {
         while let Some(line) = lines.next() {
             if line.is_blank() {
@@ -256,7 +239,11 @@ impl Format {
             }
             *decimal = decimal.or_else(|| decimal_of(&self.roles, line.bytes, self.header.delimiter));
             let row = Row { header: &self.header, roles: &self.roles, decimal: decimal.unwrap_or(b'.') };
-            return read(&row, line).map(Some);
+            return match frame {
+                Some(frame) => row.cell_by_cell(line, frame),
+                None => row.instant(line),
+            }
+            .map(Some);
         }
         Ok(None)
     }
@@ -282,34 +269,52 @@ impl Processor {
         }
     }
 
-    /// See [`Row::plain`].
-    #[inline]
-    fn plain(self, row: &Row, bytes: &[u8], channels: &mut [f64]) -> Option<(Instant, usize)> {
+    /// Reads plain rows, as far as they go on without another one; gives their length.
+    fn plain(self, rows: PlainRows) -> usize {
         #[cfg(target_arch = "x86_64")]
         if let Some(wide) = self.wide {
-            return wide.vectorize(Plain { wide, row, bytes, channels });
+            return wide.vectorize(Wide(wide, rows));
         }
-        row.plain(Eights, bytes, channels)
+        rows.read(Eights)
     }
 }
 
-/// A row that is read in wide registers. (A closure would not be inlined.)
-#[cfg(target_arch = "x86_64")]
-struct Plain<'a> {
-    wide: pulp::x86::V3,
-    row: &'a Row<'a>,
-    bytes: &'a [u8],
-    channels: &'a mut [f64],
+/// Rows of plain numbers that are to be read one after the other.
+struct PlainRows<'a> {
+    row: Row<'a>,
+    text: &'a [u8],
+    /// `[row][channel]`, room for them.
+    readings: &'a mut [f64],
+    instants: &'a mut Vec<Instant>,
 }
 
+impl PlainRows<'_> {
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "what is not inlined leaves wide registers")]
+    fn read(self, reading: impl Reading) -> usize {
+        let Self { row, text, readings, instants } = self;
+        let mut read = 0;
+        for frame in readings.chunks_exact_mut(row.header.sensors.len().max(1)) {
+            let Some((instant, length)) = row.plain(reading, &text[read..], frame) else { break };
+            instants.push(instant);
+            read += length;
+        }
+        read
+    }
+}
+
+/// The same in wide registers. (A closure would not be inlined.)
 #[cfg(target_arch = "x86_64")]
-impl pulp::NullaryFnOnce for Plain<'_> {
-    type Output = Option<(Instant, usize)>;
+struct Wide<'a>(pulp::x86::V3, PlainRows<'a>);
+
+#[cfg(target_arch = "x86_64")]
+impl pulp::NullaryFnOnce for Wide<'_> {
+    type Output = usize;
 
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "what is not inlined leaves wide registers")]
-    fn call(self) -> Self::Output {
-        self.row.plain(self.wide, self.bytes, self.channels)
+    fn call(self) -> usize {
+        self.1.read(self.0)
     }
 }
 
