@@ -22,7 +22,7 @@ const FEWEST: usize = 8;
 /// More than these are joined in pairs, so that a long recording takes no more memory.
 const MOST: usize = 8192;
 /// A reading is far from the others where it is beyond the upper quartile of the stretches' extremes by more than this many
-/// times the distance of the quartiles. The extremes of 2500 readings with Gaussian noise go as far once in 10⁸ turns.
+/// times the distance of the quartiles. The extremes of 2500 readings with Gaussian noise go as far in less than one of 10⁷ turns.
 const FAR: f64 = 10.0;
 /// And by more than this share of the usual swing: what is less moves the mean of some turns by less than other errors do.
 const MATTERS: f64 = 0.05;

@@ -176,8 +176,9 @@ pub fn inverse_of_cholesky<A: Arithmetic>(size: usize, matrix: &mut [Complexes],
 
 /// Least squares by orthonormal columns: A·S = Q·R, S making columns of norm 1.
 ///
-/// Gram and Schmidt's way, each column twice, which leaves Q orthogonal to rounding where A is not deficient to working
-/// precision (L. Giraud, J. Langou, M. Rozložník, J. van den Eshof, Numer. Math. 101, 2005).
+/// Gram and Schmidt's way, each column twice, which leaves Q orthogonal to rounding where A is not nearly deficient (shown for
+/// the classical process by L. Giraud, J. Langou, M. Rozložník, J. van den Eshof, Numer. Math. 101, 2005; here shares are
+/// taken out one after the other, which errs less).
 pub struct Orthonormal {
     rows: usize,
     cols: usize,

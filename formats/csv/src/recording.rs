@@ -308,6 +308,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_mistake_before_a_line_without_end_is_told_first() {
+        let (text, _) = long("index", 0);
+        let mut lines: Vec<&str> = text.lines().collect();
+        let endless = "1".repeat(3 << 20);
+        lines[20_000] = &endless;
+        let endless = lines.join("\n");
+        lines[17_000] = "16999;1;;3;1";
+        let both = lines.join("\n");
+        for way in WAYS {
+            let problem = [&endless, &both].map(|text| problem(text, way));
+            assert_eq!(problem[0], ", line 20001: expected a line end within 1048576 bytes", "{way:?}");
+            assert!(problem[1].starts_with(", line 17001, column 4"), "{way:?}: {}", problem[1]);
+        }
+    }
+
     /// Blank lines may end a file, whether a line end ends them or not, and however many there are.
     #[test]
     fn blank_lines_at_the_end_are_passed_over() {

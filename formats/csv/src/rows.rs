@@ -140,17 +140,22 @@ impl Rows {
             };
             let parsers: Vec<(SyncSender<Piece>, Receiver<Piece>)> = (0..threads).map(parse).collect();
             let (mut given, mut taken) = (0, 0);
+            // What stops the reading is told behind what was read before.
+            let mut end = None;
             loop {
-                while given < taken + WAITING * threads {
+                while end.is_none() && given < taken + WAITING * threads {
                     let mut piece = spare.pop().unwrap_or_default();
-                    if !read(&mut text, &mut piece)? {
-                        break;
+                    match read(&mut text, &mut piece) {
+                        Ok(true) => {
+                            parsers[given % threads].0.send(piece).map_err(|_| stopped())?;
+                            given += 1;
+                        }
+                        Ok(false) => end = Some(Ok(())),
+                        Err(error) => end = Some(Err(error)),
                     }
-                    parsers[given % threads].0.send(piece).map_err(|_| stopped())?;
-                    given += 1;
                 }
                 if taken == given {
-                    return Ok(());
+                    return end.unwrap_or(Ok(()));
                 }
                 let mut piece = parsers[taken % threads].1.recv().map_err(|_| stopped())?;
                 taken += 1;

@@ -250,7 +250,7 @@ impl Layout {
         self.systems.up_to(self, max_order)
     }
 
-    /// Factors one order's matrix, rows weighted where `weights` (`[reading][reading]`) is given.
+    /// Factors one order's matrix.
     #[must_use]
     pub fn factor(&self, order: usize) -> PivotedQr {
         PivotedQr::new(self.readings.len(), self.unknowns.len(), &self.matrix(order), RANK_TOLERANCE)

@@ -22,8 +22,8 @@ use crate::{
 
 /// Three passes settle the second order; more are allowed for large eccentricities.
 const MAX_PASSES: usize = 8;
-/// What lost orders may carry into others is said from so many standard uncertainties on.
-const CARRIED: f64 = 3.0;
+/// What lost orders may carry into others is said in these standard uncertainties.
+const CARRIED: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e5];
 /// Passes end when the readings move less than this, rms.
 const SETTLED_UM: f64 = 1e-9;
 
@@ -85,7 +85,7 @@ impl Solver<'_> {
         let share = eccentricity_um / (1e3 * self.selection.rig.part_radius_mm);
         let sees = |wanted| self.layout.unknowns.contains(&wanted);
         let sideways_unseen = !(sees(Quantity::X) && sees(Quantity::Y));
-        let mut worst = (CARRIED, 0);
+        let mut worst: f64 = 0.0;
         for unknown in self.layout.forms() {
             let at = |order: usize| order * width + unknown;
             let told = |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
@@ -105,20 +105,17 @@ impl Solver<'_> {
                 };
                 for near in beside.iter().filter(|near| told(near)) {
                     let ratio = 0.5 * order as f64 * share * amplitude_um / separation.variance[at(*near)].sqrt();
-                    if ratio > worst.0 {
-                        worst = (ratio, *near);
-                    }
+                    worst = worst.max(ratio);
                 }
             }
         }
-        let (ratio, order) = worst;
+        // The estimate is good to a size, and stations that are alike are to say the same.
+        let times = CARRIED.into_iter().rfind(|times| worst >= *times)?;
         let unknown = if sideways_unseen { "the surface goes sideways unseen" } else { "orders of form are lost" };
-        (order > 0).then(|| {
-            format!(
-                "{unknown}, and an eccentricity of {eccentricity_um:.0} µm carries that into the other orders: order {order} of form \
-                 may be off by {ratio:.0} times its stated uncertainty, and motion with it; centre the part better"
-            )
-        })
+        Some(format!(
+            "{unknown}, and an eccentricity of {eccentricity_um:.0} µm carries that into the other orders: some of form may be off by \
+             {times} times their stated uncertainty or more, and motion with them; centre the part better"
+        ))
     }
 
     /// Solves, adds what exact geometry and `beyond` add to linear readings at that solution, and solves again until it
