@@ -113,7 +113,7 @@ impl Solver<'_> {
         let times = CARRIED.into_iter().rfind(|times| worst >= *times)?;
         let unknown = if sideways_unseen { "the surface goes sideways unseen" } else { "orders of form are lost" };
         Some(format!(
-            "{unknown}, and an eccentricity of {eccentricity_um:.0} µm carries that into the other orders: some of form may be off by \
+            "{unknown}, and an eccentricity of {eccentricity_um:.0} µm carries that into other orders of form: some may be off by \
              {times} times their stated uncertainty or more, and motion with them; centre the part better"
         ))
     }
