@@ -84,7 +84,8 @@ impl Rows {
 
     /// The next rows in place of others; false at the end.
     pub(crate) fn next(&mut self, piece: &mut Piece) -> Result<bool> {
-        let more = self.text.read(piece, true)?;
+        piece.with_readings = true;
+        let more = self.text.read(piece)?;
         if more {
             self.format.parse(piece);
             self.text.accept(&self.format.header, piece)?;
@@ -103,7 +104,7 @@ impl Rows {
     ) -> Result<()> {
         let Self { format, mut text } = self;
         let read = |text: &mut Text, piece: &mut Piece| {
-            let more = text.read(piece, true)?;
+            let more = text.read(piece)?;
             piece.with_readings = wanted(piece.stretch.lines_so_far());
             Ok(more)
         };
@@ -168,8 +169,7 @@ impl Rows {
 
 impl Text {
     /// Reads the next piece; false at the end.
-    fn read(&mut self, piece: &mut Piece, with_readings: bool) -> Result<bool> {
-        piece.with_readings = with_readings;
+    fn read(&mut self, piece: &mut Piece) -> Result<bool> {
         piece.decimal = self.decimal;
         match self.next.take() {
             Some(next) => {

@@ -20,7 +20,7 @@ pub(super) struct Scatter {
     /// Length of a plane: the orders, and as many zeros as fill the last lanes.
     plane: usize,
     turns: usize,
-    /// The first turn.
+    /// The first turn, as all planes.
     pivot: Vec<f64>,
     /// The turn under work less the pivot, d.
     turn: Vec<f64>,
@@ -134,17 +134,8 @@ impl FusedWork for Summing<'_> {
 fn part(turn: &[Complex64], orders: usize, plane: usize, planes: &mut [f64]) {
     for (turn, planes) in turn.chunks_exact(orders).zip(planes.chunks_exact_mut(2 * plane)) {
         let (re, im) = planes.split_at_mut(plane);
-        let lanes = re.chunks_exact_mut(LANES).zip(im.chunks_exact_mut(LANES));
-        for (turn, (re, im)) in turn.chunks(LANES).zip(lanes) {
-            // With a fixed number, whole registers change places.
-            if let Ok(turn) = <&[Complex64; LANES]>::try_from(turn) {
-                re.copy_from_slice(&turn.map(|harmonic| harmonic.re));
-                im.copy_from_slice(&turn.map(|harmonic| harmonic.im));
-            } else {
-                for ((re, im), harmonic) in re.iter_mut().zip(im).zip(turn) {
-                    (*re, *im) = (harmonic.re, harmonic.im);
-                }
-            }
+        for ((turn, re), im) in turn.iter().zip(re).zip(im) {
+            (*re, *im) = (turn.re, turn.im);
         }
     }
 }
