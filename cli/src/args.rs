@@ -6,7 +6,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Separates the form of a turning part from the error motion of its spindle.
 ///
-/// Exit status: 0 done; 1 the data or the work failed; 2 the command line or the configuration is wrong.
+/// Exit status: 0 done; 1 the data or the work failed, or `run --fail-on-limit` or `run --fail-on-warning` found a reason; 2 the
+/// command line or the configuration is wrong.
 #[derive(Debug, Parser)]
 #[command(name = "runout", version, arg_required_else_help = true)]
 pub struct CommandLine {
@@ -72,6 +73,10 @@ pub struct RunArgs {
     /// written all the same. Without any [[limit]] that is a mistake (exit status 2).
     #[arg(long)]
     pub fail_on_limit: bool,
+    /// End with exit status 1 where the run warns of something in the data. Files and the summary are written all the same;
+    /// notes that `check` gives without the data do not count.
+    #[arg(long)]
+    pub fail_on_warning: bool,
 }
 
 /// `runout diagnose`.
@@ -82,6 +87,9 @@ pub struct DiagnoseArgs {
     /// Stations read and averaged at a time; as many as there are processors without it.
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
+    /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can stand for it.
+    #[arg(long, value_name = "RIG.toml")]
+    pub write: Option<PathBuf>,
 }
 
 /// `runout compare`.
@@ -197,7 +205,8 @@ fn degrees(text: &str) -> Result<f64, String> {
 /// `runout plugins`.
 #[derive(Debug, Args)]
 pub struct PluginsArgs {
-    /// A plugin's name; `stage/name` where two stages have one of that name (`export/hdf5`).
+    /// A plugin, a table without one (`rig`, `surface`, `evaluate`, `limit`, `diagnose`) or a stage; `stage/name` where two stages
+    /// have a plugin of that name (`export/hdf5`).
     pub name: Option<String>,
 }
 

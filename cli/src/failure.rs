@@ -28,6 +28,8 @@ pub enum Failure {
     Work(Error),
     /// Limits that are not proven to be kept, after a result that has been shown.
     Limit(Vec<String>),
+    /// So many warnings, after a result that has been shown with them.
+    Warnings(usize),
     /// Standard output cannot be written to.
     Output(io::Error),
 }
@@ -67,13 +69,13 @@ impl Failure {
     pub fn report(&self, json: bool) -> ExitCode {
         render::to_stderr(&self.text());
         // The result itself is the one document then.
-        if json && !matches!(self, Self::Limit(_)) {
+        if json && !matches!(self, Self::Limit(_) | Self::Warnings(_)) {
             // When stdout cannot be written to either, the exit status has to tell.
             let _ = render::document(&json!({ "error": self.document() }));
         }
         ExitCode::from(match self {
             Self::CommandLine(_) | Self::Name { .. } | Self::Configuration(_) => 2,
-            Self::Work(_) | Self::Limit(_) | Self::Output(_) => 1,
+            Self::Work(_) | Self::Limit(_) | Self::Warnings(_) | Self::Output(_) => 1,
         })
     }
 
@@ -87,6 +89,10 @@ impl Failure {
                 plain(&error.to_string(), error.advice())
             }
             Self::Limit(open) => plain(&format!("not proven to be kept: {}", open.join("; ")), None),
+            Self::Warnings(count) => {
+                let s = if *count == 1 { "" } else { "s" };
+                plain(&format!("{count} warning{s}, and --fail-on-warning"), None)
+            }
             Self::Output(error) => plain(&format!("cannot write to stdout: {error}"), None),
         }
     }
@@ -114,6 +120,7 @@ impl Failure {
                 json!({ "message": error.to_string(), "help": error.advice() })
             }
             Self::Limit(open) => json!({ "message": "not proven to be kept", "limits": open }),
+            Self::Warnings(count) => json!({ "message": "there are warnings", "warnings": count }),
             Self::Output(error) => json!({ "message": error.to_string() }),
         }
     }

@@ -4,11 +4,15 @@
 //! micrometres, geometry in millimetres, angles in radians inside the code (`_deg` in files).
 
 pub mod atomic_file;
+pub mod azimuth;
+mod calibrated;
 pub mod checksum;
+pub mod creep;
 pub mod encoder;
 pub mod error;
 pub mod evaluate;
 pub mod inspection;
+pub mod marker;
 pub mod measurement;
 pub mod model;
 pub mod numerics;
@@ -22,6 +26,7 @@ pub mod spread;
 pub mod stage;
 pub mod straightness;
 pub mod surface;
+pub mod table;
 
 pub use error::{Error, Result};
 pub use num_complex::Complex64;

@@ -1,7 +1,10 @@
 //! The synchronous average of one capture, one harmonic at a time, with its covariance over the turns.
 
+use std::f64::consts::TAU;
+
 use crate::{
     Complex64,
+    creep::Levels,
     measurement::{DefectKind, Response, Trim},
     spread::Spread,
 };
@@ -28,6 +31,8 @@ pub struct Profile {
     /// The covariance of single turns over their number, likewise: what the covariance of the mean would be if turns
     /// were independent. It is the better known of the two, and serves for weights.
     pub scatter: Option<Vec<Complex64>>,
+    /// Mean level of each turn used.
+    pub levels: TurnLevels,
     /// The same turns in parts, where asked for.
     pub split: Option<Split>,
     /// How far the turns lie apart, where asked for and there are two.
@@ -36,10 +41,30 @@ pub struct Profile {
     pub turns: TurnCount,
     /// Mean speed over the turns used, where the sampling rate is known.
     pub speed_rpm: Option<f64>,
+    /// Samples a second, where known.
+    pub sample_rate_hz: Option<f64>,
     /// Filters that the signal went through.
     pub responses: Vec<Response>,
     /// What the user should know of this capture.
     pub warnings: Vec<String>,
+}
+
+/// Mean levels of turns, as far as they are in an average.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TurnLevels {
+    /// Each turn's number in the capture: those left out are missing.
+    pub numbers: Vec<usize>,
+    /// In µm, `[turn][channel]`.
+    pub levels_um: Vec<f64>,
+}
+
+impl TurnLevels {
+    /// Those of one of so many channels.
+    #[must_use]
+    pub fn of(&self, channel: usize, channels: usize) -> Levels {
+        let levels = self.levels_um.iter().skip(channel).step_by(channels.max(1)).copied();
+        Levels::new(self.numbers.iter().copied().zip(levels))
+    }
 }
 
 /// The turns of a capture in parts: what a model is fitted to, and what it has not seen.
@@ -49,6 +74,8 @@ pub struct Split {
     pub fit: Part,
     /// The last ones.
     pub held_out: Part,
+    /// What the covariance of the mean over all turns is taken from; nothing below three turns.
+    pub neighbours: Option<Neighbours>,
     /// Each turn by itself.
     pub turns: Turns,
 }
@@ -65,6 +92,8 @@ pub struct Turns {
     pub orders: usize,
     /// Channels.
     pub channels: usize,
+    /// Sample positions at which each turn begins and ends.
+    pub spans: Vec<[f64; 2]>,
     /// Coefficients of Re Σ cₙ e^{−inΦ} in µm, `[turn][order][channel]`.
     pub harmonics: Vec<Complex64>,
 }
@@ -97,8 +126,86 @@ pub struct Part {
     pub covariance: Option<Vec<Complex64>>,
     /// The same with independent turns.
     pub scatter: Option<Vec<Complex64>>,
+    /// What that covariance is taken from; nothing below three turns.
+    pub neighbours: Option<Neighbours>,
     /// First turn and number of turns, among those used.
     pub turns: std::ops::Range<usize>,
+}
+
+/// Coefficients of a record of turns beside a whole order n, at n ± k/P: the power that the mean takes at n from what is not
+/// synchronous. Their mean square is the covariance of the mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Neighbours {
+    /// P, in turns.
+    pub period: usize,
+    /// Channels.
+    pub channels: usize,
+    /// Equal angles of a turn.
+    pub angles: usize,
+    /// Of e^{−2πikm/P} over the turns at n and −n, k = 1, 2, …: `[k][side][order][channel]`, in µm.
+    pub coefficients: Vec<Vec<Complex64>>,
+}
+
+impl Neighbours {
+    /// Covariance of the mean across channels, `[order][channel][channel]`.
+    #[must_use]
+    pub fn covariance(&self) -> Vec<Complex64> {
+        let channels = self.channels;
+        let orders = self.coefficients.first().map_or(0, |side| side.len() / channels.max(1));
+        let mut covariance = vec![Complex64::ZERO; orders * channels * channels];
+        let scale = 1.0 / self.coefficients.len() as f64;
+        for side in &self.coefficients {
+            let each = side.chunks_exact(channels).zip(covariance.chunks_exact_mut(channels * channels));
+            for (values, covariance) in each {
+                for (place, (row, target)) in values.iter().zip(covariance.chunks_exact_mut(channels)).enumerate() {
+                    let row = row * scale;
+                    target.iter_mut().zip(&values[..=place]).for_each(|(to, column)| *to += row * column.conj());
+                }
+            }
+        }
+        for covariance in covariance.chunks_exact_mut(channels * channels) {
+            for row in 0..channels {
+                covariance[row * channels + row].im = 0.0;
+                for column in 0..row {
+                    covariance[column * channels + row] = covariance[row * channels + column].conj();
+                }
+            }
+        }
+        covariance
+    }
+
+    /// Takes out what a channel creeps: `course` gives each turn's mean level and its rise over the turn, in µm.
+    pub fn take_out(&mut self, channel: usize, course: &[[f64; 2]]) {
+        let count = course.len().max(1) as f64;
+        let [level, rise] = [0, 1].map(|which| course.iter().map(|turn| turn[which]).sum::<f64>() / count);
+        for (index, values) in self.coefficients.iter_mut().enumerate() {
+            let (beside, side) = (index / 2 + 1, index % 2);
+            let (mut levels, mut rises) = (Complex64::ZERO, Complex64::ZERO);
+            for (turn, [of_level, of_rise]) in course.iter().enumerate() {
+                let phase = Complex64::cis(-TAU * ((beside * turn % self.period) as f64 / self.period as f64)) / count;
+                levels += phase * (of_level - level);
+                rises += phase * (of_rise - rise);
+            }
+            let share = beside as f64 / self.period as f64;
+            for order in 0..values.len() / self.channels {
+                let at = if side == 0 { order as f64 } else { -(order as f64) } - share;
+                let [flat, ramp] = ramp(at, self.angles);
+                let found = (levels * flat + rises * ramp) * if order == 0 { 1.0 } else { 2.0 };
+                values[order * self.channels + channel] -= if side == 0 { found } else { found.conj() };
+            }
+        }
+    }
+}
+
+/// Means of e^{iνφ} and of (φ/2π − ½)·e^{iνφ} over L equal angles from 0, ν not whole.
+fn ramp(nu: f64, angles: usize) -> [Complex64; 2] {
+    let count = angles as f64;
+    let step = Complex64::cis(TAU * nu / count);
+    let whole = Complex64::cis(TAU * nu);
+    // Sums of a geometric series and of its terms times their number.
+    let flat = (whole - 1.0) / (step - 1.0);
+    let ramp = (whole * count - step * flat) / (step - 1.0);
+    [flat / count, ramp / (count * count) - flat / (2.0 * count)]
 }
 
 impl Split {
@@ -233,4 +340,24 @@ pub struct TurnLength {
     pub samples: f64,
     /// The capture's median, in samples.
     pub median_samples: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_is_the_sum_that_it_is() {
+        for (nu, angles) in [(3.0 - 1.0 / 60.0, 512), (-2.0 - 2.0 / 48.0, 90), (-1.0 / 60.0, 64)] {
+            let terms = (0..angles).map(|angle| {
+                let phase = Complex64::cis(TAU * nu * angle as f64 / angles as f64) / angles as f64;
+                [phase, phase * (angle as f64 / angles as f64 - 0.5)]
+            });
+            let sums = terms.fold([Complex64::ZERO; 2], |sum, term| [sum[0] + term[0], sum[1] + term[1]]);
+            for (found, sum) in ramp(nu, angles).iter().zip(sums) {
+                // Rounding of differences of numbers near 1 over 2π/60/512.
+                assert!((found - sum).norm() < 1e-9, "{nu} {angles}: {found} {sum}");
+            }
+        }
+    }
 }

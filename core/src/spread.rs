@@ -3,7 +3,7 @@
 //! Form and clamping add the same to a reading at an angle in every turn. In whatever combination of one setup's readings
 //! that gives motion, turns therefore differ by motion only, and by the sensors' noise and drift.
 
-use crate::separation::Quantity;
+use crate::{azimuth::Azimuth, separation::Quantity};
 
 /// A sensitive direction (ISO 230-7): where motion of the axis counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -20,10 +20,14 @@ pub enum Direction {
     TiltY,
     /// Tilt towards the direction that turns with the spindle from x on: ε_y·cos θ − ε_x·sin θ.
     RotatingTilt,
+    /// Fixed, along one line that is neither x nor y.
+    Along(Azimuth),
+    /// Fixed: tilt towards that line.
+    TiltAlong(Azimuth),
 }
 
 impl Direction {
-    /// All of them.
+    /// All that x, y and the tilts about them give.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Rotating, Self::TiltX, Self::TiltY, Self::RotatingTilt];
 
     /// The motion that counts; with a second one and its factor, cos θ of the first and factor · sin θ of the second.
@@ -36,13 +40,15 @@ impl Direction {
             Self::TiltX => (Quantity::TiltX, None),
             Self::TiltY => (Quantity::TiltY, None),
             Self::RotatingTilt => (Quantity::TiltY, Some((Quantity::TiltX, -1.0))),
+            Self::Along(azimuth) => (Quantity::Along(azimuth), None),
+            Self::TiltAlong(azimuth) => (Quantity::TiltAlong(azimuth), None),
         }
     }
 
     /// Whether it is one of tilt, in µrad; the others are in µm.
     #[must_use]
     pub fn is_tilt(self) -> bool {
-        matches!(self, Self::TiltX | Self::TiltY | Self::RotatingTilt)
+        self.parts().0.is_tilt()
     }
 
     /// Whether it turns with the spindle.
@@ -61,6 +67,24 @@ pub struct Projection {
     pub z_mm: f64,
     /// θ over the spindle's angle: +1 where the part turns counter-clockwise, −1 where it turns clockwise.
     pub rotation: f64,
+}
+
+impl Projection {
+    /// The directions in which it gives motion.
+    #[must_use]
+    pub fn directions(&self) -> Vec<Direction> {
+        let gives = |wanted: Quantity| self.rows.iter().any(|(quantity, _)| *quantity == wanted);
+        let along = self.rows.iter().filter_map(|(quantity, _)| match quantity {
+            Quantity::Along(azimuth) => Some(Direction::Along(*azimuth)),
+            Quantity::TiltAlong(azimuth) => Some(Direction::TiltAlong(*azimuth)),
+            _ => None,
+        });
+        let given = |direction: &Direction| {
+            let (first, second) = direction.parts();
+            gives(first) && second.is_none_or(|(second, _)| gives(second))
+        };
+        Direction::ALL.into_iter().chain(along).filter(given).collect()
+    }
 }
 
 /// How far the turns of one capture lie apart, on equal angles of the spindle from 0.

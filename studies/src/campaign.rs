@@ -25,6 +25,7 @@ pub fn four_sensors(setups: &[(f64, f64)]) -> RigConfig {
         z_mm,
         section: section.into(),
         sign: 1,
+        ..SensorConfig::default()
     };
     RigConfig {
         interruptions: Vec::new(),

@@ -222,6 +222,7 @@ fn true_curve(truth: &StationTruth, quantity: Quantity) -> Option<&[f64]> {
         Quantity::Y => 1,
         Quantity::TiltX => 2,
         Quantity::TiltY => 3,
+        Quantity::Along(_) | Quantity::TiltAlong(_) => return None,
     };
     Some(&truth.motion.as_ref()?[axis])
 }

@@ -71,7 +71,8 @@ impl Wall {
     /// # Errors
     /// When it cannot be read, or holds no circle.
     pub fn measured(path: &Path, radius_mm: f64) -> Result<Self> {
-        let file = Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"] }.read(path)?;
+        let file =
+            Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"], optional: &[] }.read(path)?;
         let [z, angle, form] = [file.column("z_mm")?, file.column("angle_deg")?, file.column("deviation_um")?];
         let circles = file.traces.iter().filter(|trace| trace.kind == "circle");
         let points = circles.flat_map(|trace| trace.points.clone());

@@ -71,7 +71,7 @@ pub fn separate(file: &Path) -> Result<Straightness> {
     let loader = AxialTracesConfig { path: file.to_path_buf() }
         .check(&Context { folder: &PathBuf::new(), rig: None })
         .map_err(configured)?;
-    let config = AxialReversalConfig { initial: "initial".into(), reversed: "reversed".into(), step_mm: None };
+    let config = AxialReversalConfig::default();
     match loader.open(None)? {
         Source::Points(points) => config.separator().map_err(configured)?.separate(&points),
         Source::Turns(_) => Err(Error::new("read", file.display().to_string(), "it holds turns")),

@@ -1,4 +1,4 @@
-//! Readers that others wrote, for tests of our files: h5py, pyarrow, trimesh, and the Khronos glTF validator.
+//! Readers that others wrote, for tests of our files: h5py, pyarrow, trimesh, MeshLab, and the Khronos glTF validator.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use crate::{
     setup,
 };
 
-const PYTHON_PACKAGES: [&str; 4] = ["numpy", "h5py", "pyarrow", "trimesh"];
+const PYTHON_PACKAGES: [&str; 6] = ["numpy", "scipy", "h5py", "pyarrow", "trimesh", "pymeshlab"];
 /// The Khronos validator's releases are pre-releases to npm: the version has to be named.
 const NODE_PACKAGES: [&str; 1] = ["gltf-validator@2.0.0-dev.3.10"];
 

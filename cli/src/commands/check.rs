@@ -1,6 +1,7 @@
 //! `runout check`: everything that can be said without the data.
 
 use runout_core::{
+    azimuth::Azimuth,
     model::foresight::Foresight,
     pipeline::{
         Pipeline, Registry,
@@ -77,10 +78,13 @@ pub struct Separability {
 /// Something that is solved for.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Unknown {
-    /// "form", "x", "y", "tilt_x", "tilt_y".
+    /// "form", "x", "y", "tilt_x", "tilt_y", "along", "tilt_along".
     pub quantity: &'static str,
     /// The section whose form it is; absent for motion.
     pub section: Option<String>,
+    /// The line of "along" and "tilt_along": its angle from x towards y, in degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub along_deg: Option<f64>,
     /// "um" or "urad".
     pub unit: &'static str,
 }
@@ -107,7 +111,11 @@ impl Unknown {
     /// "form a", "tilt_x".
     #[must_use]
     pub fn name(&self) -> String {
-        self.section.as_ref().map_or_else(|| self.quantity.to_owned(), |id| format!("{} {id}", self.quantity))
+        match (&self.section, self.along_deg) {
+            (Some(section), _) => format!("{} {section}", self.quantity),
+            (None, Some(along_deg)) => format!("{} {along_deg}°", self.quantity),
+            (None, None) => self.quantity.to_owned(),
+        }
     }
 }
 
@@ -185,6 +193,7 @@ impl Separability {
                 Quantity::Form(section) => rig.and_then(|rig| rig.sections.get(*section)).cloned(),
                 _ => None,
             },
+            along_deg: quantity.azimuth().map(Azimuth::degrees),
             unit: quantity.unit(),
         };
         Self {

@@ -1,6 +1,11 @@
 //! `runout diagnose`.
 
-use runout_core::pipeline::{Registry, diagnose};
+use std::path::Path;
+
+use runout_core::{
+    atomic_file::resolved,
+    pipeline::{Pipeline, Registry, diagnose, document::Sources},
+};
 
 use super::{pipeline, print};
 use crate::{args::DiagnoseArgs, failure::Failure, progress::Progress, render};
@@ -10,9 +15,29 @@ use crate::{args::DiagnoseArgs, failure::Failure, progress::Progress, render};
 /// # Errors
 /// When the configuration is wrong, or the data or a file fails. Whatever the verdict, a diagnosis is no failure.
 pub fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
-    let (_, pipeline) = pipeline(&args.pipeline, registry)?;
+    let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
+    if let Some(path) = &args.write {
+        is_free(path, &sources, &pipeline)?;
+        pipeline.diagnose.write_rig = Some(path.clone());
+    }
     let progress = Progress::new("stations");
     let diagnosis = diagnose::diagnose(&pipeline, args.threads, &progress)?;
     drop(progress);
     print(&diagnosis, json, render::diagnosis::text)
+}
+
+/// Refuses a file for the corrected rig that is something else, and a pipeline without a rig.
+fn is_free(path: &Path, sources: &Sources, pipeline: &Pipeline) -> Result<(), Failure> {
+    let refuse = |message: String, help: &str| Err(Failure::Name { message, help: help.into() });
+    let (shown, place) = (path.display(), resolved(path));
+    if pipeline.rig.is_none() {
+        return refuse("--write, and the pipeline has no [rig]".into(), "leave --write out");
+    }
+    if sources.files().any(|file| resolved(file) == place) {
+        return refuse(format!("{shown} is read as configuration"), "write the corrected rig to another file");
+    }
+    if pipeline.diagnosed_outputs().iter().any(|output| resolved(output) == place) {
+        return refuse(format!("{shown} is written by an exporter"), "write the corrected rig to another file");
+    }
+    Ok(())
 }

@@ -1,6 +1,8 @@
 //! `runout plugins`: what is on board, and the keys of each.
 
-use runout_core::pipeline::{Registry, effects::EffectEntry, error::known_names, registry::Catalogue};
+use runout_core::pipeline::{
+    Registry, config::plain_tables, effects::EffectEntry, error::known_names, registry::Catalogue,
+};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -12,21 +14,26 @@ use crate::{
 };
 
 const EFFECT: &str = "effect";
+const TABLE: &str = "table";
 
-/// One plugin.
+/// One plugin, or one of the tables that name none.
 #[derive(Debug, Serialize)]
 pub struct Entry {
-    /// The table's key in TOML; "simulate" for scenarios, "effect" for what `[diagnose]` looks for.
+    /// The table's key in TOML; "simulate" for scenarios, "effect" for what `[diagnose]` looks for, "table" for the tables
+    /// that name no plugin.
     pub stage: &'static str,
-    /// Kebab-case name in TOML.
+    /// Kebab-case name in TOML; of a table, its key.
     pub name: &'static str,
     /// What it does.
     pub about: &'static str,
     /// JSON Schema of its keys; of an effect, of what may stand in `values` where it is known.
     pub schema: Value,
+    /// Where its keys are written.
+    #[serde(skip)]
+    place: String,
 }
 
-/// Lists the plugins, or the keys of those with one name.
+/// Lists the plugins, all or those of one stage, or the keys of those with one name.
 ///
 /// # Errors
 /// When the name is unknown.
@@ -35,7 +42,10 @@ pub fn execute(args: &PluginsArgs, json: bool, registry: &Registry) -> Result<()
     match &args.name {
         None => print(&entries.iter().collect::<Vec<_>>(), json, |entries| list(entries)),
         Some(name) => match named(&entries, name) {
-            found if found.is_empty() => Err(unknown(&entries, name, &[])),
+            found if found.is_empty() => match entries.iter().filter(|entry| entry.stage == name).collect::<Vec<_>>() {
+                stage if stage.is_empty() => Err(unknown(&entries, name, &[])),
+                stage => print(&stage, json, |stage| list(stage)),
+            },
             found => {
                 print(&found, json, |found| found.iter().map(|entry| describe(entry)).collect::<Vec<_>>().join("\n"))
             }
@@ -43,7 +53,7 @@ pub fn execute(args: &PluginsArgs, json: bool, registry: &Registry) -> Result<()
     }
 }
 
-/// Every plugin, by stage, and every effect.
+/// Every plugin, by stage, every effect, and the tables that name no plugin.
 #[must_use]
 pub fn entries(registry: &Registry) -> Vec<Entry> {
     let mut entries = Vec::new();
@@ -57,6 +67,14 @@ pub fn entries(registry: &Registry) -> Vec<Entry> {
         name: effect.name,
         about: effect.about,
         schema: values(effect),
+        place: "[diagnose] effects, values in known".into(),
+    }));
+    entries.extend(plain_tables().into_iter().map(|table| Entry {
+        stage: TABLE,
+        name: table.key,
+        about: table.about,
+        schema: table.schema.to_value(),
+        place: if table.repeats { format!("[[{}]]", table.key) } else { format!("[{}]", table.key) },
     }));
     entries
 }
@@ -67,6 +85,11 @@ fn add<S>(entries: &mut Vec<Entry>, stage: &'static str, catalogue: &Catalogue<S
         name: plugin.name,
         about: plugin.about,
         schema: plugin.schema().to_value(),
+        place: match stage {
+            "simulate" => "a scenario".into(),
+            "preprocess" | "export" => format!("[[{stage}]]"),
+            stage => format!("[{stage}]"),
+        },
     }));
 }
 
@@ -112,11 +135,5 @@ fn list(entries: &[&Entry]) -> String {
 }
 
 fn describe(entry: &Entry) -> String {
-    let table = match entry.stage {
-        "simulate" => "a scenario".to_owned(),
-        EFFECT => "[diagnose] effects, values in known".to_owned(),
-        stage @ ("preprocess" | "export") => format!("[[{stage}]]"),
-        stage => format!("[{stage}]"),
-    };
-    format!("{} ({table}): {}\n\n{}", entry.name, entry.about, keys::text(&entry.schema))
+    format!("{} ({}): {}\n\n{}", entry.name, entry.place, entry.about, keys::text(&entry.schema))
 }

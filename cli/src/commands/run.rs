@@ -12,7 +12,7 @@ use crate::{args::RunArgs, failure::Failure, progress::Progress, render};
 ///
 /// # Errors
 /// When the configuration is wrong, or the data or a file fails; where it was asked for, also when a limit is not proven to
-/// be kept.
+/// be kept or a warning was given.
 pub fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (_, pipeline) = pipeline(&args.pipeline, registry)?;
     if args.fail_on_limit && pipeline.evaluate.limits().is_empty() {
@@ -27,5 +27,11 @@ pub fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Fa
         .filter(|limit| args.fail_on_limit && limit.decision != Decision::Conforms)
         .map(|limit| limit.limit.name())
         .collect();
-    if open.is_empty() { Ok(()) } else { Err(Failure::Limit(open)) }
+    if !open.is_empty() {
+        return Err(Failure::Limit(open));
+    }
+    // What is said of the layout is known before any data.
+    let notes = pipeline.assessment.as_ref().map(|found| found.notes.as_slice()).unwrap_or_default();
+    let warnings = summary.all_warnings().filter(|warning| !notes.contains(warning)).count();
+    if args.fail_on_warning && warnings > 0 { Err(Failure::Warnings(warnings)) } else { Ok(()) }
 }

@@ -4,7 +4,7 @@ use runout_core::pipeline::compare::{Comparison, Difference, MethodValue, Quanti
 
 use super::{
     count,
-    number::{ranges, significant, spread},
+    number::{lacking, ranges, significant, spread},
     page::Page,
     table::Table,
 };
@@ -93,7 +93,7 @@ fn name((quantity, section): &Key, unit: &str) -> String {
 }
 
 fn values(comparison: &Comparison) -> Table {
-    let mut table = Table::new(2, ["", "method", "rms", "±", "RONt", "true error"]);
+    let mut table = Table::new(2, ["", "method", "rms", "±", "RONt LSCI, unfiltered", "true error"]);
     for (wanted, unit) in quantities(comparison) {
         let mut label = name(&wanted, &unit);
         for method in &comparison.methods {
@@ -103,17 +103,26 @@ fn values(comparison: &Comparison) -> Table {
                 }))
             };
             let Some(rms) = of(&|value| Some(value.rms)) else { continue };
+            let ront_um = of(&|value| value.ront_um);
+            let first = at_stations(comparison, &wanted)
+                .find_map(|(_, quantity)| quantity.values.iter().find(|value| value.method == method.method));
+            // Order 1 is centring.
+            let lost = first.map_or_else(Vec::new, |value| without_centring(&value.lost_orders));
             table.row([
                 std::mem::take(&mut label),
                 method.method.clone(),
                 significant(rms, 5),
                 shown(of(&|value| value.std), 2),
-                shown(of(&|value| value.ront_um), 5),
+                shown(ront_um, 5) + &ront_um.map_or_else(String::new, |_| lacking(&lost)),
                 shown(of(&|value| value.truth_rms_error_um), 2),
             ]);
         }
     }
     table
+}
+
+fn without_centring(orders: &[usize]) -> Vec<usize> {
+    orders.iter().copied().filter(|order| *order > 1).collect()
 }
 
 fn differences(comparison: &Comparison) -> Table {

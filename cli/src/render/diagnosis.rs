@@ -3,8 +3,9 @@
 use runout_core::model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step, Verdict};
 
 use super::{
-    number::{ranges, significant, spread, with_std},
+    number::{lacking, ranges, significant, spread, with_std},
     page::Page,
+    summary::described,
     table::Table,
 };
 
@@ -12,26 +13,50 @@ use super::{
 #[must_use]
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut page = Page::default();
-    page.line(match (diagnosis.verdict, diagnosis.after.chi2_per_dof) {
-        (Verdict::AtNoiseFloor, Some(_)) => "At the noise floor: the declared model leaves noise only",
-        (Verdict::AtNoiseFloor, None) => "Nothing found: no effect earns its place (what noise there is, is not known)",
-        (Verdict::Explained, Some(_)) => "Explained: with what was added, noise only is left",
-        (Verdict::Explained, None) => "Explained: nothing else earns its place (what noise there is, is not known)",
-        (Verdict::Unexplained, _) => "Unexplained: something is left that no known effect explains",
-    });
-    page.headed_table("Error before and after", &levels(diagnosis));
+    let headline = match diagnosis.verdict {
+        _ if diagnosis.nothing_separated => {
+            "Nothing is separated: each reading is form, eccentricity and error motion together"
+        }
+        _ if diagnosis.after.degrees_of_freedom == 0 => {
+            "Nothing found: the residual has no degrees of freedom, so nothing checks the declared model"
+        }
+        Verdict::AtNoiseFloor => "At the noise floor: the declared model leaves noise only",
+        Verdict::Explained => "Explained: with what was added, noise only is left",
+        Verdict::Unexplained => "Unexplained: something is left that no known effect explains",
+        Verdict::Improved => {
+            "Improved: effects were added. The noise level is not known, so the residual may hold more"
+        }
+        Verdict::NothingFound => {
+            "Nothing found: no effect was added. The noise level is not known, so the residual may hold more"
+        }
+    };
+    page.line(headline);
+    for set in undecided(&diagnosis.added) {
+        page.line(format_args!("Not decided: {set}. The ± of form and motion include each of them"));
+    }
+    // A residual without degrees of freedom is 0 whatever the data are.
+    if diagnosis.after.degrees_of_freedom > 0 && !diagnosis.nothing_separated {
+        page.headed_table("Error before and after", &levels(diagnosis));
+    }
     page.headed_table("What the declared model lacks", &added(diagnosis));
-    page.bullets("Cannot be told from", &confounded(&diagnosis.added));
+    page.bullets("Confounded sets: the data do not decide which effect is present", &confounded(&diagnosis.added));
     page.headed_table("What moved", &moved(diagnosis));
     page.headed_table("Left, and not explained", &unexplained(diagnosis));
     page.bullets("Looked likely, and refused", &refused(diagnosis));
-    page.headed_table("What these data cannot show, and what it would do all the same", &blind(&diagnosis.blind_to));
+    // Where nothing is separated, no effect shows and none moves anything.
+    if !diagnosis.nothing_separated {
+        let heading = "What these data cannot show, and what it would do all the same";
+        page.headed_table(heading, &blind(&diagnosis.blind_to));
+    }
     if let Some(lost) = &diagnosis.lost_orders {
         page.heading("Lost orders");
         page.line(format_args!("  form    {}", ranges(&lost.form)));
         page.line(format_args!("  motion  {}", ranges(&lost.motion)));
     }
+    page.bullets("Put into the rig", &changes(&diagnosis.added));
     page.bullets("Warnings and notes", &diagnosis.warnings);
+    let outputs: Vec<String> = diagnosis.outputs.iter().map(|path| path.display().to_string()).collect();
+    page.bullets("Written", &outputs);
     page.into_text()
 }
 
@@ -45,10 +70,15 @@ fn levels(diagnosis: &Diagnosis) -> Table {
         }
     };
     let of = |value: fn(&Level) -> Option<f64>| [value(&diagnosis.before), value(&diagnosis.after)];
-    row(format!("left by the fit, rms {unit}"), 3, of(|level| Some(level.residual_rms_um)));
-    row(format!("noise lets expect, rms {unit}"), 3, of(|level| level.noise_floor_um));
-    row("chi squared per degree of freedom".into(), 3, of(|level| level.chi2_per_dof));
-    row(format!("left of data not used, rms {unit}"), 3, of(|level| level.held_out_rms_um));
+    let only = match diagnosis.before.orders.or(diagnosis.after.orders) {
+        Some([1, 1]) => ", order 1 only",
+        _ => "",
+    };
+    row(format!("left by the fit, rms {unit}{only}"), 3, of(|level| Some(level.residual_rms_um)));
+    row(format!("expected from noise, rms {unit}{only}"), 3, of(|level| level.noise_floor_um));
+    row(format!("chi squared per degree of freedom{only}"), 3, of(|level| level.chi2_per_dof));
+    row(format!("residual on held-out data, rms {unit}"), 3, of(|level| level.held_out_rms_um));
+    row(format!("  expected from noise, rms {unit}"), 3, of(|level| level.held_out_expected_rms_um));
     if let Some(truth) = &diagnosis.truth {
         let Step { before, after } = truth.form_rms_error_um;
         row("true error of form, rms µm".into(), 2, [before, after]);
@@ -58,16 +88,23 @@ fn levels(diagnosis: &Diagnosis) -> Table {
 
 fn added(diagnosis: &Diagnosis) -> Table {
     let unit = unit(diagnosis.before.unit.as_deref().unwrap_or("um"));
-    let [left, unused] = [format!("left {unit}"), format!("of data not used {unit}")];
-    let mut table = Table::new(3, ["effect", "at", "parameter ± std", &left, &unused, "ΔBIC", "p"]);
+    let [left, held_out, expected] = ["left", "held-out", "expected"].map(|what| format!("{what} {unit}"));
+    let header = ["effect", "at", "parameter ± std", &left, &held_out, &expected, "ΔBIC", "p"];
+    let mut table = Table::new(3, header);
     for one in &diagnosis.added {
-        let mut parameters = one.parameters.iter().map(parameter);
+        let [effect, at] = named(one);
+        let alone = if one.confounded_with.is_empty() { None } else { Some(place(&one.effect, &one.targets)) };
+        let mut parameters = one.parameters.iter().map(|estimated| match &alone {
+            Some(alone) => format!("{} for {alone} alone", parameter(estimated)),
+            None => parameter(estimated),
+        });
         table.row([
-            one.effect.clone(),
-            one.targets.join(", "),
+            effect,
+            at,
             parameters.next().unwrap_or_default(),
             step(one.residual_rms_um),
             step(one.held_out_rms_um),
+            one.held_out_expected_rms_um.map_or_else(String::new, |value| significant(value, 3)),
             significant(one.delta_bic, 3),
             chance(one.p_value),
         ]);
@@ -78,23 +115,55 @@ fn added(diagnosis: &Diagnosis) -> Table {
     table
 }
 
+/// An effect and where it acts; of a confounded set all that it may be.
+fn named(one: &Added) -> [String; 2] {
+    let targets = one.targets.join(", ");
+    let others: Option<Vec<&str>> = one
+        .confounded_with
+        .iter()
+        .map(|other| other.strip_prefix(one.effect.as_str()).and_then(|target| target.strip_prefix(' ')))
+        .collect();
+    match others {
+        Some(others) => [one.effect.clone(), [&[targets.as_str()], &others[..]].concat().join(" or ")],
+        None => [members(one), String::new()],
+    }
+}
+
+/// All that a confounded set may be: "effect target or effect target".
+fn members(one: &Added) -> String {
+    let first = place(&one.effect, &one.targets);
+    std::iter::once(&first).chain(&one.confounded_with).cloned().collect::<Vec<_>>().join(" or ")
+}
+
+fn undecided(added: &[Added]) -> impl Iterator<Item = String> + '_ {
+    added.iter().filter(|one| !one.confounded_with.is_empty()).map(members)
+}
+
 fn confounded(added: &[Added]) -> Vec<String> {
     let sets = added.iter().filter(|one| !one.confounded_with.is_empty());
     sets.map(|one| {
-        let by = one.told_apart_by.as_ref().map(|by| format!("; told apart by {by}")).unwrap_or_default();
-        format!("{}: {}{by}", place(&one.effect, &one.targets), one.confounded_with.join(", "))
+        let by = one.told_apart_by.as_ref().map(|by| format!("; to decide: {by}")).unwrap_or_default();
+        format!("{}{by}", members(one))
     })
     .collect()
+}
+
+/// Keys of the rig, each with its value.
+fn changes(added: &[Added]) -> Vec<String> {
+    added.iter().filter_map(|one| one.change.as_ref()).flat_map(|change| change.lines()).map(str::to_owned).collect()
 }
 
 fn moved(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(2, ["", "section", "before", "after ± std"]);
     for one in &diagnosis.moved {
         table.row([
-            format!("{} {}", one.value, unit(&one.unit)),
+            match (&one.reference, &one.filter) {
+                (Some(reference), Some(filter)) => described(&one.value, reference, filter, &one.unit),
+                _ => format!("{} {}", one.value, unit(&one.unit)),
+            },
             one.section.clone().unwrap_or_default(),
-            significant(one.before, 5),
-            with_std(one.after, one.std),
+            significant(one.before, 6),
+            with_std(one.after, one.std) + &lacking(&one.lost_orders),
         ]);
     }
     table
@@ -105,10 +174,21 @@ fn unexplained(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(5, ["sensor", "setup", "orders", "where", &format!("rms {unit}")]);
     for one in &diagnosis.unexplained {
         let [first, last] = one.orders;
+        // Groups of measured points have neither sensors nor orders.
+        let group = one.sensor.is_none() && one.setup.is_none() && one.orders == [0, 0];
+        let several = |id: &Option<String>| match id {
+            Some(id) => id.clone(),
+            None if group => String::new(),
+            None => "several".into(),
+        };
         table.row([
-            one.sensor.clone().unwrap_or_else(|| "several".into()),
-            one.setup.clone().unwrap_or_else(|| "several".into()),
-            if first == last { first.to_string() } else { format!("{first}-{last}") },
+            several(&one.sensor),
+            several(&one.setup),
+            match one.orders {
+                _ if group => String::new(),
+                _ if first == last => first.to_string(),
+                _ => format!("{first}-{last}"),
+            },
             one.place.clone(),
             significant(one.rms_um, 3),
         ]);
@@ -167,8 +247,8 @@ fn step(step: Step) -> String {
 }
 
 fn parameter(one: &Estimated) -> String {
-    let value = estimated(one.value, one.std);
-    format!("{} {value} {}", one.name, unit(&one.unit)).trim().to_owned()
+    let value = one.std.map_or_else(|| significant(one.value, 3), |std| estimated(one.value, std));
+    format!("{} {value} {}", one.name, unit(&one.unit)).trim_end().to_owned()
 }
 
 /// A parameter of any size with its standard uncertainty, of which two digits are told.
@@ -196,7 +276,11 @@ fn shown(value: Option<f64>, digits: usize) -> String {
 }
 
 fn unit(unit: &str) -> String {
-    unit.replace("um", "µm").replace("urad", "µrad")
+    match unit {
+        "1" => String::new(),
+        "deg" => "°".into(),
+        _ => unit.replace("um", "µm").replace("urad", "µrad").replace("/deg", "/°"),
+    }
 }
 
 #[cfg(test)]

@@ -56,6 +56,21 @@ pub fn ranges(numbers: &[usize]) -> String {
     if shown.is_empty() { "none".into() } else { shown.join(", ") }
 }
 
+/// " (orders 3, 6, 9… lost)", behind a number that lacks these orders; nothing where it lacks none.
+#[must_use]
+pub fn lacking(lost_orders: &[usize]) -> String {
+    let shown: Vec<String> = lost_orders.iter().take(LISTED).map(ToString::to_string).collect();
+    let more = if lost_orders.len() > LISTED { "…" } else { "" };
+    match lost_orders.len() {
+        0 => String::new(),
+        1 => format!(" (order {} lost)", shown[0]),
+        _ => format!(" (orders {}{more} lost)", shown.join(", ")),
+    }
+}
+
+/// Lost orders that are listed behind a number: enough to see how they go on.
+const LISTED: usize = 3;
+
 /// Whether two values are equal up to rounding.
 #[must_use]
 pub fn same(a: f64, b: f64) -> bool {
@@ -73,7 +88,7 @@ pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::{ranges, significant, spread, with_std};
+    use super::{lacking, ranges, significant, spread, with_std};
 
     #[test]
     fn orders_become_ranges() {
@@ -86,6 +101,12 @@ mod tests {
         assert_eq!(ranges(&[1, 2, 3, 9, 255, 257]), "1-3, 9, 255, 257");
         assert_eq!(ranges(&[3, 5, 7, 8]), "3-7 odd, 8");
         assert_eq!(ranges(&[]), "none");
+    }
+
+    #[test]
+    fn a_number_says_which_orders_it_lacks() {
+        let text = [&[][..], &[5], &[2, 4], &[3, 6, 9, 12]].map(lacking);
+        assert_eq!(text, ["", " (order 5 lost)", " (orders 2, 4 lost)", " (orders 3, 6, 9… lost)"]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What a run found, for people: `run`'s last words.
 
 mod motion;
+mod reading;
 mod straightness;
 mod values;
 
@@ -11,7 +12,7 @@ use runout_core::{
 
 use super::{
     count,
-    number::{ranges, significant, spread, with_std},
+    number::{lacking, ranges, significant, spread, with_std},
     page::Page,
     table::Table,
 };
@@ -33,16 +34,12 @@ pub fn text(summary: &Summary) -> String {
     } else {
         page.line(count(stations.len(), "station"));
         turns(&mut page, stations);
-        let form = if stations.len() <= FEW_STATIONS { form_by_station(stations) } else { form_gathered(stations) };
-        page.headed_table(form_heading(stations), &form);
-        if sections(stations).any(|(_, section)| section.form_std_um.is_some()) {
-            page.line("  ± is the standard uncertainty: beside rms that of the form at any one angle");
+        // Where nothing is separated, there is no form and no motion to show.
+        if stations.iter().all(|station| station.readings.is_empty()) {
+            separated(&mut page, summary);
+        } else {
+            reading::section(&mut page, stations);
         }
-        motion::section(&mut page, stations);
-        values::part(&mut page, summary);
-        values::limits(&mut page, summary);
-        residual(&mut page, stations);
-        motion_truth(&mut page, stations);
         lost_orders(&mut page, summary);
         surface(&mut page, summary);
     }
@@ -52,6 +49,24 @@ pub fn text(summary: &Summary) -> String {
     let outputs: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
     page.into_text()
+}
+
+/// Form, motion and what the fit leaves.
+fn separated(page: &mut Page, summary: &Summary) {
+    let stations = &summary.stations;
+    let form = if stations.len() <= FEW_STATIONS { form_by_station(stations) } else { form_gathered(stations) };
+    page.headed_table(form_heading(stations), &form);
+    if sections(stations).any(|(_, section)| section.form_std_um.is_some()) {
+        page.line("  ± is the standard uncertainty: beside rms that of the form at any one angle");
+    }
+    if form.text().contains(STARRED) {
+        page.line(format_args!("  {STARRED} lacks the same lost orders"));
+    }
+    motion::section(page, stations);
+    values::part(page, summary);
+    values::limits(page, summary);
+    residual(page, stations);
+    motion_truth(page, stations);
 }
 
 fn captures(stations: &[StationSummary]) -> impl Iterator<Item = (&StationSummary, &CaptureSummary)> {
@@ -122,10 +137,26 @@ fn rejected(page: &mut Page, stations: &[StationSummary]) {
 /// pipeline has others. All of them are in the files.
 const SHOWN: [&str; 2] = ["RONt", "Ra"];
 
-/// Symbols and units of the values shown that any section has.
-fn symbols(stations: &[StationSummary]) -> Vec<(String, String)> {
+/// Behind a number that lacks the orders which are named beside another one.
+const STARRED: char = '*';
+
+/// The values shown that any section has, each by the first one there is.
+fn first_values(stations: &[StationSummary]) -> Vec<&Value> {
     let first = |symbol| sections(stations).find_map(|(_, section)| value_of(section, symbol));
-    SHOWN.into_iter().filter_map(first).map(|value| (value.symbol.clone(), unit(&value.unit))).collect()
+    SHOWN.into_iter().filter_map(first).collect()
+}
+
+/// "RONt LSCI, unfiltered µm": what a value is, with reference and filter.
+fn label(value: &Value) -> String {
+    described(&value.symbol, &value.reference, &value.filter, &value.unit)
+}
+
+/// The same of its parts.
+pub(super) fn described(symbol: &str, reference: &str, filter: &str, unit_id: &str) -> String {
+    // The mean line is the only one that there is for texture.
+    let reference = if reference == "mean line" { String::new() } else { format!(" {reference}") };
+    let filter = if filter == "none" { "unfiltered" } else { filter };
+    format!("{symbol}{reference}, {filter} {}", unit(unit_id))
 }
 
 fn unit(id: &str) -> String {
@@ -155,9 +186,9 @@ fn form_heading(stations: &[StationSummary]) -> String {
 }
 
 fn form_by_station(stations: &[StationSummary]) -> Table {
-    let symbols = symbols(stations);
+    let firsts = first_values(stations);
     let mut header = vec!["station".to_owned(), "section".into(), "z mm".into(), "rms µm".into()];
-    header.extend(symbols.iter().map(|(symbol, unit)| format!("{symbol} {unit}")));
+    header.extend(firsts.iter().map(|value| label(value)));
     header.push("true error µm".into());
     let mut table = Table::new(2, header);
     for (station, section) in sections(stations) {
@@ -169,14 +200,35 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
             significant(section.z_mm, 5),
             with_std(section.form_rms_um, section.form_std_um),
         ];
-        row.extend(symbols.iter().map(|(symbol, _)| match value_of(section, symbol) {
-            Some(value) if std_of(value).is_some() => with_std(value.value, std_of(value)),
-            value => known(value.map(|value| value.value), 4),
+        let lost = lost_in(section);
+        row.extend(firsts.iter().enumerate().map(|(place, first)| {
+            let Some(value) = value_of(section, &first.symbol) else { return String::new() };
+            let number = if std_of(value).is_some() {
+                with_std(value.value, std_of(value))
+            } else {
+                significant(value.value, 4)
+            };
+            // The orders are named once a row.
+            if place == 0 { number + &lacking(lost) } else { number + star(lost) }
         }));
+        if firsts.is_empty() {
+            row[3].push_str(&lacking(lost));
+        } else {
+            row[3].push_str(star(lost));
+        }
         row.push(known(section.truth_form_rms_error_um, 2));
         table.row(row);
     }
     table
+}
+
+/// Orders that a section's form lacks, as its unfiltered values say.
+fn lost_in(section: &SectionSummary) -> &[usize] {
+    section.values.first().map_or(&[], |value| &value.lost_orders)
+}
+
+fn star(lost: &[usize]) -> &'static str {
+    if lost.is_empty() { "" } else { "*" }
 }
 
 fn form_gathered(stations: &[StationSummary]) -> Table {
@@ -199,11 +251,17 @@ fn form_gathered(stations: &[StationSummary]) -> Table {
             }
         };
         gather("z mm".into(), 5, &|section| Some(section.z_mm));
-        gather("rms µm".into(), 4, &|section| Some(section.form_rms_um));
+        // All sections of a rig lose the same orders, or nearly so.
+        let mut lost: Vec<usize> = of.iter().flat_map(|section| lost_in(section)).copied().collect();
+        lost.sort_unstable();
+        lost.dedup();
+        let lost = lacking(&lost);
+        gather(format!("rms µm{lost}"), 4, &|section| Some(section.form_rms_um));
         gather("rms ± µm".into(), 2, &|section| section.form_std_um);
-        for (symbol, unit) in symbols(stations) {
-            gather(format!("{symbol} {unit}"), 4, &|section| Some(value_of(section, &symbol)?.value));
-            gather(format!("{symbol} ± {unit}"), 2, &|section| std_of(value_of(section, &symbol)?));
+        for first in first_values(stations) {
+            let (symbol, unit) = (&first.symbol, unit(&first.unit));
+            gather(format!("{}{lost}", label(first)), 4, &|section| Some(value_of(section, symbol)?.value));
+            gather(format!("{symbol} ± {unit}"), 2, &|section| std_of(value_of(section, symbol)?));
         }
         gather("true error µm".into(), 2, &|section| section.truth_form_rms_error_um);
     }
@@ -241,7 +299,12 @@ fn residual(page: &mut Page, stations: &[StationSummary]) {
         ],
         stations,
     );
-    page.headed_table("Residual", &table);
+    let of_one_order = stations.iter().filter_map(|station| station.residual_orders).all(|orders| orders == [1, 1]);
+    let only = stations.iter().any(|station| station.residual_orders.is_some()) && of_one_order;
+    page.headed_table(
+        if only { "Residual, of order 1 only: no other order has a redundant reading" } else { "Residual" },
+        &table,
+    );
     if table.is_empty() {
         page.heading("Residual");
         page.line("  none: no reading is redundant, so nothing checks the fit");
@@ -255,6 +318,8 @@ fn motion_truth(page: &mut Page, stations: &[StationSummary]) {
             ("y, rms µm", &|station| station.truth.as_ref()?.y_rms_error_um),
             ("tilt x, rms µrad", &|station| station.truth.as_ref()?.tilt_x_rms_error_urad),
             ("tilt y, rms µrad", &|station| station.truth.as_ref()?.tilt_y_rms_error_urad),
+            ("along the line, rms µm", &|station| station.truth.as_ref()?.along_rms_error_um),
+            ("tilt along the line, rms µrad", &|station| station.truth.as_ref()?.tilt_along_rms_error_urad),
         ],
         stations,
     );

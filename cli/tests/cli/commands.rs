@@ -14,6 +14,22 @@ fn keys_of_a_plugin() {
     assert_snapshot!(Folder::with(&[]).run(&["plugins", "synchronous-average"]).shown());
 }
 
+/// Tables that name no plugin have keys too, and a stage is listed.
+#[test]
+fn keys_of_tables_without_a_plugin() {
+    assert_snapshot!(Folder::with(&[]).run(&["plugins", "limit"]).shown());
+    for (table, key) in
+        [("rig", "sensors[].angle_deg"), ("evaluate", "filter_upr"), ("surface", "angles"), ("diagnose", "effects")]
+    {
+        let ran = Folder::with(&[]).run(&["plugins", table]);
+        assert_eq!(ran.status, 0, "{table}: {}", ran.stderr);
+        assert!(ran.stdout.starts_with(&format!("{table} ([{table}]): ")), "{}", ran.stdout);
+        assert!(ran.stdout.contains(&format!("  {key}: ")), "{table}: {}", ran.stdout);
+    }
+    let stage = Folder::with(&[]).run(&["plugins", "preprocess"]).stdout;
+    assert!(stage.contains("low-pass") && !stage.contains("parquet"), "{stage}");
+}
+
 #[test]
 fn help() {
     assert_snapshot!(Folder::with(&[]).run(&["--help"]).shown());
@@ -165,7 +181,7 @@ fn plan_of_a_rig_that_loses_orders() {
     // With the part reversed and nothing else, an angle that is off by a little looks like another form.
     let blind = |entry: &&Value| entry["effect"] == "reversal-angle" && entry["targets"] == json!(["reversed"]);
     let unseen = report["blind_to"].as_array().unwrap().iter().find(blind).unwrap();
-    assert_eq!(unseen["bias_per_unit"]["unit"], "um/rad");
+    assert_eq!(unseen["bias_per_unit"]["unit"], "um/deg");
 }
 
 /// Better angles and the map, with nothing but the document on stdout and no progress in a pipe.

@@ -35,6 +35,29 @@ fn a_run_checks_what_is_compared_and_leaves_it_alone() {
     assert!(wrong.stderr.contains("unknown key `sensor`"), "{}", wrong.stderr);
 }
 
+/// Three-point by its formula and by least squares are one method: no reading is redundant. Simulated.
+#[test]
+fn methods_that_agree_to_rounding_have_no_normalised_difference() {
+    let rig = "part_radius_mm = 30\nsensors = [{ id = \"S1\", angle_deg = 0 }, { id = \"S2\", angle_deg = 99.844 }, \
+               { id = \"S3\", angle_deg = 202.5 }]\nsetups = [{ id = \"initial\" }]\n";
+    let pipeline = pipeline().replace(RIG, rig).replace("four-sensor-reversal", "harmonic-least-squares");
+    let folder = Folder::with(&[("pipeline.toml", &pipeline), ("scenario.toml", SCENARIO), ("rig.toml", rig)]);
+    for set in ["eccentricity.offset_um=8", "eccentricity.offset_um=200", "asynchronous.rms_um=0.2"] {
+        assert_eq!(folder.run(&["simulate", "scenario.toml", "--set", set]).status, 0);
+        let ran = folder.run(&["compare", "pipeline.toml", "--with", "three-point", "--json"]);
+        let document: Value = serde_json::from_str(&ran.stdout).unwrap();
+        for quantity in document["stations"][0]["quantities"].as_array().unwrap() {
+            let difference = &quantity["differences"][0];
+            assert!(difference["orders_compared"].as_u64().unwrap() > 60, "{set}");
+            assert_eq!(
+                difference["worst"]["e_n"], 0.0,
+                "{set}: {} differs by {}",
+                quantity["quantity"], difference["rms"]
+            );
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_compared() {
     let folder = campaign("");

@@ -164,6 +164,29 @@ fn scenario_with_an_unknown_key() {
     assert_snapshot!(Folder::with(&[("scenario.toml", &text)]).run(&["simulate", "scenario.toml"]).shown());
 }
 
+/// An effect's keys are known once its plugin is: the mistake is shown at the key all the same.
+#[test]
+fn scenario_with_a_mistake_in_an_effect() {
+    let scenario = |effects: &str| {
+        let text = format!("plugin = \"spindle\"\noutput = \"shaft.h5\"\n\n[rig]\n{RIG}\n{effects}");
+        Folder::with(&[("scenario.toml", &text)]).run(&["simulate", "scenario.toml"])
+    };
+    let creep = "[[effect]]\nplugin = \"thermal-drift\"\ntargets = [\"S1\"]\nweight_kg = 1.0\nrate_um_per_rev = 0.1\n";
+    let gain = "[[effect]]\nplugin = \"sensor-gain\"\ntargets = [\"S1\"]\n";
+    assert_snapshot!(scenario(&format!("{gain}relative_gain = 0.1\nrelativ_gain = 0.05\n")).shown());
+    for (effects, line, words) in [
+        (format!("{gain}relative_gain = 0.1\n\n{gain}gain = 0.05\n"), 25, "unknown key `gain`"),
+        (format!("{gain}relative_gain = \"much\"\n"), 20, "expected a number, found string \"much\""),
+        (format!("{}relative_gain = 0.1\n", gain.replace("sensor-gain", "sensor-gian")), 18, "`sensor-gian`"),
+        (creep.to_owned(), 20, "unknown key `weight_kg`"),
+    ] {
+        let ran = scenario(&effects);
+        assert_eq!(ran.status, 2, "{}", ran.stdout);
+        assert!(ran.stderr.contains(words), "{words}: {}", ran.stderr);
+        assert!(ran.stderr.contains(&format!("scenario.toml:{line}:")), "{line}: {}", ran.stderr);
+    }
+}
+
 #[test]
 fn inspect_what_is_no_data() {
     assert_snapshot!(Folder::with(&[("notes.txt", "Hello")]).run(&["inspect", "notes.txt"]).shown());

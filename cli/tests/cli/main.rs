@@ -3,11 +3,14 @@
 
 mod commands;
 mod compare;
+mod diagnosed;
 mod diagnostics;
 mod folder;
 mod lost_orders;
 mod measured;
+mod one_line;
 mod other_rigs;
+mod reading;
 mod safety;
 mod schemas;
 mod straightness;

@@ -90,6 +90,20 @@ fn limits_are_decided_and_end_the_program_only_when_asked() {
 }
 
 #[test]
+fn warnings_end_the_program_only_when_asked() {
+    let folder = campaign("");
+    let sound = folder.run(&["run", "pipeline.toml", "--fail-on-warning"]);
+    assert_eq!(sound.status, 0, "{}{}", sound.stdout, sound.stderr);
+    let wrong = ["run", "pipeline.toml", "--set", "rig.sensors.0.sign=-1"];
+    let warned = folder.run(&wrong);
+    assert_eq!(warned.status, 0, "{}", warned.stderr);
+    let failed = folder.run(&[&wrong[..], &["--fail-on-warning"]].concat());
+    assert_eq!(failed.status, 1);
+    assert!(failed.stderr.contains("--fail-on-warning"), "{}", failed.stderr);
+    assert!(failed.stdout.contains("sensor-sign"), "the likely mistake is named\n{}", failed.stdout);
+}
+
+#[test]
 fn what_cannot_be_evaluated_or_limited_has_a_place() {
     let folder = campaign("");
     let refused = |arguments: &[&str], words: &[&str]| {

@@ -40,6 +40,25 @@ impl Uncertainty {
         self.interval_95 = self.interval_95.map(|end| (end + by).max(floor));
         self
     }
+
+    /// The same where the data do not decide between `value` and these: the largest distance from it is added to the standard
+    /// uncertainty, and the interval reaches as far beyond each of them as beyond it.
+    #[must_use]
+    pub fn with_equivalents(mut self, value: f64, equivalents: &[f64]) -> Self {
+        let distances = || equivalents.iter().map(|other| other - value).filter(|distance| distance.is_finite());
+        let [low, high] = &mut self.interval_95;
+        let floor = if *low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        *low = (*low + distances().fold(0.0, f64::min)).max(floor);
+        *high += distances().fold(0.0, f64::max);
+        self.std = self.std.hypot(distances().map(f64::abs).fold(0.0, f64::max));
+        self
+    }
+}
+
+/// Largest distance of other values from one.
+#[must_use]
+pub fn farthest(value: f64, others: impl IntoIterator<Item = f64>) -> f64 {
+    others.into_iter().map(|other| (other - value).abs()).fold(0.0, f64::max)
 }
 
 /// Draws of the errors of a profile on equal angles.

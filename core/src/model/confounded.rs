@@ -1,122 +1,119 @@
-//! A confounded set: effects of which the data tell some combinations only.
+//! Confounded sets: effects of which the data do not decide which one is present.
+//!
+//! The parameter values that fit the data equally well form a curved manifold. Each hypothesis "this member is all of it" is
+//! a point on it, found by a full non-linear refit. The truth is taken to be one of these points, or a mixture of them.
 
-use super::{
-    Effect, Fit, Setting,
-    closed_loop::Found,
-    fit::{Prior, dot, norm},
-};
+use super::fit::dot;
 
-/// The data decide a combination of a set's parameters when all of it is this many standard deviations.
-const DECIDED: f64 = 10.0;
-/// Where results hold a set, its members' own sizes hold it this many times more softly.
-const SOFT: f64 = 5.0;
+/// Most combinations of members that are refitted; beyond it, the sets are varied one at a time.
+const MOST_CHOICES: usize = 16;
+/// Exchanges of weight between two points before the search for the nearest point ends.
+const MAX_EXCHANGES: usize = 500;
+/// The search ends where an exchange brings the point nearer by less than this share of the squared distances.
+const SETTLED: f64 = 1e-12;
 
-/// A set at some values of its parameters. Columns and directions are per size of each parameter.
-pub(super) struct ConfoundedSet {
-    /// Of each parameter, if its member is all of it.
-    sizes: Vec<f64>,
-    /// Values over sizes.
-    values: Vec<f64>,
-    /// Of what is left of the data.
-    columns: Vec<Vec<f64>>,
-    /// Of the results, and their distance from those without the set.
-    moves: Vec<Vec<f64>>,
-    distance: Vec<f64>,
+/// One member of each set, for sets of these sizes: all combinations, the first members first.
+pub(super) fn choices(sizes: &[usize]) -> Vec<Vec<usize>> {
+    let first = vec![0; sizes.len()];
+    let product = sizes.iter().try_fold(1_usize, |product, size| product.checked_mul(*size));
+    if product.is_some_and(|product| product <= MOST_CHOICES) {
+        let all = vec![Vec::with_capacity(sizes.len())];
+        return sizes.iter().fold(all, |all, size| {
+            let extended = |choice: Vec<usize>| (0..*size).map(move |member| [&choice[..], &[member]].concat());
+            all.into_iter().flat_map(extended).collect()
+        });
+    }
+    let other = |(set, size): (usize, &usize)| {
+        let first = first.clone();
+        (1..*size).map(move |member| {
+            let mut choice = first.clone();
+            choice[set] = member;
+            choice
+        })
+    };
+    std::iter::once(first.clone()).chain(sizes.iter().enumerate().flat_map(other)).collect()
 }
 
-impl ConfoundedSet {
-    pub fn new(found: &Found, effects: &[Effect], settings: &[Setting], fit: &impl Fit, without: &[f64]) -> Self {
-        let parameters = found.members.iter().flat_map(|member| &effects[*member].parameters);
-        let alone = found.alone.iter().flatten().zip(parameters);
-        let sizes: Vec<f64> = alone.map(|(value, known)| value.abs().max(1e-3 * known.tolerance)).collect();
-        let scaled = |columns: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
-            let scaled = columns.into_iter().zip(&sizes);
-            scaled.map(|(column, size)| column.into_iter().map(|entry| entry * size).collect()).collect()
-        };
-        let with = fit.results();
-        // Effects may change what can be told at all: then distances say nothing.
-        let comparable = with.len() == without.len();
-        let moves =
-            if comparable { found.members.iter().flat_map(|member| fit.moves(*member)).collect() } else { vec![] };
-        let values = settings.iter().flat_map(|setting| &setting.values).zip(&sizes);
-        Self {
-            columns: scaled(found.members.iter().flat_map(|member| fit.signature(*member)).collect()),
-            moves: scaled(moves),
-            distance: with.iter().zip(without).map(|(with, without)| with - without).collect(),
-            values: values.map(|(value, size)| value / size).collect(),
-            sizes,
+/// Weights (each ≥ 0, sum 1) of the mixture of `points` that is nearest to `from`.
+///
+/// The mixture is the projection of `from` onto the convex hull of the points, so that for every point or mixture t of
+/// them ‖nearest − t‖ ≤ ‖from − t‖: whichever hypothesis is true, the mixture is not farther from it than `from` is.
+/// Entries that are not finite in any of them are left out; where none remain, the weights are equal.
+pub(super) fn nearest(from: &[f64], points: &[Vec<f64>]) -> Vec<f64> {
+    let count = points.len();
+    let mut weights = vec![1.0 / count.max(1) as f64; count];
+    if points.iter().any(|point| point.len() != from.len()) {
+        return weights;
+    }
+    let known: Vec<usize> = (0..from.len())
+        .filter(|index| from[*index].is_finite() && points.iter().all(|point| point[*index].is_finite()))
+        .collect();
+    let distances: Vec<Vec<f64>> =
+        points.iter().map(|point| known.iter().map(|index| point[*index] - from[*index]).collect()).collect();
+    let gram: Vec<Vec<f64>> = distances.iter().map(|a| distances.iter().map(|b| dot(a, b)).collect()).collect();
+    let whole: f64 = (0..count).map(|index| gram[index][index]).sum();
+    for _ in 0..MAX_EXCHANGES {
+        // Half of the squared distance's gradient. Weight goes from where it is largest to where it is smallest.
+        let slope: Vec<f64> = gram.iter().map(|row| dot(row, &weights)).collect();
+        let by_slope = |a: &usize, b: &usize| slope[*a].total_cmp(&slope[*b]);
+        let to = (0..count).min_by(by_slope);
+        let off = (0..count).filter(|index| weights[*index] > 0.0).max_by(by_slope);
+        let (Some(to), Some(off)) = (to, off) else { break };
+        let steepness = slope[off] - slope[to];
+        let apart = gram[to][to] + gram[off][off] - 2.0 * gram[to][off];
+        let share = if apart > 0.0 { (steepness / apart).min(weights[off]) } else { 0.0 };
+        if share * steepness <= SETTLED * whole {
+            break;
         }
+        weights[to] += share;
+        weights[off] -= share;
+    }
+    weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_combination_is_tried_while_they_are_few() {
+        assert_eq!(choices(&[]), [Vec::<usize>::new()]);
+        assert_eq!(choices(&[1, 2]), [[0, 0], [0, 1]]);
+        assert_eq!(choices(&[2, 2]), [[0, 0], [0, 1], [1, 0], [1, 1]]);
+        let many = choices(&[2, 3, 4]);
+        assert_eq!(many.len(), 1 + 1 + 2 + 3);
+        assert_eq!(many[0], [0, 0, 0]);
     }
 
-    /// What holds the parameters, the first of which has this place: `beside` is an orthonormal basis of what else is
-    /// fitted.
-    pub fn priors(mut self, beside: &[Vec<f64>], first: usize) -> Vec<Prior> {
-        for column in &mut self.columns {
-            for base in beside {
-                let share = dot(base, column);
-                column.iter_mut().zip(base).for_each(|(entry, base)| *entry -= share * base);
+    #[test]
+    fn no_point_is_farther_from_the_nearest_mixture_than_from_where_it_started() {
+        let norm = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        // A deterministic scatter of points, from far apart to nearly equal.
+        let value = |seed: usize| ((seed * 7919 + 104_729) % 2003) as f64 / 1001.5 - 1.0;
+        for seed in 0..200 {
+            let (size, count) = (1 + seed % 5, 2 + seed % 4);
+            let scale = 10_f64.powf(-((seed % 7) as f64));
+            let points: Vec<Vec<f64>> = (0..count)
+                .map(|point| (0..size).map(|entry| 1.0 + scale * value(seed + 31 * point + 7 * entry)).collect())
+                .collect();
+            let from: Vec<f64> = (0..size).map(|entry| 1.0 + value(3 * seed + 11 * entry + 5)).collect();
+            let weights = nearest(&from, &points);
+            assert!(weights.iter().all(|weight| *weight >= 0.0));
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+            let mixture: Vec<f64> = (0..size)
+                .map(|entry| points.iter().zip(&weights).map(|(point, weight)| weight * point[entry]).sum())
+                .collect();
+            for point in &points {
+                assert!(norm(&mixture, point) <= norm(&from, point) * (1.0 + 1e-5), "{seed}: {weights:?}");
             }
         }
-        let undecided = self.undecided();
-        let moved = self.moves.iter().map(|column| norm(column)).fold(0.0, f64::max);
-        let mut priors = Vec::new();
-        if moved > 0.0 {
-            // The distance after a move along what is undecided, [moves | distance] = Q·R: as long as R's rows make it.
-            let mut columns = std::mem::take(&mut self.moves);
-            columns.push(std::mem::take(&mut self.distance));
-            for row in triangle(columns) {
-                let (Some(now), weights) = (row.last(), &row[..self.sizes.len()]) else { continue };
-                let kept = along(weights, &undecided);
-                let offset = now - dot(&kept, &self.values);
-                priors.push(self.prior(&kept, offset, moved, first));
-            }
-        }
-        let soft = if moved > 0.0 { SOFT } else { 1.0 };
-        priors.extend(undecided.iter().map(|direction| self.prior(direction, 0.0, soft, first)));
-        priors
     }
 
-    fn prior(&self, row: &[f64], offset: f64, std: f64, first: usize) -> Prior {
-        let weights = row.iter().zip(&self.sizes).enumerate();
-        let weights = weights.map(|(place, (entry, size))| (first + place, entry / (size * std)));
-        Prior { weights: weights.collect(), offset: offset / std }
+    #[test]
+    fn lost_entries_do_not_count() {
+        let points = [vec![0.0, f64::NAN], vec![1.0, 5.0]];
+        let weights = nearest(&[0.25, 0.0], &points);
+        assert!((weights[0] - 0.75).abs() < 1e-9, "{weights:?}");
+        assert_eq!(nearest(&[], &[vec![], vec![]]), [0.5, 0.5]);
     }
-
-    /// Orthonormal directions along which one unit changes χ² by too little to tell.
-    fn undecided(&self) -> Vec<Vec<f64>> {
-        let count = self.columns.len();
-        let product = |row: usize, column: usize| dot(&self.columns[row], &self.columns[column]);
-        let eigen = nalgebra::DMatrix::from_fn(count, count, product).symmetric_eigen();
-        let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
-        let weak = directions.filter(|(value, _)| **value < DECIDED * DECIDED);
-        weak.map(|(_, direction)| direction.iter().copied().collect()).collect()
-    }
-}
-
-/// What a row has along orthonormal directions.
-fn along(row: &[f64], directions: &[Vec<f64>]) -> Vec<f64> {
-    let mut kept = vec![0.0; row.len()];
-    for direction in directions {
-        let share = dot(row, direction);
-        kept.iter_mut().zip(direction).for_each(|(kept, entry)| *kept += share * entry);
-    }
-    kept
-}
-
-/// R of columns Q·R, `[row][column]`: as long as they are in every combination.
-fn triangle(mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let count = columns.len();
-    let mut upper = vec![vec![0.0; count]; count];
-    for row in 0..count {
-        let left = norm(&columns[row]);
-        if left <= 0.0 {
-            continue;
-        }
-        let base: Vec<f64> = columns[row].iter().map(|entry| entry / left).collect();
-        for (column, entry) in columns.iter_mut().zip(&mut upper[row]).skip(row) {
-            *entry = dot(&base, column);
-            column.iter_mut().zip(&base).for_each(|(value, base)| *value -= *entry * base);
-        }
-    }
-    upper
 }

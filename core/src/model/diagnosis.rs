@@ -1,5 +1,7 @@
 //! What a closed loop found, for people and programs.
 
+use std::{fmt, path::PathBuf};
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +16,9 @@ pub struct Diagnosis {
     pub added: Vec<Added>,
     /// The model with them.
     pub after: Level,
+    /// Whether the layout separates nothing: no order of form is observable, and the residual says nothing of the readings.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub nothing_separated: bool,
     /// Values that people look at, before and after.
     pub moved: Vec<Moved>,
     /// What no known effect explains.
@@ -30,18 +35,25 @@ pub struct Diagnosis {
     pub truth: Option<Truth>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Files written: the results of the final model, and this document.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<PathBuf>,
 }
 
 /// A diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The declared model leaves noise only.
+    /// The declared model leaves noise only, at a noise level known from elsewhere than the fit.
     AtNoiseFloor,
-    /// With the effects added, noise only is left.
+    /// With the effects added, noise only is left, at a noise level known from elsewhere than the fit.
     Explained,
-    /// Something is left that no known effect explains.
+    /// More than the known noise is left, and no known effect explains it.
     Unexplained,
+    /// Effects were added. The data may hold more: the noise level is not known, or nothing else is redundant.
+    Improved,
+    /// No effect was added. The data may hold more: the noise level is not known, or the residual has no degrees of freedom.
+    NothingFound,
 }
 
 /// How far a model is from its data.
@@ -49,15 +61,23 @@ pub enum Verdict {
 pub struct Level {
     /// Root mean square of what the fit leaves.
     pub residual_rms_um: f64,
-    /// What the noise lets expect of it; null where it is not known.
+    /// Its degrees of freedom: with none, the residual is 0 whatever the data are.
+    pub degrees_of_freedom: usize,
+    /// The residual's value expected from noise; null where the noise is not known.
     pub noise_floor_um: Option<f64>,
     /// Weighted sum of squares per degree of freedom; null where the noise is not known.
     pub chi2_per_dof: Option<f64>,
-    /// Root mean square of what it leaves of data that it has not seen.
+    /// Root mean square of the residual on held-out data.
     pub held_out_rms_um: Option<f64>,
+    /// Its value expected from noise: that of the held-out data and that of the data fitted. Null where the noise is not known.
+    pub held_out_expected_rms_um: Option<f64>,
     /// The data's unit, where it is not µm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
+    /// Lowest and highest order at which a reading is redundant, where the model is one of single orders: those that the
+    /// residual and chi squared are of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orders: Option<[usize; 2]>,
 }
 
 /// An effect that was added.
@@ -72,12 +92,19 @@ pub struct Added {
     /// What would tell them apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub told_apart_by: Option<String>,
-    /// Its parameters. Of a confounded set: as if this member were all of it.
+    /// Its parameters. Of a confounded set: as if this member were all of it, without standard uncertainty.
     pub parameters: Vec<Estimated>,
+    /// The keys of the rig that would declare it, and the values to put there: lines of TOML, one a key
+    /// (`setups.1.part_deg = 100.184`). Nothing where the rig has no key for it, and for a confounded set, of which the data do
+    /// not decide the member.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub change: Option<String>,
     /// Residual without and with it.
     pub residual_rms_um: Step,
-    /// The same for data left out of the fit.
+    /// The same for held-out data.
     pub held_out_rms_um: Step,
+    /// The latter's value with it, expected from noise; null where the noise is not known.
+    pub held_out_expected_rms_um: Option<f64>,
     /// Change of the Bayesian information criterion; evidence is below −10.
     pub delta_bic: f64,
     /// Chance of as much improvement by noise, corrected for the number of candidates.
@@ -91,10 +118,70 @@ pub struct Estimated {
     pub name: String,
     /// Its value.
     pub value: f64,
-    /// Its standard uncertainty.
-    pub std: f64,
+    /// Its standard uncertainty; nothing where the data do not give one: for a member of a confounded set, or where the
+    /// noise is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub std: Option<f64>,
     /// Their unit.
     pub unit: String,
+}
+
+/// An effect that results are corrected for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Correction {
+    /// Its id.
+    pub effect: String,
+    /// Where it acts; of a confounded set, one representative.
+    pub targets: Vec<String>,
+    /// What these data cannot tell it from: "effect target".
+    pub confounded_with: Vec<String>,
+    /// Its parameters.
+    pub parameters: Vec<Estimated>,
+    /// Whether `[diagnose] known` declares it; the loop added it else.
+    pub known: bool,
+}
+
+impl From<&Added> for Correction {
+    fn from(added: &Added) -> Self {
+        Self {
+            effect: added.effect.clone(),
+            targets: added.targets.clone(),
+            confounded_with: added.confounded_with.clone(),
+            parameters: added.parameters.clone(),
+            known: false,
+        }
+    }
+}
+
+/// "reversal-angle b: angle 0.340012 deg (standard uncertainty 0.00058)", on one line.
+impl fmt::Display for Correction {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.effect)?;
+        for target in &self.targets {
+            write!(formatter, " {target}")?;
+        }
+        for other in &self.confounded_with {
+            write!(formatter, " or {other}")?;
+        }
+        for (index, one) in self.parameters.iter().enumerate() {
+            let separator = if index == 0 { ":" } else { "," };
+            write!(formatter, "{separator} {} {}", one.name, rounded(one.value, 6))?;
+            if one.unit != "1" {
+                write!(formatter, " {}", one.unit)?;
+            }
+            if let Some(std) = one.std {
+                write!(formatter, " (standard uncertainty {})", rounded(std, 2))?;
+            }
+        }
+        if self.known { formatter.write_str(" (declared as known)") } else { Ok(()) }
+    }
+}
+
+/// A number with at most so many significant digits, as a file takes it.
+#[must_use]
+pub fn rounded(value: f64, digits: usize) -> f64 {
+    // Through decimal text: a product with a power of ten would leave digits of its own.
+    format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }
 
 /// Before and after.
@@ -121,6 +208,15 @@ pub struct Moved {
     pub std: Option<f64>,
     /// Their unit.
     pub unit: String,
+    /// What it is counted from, where it has a reference: "LSCI".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<String>,
+    /// Its filter, where it has a reference: "none", "gaussian 50".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<String>,
+    /// Orders that it lacks after, since the layout cannot separate them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost_orders: Vec<usize>,
 }
 
 /// Something that is left and that no known effect explains.
@@ -186,4 +282,32 @@ pub struct LostOrders {
 pub struct Truth {
     /// Root mean square error of form, in µm, over all sections.
     pub form_rms_error_um: Step,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_correction_is_one_line() {
+        let angle = Estimated { name: "angle".into(), value: 0.340_012_345, std: Some(0.000_578), unit: "deg".into() };
+        let gain = Estimated { name: "gain".into(), value: -0.05, std: None, unit: "1".into() };
+        let correction = |effect: &str, target: &str, others: &[&str], parameter, known| Correction {
+            effect: effect.into(),
+            targets: vec![target.into()],
+            confounded_with: others.iter().map(|other| (*other).into()).collect(),
+            parameters: vec![parameter],
+            known,
+        };
+        assert_eq!(
+            correction("reversal-angle", "b", &[], angle, false).to_string(),
+            "reversal-angle b: angle 0.340012 deg (standard uncertainty 0.00058)"
+        );
+        assert_eq!(
+            correction("sensor-gain", "S3", &["sensor-gain S4"], gain, true).to_string(),
+            "sensor-gain S3 or sensor-gain S4: gain -0.05 (declared as known)"
+        );
+        let shown = [rounded(100.183_987_234, 6), rounded(-1.7e-5, 9), rounded(0.0, 3)].map(|value| value.to_string());
+        assert_eq!(shown, ["100.184", "-0.000017", "0"]);
+    }
 }

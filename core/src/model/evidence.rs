@@ -64,6 +64,51 @@ pub fn agreement(columns: &[Vec<f64>], residual: &[f64], stretches: &[usize]) ->
     Some(f_tail(square * square / variance.max(f64::MIN_POSITIVE), 1.0, freedom))
 }
 
+/// A group of data, for [`far_worse`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Group {
+    /// Sum of squares of what the fit leaves of it.
+    pub squares: f64,
+    /// Its degrees of freedom: its points less what they decide of the fit.
+    pub freedom: f64,
+}
+
+/// A group is far worse than the others from this ratio of its mean square to the median one (twice in rms): neighbouring
+/// points are correlated, so that a ratio which is certain by their number alone says little.
+const FAR: f64 = 4.0;
+/// Chance of one group in all being so by noise, below which it is.
+const FAR_CHANCE: f64 = 1e-3;
+
+/// Groups of which far more is left than of the median group, worst first. Nothing with less than three groups: of two, either
+/// may be the wrong one.
+#[must_use]
+pub fn far_worse(groups: &[Group]) -> Vec<usize> {
+    let mut judged: Vec<(usize, f64, f64)> = (groups.iter().enumerate())
+        .filter(|(_, group)| group.freedom > 0.5)
+        .map(|(index, group)| (index, group.squares / group.freedom, group.freedom))
+        .collect();
+    judged.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let count = judged.len();
+    if count < FEWEST_GROUPS {
+        return Vec::new();
+    }
+    let upper_half = judged[count / 2 - usize::from(count.is_multiple_of(2))..=count / 2].iter();
+    let (sum, freedoms, size) = upper_half.fold((0.0, 0.0, 0.0), |(sum, freedoms, size), (_, mean, freedom)| {
+        (sum + mean, freedoms + freedom, size + 1.0)
+    });
+    // The median of χ²/k is below 1 by about this factor (Wilson, Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
+    let median = sum / size / (1.0 - 2.0 / (9.0 * (freedoms / size).max(1.0))).powi(3);
+    let all: f64 = judged.iter().map(|(_, _, freedom)| freedom).sum();
+    let is_far = |mean: f64, freedom: f64| {
+        let ratio = mean / median.max(f64::MIN_POSITIVE);
+        ratio > FAR && f_tail(ratio, freedom, all - freedom) * (count as f64) < FAR_CHANCE
+    };
+    judged.into_iter().filter(|(_, mean, freedom)| is_far(*mean, *freedom)).map(|(index, ..)| index).collect()
+}
+
+/// Groups of which one can be called worse than the others, at least.
+const FEWEST_GROUPS: usize = 3;
+
 /// Stretches that tell how far they differ, at least.
 const FEWEST_STRETCHES: usize = 4;
 
@@ -158,6 +203,37 @@ mod tests {
             [everywhere, once].map(|residual| agreement(std::slice::from_ref(&column), &residual, &stretches));
         assert!(agree.unwrap() < 1e-6 && differ.unwrap() > 0.1, "{agree:?} {differ:?}");
         assert_eq!(agreement(&[column], &noise, &[80]), None);
+    }
+
+    /// Groups of normal noise of 0.7, of which one is twelve times as large.
+    #[test]
+    fn a_group_far_above_the_median_is_found() {
+        let mut seed = 3_u64;
+        let mut uniform = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let mut group = |points: usize, size: f64| {
+            // Twelve uniform numbers have the variance 1.
+            let mut normal = || (0..12).map(|_| uniform()).sum::<f64>();
+            let squares = (0..points).map(|_| (size * normal()).powi(2)).sum();
+            Group { squares, freedom: points as f64 }
+        };
+        for points in [3, 30, 300] {
+            for count in [2, 3, 8, 100] {
+                let mut groups: Vec<Group> = (0..count).map(|_| group(points, 0.7)).collect();
+                assert_eq!(far_worse(&groups), [0; 0], "{points} points, {count} groups");
+                groups[1] = group(points, 0.7 * 12.0);
+                groups[0].freedom = if count > 3 { 0.0 } else { groups[0].freedom };
+                let expected: &[usize] = if count > 2 { &[1] } else { &[] };
+                assert_eq!(far_worse(&groups), expected, "{points} points, {count} groups");
+            }
+        }
+        // Certain, but not far.
+        let groups = [1.0, 1.1, 0.9, 3.0].map(|mean| Group { squares: 1e4 * mean, freedom: 1e4 });
+        assert_eq!(far_worse(&groups), [0; 0]);
+        // No noise at all is no reason for a division by 0.
+        assert_eq!(far_worse(&[Group { squares: 0.0, freedom: 5.0 }; 4]), [0; 0]);
     }
 
     #[test]

@@ -12,29 +12,6 @@ const SETTLED: f64 = 1e-3;
 /// A parameter whose column adds less than this, relative, to those before it cannot be told from them.
 const INDEPENDENT: f64 = 1e-9;
 
-/// A combination of parameters that is held near 0: Σ weight·value + offset has the standard deviation 1.
-///
-/// Only what the data do not decide is held, so that a refit goes [`FIRM`] times nearer to 0 there than the data's noise
-/// would let it; the covariance is that of the plain prior.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Prior {
-    /// Positions among the settings' parameters, one after the other, and their weights.
-    pub weights: Vec<(usize, f64)>,
-    /// What it is where all of them are 0.
-    pub offset: f64,
-}
-
-/// How much more firmly priors hold a refit than they say.
-const FIRM: f64 = 10.0;
-
-impl Prior {
-    /// The combination at these values.
-    fn at(&self, values: &[f64]) -> f64 {
-        let value = |place: usize| values.get(place).copied().unwrap_or(0.0);
-        self.offset + self.weights.iter().map(|(place, weight)| weight * value(*place)).sum::<f64>()
-    }
-}
-
 /// Effects applied at their best values.
 pub struct Refit<F> {
     /// The effects and values; fixed ones first.
@@ -51,13 +28,12 @@ pub struct Refit<F> {
 ///
 /// # Errors
 /// When the model cannot be fitted even where the refit starts.
-pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize, priors: &[Prior]) -> Result<Refit<M::Fit>> {
+pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<Refit<M::Fit>> {
     let mut settings = start;
     let mut fit = model.fit(&settings)?;
-    let mut cost = cost_of(&fit, &settings[fixed..], priors);
+    let mut chi2 = fit.remainder().chi2();
     for _ in 0..MAX_STEPS {
-        let system = System::new(&fit, &settings[fixed..], priors, FIRM);
-        let step = system.step();
+        let step = System::new(&fit, &settings[fixed..]).step();
         let mut share = 1.0;
         let mut better = None;
         for _ in 0..MAX_HALVINGS {
@@ -66,33 +42,27 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize, priors: &[P
             values.zip(&step).for_each(|(value, step)| *value += share * step);
             // A trial beyond all bounds is as bad as a worse one.
             if let Ok(found) = model.fit(&trial) {
-                let found_cost = cost_of(&found, &trial[fixed..], priors);
-                if found_cost < cost {
-                    better = Some((trial, found, found_cost));
+                let found_chi2 = found.remainder().chi2();
+                if found_chi2 < chi2 {
+                    better = Some((trial, found, found_chi2));
                     break;
                 }
             }
             share *= 0.5;
         }
-        let Some((trial, found, found_cost)) = better else { break };
-        let gained = cost - found_cost;
+        let Some((trial, found, found_chi2)) = better else { break };
+        let gained = chi2 - found_chi2;
         let unit = found.remainder().chi2_per_dof().min(1.0);
-        (settings, fit, cost) = (trial, found, found_cost);
+        (settings, fit, chi2) = (trial, found, found_chi2);
         if gained < SETTLED * unit {
             break;
         }
     }
-    let covariance = System::new(&fit, &settings[fixed..], priors, 1.0).covariance();
-    Ok(Refit { chi2: fit.remainder().chi2(), settings, fit, covariance })
+    let covariance = System::new(&fit, &settings[fixed..]).covariance();
+    Ok(Refit { settings, fit, chi2, covariance })
 }
 
-fn cost_of(fit: &impl Fit, free: &[Setting], priors: &[Prior]) -> f64 {
-    let values: Vec<f64> = free.iter().flat_map(|setting| setting.values.iter().copied()).collect();
-    let held: f64 = priors.iter().map(|prior| (FIRM * prior.at(&values)).powi(2)).sum();
-    fit.remainder().chi2() + held
-}
-
-/// The linearised system J δ ≈ −r, with the priors as rows, factored J = Q R by modified Gram-Schmidt on scaled columns.
+/// The linearised system J δ ≈ −r, factored J = Q R by modified Gram-Schmidt on scaled columns.
 struct System {
     /// Qᵀ r.
     projected: Vec<f64>,
@@ -102,21 +72,9 @@ struct System {
 }
 
 impl System {
-    fn new(fit: &impl Fit, free: &[Setting], priors: &[Prior], firm: f64) -> Self {
+    fn new(fit: &impl Fit, free: &[Setting]) -> Self {
         let mut columns: Vec<Vec<f64>> = free.iter().flat_map(|setting| fit.signature(setting.effect)).collect();
-        let mut right = fit.remainder().residual.clone();
-        let values: Vec<f64> = free.iter().flat_map(|setting| setting.values.iter().copied()).collect();
-        for prior in priors {
-            for column in &mut columns {
-                column.push(0.0);
-            }
-            for (place, weight) in &prior.weights {
-                if let Some(entry) = columns.get_mut(*place).and_then(|column| column.last_mut()) {
-                    *entry += firm * weight;
-                }
-            }
-            right.push(firm * prior.at(&values));
-        }
+        let right = &fit.remainder().residual;
         let count = columns.len();
         let mut scale = Vec::with_capacity(count);
         for column in &mut columns {
@@ -149,7 +107,7 @@ impl System {
                 column.fill(0.0);
             }
         }
-        Self { projected: columns.iter().map(|basis| dot(basis, &right)).collect(), upper, scale }
+        Self { projected: columns.iter().map(|basis| dot(basis, right)).collect(), upper, scale }
     }
 
     fn back_substitute(&self, mut right: Vec<f64>) -> Vec<f64> {

@@ -59,22 +59,24 @@ pub struct Unseen {
     pub bias: Vec<BiasPerUnit>,
 }
 
-/// "effect target".
+/// "effect target"; of two targets "effect target target".
 #[must_use]
-pub fn name(effect: &str, target: Option<&str>) -> String {
-    target.map_or_else(|| effect.to_owned(), |target| format!("{effect} {target}"))
+pub fn name(effect: &str, targets: &[String]) -> String {
+    std::iter::once(effect).chain(targets.iter().map(String::as_str)).collect::<Vec<_>>().join(" ")
 }
 
 impl Effect {
-    fn name(&self) -> String {
-        name(&self.id, self.target.as_deref())
+    /// "effect target".
+    #[must_use]
+    pub fn name(&self) -> String {
+        name(&self.id, &self.targets)
     }
 }
 
 impl Foresight {
     /// "effect target" of everything blind.
     pub fn blind_names(&self) -> impl Iterator<Item = String> {
-        self.blind_to.iter().map(|unseen| name(&unseen.blind.effect, unseen.blind.targets.first().map(String::as_str)))
+        self.blind_to.iter().map(|unseen| name(&unseen.blind.effect, &unseen.blind.targets))
     }
 }
 
@@ -85,10 +87,10 @@ impl Foresight {
 pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
     let effects = model.effects();
     let fit = Kept::new(model.fit(&[])?, effects.len());
-    let all: Vec<usize> = (0..effects.len()).collect();
+    let all: Vec<usize> = (0..effects.len()).filter(|effect| !model.is_mistake(*effect)).collect();
     let mut blind_to: Vec<Unseen> = Vec::new();
     for blind in blind(effects, &all, &fit) {
-        let same = |effect: &Effect| effect.id == blind.effect && effect.target.iter().eq(&blind.targets);
+        let same = |effect: &Effect| effect.id == blind.effect && effect.targets == blind.targets;
         let bias = all.iter().filter(|index| same(&effects[**index])).flat_map(|index| fit.bias(*index));
         let mut worst: Vec<BiasPerUnit> = Vec::new();
         for bias in bias {
@@ -132,12 +134,9 @@ pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
 impl Foresight {
     /// The same effect at several orders is one, visible from where all of them are.
     fn see(&mut self, effect: &Effect, parameters: Vec<VisibleFrom>) {
-        let known = self
-            .visible
-            .iter_mut()
-            .find(|known| known.effect == effect.id && known.targets.iter().eq(effect.target.iter()));
+        let known = self.visible.iter_mut().find(|known| known.effect == effect.id && known.targets == effect.targets);
         let Some(known) = known else {
-            let targets = effect.target.iter().cloned().collect();
+            let targets = effect.targets.clone();
             self.visible.push(Visible { effect: effect.id.clone(), targets, parameters });
             return;
         };

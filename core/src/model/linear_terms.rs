@@ -1,14 +1,19 @@
 //! A model whose declared part and effects are all linear: measured points and terms.
 
-mod basis;
+pub mod basis;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use self::basis::Basis;
-use super::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, fit::dot};
-use crate::{Error, Result};
+use super::{
+    Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
+    diagnosis::Unexplained,
+    evidence::{Group, far_worse},
+    fit::dot,
+};
+use crate::{Error, Result, evaluate::uncertainty::farthest};
 
 /// What was measured.
 #[derive(Debug, Clone, Default)]
@@ -78,6 +83,14 @@ struct Data {
     unseen: Vec<Unseen>,
     /// Effects that are declared with their values: never refitted.
     known: Vec<usize>,
+    /// The last effect of each list, by id, and what ends the list.
+    ends: Vec<(String, String)>,
+    /// Ids of the effects that may be added; all without it.
+    chosen: Option<Vec<String>>,
+    /// Points by which held-out predictions are judged; all without it.
+    judged: Option<Range<usize>>,
+    /// What measurement separates effects of a confounded set.
+    told_apart_by: Option<String>,
 }
 
 impl LinearTerms {
@@ -86,7 +99,7 @@ impl LinearTerms {
     /// # Errors
     /// When columns and observations are not of one length, a number is not finite, or the points cannot tell the declared
     /// parameters apart.
-    pub fn new(observations: Observations, declared: Vec<Declared>, terms: Vec<Term>) -> Result<Self> {
+    pub fn new(mut observations: Observations, mut declared: Vec<Declared>, mut terms: Vec<Term>) -> Result<Self> {
         let refuse = |problem: String| Error::new("fit", "the points", problem);
         let count = observations.values.len();
         let columns = || declared.iter().map(|known| &known.column).chain(terms.iter().flat_map(|term| &term.columns));
@@ -96,6 +109,7 @@ impl LinearTerms {
         if columns().chain([&observations.values]).flatten().any(|value| !value.is_finite()) {
             return Err(refuse("a value is no finite number".into()));
         }
+        sort_by_group(&mut observations, &mut declared, &mut terms);
         let mut members = vec![Vec::new(); observations.groups.len()];
         for (point, group) in observations.group.iter().enumerate() {
             let group = members.get_mut(*group).ok_or_else(|| refuse(format!("there is no group {group}")))?;
@@ -107,14 +121,56 @@ impl LinearTerms {
             return Err(refuse(format!("{count} points cannot tell {} apart", names.join(", "))));
         }
         let effects = terms.iter().map(|term| term.effect.clone()).collect();
-        let (unseen, known) = (Vec::new(), Vec::new());
-        Ok(Self(Arc::new(Data { observations, declared, basis, effects, terms, members, unseen, known })))
+        let (unseen, known, ends) = (Vec::new(), Vec::new(), Vec::new());
+        let (chosen, judged, told_apart_by) = (None, None, None);
+        Ok(Self(Arc::new(Data {
+            observations,
+            declared,
+            basis,
+            effects,
+            terms,
+            members,
+            unseen,
+            known,
+            ends,
+            chosen,
+            judged,
+            told_apart_by,
+        })))
     }
 
     /// Adds points that are only predicted; each set gives a value "rms of …".
     #[must_use]
     pub fn predicting(mut self, unseen: Vec<Unseen>) -> Self {
         Arc::make_mut(&mut self.0).unseen = unseen;
+        self
+    }
+
+    /// Says that an effect is the last of a list, and what ends the list ([`Model::last_of_list`]).
+    #[must_use]
+    pub fn ending_at(mut self, effect: impl Into<String>, limit: impl Into<String>) -> Self {
+        Arc::make_mut(&mut self.0).ends.push((effect.into(), limit.into()));
+        self
+    }
+
+    /// Judges held-out predictions by some of the points only: by those that count for the user.
+    #[must_use]
+    pub fn judged_by(mut self, points: Range<usize>) -> Self {
+        Arc::make_mut(&mut self.0).judged = Some(points);
+        self
+    }
+
+    /// Says what measurement separates effects that these points do not.
+    #[must_use]
+    pub fn told_apart_by(mut self, measurement: &str) -> Self {
+        Arc::make_mut(&mut self.0).told_apart_by = Some(measurement.to_owned());
+        self
+    }
+
+    /// Says which effects may be added, by their ids; all without it.
+    #[must_use]
+    pub fn considering(mut self, ids: Option<&[String]>) -> Self {
+        Arc::make_mut(&mut self.0).chosen = ids.map(<[String]>::to_vec);
         self
     }
 
@@ -137,6 +193,11 @@ impl Model for LinearTerms {
         self.0.terms.get(effect).map_or(0, |term| term.rank)
     }
 
+    fn last_of_list(&self, effect: usize) -> Option<String> {
+        let id = &self.0.effects.get(effect)?.id;
+        self.0.ends.iter().find(|(last, _)| last == id).map(|(_, limit)| limit.clone())
+    }
+
     fn fit(&self, applied: &[Setting]) -> Result<LinearFit> {
         let data = &self.0;
         let Observations { values, std, unit, .. } = &data.observations;
@@ -149,22 +210,30 @@ impl Model for LinearTerms {
         let joint = data.basis.extended(free.collect());
         let known: Vec<Setting> =
             applied.iter().filter(|setting| data.known.contains(&setting.effect)).cloned().collect();
-        let held_out = joint.left_out(&data.less(&known), &data.members);
+        let mut held_out = joint.left_out(&data.less(&known), &data.members);
+        if let Some(judged) = data.judged.as_ref().and_then(|judged| held_out.get(judged.clone())) {
+            held_out = judged.to_vec();
+        }
         let mean_square = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
         let dof = values.len().saturating_sub(joint.rank());
         let remainder = Remainder {
             rms: mean_square(&residual).sqrt(),
             noise_floor: std.map_or(f64::NAN, |std| std * (dof as f64 / values.len() as f64).sqrt()),
             held_out_rms: mean_square(&held_out).sqrt(),
+            disturbed_chi2: 0.0,
+            held_out_expected_rms: std.map_or(f64::NAN, |std| std * joint.left_out_gain(&data.members, values.len())),
             held_out_chi2: dot(&held_out, &held_out) / (scale * scale),
             residual: residual.iter().map(|value| value / scale).collect(),
-            stretches: Vec::new(),
+            // Where the noise is not known, neither is how far neighbouring points depend on each other: groups have to agree.
+            stretches: if std.is_some() { Vec::new() } else { data.members.iter().map(Vec::len).collect() },
             dof,
             unit: unit.clone(),
         };
         let coefficients = data.basis.coefficients(&left);
         let doubt = vec![0.0; coefficients.len()];
+        let groups = data.members.iter().map(|points| group(points, &residual, &joint)).collect();
         Ok(LinearFit {
+            groups,
             data: Arc::clone(data),
             applied: applied.to_vec(),
             coefficients,
@@ -194,10 +263,33 @@ impl Data {
     }
 }
 
+fn mean(weights: &[f64], values: impl Iterator<Item = f64>) -> f64 {
+    weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
+}
+
+/// Puts points of one group next to each other: groups are independent stretches of the residual.
+fn sort_by_group(observations: &mut Observations, declared: &mut [Declared], terms: &mut [Term]) {
+    let mut order: Vec<usize> = (0..observations.group.len()).collect();
+    order.sort_by_key(|point| observations.group[*point]);
+    let columns = declared.iter_mut().map(|known| &mut known.column);
+    let columns = columns.chain(terms.iter_mut().flat_map(|term| &mut term.columns));
+    for column in columns.chain([&mut observations.values]) {
+        *column = order.iter().map(|point| column[*point]).collect();
+    }
+    observations.group.sort_unstable();
+}
+
 fn subtract(from: &mut [f64], columns: &[Vec<f64>], values: &[f64]) {
     for (column, value) in columns.iter().zip(values) {
         from.iter_mut().zip(column).for_each(|(entry, column)| *entry -= value * column);
     }
+}
+
+/// What is left of a group of points, of which those are free that are not needed to fit them: n − tr Q_gᵀQ_g. The residual of the
+/// fit without the group would be large beside a bad group, too.
+fn group(points: &[usize], residual: &[f64], joint: &Basis) -> Group {
+    let squares = points.iter().map(|point| residual[*point].powi(2)).sum();
+    Group { squares, freedom: (points.len() as f64 - joint.weight(points)).max(0.0) }
 }
 
 /// A fit of [`LinearTerms`].
@@ -209,6 +301,8 @@ pub struct LinearFit {
     /// Variance of each declared parameter that comes from not knowing the effects.
     doubt: Vec<f64>,
     remainder: Remainder,
+    /// Of each group of the observations, in the data's unit.
+    groups: Vec<Group>,
     /// Variances of the applied effects' parameters.
     variance: Vec<(usize, Vec<f64>)>,
 }
@@ -227,6 +321,19 @@ impl LinearFit {
             let variance = known.map_or_else(|| vec![f64::NAN; setting.values.len()], |(_, variance)| variance.clone());
             Some((self.data.effects.get(setting.effect)?, setting.values.as_slice(), variance))
         })
+    }
+
+    /// Whether an effect might have been added, and is not declared.
+    #[must_use]
+    pub fn considers(&self, id: &str) -> bool {
+        let chosen = self.data.chosen.as_ref().is_none_or(|ids| ids.iter().any(|known| known == id));
+        chosen && !self.knows(id)
+    }
+
+    /// Whether an effect is declared with its values.
+    #[must_use]
+    pub fn knows(&self, id: &str) -> bool {
+        self.data.known.iter().any(|known| self.data.effects.get(*known).is_some_and(|effect| effect.id == id))
     }
 
     /// Root mean square of points never fitted less what the fit predicts of them.
@@ -305,6 +412,78 @@ impl Fit for LinearFit {
             let count = self.data.effects.get(*effect).map_or(0, |effect| effect.parameters.len());
             self.variance.push((*effect, diagonal.by_ref().take(count).collect()));
         }
+    }
+
+    /// The declared part at the points, in the observations' unit.
+    fn results(&self) -> Vec<f64> {
+        let mut part = vec![0.0; self.data.observations.values.len()];
+        for (declared, coefficient) in self.data.declared.iter().zip(&self.coefficients) {
+            part.iter_mut().zip(&declared.column).for_each(|(entry, column)| *entry += coefficient * column);
+        }
+        part
+    }
+
+    /// All is linear: the mixture is the fit with the weighted mean of all settings.
+    fn mix(&mut self, weights: &[f64], others: Vec<Self>) {
+        let all: Vec<Self> = std::iter::once(self.clone()).chain(others).collect();
+        for (index, coefficient) in self.coefficients.iter_mut().enumerate() {
+            *coefficient = mean(weights, all.iter().map(|one| one.coefficients[index]));
+            let spread = farthest(*coefficient, all.iter().map(|one| one.coefficients[index]));
+            let doubt = mean(weights, all.iter().map(|one| one.doubt[index]));
+            self.doubt[index] = doubt + spread * spread;
+        }
+        for (index, entry) in self.remainder.residual.iter_mut().enumerate() {
+            *entry = mean(weights, all.iter().map(|one| one.remainder.residual[index]));
+        }
+        let mut effects: Vec<usize> = all.iter().flat_map(|one| &one.applied).map(|setting| setting.effect).collect();
+        effects.sort_unstable();
+        effects.dedup();
+        (self.applied, self.variance) = (Vec::new(), Vec::new());
+        for effect in effects {
+            let count = self.data.effects.get(effect).map_or(0, |effect| effect.parameters.len());
+            let of = |one: &Self, index: usize| {
+                let setting = one.applied.iter().find(|setting| setting.effect == effect);
+                setting.and_then(|setting| setting.values.get(index)).copied().unwrap_or(0.0)
+            };
+            let variance_of = |one: &Self, index: usize| {
+                let known = one.variance.iter().find(|(known, _)| *known == effect);
+                known.and_then(|(_, variance)| variance.get(index)).copied().unwrap_or(0.0)
+            };
+            let each = |index: usize| all.iter().map(move |one| of(one, index));
+            let values: Vec<f64> = (0..count).map(|index| mean(weights, each(index))).collect();
+            let variance = values.iter().enumerate().map(|(index, value)| {
+                let noise = mean(weights, all.iter().map(|one| variance_of(one, index)));
+                noise + farthest(*value, each(index)).powi(2)
+            });
+            self.variance.push((effect, variance.collect()));
+            self.applied.push(Setting { effect, values });
+        }
+    }
+
+    fn far_worse(&self) -> Vec<Unexplained> {
+        let rms = |points: &[usize]| {
+            let squares: f64 = points.iter().map(|point| self.remainder.residual[*point].powi(2)).sum();
+            (squares / points.len().max(1) as f64).sqrt() * self.data.observations.std.unwrap_or(1.0)
+        };
+        let mut all: Vec<f64> = self.data.members.iter().map(|points| rms(points)).collect();
+        all.sort_by(f64::total_cmp);
+        let median = all.get(all.len() / 2).copied().unwrap_or(f64::NAN);
+        let report = |group: usize| {
+            let rms_um = rms(&self.data.members[group]);
+            let name = &self.data.observations.groups[group];
+            Unexplained {
+                sensor: None,
+                setup: None,
+                orders: [0, 0],
+                rms_um,
+                place: format!("{name}: {:.1} times the median of {} groups", rms_um / median, all.len()),
+            }
+        };
+        far_worse(&self.groups).into_iter().map(report).collect()
+    }
+
+    fn told_apart_by(&self, _effects: &[usize]) -> Option<String> {
+        self.data.told_apart_by.clone()
     }
 
     fn unexplained(&self) -> Vec<Unexplained> {

@@ -11,6 +11,8 @@ pub mod evidence;
 pub mod fit;
 pub mod foresight;
 pub mod linear_terms;
+mod mistakes;
+mod parts;
 
 use self::diagnosis::{Estimated, Unexplained};
 use crate::Result;
@@ -35,9 +37,52 @@ pub trait Model {
         0
     }
 
+    /// Whether an effect can have these values: a low-pass cannot amplify.
+    fn is_possible(&self, _effect: usize, _values: &[f64]) -> bool {
+        true
+    }
+
+    /// What ends a list of effects (orders, lines) of which this one is the last, in words: "order 8 is the highest".
+    fn last_of_list(&self, _effect: usize) -> Option<String> {
+        None
+    }
+
+    /// Values of an effect that its search begins at, beside what is applied; all 0 without them. A model that is far from
+    /// linear in an effect searches them itself.
+    fn start(&self, _effect: usize, _applied: &[Setting]) -> Option<Vec<f64>> {
+        None
+    }
+
     /// The same model on all data, for the final results: what the loop holds out is part of them.
     fn whole(&self) -> &Self {
         self
+    }
+
+    /// What would declare an effect at the values that are `applied`: lines of TOML, a key of the measurement's declaration
+    /// and the value to put there each (`setups.1.part_deg = 100.184`). Nothing where there is no key for it.
+    fn changes(&self, _effect: usize, _applied: &[Setting]) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Whether data beside those of the residual's rms show an effect: single turns beside their average.
+    fn is_seen_besides(&self, _effect: usize) -> bool {
+        false
+    }
+
+    /// Whether an effect is a mistake in the declaration: it is there or not, and is looked for before any other.
+    fn is_mistake(&self, _effect: usize) -> bool {
+        false
+    }
+
+    /// Mistakes in the declaration that may explain what is left with some effects applied, the likeliest first: each entry is
+    /// one mistake, or several that were made together. Asked for only where far more than noise is left.
+    fn suspected_mistakes(&self, _applied: &[Setting]) -> Vec<Vec<usize>> {
+        Vec::new()
+    }
+
+    /// Effects that take the place of one that acts on the whole, where it is not the same in all its parts: one a part.
+    fn parts(&self, _effect: usize) -> Vec<usize> {
+        Vec::new()
     }
 
     /// An effect's parameters as people say them.
@@ -59,16 +104,18 @@ pub trait Fit {
     /// How the results (form, motion) change with each parameter of an effect: root mean square, per unit of it.
     fn bias(&self, effect: usize) -> Vec<Bias>;
 
-    /// The result that counts most (form), in one unit; nothing where there is no such result. Where the data cannot decide
-    /// between effects, it is left as it was as far as possible.
+    /// The result that counts most (form), in one unit, NaN where it is not observable; always of one length. Where the data
+    /// do not decide between effects, it stays as near as possible to that of the declared model.
     fn results(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// How each entry of [`results`](Self::results) changes with each parameter of an effect: `[parameter][entry]`.
-    fn moves(&self, effect: usize) -> Vec<Vec<f64>> {
-        let _ = effect;
-        Vec::new()
+    /// Replaces all results by their weighted mean over equivalent fits, between which the data do not decide, and adds to
+    /// their uncertainty how far these are from it. `weights` are this fit's and then those of `others`; their sum is 1.
+    fn mix(&mut self, _weights: &[f64], _others: Vec<Self>)
+    where
+        Self: Sized,
+    {
     }
 
     /// Values that people look at, with their standard uncertainty where it is known.
@@ -77,6 +124,12 @@ pub trait Fit {
     /// Takes into its results' uncertainty what is not known of the parameters of these effects, one after the other:
     /// their covariance `[parameter][parameter]`.
     fn widen(&mut self, _effects: &[usize], _covariance: &[Vec<f64>]) {}
+
+    /// Groups of the data (circles, blocks, captures) of which far more is left than of the others, whether or not the noise is
+    /// known ([`evidence::far_worse`]).
+    fn far_worse(&self) -> Vec<Unexplained> {
+        Vec::new()
+    }
 
     /// Where something is left that the noise does not explain.
     fn unexplained(&self) -> Vec<Unexplained> {
@@ -94,8 +147,8 @@ pub trait Fit {
 pub struct Effect {
     /// Its id, in kebab-case.
     pub id: String,
-    /// Where it acts: the id of a sensor or a setup; nothing for the whole.
-    pub target: Option<String>,
+    /// Where it acts: the id of a sensor or a setup, or of two; nothing for the whole.
+    pub targets: Vec<String>,
     /// What it is described by.
     pub parameters: Vec<Parameter>,
 }
@@ -138,8 +191,14 @@ pub struct Remainder {
     pub noise_floor: f64,
     /// Root mean square of what the fit leaves of data that it has not seen, in the data's unit.
     pub held_out_rms: f64,
-    /// Weighted sum of squares of the same.
+    /// Its value expected from noise, in the data's unit: the noise of the held-out data and that of their prediction from the
+    /// data fitted. NaN where the noise is not known.
+    pub held_out_expected_rms: f64,
+    /// Weighted sum of squares of the residual on held-out data.
     pub held_out_chi2: f64,
+    /// Share of χ² that is expected from disturbances which the model knows to be in the data beyond noise, and whose course it
+    /// does not know: an effect that explains no more than this may be one of them. 0 without any.
+    pub disturbed_chi2: f64,
     /// Unit of the data.
     pub unit: String,
 }

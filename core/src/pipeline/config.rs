@@ -18,10 +18,10 @@ use crate::{
     atomic_file::resolved,
     model::Effect,
     rig::{Rig, RigConfig},
-    separation::Assessment,
+    separation::{Assessment, NOTHING_SEPARATED},
     stage::{
         Averager, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Separator, SourceKind,
-        StationModel, StationSeparator, TraceSeparator,
+        StationModel, StationSeparator, TraceModel, TraceSeparator,
     },
     surface::SurfaceConfig,
 };
@@ -35,6 +35,8 @@ pub struct Pipeline {
     pub title: String,
     /// Sensors and setups; always there on the [`Route::Turns`].
     pub rig: Option<Rig>,
+    /// The rig as it is configured, as a file of its own.
+    pub rig_text: Option<String>,
     /// Opens the measurement.
     pub loader: Box<dyn Loader>,
     /// From there to form and motion.
@@ -51,6 +53,8 @@ pub struct Pipeline {
     pub evaluate: Evaluate,
     /// In the order configured.
     pub exporters: Vec<Box<dyn Exporter>>,
+    /// The same for the results of a diagnosis: below `diagnosed/`, or where `[diagnose] out` says.
+    pub diagnosed: Vec<Box<dyn Exporter>>,
     /// What the separator can tell with the rig.
     pub assessment: Option<Assessment>,
     /// The configuration with includes and overrides in their places, for provenance: it runs again as it is.
@@ -88,13 +92,23 @@ pub enum Route {
 }
 
 impl Route {
+    /// Whether there is a model for the closed loop.
+    fn has_model(&self) -> bool {
+        match self {
+            Self::Turns { model, .. } => model.is_some(),
+            Self::Points { separator } => separator.model().is_some(),
+            Self::Model { .. } => true,
+            Self::Traces { .. } => false,
+        }
+    }
+
     /// What its model may lack.
     fn effects(&self) -> Vec<Effect> {
         match self {
             Self::Turns { model, .. } => model.as_ref().map_or_else(Vec::new, |model| model.effects().to_vec()),
             Self::Points { separator } => separator.model().map_or_else(Vec::new, PointModel::effects),
             Self::Model { model } => model.effects(),
-            Self::Traces { .. } => Vec::new(),
+            Self::Traces { separator } => separator.model().map_or_else(Vec::new, TraceModel::effects),
         }
     }
 }
@@ -127,7 +141,9 @@ impl Pipeline {
                 .ok_or_else(|| Fault::span(value.span(), "expected the title in quotes"))?
                 .to_owned(),
         };
-        let rig = table(root, "rig")?.map(|table| checked::<RigConfig, _>(&table, RigConfig::check)).transpose()?;
+        let rig_table = table(root, "rig")?;
+        let rig = rig_table.as_ref().map(|table| checked::<RigConfig, _>(table, RigConfig::check)).transpose()?;
+        let rig_text = rig_table.as_ref().map(document::table_text).transpose()?;
         let context = Context { folder: sources.folder(), rig: rig.as_ref() };
         let surface = table(root, "surface")?
             .map(|table| checked::<SurfaceConfig, _>(&table, SurfaceConfig::check))
@@ -160,7 +176,12 @@ impl Pipeline {
         let diagnose = table(root, "diagnose")?
             .map(|table| {
                 checked::<DiagnoseConfig, _>(&table, |config| {
-                    config.check(sources.folder(), loader.kind(), &route.effects())
+                    config.check(
+                        sources.folder(),
+                        loader.kind(),
+                        &route.effects(),
+                        matches!(route, Route::Traces { .. }),
+                    )
                 })
             })
             .transpose()?
@@ -170,10 +191,11 @@ impl Pipeline {
             .map(|table| compare::candidate(table, registry, &context))
             .collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref())?;
-        let exporters = exporters(root, sources, registry, &context, &route, diagnose.path.as_deref())?;
+        let Exports { exporters, diagnosed } = exports(root, sources, registry, &context, &route, &diagnose)?;
         Ok(Self {
             title,
             rig,
+            rig_text,
             loader,
             route,
             separator: compare::plugin_name(&separate_table),
@@ -182,6 +204,7 @@ impl Pipeline {
             surface,
             evaluate,
             exporters,
+            diagnosed,
             assessment,
             configuration: document::resolved_text(root, sources)?,
         })
@@ -192,24 +215,35 @@ impl Pipeline {
     /// Every file that a run writes.
     #[must_use]
     pub fn outputs(&self) -> Vec<PathBuf> {
-        let exported = self.exporters.iter().flat_map(|exporter| exporter.outputs());
-        exported.chain(self.summary_path()).collect()
+        written(&self.exporters)
     }
 
-    /// Where the summary goes: beside the first export.
+    /// Every file that a diagnosis writes.
+    #[must_use]
+    pub fn diagnosed_outputs(&self) -> Vec<PathBuf> {
+        let more = self.diagnosis_path().into_iter().chain(self.diagnose.write_rig.clone());
+        written(&self.diagnosed).into_iter().chain(more).collect()
+    }
+
+    /// Where the run's summary goes: beside the first export.
     #[must_use]
     pub fn summary_path(&self) -> Option<PathBuf> {
-        self.beside_the_first(SUMMARY)
+        summary_path(&self.exporters)
     }
 
-    /// Where the diagnosis goes: where `[diagnose]` says, or beside the first export.
+    /// Where the diagnosis goes: where `[diagnose]` says, or beside the first export of the final model.
     #[must_use]
     pub fn diagnosis_path(&self) -> Option<PathBuf> {
-        self.diagnose.path.clone().or_else(|| self.beside_the_first(DIAGNOSIS))
+        self.diagnose.path.clone().or_else(|| beside_the_first(&self.diagnosed, DIAGNOSIS))
     }
 
-    fn beside_the_first(&self, name: &str) -> Option<PathBuf> {
-        self.exporters.iter().find_map(|exporter| exporter.outputs().first().map(|path| beside(path, name)))
+    /// Where a diagnosis may be that describes files which a run replaces: the configured one beside them, and the one that
+    /// earlier versions wrote beside them.
+    pub(super) fn outdated_diagnoses(&self) -> impl Iterator<Item = PathBuf> {
+        let outputs = self.outputs();
+        let beside = move |path: &PathBuf| outputs.iter().any(|output| output.parent() == path.parent());
+        let configured = self.diagnose.path.clone().filter(beside);
+        beside_the_first(&self.exporters, DIAGNOSIS).into_iter().chain(configured)
     }
 }
 
@@ -217,9 +251,24 @@ const SUMMARY: &str = "summary.json";
 const SUMMARY_USE: &str = "where the run's summary goes";
 const DIAGNOSIS: &str = "diagnosis.json";
 const DIAGNOSIS_USE: &str = "where the diagnosis goes";
+const DIAGNOSED: &str = "diagnosed";
+const DIAGNOSED_USE: &str = "written by `diagnose`";
 
 fn beside(output: &Path, name: &str) -> PathBuf {
     output.with_file_name(name)
+}
+
+fn beside_the_first(exporters: &[Box<dyn Exporter>], name: &str) -> Option<PathBuf> {
+    exporters.iter().find_map(|exporter| exporter.outputs().first().map(|path| beside(path, name)))
+}
+
+/// Where the summary of these exports goes: beside the first of their files.
+pub(super) fn summary_path(exporters: &[Box<dyn Exporter>]) -> Option<PathBuf> {
+    beside_the_first(exporters, SUMMARY)
+}
+
+fn written(exporters: &[Box<dyn Exporter>]) -> Vec<PathBuf> {
+    exporters.iter().flat_map(|exporter| exporter.outputs()).chain(summary_path(exporters)).collect()
 }
 
 /// The route of measured points.
@@ -254,48 +303,109 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
     Ok(evaluate)
 }
 
+/// The exporters of `run` and those of `diagnose`.
+#[derive(Default)]
+struct Exports {
+    exporters: Vec<Box<dyn Exporter>>,
+    diagnosed: Vec<Box<dyn Exporter>>,
+}
+
 /// The exporters, none of which writes over what is read or what another file is for.
-fn exporters(
+fn exports(
     root: &Table,
     sources: &Sources,
     registry: &Registry,
     context: &Context,
     route: &Route,
-    diagnosis_path: Option<&Path>,
-) -> Result<Vec<Box<dyn Exporter>>, Fault> {
-    let mut exporters: Vec<Box<dyn Exporter>> = Vec::new();
-    let mut outputs: Vec<_> = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
-    outputs.extend(diagnosis_path.map(|path| (resolved(path), DIAGNOSIS_USE)));
-    for table in tables(root, "export")? {
-        let exporter = registry.exporters.build(&table, context)?;
+    diagnose: &Diagnose,
+) -> Result<Exports, Fault> {
+    let mut exports = Exports::default();
+    let mut taken = Taken(sources.files().map(|file| (resolved(file), "read as configuration")).collect());
+    taken.0.extend(diagnose.path.as_ref().map(|path| (resolved(path), DIAGNOSIS_USE)));
+    let tables = tables(root, "export")?;
+    for table in &tables {
+        let exporter = registry.exporters.build(table, context)?;
         match route {
             Route::Traces { .. } if exporter.straightness().is_none() => {
                 let fault = Fault::at("plugin", "this exporter takes form; [separate] gives straightness along a line");
-                return Err(document::resolve(fault.help("take one that writes tables"), &table));
+                return Err(document::resolve(fault.help("take one that writes tables"), table));
             }
-            Route::Model { .. } => {
+            Route::Model { model } if model.table().is_none() => {
                 let fault = Fault::at("plugin", "this exporter takes form; [separate] is a model for `diagnose` only");
-                return Err(document::resolve(fault.help("name a file by `path` in [diagnose]"), &table));
+                return Err(document::resolve(fault.help("name a file by `path` in [diagnose]"), table));
+            }
+            Route::Model { .. } if exporter.tables().is_none() => {
+                let fault = Fault::at("plugin", "this exporter takes form; [separate] gives a table");
+                return Err(document::resolve(fault.help("take one that writes tables"), table));
             }
             _ => {}
         }
+        taken
+            .add(&*exporter, "written by an exporter", &[(SUMMARY, SUMMARY_USE)])
+            .map_err(|fault| document::resolve(fault, table))?;
+        exports.exporters.push(exporter);
+    }
+    if !route.has_model() {
+        return Ok(exports);
+    }
+    let beside: &[_] = match &diagnose.path {
+        None => &[(SUMMARY, DIAGNOSED_USE), (DIAGNOSIS, DIAGNOSIS_USE)],
+        Some(_) => &[(SUMMARY, DIAGNOSED_USE)],
+    };
+    for (table, exporter) in tables.iter().zip(&exports.exporters) {
+        let diagnosed =
+            registry.exporters.build(&diagnosed(table, &**exporter, diagnose.out.as_deref(), context), context)?;
+        taken.add(&*diagnosed, DIAGNOSED_USE, beside).map_err(|fault| document::resolve(fault, table))?;
+        exports.diagnosed.push(diagnosed);
+    }
+    Ok(exports)
+}
+
+/// Files that are read or written, each with its use.
+struct Taken(Vec<(PathBuf, &'static str)>);
+
+impl Taken {
+    /// Adds an exporter's files, and those beside the first of them where no exporter of this kind has brought them.
+    fn add(
+        &mut self,
+        exporter: &dyn Exporter,
+        own_use: &'static str,
+        beside_it: &[(&str, &'static str)],
+    ) -> Result<(), Fault> {
         for output in exporter.outputs() {
             let place = resolved(&output);
-            if let Some((_, use_of_it)) = outputs.iter().find(|(other, _)| *other == place) {
-                let message = format!("{} is already {use_of_it}", output.display());
-                return Err(document::resolve(Fault::at("path", message), &table));
+            if let Some((_, use_of_it)) = self.0.iter().find(|(other, _)| *other == place) {
+                return Err(Fault::at("path", format!("{} is already {use_of_it}", output.display())));
             }
-            if outputs.iter().all(|(_, use_of_it)| *use_of_it != SUMMARY_USE) {
-                outputs.push((resolved(&beside(&output, SUMMARY)), SUMMARY_USE));
-                if diagnosis_path.is_none() {
-                    outputs.push((resolved(&beside(&output, DIAGNOSIS)), DIAGNOSIS_USE));
+            self.0.push((place, own_use));
+            for (name, use_of_it) in beside_it {
+                // A summary of a diagnosis is one of its files.
+                if self.0.iter().all(|(path, known)| known != use_of_it || !path.ends_with(name)) {
+                    self.0.push((resolved(&beside(&output, name)), use_of_it));
                 }
             }
-            outputs.push((place, "written by an exporter"));
         }
-        exporters.push(exporter);
+        Ok(())
     }
-    Ok(exporters)
+}
+
+/// The table of an exporter with another path: a folder `out` becomes `out/diagnosed`, a file `out/shaft.glb`
+/// `out/diagnosed/shaft.glb`. `out` of `[diagnose]` stands for the folder where there is one.
+fn diagnosed<'a>(table: &Table<'a>, exporter: &dyn Exporter, out: Option<&Path>, context: &Context) -> Table<'a> {
+    let mut keys = table.get_ref().clone();
+    if let Some(value) = keys.get_mut("path")
+        && let Some(path) = value.get_ref().as_str().map(PathBuf::from)
+    {
+        let is_file = exporter.outputs().contains(&context.path(&path));
+        let folder = match (out, is_file) {
+            (Some(out), _) => out.to_path_buf(),
+            (None, true) => path.with_file_name(DIAGNOSED),
+            (None, false) => path.join(DIAGNOSED),
+        };
+        let moved = if is_file { path.file_name().map_or(folder.clone(), |name| folder.join(name)) } else { folder };
+        *value.get_mut() = DeValue::String(moved.to_string_lossy().into_owned().into());
+    }
+    Spanned::new(table.span(), keys)
 }
 
 fn turns(
@@ -323,8 +433,11 @@ fn turns(
     })?;
     match separator {
         Separator::Stations(separator) => {
-            let assessment =
+            let mut assessment =
                 separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
+            if assessment.tells_no_form() {
+                assessment.notes.insert(0, NOTHING_SEPARATED.into());
+            }
             let model = separator.model(&registry.effects);
             Ok((Route::Turns { conditioners, averager, separator, model }, Some(assessment)))
         }
@@ -382,9 +495,36 @@ fn tables<'a>(root: &Table<'a>, key: &str) -> Result<Vec<Table<'a>>, Fault> {
     }
 }
 
+/// A table of a pipeline that names no plugin.
+#[derive(Debug, Clone)]
+pub struct PlainTable {
+    /// Its key in TOML.
+    pub key: &'static str,
+    /// One line for lists.
+    pub about: &'static str,
+    /// Whether there may be several.
+    pub repeats: bool,
+    /// JSON Schema of its keys.
+    pub schema: Schema,
+}
+
+/// The tables of a pipeline that name no plugin.
+#[must_use]
+pub fn plain_tables() -> [PlainTable; 5] {
+    let one = |key, about, schema| PlainTable { key, about, repeats: false, schema };
+    [
+        one("rig", "sensors, setups and part; or the path of a file with these keys", inline::<RigConfig>()),
+        one("surface", "how sections become a surface", inline::<SurfaceConfig>()),
+        one("evaluate", "which of the standards' values are computed, and how", inline::<EvaluateConfig>()),
+        PlainTable { repeats: true, ..one("limit", "a limit of one value", inline::<Limit>()) },
+        one("diagnose", "what the closed loop may consider", inline::<DiagnoseConfig>()),
+    ]
+}
+
 /// JSON Schema of a pipeline file with these plugins.
 #[must_use]
 pub fn pipeline_schema(registry: &Registry) -> Value {
+    let [rig, surface, evaluate, limit, diagnose] = plain_tables().map(|table| table.schema);
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "runout pipeline",
@@ -395,16 +535,16 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
             "title": { "type": "string", "description": "For results and meshes." },
             "rig": {
                 "description": "Sensors and setups, or the path of a file that holds them.",
-                "anyOf": [{ "type": "string" }, inline::<RigConfig>()],
+                "anyOf": [{ "type": "string" }, rig],
             },
             "load": choice(&registry.loaders),
             "preprocess": { "type": "array", "items": choice(&registry.preprocessors) },
             "separate": choice(&registry.separators),
             "compare": { "type": "array", "items": choice(&registry.separators) },
-            "surface": inline::<SurfaceConfig>(),
-            "evaluate": inline::<EvaluateConfig>(),
-            "limit": { "type": "array", "items": inline::<Limit>() },
-            "diagnose": inline::<DiagnoseConfig>(),
+            "surface": surface,
+            "evaluate": evaluate,
+            "limit": { "type": "array", "items": limit },
+            "diagnose": diagnose,
             "export": { "type": "array", "items": choice(&registry.exporters) },
         },
     })

@@ -11,7 +11,10 @@ use toml::{
     de::{DeTable, DeValue, ValueDeserializer},
 };
 
-use super::error::{Diagnostic, Fault, Place, Step, known_names};
+use super::{
+    error::{Diagnostic, Fault, Place, Step, known_names},
+    pinpoint::pinpoint,
+};
 use crate::Error;
 
 /// A table whose every key and value knows its place.
@@ -291,7 +294,8 @@ pub fn read_besides<T: DeserializeOwned>(table: &Table, besides: &[&str]) -> Res
     let value = Spanned::new(table.span(), DeValue::Table(table.get_ref().clone()));
     T::deserialize(ValueDeserializer::from(value)).map_err(|error| {
         let span = error.span().filter(|span| *span != table.span());
-        explain(span.unwrap_or_else(|| head(table.span())), error.message(), besides)
+        let exact = pinpoint(table.get_ref(), span.as_ref(), error.message());
+        explain(exact.or(span).unwrap_or_else(|| head(table.span())), error.message(), besides)
     })
 }
 
@@ -305,11 +309,19 @@ pub fn resolved_text(root: &Table, sources: &Sources) -> Result<String, Fault> {
         [only] => Ok(only.text().to_owned()),
         parts => {
             let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
-            let table: toml::Table = read(root)?;
-            let text = toml::to_string(&table).map_err(|error| Fault::here(error.to_string()))?;
+            let text = table_text(root)?;
             Ok(format!("# joined from {}; paths are relative to the first\n\n{text}", names.join(", ")))
         }
     }
+}
+
+/// A table as a TOML text of its own.
+///
+/// # Errors
+/// When a value cannot be written.
+pub fn table_text(table: &Table) -> Result<String, Fault> {
+    let table: toml::Table = read(table)?;
+    toml::to_string(&table).map_err(|error| Fault::here(error.to_string()))
 }
 
 /// A table's own span may cover many lines; its beginning is where a reader looks.

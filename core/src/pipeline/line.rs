@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    calibrated::calibrated,
     inspection::{Inspection, Spike},
     measurement::{Capture, Recording, SampleStream, StationKey},
     profile::{Profile, RejectedTurn},
@@ -117,7 +118,7 @@ impl Line<'_> {
         setup: usize,
         spikes: &'b Mutex<Vec<Spike>>,
     ) -> Result<Box<dyn SampleStream + 'b>> {
-        let opened = self.recording.open_with(threads, station, setup)?;
+        let opened = calibrated(self.recording.open_with(threads, station, setup)?, self.rig);
         let tell = |found| *spikes.lock().unwrap_or_else(PoisonError::into_inner) = found;
         let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::telling(opened, tell));
         self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))

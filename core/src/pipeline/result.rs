@@ -73,6 +73,22 @@ impl StationResult {
         self.profiles.iter().filter_map(of).reduce(f64::min)
     }
 
+    /// Root mean square of a section's form over the orders from 2 that can be told, and its standard uncertainty, in µm.
+    ///
+    /// rms² = ½ Σ|c|², so that errors δ of no favoured phase give u² = Σ|c|² E|δ|² / (8 rms²); NaN where no variance is known.
+    /// `None` where nothing can be told.
+    #[must_use]
+    pub fn form_rms_um(&self, section: usize) -> Option<(f64, f64)> {
+        let separation = &self.separation;
+        let unknown = separation.position(Quantity::Form(section)).filter(|unknown| !separation.is_lost(*unknown))?;
+        let squares = || separation.coefficients(unknown).skip(2).map(|value| value.norm_sqr());
+        let rms = (0.5 * squares().sum::<f64>()).sqrt();
+        let variance = separation.variance.iter().skip(unknown).step_by(separation.unknowns.len()).skip(2);
+        let errors = squares().zip(variance).filter(|(square, _)| *square > 0.0);
+        let spread: f64 = errors.map(|(square, variance)| square * variance).sum();
+        Some((rms, (spread / 8.0).sqrt() / rms))
+    }
+
     /// One unknown on [`angles`](Self::angles) equal angles from 0: form over the part's, motion over the spindle's.
     /// Orders that the layout cannot tell are left out; where nothing is known, values are NaN.
     #[must_use]
@@ -120,21 +136,21 @@ pub(super) fn complete(
     result
 }
 
-/// True motion at a place along the spindle, where the separation reports it: x + z·ε_y, y − z·ε_x.
-fn moved_along(motion: &[Vec<f64>; 4], quantity: Quantity, z_mm: f64) -> Option<Vec<f64>> {
-    let [x, y, tilt_x, tilt_y] = motion;
-    let lever = z_mm * UM_PER_MM_URAD;
-    let along = |shift: &[f64], tilt: &[f64], lever: f64| {
-        let tilt = tilt.iter().copied().chain(std::iter::repeat(0.0));
-        shift.iter().zip(tilt).map(|(shift, tilt)| shift + lever * tilt).collect()
+/// True motion [x, y, tilt about x, about y] as a separation reports it at a place along the spindle: x + z·ε_y, y − z·ε_x;
+/// a curve that is not given is 0.
+fn true_motion(motion: &[Vec<f64>; 4], quantity: Quantity, z_mm: f64) -> Vec<f64> {
+    let parts = |quantity: Quantity| motion.iter().zip(quantity.cartesian()).filter(|(_, share)| *share != 0.0);
+    let mut sum = vec![0.0; parts(quantity).map(|(curve, _)| curve.len()).max().unwrap_or(0)];
+    let mut add = |quantity: Quantity, factor: f64| {
+        for (curve, share) in parts(quantity) {
+            sum.iter_mut().zip(curve).for_each(|(sum, value)| *sum += factor * share * value);
+        }
     };
-    match quantity {
-        Quantity::Form(_) => None,
-        Quantity::X => Some(along(x, tilt_y, lever)),
-        Quantity::Y => Some(along(y, tilt_x, -lever)),
-        Quantity::TiltX => Some(tilt_x.clone()),
-        Quantity::TiltY => Some(tilt_y.clone()),
+    add(quantity, 1.0);
+    if let Some((tilt, factor)) = quantity.moved_by_tilt() {
+        add(tilt, factor * z_mm * UM_PER_MM_URAD);
     }
+    sum
 }
 
 /// Root mean square of estimate minus truth over the orders from 2 that could be told.
@@ -142,7 +158,7 @@ pub(super) fn true_error(result: &StationResult, quantity: Quantity) -> Option<f
     let truth = result.truth.as_ref()?;
     let curve = match quantity {
         Quantity::Form(section) => truth.form_um.get(section)?.clone(),
-        motion => moved_along(truth.motion.as_ref()?, motion, result.separation.motion_z_mm)?,
+        motion => true_motion(truth.motion.as_ref()?, motion, result.separation.motion_z_mm),
     };
     let unknown = result.separation.position(quantity)?;
     if curve.len() < 2 {
@@ -187,6 +203,7 @@ mod tests {
             variance: vec![0.0; 8],
             observable: vec![true; 8],
             motion_covariance: None,
+            equivalents: Vec::new(),
             motion_z_mm: 100.0,
             residual: Residual::default(),
             warnings: Vec::new(),

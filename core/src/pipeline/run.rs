@@ -3,11 +3,13 @@
 use std::{num::NonZeroUsize, path::PathBuf};
 
 use super::{
-    config::{Pipeline, Route},
+    config::{Pipeline, Route, summary_path},
     evaluate::{Evaluate, Group, add_areal, decide, part_summary, steepest_um_per_deg},
     line::{Line, separate},
+    outdated,
     overlap::write_behind,
     result::{Evaluation, complete},
+    steadiness::{Steadiness, inflated},
     summary::summarise,
     traces,
 };
@@ -26,10 +28,11 @@ use crate::{
         Value,
         error_motion::{Centre, ErrorMotion},
     },
+    model::diagnosis::Correction,
     provenance::{Input, Provenance, VERSION},
     rig::Rig,
     separation::Separation,
-    stage::{Export, Source, Station},
+    stage::{Export, Exporter, Source, Station},
     surface::{Surface, SurfaceBuilder},
 };
 
@@ -67,7 +70,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
             Error::new("run", &pipeline.title, problem).help("runout diagnose finds what the declared model lacks")
         );
     }
-    let mut gathering = Gathering::begin(pipeline, &info)?;
+    let mut gathering = Gathering::begin(pipeline, &pipeline.exporters, &info)?;
     let (inputs, surface, remarks) = match (&source, &pipeline.route) {
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator, .. }) => {
             let rig = pipeline
@@ -94,11 +97,16 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 let motion_values = error_motion_values(&result, &pipeline.evaluate.centres, rig.part_radius_mm);
                 Ok(StationResult { motion_values, ..result })
             };
+            let mut steadiness = Steadiness::default();
             let inputs = write_behind(
-                |result| gathering.take(&result, Some(rig)),
+                |result: StationResult| {
+                    steadiness.take(&result.station, &result.profiles, rig);
+                    gathering.take(&result, Some(rig))
+                },
                 |take| line.run(threads, observer, work, take),
             )?;
-            (inputs, gathering.build_surface(rig.part_radius_mm)?, recording.remarks())
+            let remarks = recording.remarks().into_iter().chain(steadiness.warning(rig)).collect();
+            (inputs, gathering.build_surface(rig.part_radius_mm)?, remarks)
         }
         (Source::Points(points), Route::Points { separator }) => {
             let radius_mm = separator.reference_radius_mm(points)?;
@@ -109,7 +117,9 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
         }
         _ => return Err(Error::new("run", &pipeline.title, "the loader gave what it did not declare")),
     };
-    gathering.conclude(inputs, remarks, surface.as_ref(), None)
+    let summary = gathering.finish(inputs, remarks, surface.as_ref())?.commit(None)?;
+    outdated::remove(pipeline)?;
+    Ok(summary)
 }
 
 fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f64) -> Vec<Value> {
@@ -126,13 +136,23 @@ fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f6
 /// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.
 const MISFIT_CHI2: f64 = 4.0;
 
+/// What a surface over all sections is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum SurfaceUse {
+    /// Nothing.
+    Unused,
+    /// Tested where there is one: sections at one height have none.
+    WhereThere,
+    /// An export or a value needs it.
+    Needed,
+}
+
 /// Results on their way to the exporters.
 pub(super) struct Gathering {
     exports: Vec<Box<dyn Export>>,
     /// Sections for a surface, or for values of all of them.
     sections: Option<SurfaceBuilder>,
-    /// Whether someone takes the surface.
-    wanted: bool,
+    surface: SurfaceUse,
     angles: usize,
     evaluate: Evaluate,
     /// Whether the sections' centres and mean radii are known.
@@ -144,22 +164,27 @@ pub(super) struct Gathering {
 }
 
 impl Gathering {
-    pub(super) fn begin(pipeline: &Pipeline, info: &RunInfo) -> Result<Self> {
-        let exports: Result<Vec<_>> = pipeline.exporters.iter().map(|exporter| exporter.begin(info)).collect();
+    /// Begins the exports of these exporters.
+    pub(super) fn begin(pipeline: &Pipeline, exporters: &[Box<dyn Exporter>], info: &RunInfo) -> Result<Self> {
+        let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(info)).collect();
         let tested = matches!(&pipeline.route, Route::Points { separator } if separator.needs_surface());
         let evaluate = pipeline.evaluate.clone();
-        let exported = pipeline.exporters.iter().any(|exporter| exporter.needs_surface());
-        let wanted = tested || exported || evaluate.has(Group::Areal);
-        let gathered = wanted || evaluate.has(Group::Cylindricity);
+        let needed = exporters.iter().any(|exporter| exporter.needs_surface()) || evaluate.has(Group::Areal);
+        let surface = match (needed, tested) {
+            (true, _) => SurfaceUse::Needed,
+            (false, true) => SurfaceUse::WhereThere,
+            (false, false) => SurfaceUse::Unused,
+        };
+        let gathered = surface != SurfaceUse::Unused || evaluate.has(Group::Cylindricity);
         Ok(Self {
             exports: exports?,
             sections: gathered.then(|| SurfaceBuilder::new(&pipeline.surface)),
-            wanted,
+            surface,
             angles: pipeline.surface.angles,
             evaluate,
             placed: matches!(&pipeline.route, Route::Points { .. }),
             interrupted: false,
-            summary_path: pipeline.summary_path(),
+            summary_path: summary_path(exporters),
             summary: begun(pipeline),
         })
     }
@@ -183,8 +208,10 @@ impl Gathering {
         if evaluate.has(Group::Cylindricity) || evaluate.has(Group::Areal) {
             self.summary.part = part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
         }
-        if !self.wanted {
-            return Ok(None);
+        match self.surface {
+            SurfaceUse::Unused => return Ok(None),
+            SurfaceUse::WhereThere if builder.is_flat() => return Ok(None),
+            SurfaceUse::WhereThere | SurfaceUse::Needed => {}
         }
         let (surface, uncertain) = builder.build(radius_mm)?;
         if evaluate.has(Group::Areal) {
@@ -202,17 +229,22 @@ impl Gathering {
         Ok(Some(surface))
     }
 
-    /// Completes the exports and gives all files their names, one more among them where there is one.
-    pub(super) fn conclude(
+    /// Says which effects the results are corrected for.
+    pub(super) fn corrected_for(&mut self, effects: Vec<Correction>) {
+        self.summary.effects = effects;
+    }
+
+    /// Completes the exports.
+    pub(super) fn finish(
         mut self,
         inputs: Vec<Input>,
         remarks: Vec<String>,
         surface: Option<&Surface>,
-        besides: Option<PendingFile>,
-    ) -> Result<Summary> {
+    ) -> Result<Finished> {
         self.summary.provenance.inputs = inputs;
         self.summary.warnings.extend(remarks);
         self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
+        self.summary.warnings.extend(inflated(&self.summary.stations));
         let (limits, unmatched) = decide(self.evaluate.limits(), &self.summary.values());
         self.summary.limits = limits;
         self.summary.warnings.extend(unmatched);
@@ -220,9 +252,41 @@ impl Gathering {
         for export in self.exports {
             complete.extend(export.finish(&self.summary, surface)?);
         }
-        complete.extend(besides);
-        conclude(self.summary, complete, self.summary_path)
+        Ok(Finished { summary: self.summary, complete, summary_path: self.summary_path })
     }
+}
+
+/// Exports that are complete and wait for their names.
+pub(super) struct Finished {
+    summary: Summary,
+    complete: Vec<PendingFile>,
+    summary_path: Option<PathBuf>,
+}
+
+impl Finished {
+    pub(super) fn new(summary: Summary, complete: Vec<PendingFile>, summary_path: Option<PathBuf>) -> Self {
+        Self { summary, complete, summary_path }
+    }
+
+    /// The files that will have their names, the summary's among them.
+    pub(super) fn outputs(&self) -> Vec<PathBuf> {
+        outputs(&self.complete, self.summary_path.as_ref())
+    }
+
+    /// Adds a file.
+    pub(super) fn add(&mut self, file: PendingFile) {
+        self.complete.push(file);
+    }
+
+    /// Gives all files their names, one more among them where there is one.
+    pub(super) fn commit(mut self, besides: Option<PendingFile>) -> Result<Summary> {
+        self.complete.extend(besides);
+        conclude(self.summary, self.complete, self.summary_path)
+    }
+}
+
+fn outputs(complete: &[PendingFile], summary_path: Option<&PathBuf>) -> Vec<PathBuf> {
+    complete.iter().map(PendingFile::destination).chain(summary_path.map(PathBuf::as_path)).map(Into::into).collect()
 }
 
 /// A summary of nothing yet.
@@ -246,8 +310,7 @@ pub(super) fn conclude(
     mut complete: Vec<PendingFile>,
     summary_path: Option<PathBuf>,
 ) -> Result<Summary> {
-    let named = complete.iter().map(|file| file.destination().to_path_buf());
-    summary.outputs = named.chain(summary_path.clone()).collect();
+    summary.outputs = outputs(&complete, summary_path.as_ref());
     if let Some(path) = summary_path {
         let file = PendingFile::new(path)?;
         let text = serde_json::to_vec_pretty(&summary).map_err(|error| file.failure(error))?;
@@ -299,8 +362,10 @@ pub(super) fn take_sections(
 ) -> Result<()> {
     observer.begin(sections.len());
     let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None };
-    let angles = pipeline.surface.angles;
     for separation in sections {
+        // As many angles as the surface has, or a multiple of them that the highest order fits on.
+        let angles = pipeline.surface.angles;
+        let angles = angles * (2 * separation.max_order() + 1).div_ceil(angles);
         let (name, z_mm) =
             separation.sections.first().map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));
         let result = complete(name, z_mm, angles, separation, Vec::new(), None, evaluation);

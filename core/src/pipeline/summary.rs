@@ -10,7 +10,9 @@ use super::{
     result::{StationResult, true_error},
 };
 use crate::{
-    evaluate::{Value, straightness::strt_lsli_um},
+    azimuth::Azimuth,
+    evaluate::{Value, reading::ReadingValues, straightness::strt_lsli_um},
+    model::diagnosis::Correction,
     profile::{Profile, Rejection, TurnLength},
     provenance::Provenance,
     rig::Rig,
@@ -26,6 +28,10 @@ pub struct Summary {
     pub title: String,
     /// Enough to repeat the run.
     pub provenance: Provenance,
+    /// Effects that the results are corrected for: what `diagnose` added, and what `[diagnose] known` declares. Those of a run
+    /// have none.
+    #[serde(default)]
+    pub effects: Vec<Correction>,
     /// Orders that the layout cannot separate.
     pub lost_orders: LostOrders,
     /// One entry a station.
@@ -86,6 +92,14 @@ pub struct StationSummary {
     pub captures: Vec<CaptureSummary>,
     /// Form, section by section.
     pub sections: Vec<SectionSummary>,
+    /// The line along which all motion of this station is, where that is neither x nor y: its angle from x towards y, in
+    /// degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion_along_deg: Option<f64>,
+    /// What the readings themselves have, one entry a setup and sensor: where no order of form is observable, and nothing else is
+    /// known. Empty where form is separated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<ReadingValues>,
     /// Error motion values of the axis; empty where no spread over the turns is known.
     pub motion_values: Vec<Value>,
     /// Root mean square that the fit leaves of the readings, in µm; absent where nothing is redundant.
@@ -94,6 +108,9 @@ pub struct StationSummary {
     pub expected_residual_rms_um: Option<f64>,
     /// Weighted residual per degree of freedom.
     pub chi2_per_dof: Option<f64>,
+    /// Lowest and highest order at which a reading is redundant: those that the residual and chi squared are of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_orders: Option<[usize; 2]>,
     /// True error of the motions, where the recording carries the truth.
     pub truth: Option<MotionTruth>,
     /// What the user should know of this station.
@@ -158,6 +175,12 @@ pub struct MotionTruth {
     pub tilt_x_rms_error_urad: Option<f64>,
     /// Of the tilt about y, in µrad.
     pub tilt_y_rms_error_urad: Option<f64>,
+    /// Of motion along `motion_along_deg`, in µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along_rms_error_um: Option<f64>,
+    /// Of the tilt towards `motion_along_deg`, in µrad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tilt_along_rms_error_urad: Option<f64>,
 }
 
 /// The surface of a [`Summary`].
@@ -232,36 +255,40 @@ fn rms(values: &[f64]) -> f64 {
 pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSummary {
     let separation = &result.separation;
     let known = |value: f64| value.is_finite().then_some(value);
+    let nothing = separation.tells_no_form();
     let sections = separation.sections.iter().enumerate().map(|(section, at)| {
         let unknown = separation.position(Quantity::Form(section));
-        let rms = unknown.filter(|unknown| !separation.is_lost(*unknown)).map_or(f64::NAN, |unknown| {
-            (0.5 * separation.coefficients(unknown).skip(2).map(|value| value.norm_sqr()).sum::<f64>()).sqrt()
-        });
         SectionSummary {
             section: at.id.clone(),
             z_mm: at.z_mm,
-            form_rms_um: rms,
-            form_std_um: unknown.and_then(|unknown| known(separation.angle_std(unknown))),
+            form_rms_um: result.form_rms_um(section).filter(|_| !nothing).map_or(f64::NAN, |(rms_um, _)| rms_um),
+            form_std_um: unknown.filter(|_| !nothing).and_then(|unknown| known(separation.angle_std(unknown))),
             values: result.values.get(section).cloned().unwrap_or_default(),
             truth_form_rms_error_um: true_error(result, Quantity::Form(section)),
         }
     });
     let sections: Vec<_> = sections.collect();
+    let azimuth = separation.azimuth();
     let has_motion = result.truth.as_ref().is_some_and(|truth| truth.motion.is_some());
     StationSummary {
         station: result.station.clone(),
         z_mm: result.z_mm,
         captures: result.profiles.iter().map(|profile| capture_summary(profile, rig)).collect(),
         sections,
+        motion_along_deg: azimuth.map(Azimuth::degrees),
+        readings: if nothing { readings(&result.profiles, rig) } else { Vec::new() },
         motion_values: result.motion_values.clone(),
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),
         chi2_per_dof: known(separation.residual.chi2_per_dof),
+        residual_orders: separation.residual.orders,
         truth: has_motion.then(|| MotionTruth {
             x_rms_error_um: true_error(result, Quantity::X),
             y_rms_error_um: true_error(result, Quantity::Y),
             tilt_x_rms_error_urad: true_error(result, Quantity::TiltX),
             tilt_y_rms_error_urad: true_error(result, Quantity::TiltY),
+            along_rms_error_um: azimuth.and_then(|azimuth| true_error(result, Quantity::Along(azimuth))),
+            tilt_along_rms_error_urad: azimuth.and_then(|azimuth| true_error(result, Quantity::TiltAlong(azimuth))),
         }),
         warnings: separation
             .warnings
@@ -272,11 +299,29 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
     }
 }
 
-fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
-    let setup = rig.and_then(|rig| rig.setups.get(profile.setup)).map_or_else(String::new, |setup| setup.id.clone());
-    let sensor = |index: usize| {
-        rig.and_then(|rig| rig.sensors.get(index)).map_or_else(|| format!("sensor {index}"), |sensor| sensor.id.clone())
+fn setup_id(profile: &Profile, rig: Option<&Rig>) -> String {
+    rig.and_then(|rig| rig.setups.get(profile.setup)).map_or_else(String::new, |setup| setup.id.clone())
+}
+
+fn sensor_id(index: usize, rig: Option<&Rig>) -> String {
+    rig.and_then(|rig| rig.sensors.get(index)).map_or_else(|| format!("sensor {index}"), |sensor| sensor.id.clone())
+}
+
+/// Every channel of every capture.
+fn readings(profiles: &[Profile], rig: Option<&Rig>) -> Vec<ReadingValues> {
+    let of = |profile: &Profile| -> Vec<ReadingValues> {
+        let setup = setup_id(profile, rig);
+        let channels = profile.sensors.iter().enumerate();
+        channels
+            .filter_map(|(channel, sensor)| ReadingValues::of(profile, channel, &setup, &sensor_id(*sensor, rig)))
+            .collect()
     };
+    profiles.iter().flat_map(of).collect()
+}
+
+fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
+    let setup = setup_id(profile, rig);
+    let sensor = |index: usize| sensor_id(index, rig);
     let length =
         |turn: &TurnLength| format!("{:.1} samples long, the median turn has {:.1}", turn.samples, turn.median_samples);
     let reason = |rejection: &Rejection| match rejection {

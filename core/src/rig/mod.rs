@@ -1,5 +1,6 @@
 //! The rig: where the sensors look, and how part and sensors stand in each setup.
 
+mod calibration;
 mod gaps;
 
 use std::collections::HashSet;
@@ -7,6 +8,7 @@ use std::collections::HashSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use calibration::{Calibration, Unit, straightened};
 pub use gaps::Gaps;
 
 use crate::pipeline::error::Fault;
@@ -82,6 +84,40 @@ pub struct SensorConfig {
     #[serde(default = "default_sign")]
     #[schemars(schema_with = "sign_schema")]
     pub sign: i8,
+    /// Unit of the recorded numbers.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub unit: Unit,
+    /// Displacement that one volt stands for, in µm; with `unit = "V"` or `"mV"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub um_per_volt: Option<f64>,
+    /// Reading over displacement: 1.05 where the sensor reads 5 % too much. Readings are divided by it.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub gain: f64,
+    /// Characteristic: reading / gain = u + `quadratic_per_um`·u² + `cubic_per_um2`·u³ for a displacement u in µm, counted from
+    /// the sensor's zero. In 1/µm.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub quadratic_per_um: f64,
+    /// In 1/µm².
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub cubic_per_um2: f64,
+}
+
+impl Default for SensorConfig {
+    /// A sensor without a name at 0°, whose numbers are displacements in µm.
+    fn default() -> Self {
+        Self {
+            id: String::new(),
+            angle_deg: 0.0,
+            z_mm: 0.0,
+            section: default_section(),
+            sign: default_sign(),
+            unit: Unit::default(),
+            um_per_volt: None,
+            gain: one(),
+            quadratic_per_um: 0.0,
+            cubic_per_um2: 0.0,
+        }
+    }
 }
 
 /// One setup as it stands in a file.
@@ -104,6 +140,19 @@ fn default_section() -> String {
 
 fn default_sign() -> i8 {
     1
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, clippy::float_cmp, reason = "serde's signature; 1 as it was written")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 fn sign_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
@@ -140,6 +189,8 @@ pub struct Sensor {
     pub section: usize,
     /// +1 or −1.
     pub sign: f64,
+    /// From its numbers to displacements. Loaders give numbers with their sign; the pipeline calibrates them.
+    pub calibration: Calibration,
 }
 
 /// One clamping of the part.
@@ -188,6 +239,7 @@ impl RigConfig {
             if sensor.sign.abs() != 1 {
                 return Err(fault("sign", format!("the sign must be 1 or -1, found {}", sensor.sign)));
             }
+            let calibration = sensor.calibration().map_err(|fault| fault.under_item("sensors", index))?;
             let section = sections.iter().position(|id| *id == sensor.section).unwrap_or_else(|| {
                 sections.push(sensor.section.clone());
                 sections.len() - 1
@@ -198,6 +250,7 @@ impl RigConfig {
                 z_mm: sensor.z_mm,
                 section,
                 sign: f64::from(sensor.sign),
+                calibration,
             };
             if let Some(first) = sensors.iter().find(|other: &&Sensor| other.section == section)
                 && (first.z_mm - checked.z_mm).abs() > SAME_SECTION_MM

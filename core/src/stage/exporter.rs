@@ -8,6 +8,7 @@ use crate::{
     pipeline::run::{RunInfo, StationResult, Summary},
     straightness::Straightness,
     surface::Surface,
+    table::Table,
 };
 
 /// Writes results to files.
@@ -25,6 +26,11 @@ pub trait Exporter: Send + Sync {
         None
     }
 
+    /// How it writes a model's table; `None` where it has no place for it, so that `check` can refuse it.
+    fn tables(&self) -> Option<&dyn TableExporter> {
+        None
+    }
+
     /// Begins an export. Files appear under their names only when it is finished.
     ///
     /// # Errors
@@ -39,6 +45,18 @@ pub trait StraightnessExporter {
     /// # Errors
     /// When they cannot be written.
     fn write(&self, result: &Straightness, summary: &Summary) -> Result<Vec<PendingFile>>;
+}
+
+/// Writes a table of numbers, all at once.
+pub trait TableExporter {
+    /// The file that a table of this name goes to.
+    fn table_output(&self, name: &str) -> PathBuf;
+
+    /// Completes the files. The run gives them their names when every exporter's are complete.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    fn write_table(&self, table: &Table, summary: &Summary) -> Result<Vec<PendingFile>>;
 }
 
 /// An export under way: stations come in order, one at a time.

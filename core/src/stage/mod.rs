@@ -6,11 +6,11 @@ pub mod preprocessor;
 pub mod separator;
 pub mod simulator;
 
-pub use exporter::{Export, Exporter, StraightnessExporter};
+pub use exporter::{Export, Exporter, StraightnessExporter, TableExporter};
 pub use loader::{Loader, Source, SourceKind};
 pub use preprocessor::{Averager, Conditioner, Preprocessor, Wanted};
 pub use separator::{
     Conclusion, PointModel, PointSeparator, Separator, Shape, Station, StationDiagnosis, StationModel,
-    StationSeparator, TraceSeparator,
+    StationSeparator, TraceDiagnosis, TraceModel, TraceSeparator,
 };
 pub use simulator::Simulator;

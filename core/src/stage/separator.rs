@@ -3,7 +3,7 @@
 use crate::{
     Result,
     model::linear_terms::{LinearFit, LinearTerms},
-    model::{Effect, closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight},
+    model::{Effect, Setting, closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight},
     pipeline::{effects::EffectCatalogue, error::Fault},
     points::Points,
     profile::Profile,
@@ -12,6 +12,7 @@ use crate::{
     spread::Projection,
     straightness::Straightness,
     surface::Surface,
+    table::Table,
 };
 
 /// A separator, by what it takes.
@@ -68,6 +69,13 @@ pub trait StationSeparator: Send + Sync {
 pub trait StationModel: Send + Sync {
     /// What it may lack, at each target.
     fn effects(&self) -> &[Effect];
+
+    /// Lines of TOML that declare an effect in the rig, at the values that are applied ([`Model::changes`]).
+    ///
+    /// [`Model::changes`]: crate::model::Model::changes
+    fn changes(&self, _effect: usize, _applied: &[Setting]) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Runs the loop on all stations at once; `settings` count effects as [`effects`](Self::effects) does.
     ///
@@ -143,6 +151,11 @@ pub trait PointModel: Send + Sync {
     /// When the points do not hold what the model needs.
     fn terms(&self, points: &Points) -> Result<LinearTerms>;
 
+    /// The name of the table that its conclusion gives, where it gives one.
+    fn table(&self) -> Option<&'static str> {
+        None
+    }
+
     /// What the final fit says.
     ///
     /// # Errors
@@ -155,6 +168,8 @@ pub trait PointModel: Send + Sync {
 pub struct Conclusion {
     /// The form by the effects that were found, where there is one.
     pub shape: Option<Shape>,
+    /// Numbers that the effects that were found give of each point, where there are any.
+    pub table: Option<Table>,
     /// What the user should know.
     pub remarks: Vec<String>,
 }
@@ -175,6 +190,38 @@ pub trait TraceSeparator: Send + Sync {
     /// # Errors
     /// When the traces do not hold what the method needs.
     fn separate(&self, points: &Points) -> Result<Straightness>;
+
+    /// Its model for the closed loop, where it has one.
+    fn model(&self) -> Option<&dyn TraceModel> {
+        None
+    }
+}
+
+/// A model of traces along an axis for the closed loop.
+pub trait TraceModel: Send + Sync {
+    /// What it may lack, without targets: these are traces and setups, which the data name.
+    fn effects(&self) -> Vec<Effect>;
+
+    /// What it may lack with these traces, at each target.
+    ///
+    /// # Errors
+    /// When the traces do not hold what the model needs.
+    fn effects_of(&self, points: &Points) -> Result<Vec<Effect>>;
+
+    /// Runs the loop; `settings` count effects as [`effects_of`](Self::effects_of) does.
+    ///
+    /// # Errors
+    /// When the traces do not hold what the model needs.
+    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<TraceDiagnosis>;
+}
+
+/// What the closed loop found, with the straightness of the final model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TraceDiagnosis {
+    /// What was found.
+    pub diagnosis: Diagnosis,
+    /// Straightness of part and slide with the effects added.
+    pub after: Straightness,
 }
 
 /// What a separator is built with besides its own configuration.

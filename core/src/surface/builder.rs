@@ -68,6 +68,12 @@ impl SurfaceBuilder {
         Self { config: config.clone(), ..Self::default() }
     }
 
+    /// Whether all sections that were added lie at one height: then there is no surface.
+    pub(crate) fn is_flat(&self) -> bool {
+        let heights = || self.sections.iter().map(|section| section.z_mm);
+        heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min) <= SAME_Z_MM
+    }
+
     /// What was added.
     pub(crate) fn sections(&self) -> &[Section] {
         &self.sections

@@ -84,6 +84,7 @@ mod tests {
             z_mm: 100.0,
             section: "a".into(),
             sign: 1,
+            ..SensorConfig::default()
         };
         let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
         let mut config = SpindleConfig::new(RigConfig {
@@ -156,7 +157,7 @@ mod tests {
             let lag = &added.parameters[0];
             let truth = TAU * samples as f64 / SAMPLES_PER_REV as f64;
             // Five standard uncertainties: what two seeds never reach by chance.
-            assert!((lag.value - truth).abs() < 5.0 * lag.std, "{lag:?} for {truth}");
+            assert!((lag.value - truth).abs() < 5.0 * lag.std.unwrap(), "{lag:?} for {truth}");
         }
     }
 
@@ -171,7 +172,7 @@ mod tests {
             SpindleModel::new(Selection::whole(&rig), layout, true, vec![Arc::new(ProbeLag)], &[station]).unwrap();
         let declared = model.fit(&[]).unwrap();
         let norm = |vector: &[f64]| vector.iter().map(|value| value * value).sum::<f64>().sqrt();
-        for (effect, Effect { target, .. }) in model.effects().iter().enumerate() {
+        for (effect, Effect { targets, .. }) in model.effects().iter().enumerate() {
             let step = 1e-4;
             let residual = |lag: f64| {
                 let applied = [Setting { effect, values: vec![lag] }];
@@ -182,7 +183,7 @@ mod tests {
             let slope = late.iter().zip(&early).map(|(late, early)| (late - early) / (2.0 * step));
             let off: Vec<f64> = slope.zip(analytic).map(|(slope, analytic)| slope - analytic).collect();
             // 5 %: what exact geometry adds to the linear reading, and the projection's own change (Kaufman).
-            assert!(norm(&off) < 0.05 * norm(analytic), "{target:?}: {} of {}", norm(&off), norm(analytic));
+            assert!(norm(&off) < 0.05 * norm(analytic), "{targets:?}: {} of {}", norm(&off), norm(analytic));
         }
     }
 }

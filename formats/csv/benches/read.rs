@@ -16,8 +16,13 @@ use toml::de::DeTable;
 const ROWS: usize = 300_000;
 
 fn rig() -> Rig {
-    let sensor =
-        |id: &str, angle_deg| SensorConfig { id: id.into(), angle_deg, z_mm: 0.0, section: "a".into(), sign: 1 };
+    let sensor = |id: &str, angle_deg| SensorConfig {
+        id: id.into(),
+        angle_deg,
+        z_mm: 0.0,
+        section: "a".into(),
+        ..SensorConfig::default()
+    };
     RigConfig {
         interruptions: Vec::new(),
         part_radius_mm: 30.0,

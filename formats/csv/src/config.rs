@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use runout_core::{
     Error, Result,
+    marker::Marker,
     measurement::StationKey,
     pipeline::{
         error::{Fault, known_names},
@@ -32,6 +33,9 @@ pub struct CsvConfig {
     pub sample_rate_hz: Option<f64>,
     /// Speed of the spindle as set, in rpm.
     pub speed_rpm: Option<f64>,
+    /// The once-per-turn mark as an analogue trace in a column of its own, instead of a column `index` of 0 and 1: a turn
+    /// begins where it crosses a threshold, between two samples.
+    pub marker: Option<Marker>,
 }
 
 /// An axial station.
@@ -83,6 +87,9 @@ impl StageConfig for CsvConfig {
                 return Err(Fault::at(key, format!("expected a number above 0, found {value}")));
             }
         }
+        if let Some(marker) = &self.marker {
+            marker.check_with(context.rig).map_err(|fault| fault.under("marker"))?;
+        }
         // A pipeline without a rig is refused as a whole, with a better message than could be given here.
         let paths = match (context.rig, &self.pattern) {
             (None, _) => Vec::new(),
@@ -95,7 +102,7 @@ impl StageConfig for CsvConfig {
         Ok(Box::new(CsvLoader {
             stations,
             paths,
-            stated: Stated { sample_rate_hz: self.sample_rate_hz, speed_rpm: self.speed_rpm },
+            stated: Stated { sample_rate_hz: self.sample_rate_hz, speed_rpm: self.speed_rpm, marker: self.marker },
         }))
     }
 }
@@ -167,10 +174,11 @@ fn expanded(
 }
 
 /// What the configuration says of all files.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Stated {
     pub(crate) sample_rate_hz: Option<f64>,
     pub(crate) speed_rpm: Option<f64>,
+    pub(crate) marker: Option<Marker>,
 }
 
 struct CsvLoader {
@@ -187,7 +195,7 @@ impl Loader for CsvLoader {
     fn open(&self, rig: Option<&Rig>) -> Result<Source> {
         let rig = rig.filter(|_| !self.paths.is_empty());
         let rig = rig.ok_or_else(|| Error::new("open", "the CSV files", "recorded turns need a [rig]"))?;
-        let recording = CsvRecording::open(rig, self.stations.clone(), self.paths.clone(), self.stated)?;
+        let recording = CsvRecording::open(rig, self.stations.clone(), self.paths.clone(), self.stated.clone())?;
         Ok(Source::Turns(Box::new(recording)))
     }
 }

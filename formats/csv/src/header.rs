@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use runout_core::{Error, Result, rig::Rig};
+use runout_core::{Error, Result, marker::Marker, pipeline::error::known_names, rig::Rig};
 
 use crate::lines::{Stretch, Stretches, cells};
 
@@ -34,27 +34,32 @@ pub(crate) struct Header {
 pub(crate) enum Phase {
     Index(usize),
     Angle(usize),
+    /// The mark as an analogue trace.
+    Trace(usize),
 }
 
 impl Phase {
     pub(crate) fn column(self) -> usize {
         match self {
-            Self::Index(column) | Self::Angle(column) => column,
+            Self::Index(column) | Self::Angle(column) | Self::Trace(column) => column,
         }
     }
 
     /// What to do where a value cannot be.
     pub(crate) fn help(self) -> &'static str {
         match self {
-            Self::Index(_) => "the mark is 1 while it is up, and 0 otherwise",
+            Self::Index(_) => {
+                "the mark is 1 while it is up, and 0 otherwise; of a trace in volts, name its column and threshold by `marker` in [load]"
+            }
             Self::Angle(_) => "let the angle go on beyond 360° from turn to turn",
+            Self::Trace(_) => "every sample of the mark is needed",
         }
     }
 }
 
 impl Header {
     /// Opens a file and reads its header; gives the stretch that it is in, from the first row on, and those behind.
-    pub(crate) fn open(path: &Path, rig: &Rig) -> Result<(Self, Stretch, Stretches)> {
+    pub(crate) fn open(path: &Path, rig: &Rig, marker: Option<&Marker>) -> Result<(Self, Stretch, Stretches)> {
         let (mut stretches, mut stretch) = (Stretches::open(path)?, Stretch::default());
         let shown = path.display().to_string();
         while stretches.next(&mut stretch)? {
@@ -62,7 +67,7 @@ impl Header {
             let length = lines.ahead().len();
             while let Some(line) = lines.next() {
                 if !line.is_blank() && !line.bytes.starts_with(b"#") {
-                    let header = Self::parse(line.bytes, line.number, shown, rig)?;
+                    let header = Self::parse(line.bytes, line.number, shown, rig, marker)?;
                     let (passed, number) = (length - lines.ahead().len(), lines.number());
                     stretch.pass(passed, number);
                     return Ok((header, stretch, stretches));
@@ -72,7 +77,7 @@ impl Header {
         Err(Error::new("read", shown, "expected a header that names the columns, found none"))
     }
 
-    fn parse(line: &[u8], number: u64, shown: String, rig: &Rig) -> Result<Self> {
+    fn parse(line: &[u8], number: u64, shown: String, rig: &Rig, marker: Option<&Marker>) -> Result<Self> {
         // A decimal comma is no delimiter: a header with semicolons or tabs is split there.
         let delimiter = [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
         let names: Vec<String> = cells(line, delimiter).map(decode).collect();
@@ -96,17 +101,36 @@ impl Header {
                     .help("the header has to name the rig's sensors by their ids")
             })?);
         }
+        let trace = match marker {
+            None => None,
+            Some(marker) => Some(find(&marker.channel)?.ok_or_else(|| {
+                let problem = format!("expected a column `{}` with the mark, found {}", marker.channel, listed(&names));
+                error(problem).help(known_names(&marker.channel, names.iter().map(String::as_str)))
+            })?),
+        };
         let (index, angle, time) = (find(INDEX)?, find(ANGLE)?, find(TIME)?);
         let mut remarks = Vec::new();
-        let phase = match (index, angle) {
-            (None, None) => {
+        if trace.is_some() && trace == time {
+            return Err(error(format!("the column `{TIME}` cannot be the trace of the mark")));
+        }
+        let phase = match (trace, index, angle) {
+            (Some(column), ..) => {
+                for (name, other) in [(INDEX, index), (ANGLE, angle)] {
+                    if other.is_some_and(|other| other != column) {
+                        remarks
+                            .push(format!("{shown}: the trace `{}` was used, not the column `{name}`", names[column]));
+                    }
+                }
+                Phase::Trace(column)
+            }
+            (None, None, None) => {
                 let problem = format!("expected a column `{INDEX}` or `{ANGLE}`, found {}", listed(&names));
-                let help =
-                    "name the column with the once-per-turn mark (0 or 1), or with the encoder's unwrapped angle";
+                let help = "name the column with the once-per-turn mark (0 or 1), or with the encoder's unwrapped angle; of a mark \
+                            in volts, state marker = { channel, threshold, hysteresis } in [load]";
                 return Err(error(problem).help(help));
             }
-            (Some(column), None) => Phase::Index(column),
-            (index, Some(column)) => {
+            (None, Some(column), None) => Phase::Index(column),
+            (None, index, Some(column)) => {
                 if index.is_some() {
                     remarks.push(format!("{shown}: the encoder's angle was used, not the index"));
                 }
@@ -114,7 +138,8 @@ impl Header {
             }
         };
         let known = |name: &&String| {
-            name.is_empty() || [INDEX, ANGLE, TIME].contains(&name.as_str()) || rig.sensor(name).is_some()
+            let named = marker.is_some_and(|marker| marker.channel == **name);
+            name.is_empty() || named || [INDEX, ANGLE, TIME].contains(&name.as_str()) || rig.sensor(name).is_some()
         };
         let unknown = names.iter().filter(|name| !known(name)).cloned().collect();
         Ok(Self { shown, delimiter, names, sensors, phase, time, remarks, unknown })

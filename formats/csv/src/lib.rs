@@ -12,8 +12,10 @@
 //! two the decimal separator may be a comma. An empty cell is a missing reading (NaN). Text is UTF-8 or Latin-1.
 //!
 //! Where `index` goes from 0 to 1, a turn began somewhere between the two samples: half a sample before the first 1 is
-//! the best guess, and it is wrong by up to half a sample. An encoder's angle, or the mark's time in an HDF5 file, is
-//! better.
+//! the best guess, and it is wrong by up to half a sample. An encoder's angle, the mark's time in an HDF5 file, or the mark as
+//! an analogue trace (`marker` in `[load]`), whose crossing of a threshold lies between two samples, is better.
+//!
+//! A file that gzip packed is read as it is.
 
 mod config;
 mod header;

@@ -1,6 +1,12 @@
 //! A text file in stretches of whole lines, and their lines and cells.
 
-use std::{fs::File, io::Read, path::Path};
+use std::{
+    fs::File,
+    io::{Cursor, Read},
+    path::Path,
+};
+
+use flate2::read::MultiGzDecoder;
 
 use runout_core::{Error, Result};
 
@@ -8,10 +14,12 @@ use runout_core::{Error, Result};
 const STRETCH: usize = 1 << 18;
 /// No row of readings is longer; a file without line ends is no table.
 const LONGEST_LINE: usize = 1 << 20;
+/// What a file packed by gzip begins with (RFC 1952).
+const GZIP: [u8; 2] = [0x1F, 0x8B];
 
 /// Reads a file stretch by stretch.
 pub(crate) struct Stretches {
-    file: File,
+    text: Box<dyn Read + Send>,
     shown: String,
     /// The beginning of a line whose end is still to be read.
     rest: Vec<u8>,
@@ -35,8 +43,16 @@ pub(crate) struct Stretch {
 impl Stretches {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let shown = path.display().to_string();
-        let file = File::open(path).map_err(|error| Error::new("open", &shown, error))?;
-        Ok(Self { file, shown, rest: Vec::new(), lines: 0 })
+        let open = || {
+            let mut file = File::open(path)?;
+            let mut first = Vec::new();
+            Read::by_ref(&mut file).take(GZIP.len() as u64).read_to_end(&mut first)?;
+            let is_packed = first == GZIP;
+            let whole = Cursor::new(first).chain(file);
+            Ok(if is_packed { Box::new(MultiGzDecoder::new(whole)) as Box<dyn Read + Send> } else { Box::new(whole) })
+        };
+        let text = open().map_err(|error: std::io::Error| Error::new("open", &shown, error))?;
+        Ok(Self { text, shown, rest: Vec::new(), lines: 0 })
     }
 
     /// Reads the next stretch in place of another one; false at the end.
@@ -73,6 +89,10 @@ impl Stretches {
                 let error = Error::new("read", &self.shown, "expected text in UTF-8 or Latin-1, found UTF-16");
                 return Err(error.help("save it as UTF-8"));
             }
+            if begin.starts_with(b"PK\x03\x04") {
+                let error = Error::new("read", &self.shown, "expected text, found a ZIP archive or a workbook");
+                return Err(error.help("unpack it, or save the sheet as CSV"));
+            }
             if begin.starts_with(&[0xEF, 0xBB, 0xBF]) {
                 *start = 3;
             }
@@ -85,7 +105,7 @@ impl Stretches {
 
     fn read(&mut self, into: &mut [u8]) -> Result<usize> {
         loop {
-            match self.file.read(into) {
+            match self.text.read(into) {
                 Ok(count) => return Ok(count),
                 Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(Error::new("read", &self.shown, error)),

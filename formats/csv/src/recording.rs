@@ -39,7 +39,7 @@ impl CsvRecording {
         let mut remarks = Vec::new();
         let mut unknown: Vec<String> = Vec::new();
         for path in paths.iter().flatten() {
-            let (header, ..) = Header::open(path, rig)?;
+            let (header, ..) = Header::open(path, rig, stated.marker.as_ref())?;
             remarks.extend(header.remarks);
             for name in header.unknown {
                 if !unknown.contains(&name) {
@@ -68,9 +68,10 @@ impl Recording for CsvRecording {
         let (Some(key), Some(path)) = (self.stations.get(station), path) else {
             return Err(Error::new("open", format!("station {station} in setup {setup}"), "there is no such file"));
         };
-        let rows = Rows::open(path, &self.rig)?;
+        let marker = self.stated.marker.as_ref();
+        let rows = Rows::open(path, &self.rig, marker)?;
         let shown = rows.format.header.shown.clone();
-        let mut scan = Scan::of(rows, threads, self.most_kept)?;
+        let mut scan = Scan::of(rows, marker, threads, self.most_kept)?;
         let sample_rate_hz = match (self.stated.sample_rate_hz, scan.sample_rate_hz) {
             (Some(stated), Some(found)) if (found / stated - 1.0).abs() > SAME_RATE => {
                 return Err(Error::new(
@@ -101,7 +102,7 @@ impl Recording for CsvRecording {
         if let Some(kept) = scan.kept.take() {
             return Ok(Box::new(KeptStream { capture, blocks: kept.into_iter(), encoder: scan.encoder }));
         }
-        let rows = Rows::open(path, &self.rig)?;
+        let rows = Rows::open(path, &self.rig, marker)?;
         Ok(Box::new(CsvStream { capture, rows, piece: Piece::default(), encoder: scan.encoder, next: 0 }))
     }
 
@@ -185,8 +186,14 @@ mod tests {
     use super::*;
 
     fn rig() -> Rig {
-        let sensor =
-            |id: &str, sign| SensorConfig { id: id.into(), angle_deg: 0.0, z_mm: 0.0, section: id.into(), sign };
+        let sensor = |id: &str, sign| SensorConfig {
+            id: id.into(),
+            angle_deg: 0.0,
+            z_mm: 0.0,
+            section: id.into(),
+            sign,
+            ..SensorConfig::default()
+        };
         let config = RigConfig {
             interruptions: Vec::new(),
             part_radius_mm: 30.0,
@@ -207,7 +214,7 @@ mod tests {
         let path = folder.path().join("x.csv");
         std::fs::write(&path, text).unwrap();
         let station = StationKey { name: "s".into(), z_mm: 0.0 };
-        let stated = Stated { sample_rate_hz: None, speed_rpm: None };
+        let stated = Stated::default();
         let mut recording = CsvRecording::open(&rig(), vec![station], vec![vec![path]], stated)?;
         recording.most_kept = most_kept;
         let mut stream = recording.open_with(NonZeroUsize::new(threads).unwrap(), 0, 0)?;

@@ -47,7 +47,7 @@ pub(crate) struct Row<'a> {
 /// What a row holds besides readings.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Instant {
-    /// The mark, 0 or 1, or the encoder's angle in degrees.
+    /// The mark, 0 or 1 or its trace, or the encoder's angle in degrees.
     pub(crate) phase: f64,
     /// NaN without such a column.
     pub(crate) time_s: f64,

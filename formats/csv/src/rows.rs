@@ -6,7 +6,7 @@ use std::{
     sync::mpsc::{Receiver, SyncSender, sync_channel},
 };
 
-use runout_core::{Error, Result, rig::Rig};
+use runout_core::{Error, Result, marker::Marker, rig::Rig};
 
 use crate::{
     header::Header,
@@ -65,7 +65,7 @@ impl Piece {
         self.stretch.lines_before() + 1 + row as u64
     }
 
-    /// The mark, 0 or 1, or the encoder's angle in degrees, of each row.
+    /// The mark, 0 or 1 or its trace, or the encoder's angle in degrees, of each row.
     pub(crate) fn phases(&self) -> impl Iterator<Item = f64> {
         self.instants.iter().map(|instant| instant.phase)
     }
@@ -73,8 +73,8 @@ impl Piece {
 
 impl Rows {
     /// Opens a file and reads its header.
-    pub(crate) fn open(path: &Path, rig: &Rig) -> Result<Self> {
-        let (header, next, stretches) = Header::open(path, rig)?;
+    pub(crate) fn open(path: &Path, rig: &Rig, marker: Option<&Marker>) -> Result<Self> {
+        let (header, next, stretches) = Header::open(path, rig, marker)?;
         let roles = Role::of_columns(&header, rig);
         // Where the comma delimits, it cannot be in a number.
         let decimal = (header.delimiter == b',').then_some(b'.');

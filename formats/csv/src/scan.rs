@@ -3,7 +3,12 @@
 
 use std::num::NonZeroUsize;
 
-use runout_core::{Error, Result, encoder::EncoderScan, measurement::Block};
+use runout_core::{
+    Error, Result,
+    encoder::EncoderScan,
+    marker::{Marker, MarkerScan},
+    measurement::Block,
+};
 
 use crate::{
     header::{Header, Phase},
@@ -26,21 +31,17 @@ pub(crate) struct Scan {
 
 impl Scan {
     /// By so many threads; keeps up to so many readings.
-    pub(crate) fn of(rows: Rows, threads: NonZeroUsize, most_kept: usize) -> Result<Self> {
+    pub(crate) fn of(rows: Rows, marker: Option<&Marker>, threads: NonZeroUsize, most_kept: usize) -> Result<Self> {
         let Header { phase, time: time_column, ref shown, .. } = rows.format.header;
         let (shown, channels) = (shown.clone(), rows.format.header.sensors.len());
-        let mut index = IndexScan::default();
-        let mut encoder = matches!(phase, Phase::Angle(_)).then(EncoderScan::default);
+        let mut turns = Turns::new(phase, marker);
         let mut time = TimeScan::default();
         let mut samples: u64 = 0;
         let mut kept = Some(Vec::new());
         let wanted = |lines: u64| lines.saturating_mul(channels as u64) <= most_kept as u64;
         rows.each(threads, wanted, |header, piece| {
             for (row, instant) in piece.instants.iter().enumerate() {
-                let taken = match &mut encoder {
-                    Some(encoder) => encoder.push(instant.phase).map_err(|fault| fault.problem),
-                    None => index.push(instant.phase),
-                };
+                let taken = turns.push(instant.phase);
                 let error = |column, problem| header.error(piece.line(row), column, problem);
                 taken.map_err(|problem| error(phase.column(), problem).help(phase.help()))?;
                 if let Some(column) = time_column {
@@ -51,7 +52,7 @@ impl Scan {
                 (Some(blocks), Some(readings)) => blocks.push(Block {
                     start: samples,
                     samples: readings,
-                    angle_rev: if encoder.is_some() { piece.phases().collect() } else { Vec::new() },
+                    angle_rev: if turns.is_encoder() { piece.phases().collect() } else { Vec::new() },
                     defects: Vec::new(),
                 }),
                 _ => kept = None,
@@ -62,9 +63,49 @@ impl Scan {
         if samples == 0 {
             return Err(Error::new("read", shown, "expected samples below the header, found none"));
         }
-        let marks = encoder.as_ref().map_or(index.marks, |encoder| encoder.marks().to_vec());
+        let (marks, encoder) = turns.marks().map_err(|problem| {
+            Error::new("read", &shown, problem)
+                .help("set `threshold` and `hysteresis` of `marker` in [load] between its levels")
+        })?;
         let kept = kept.map(|blocks| blocks.into_iter().filter(|block| !block.samples.is_empty()).collect());
         Ok(Self { samples, marks, encoder, sample_rate_hz: time.rate_hz(), kept })
+    }
+}
+
+/// Finds where turns begin.
+enum Turns {
+    Index(IndexScan),
+    Encoder(EncoderScan),
+    Trace(MarkerScan),
+}
+
+impl Turns {
+    fn new(phase: Phase, marker: Option<&Marker>) -> Self {
+        match (phase, marker) {
+            (Phase::Trace(_), Some(marker)) => Self::Trace(MarkerScan::new(marker)),
+            (Phase::Angle(_), _) => Self::Encoder(EncoderScan::default()),
+            _ => Self::Index(IndexScan::default()),
+        }
+    }
+
+    fn is_encoder(&self) -> bool {
+        matches!(self, Self::Encoder(_))
+    }
+
+    fn push(&mut self, value: f64) -> std::result::Result<(), String> {
+        match self {
+            Self::Index(index) => index.push(value),
+            Self::Encoder(encoder) => encoder.push(value).map_err(|fault| fault.problem),
+            Self::Trace(trace) => trace.push(value),
+        }
+    }
+
+    fn marks(self) -> std::result::Result<(Vec<f64>, Option<EncoderScan>), String> {
+        Ok(match self {
+            Self::Index(index) => (index.marks, None),
+            Self::Encoder(encoder) => (encoder.marks().to_vec(), Some(encoder)),
+            Self::Trace(trace) => (trace.marks()?, None),
+        })
     }
 }
 

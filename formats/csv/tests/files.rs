@@ -1,10 +1,11 @@
 //! CSV files as programs write them, and as they should not be.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{fmt::Write as _, fs, io::Write as _, path::Path};
 
 use runout_core::{
     Result,
+    marker::{Edge, Marker},
     measurement::{Block, Capture, Recording},
     pipeline::registry::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
@@ -14,7 +15,14 @@ use runout_csv::{CsvConfig, FileConfig, StationConfig};
 
 /// Sensors `S1` and, turned round, `Fühler`.
 fn rig(setups: &[&str]) -> Rig {
-    let sensor = |id: &str, sign| SensorConfig { id: id.into(), angle_deg: 0.0, z_mm: 0.0, section: id.into(), sign };
+    let sensor = |id: &str, sign| SensorConfig {
+        id: id.into(),
+        angle_deg: 0.0,
+        z_mm: 0.0,
+        section: id.into(),
+        sign,
+        ..SensorConfig::default()
+    };
     let setup = |id: &&str| SetupConfig { id: (*id).into(), part_deg: 0.0, sensors_deg: 0.0 };
     let config = RigConfig {
         interruptions: Vec::new(),
@@ -33,6 +41,7 @@ fn config(pattern: Option<&str>) -> CsvConfig {
         files: Vec::new(),
         sample_rate_hz: None,
         speed_rpm: None,
+        marker: None,
     }
 }
 
@@ -265,4 +274,97 @@ fn files_are_found_by_pattern_or_by_list() {
     unknown[2].setup = "tow".into();
     expect(&fault(CsvConfig { files: unknown, ..by_list }), &["no setup `tow`"]);
     expect(&fault(CsvConfig { sample_rate_hz: Some(-1.0), ..by_pattern }), &["above 0"]);
+}
+
+/// A mark in volts: up for some samples each turn; the rising edge passes 2.5 V a quarter of a sample behind each 40th, the falling
+/// one in the middle between two samples.
+fn with_trace(name: &str) -> String {
+    let mut text = format!("S1;{name};Fühler;index\n");
+    for row in 0..4000 {
+        let volts = match row % 40 {
+            0 => 1.75,
+            1 => 4.75,
+            2..=5 => 5.0,
+            _ => 0.0,
+        };
+        writeln!(text, "{row};{};-{row};0", volts.to_string().replace('.', ",")).unwrap();
+    }
+    text
+}
+
+fn read_marked(bytes: impl AsRef<[u8]>, marker: Marker) -> Result<(Capture, Vec<f64>, Vec<String>)> {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("x.csv"), bytes).unwrap();
+    let config = CsvConfig { marker: Some(marker), ..config(Some("x.csv")) };
+    let recording = open(folder.path(), config, &rig(&["one"]))?;
+    let (capture, samples, _) = drain(&*recording)?;
+    Ok((capture, samples, recording.remarks()))
+}
+
+#[test]
+fn marks_are_found_in_an_analogue_trace() {
+    let marker = Marker { channel: "MARK".into(), threshold: 2.5, hysteresis: 0.5, edge: Edge::Rising };
+    for (edge, first) in [(Edge::Rising, 0.25), (Edge::Falling, 5.5)] {
+        let (capture, samples, remarks) = read_marked(with_trace("MARK"), Marker { edge, ..marker.clone() }).unwrap();
+        assert_eq!((capture.samples, capture.marks.len(), samples[2 * 77]), (4000, 100, 77.0));
+        for (turn, mark) in capture.marks.iter().enumerate() {
+            assert!((mark - (40.0 * turn as f64 + first)).abs() < 1e-9, "{mark}");
+        }
+        let remarks = remarks.join("; ");
+        expect(&remarks, &["the trace `MARK` was used, not the column `index`"]);
+        assert!(!remarks.contains("does not name"), "{remarks}");
+    }
+    let refused = |text: String, marker: Marker| read_marked(text, marker).map(|_| ()).unwrap_err().to_string();
+    expect(&refused(with_trace("Mark"), marker.clone()), &["expected a column `MARK` with the mark, found S1, Mark"]);
+    let high = Marker { threshold: 5.5, ..marker.clone() };
+    expect(&refused(with_trace("MARK"), high), &["`MARK`, found 0: it lies from 0 to 5", "5.5"]);
+    let broken = with_trace("MARK").replace("\n1000;1,75", "\n1000;NaN");
+    expect(&refused(broken, marker.clone()), &["x.csv, line 1002, column 2 (`MARK`)", "expected a number"]);
+    // Volts in the column of 0 and 1.
+    let (volts, twice) =
+        (with_trace("index").replacen("index\n", "other\n", 1), with_trace("MARK").replacen("index", "MARK", 1));
+    expect(&refusal(&volts), &["expected 0 or 1, found 1.75"]);
+    expect(&refused(twice, marker), &["the column `MARK` is there twice"]);
+}
+
+#[test]
+fn settings_of_the_trace_are_checked() {
+    let rig = rig(&["one"]);
+    let refused = |marker: Marker| {
+        let config = CsvConfig { marker: Some(marker), ..config(Some("x.csv")) };
+        let checked = config.check(&Context { folder: Path::new(""), rig: Some(&rig) });
+        checked.map(|_| ()).unwrap_err().to_string()
+    };
+    let marker = Marker { channel: "MARK".into(), threshold: 2.5, hysteresis: 0.5, edge: Edge::Rising };
+    expect(&refused(Marker { channel: "S1".into(), ..marker.clone() }), &["`S1` is a sensor of the rig"]);
+    expect(&refused(Marker { hysteresis: -0.5, ..marker.clone() }), &["at least 0, found -0.5"]);
+    expect(&refused(Marker { threshold: f64::NAN, ..marker }), &["finite"]);
+}
+
+fn packed(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packer.write_all(bytes).unwrap();
+    packer.finish().unwrap()
+}
+
+/// As loggers leave it; also several members one after the other, as `cat a.gz b.gz` makes them.
+#[test]
+fn a_file_that_gzip_packed_is_read() {
+    let text = with_trace("other");
+    let plain = read(&text).unwrap();
+    let whole = packed(text.as_bytes());
+    let (one, other) = text.as_bytes().split_at(text.len() / 3);
+    let members = [packed(one), packed(other)].concat();
+    for bytes in [&whole, &members] {
+        let found = read(bytes).unwrap();
+        assert_eq!((found.0.samples, &found.1), (plain.0.samples, &plain.1));
+    }
+    for length in [3, 12, whole.len() / 2, whole.len() - 3] {
+        expect(&refusal(&whole[..length]), &["x.csv"]);
+    }
+    let mut wrong = whole.clone();
+    let middle = wrong.len() / 2;
+    wrong[middle..middle + 8].fill(0xFF);
+    expect(&refusal(&wrong), &["x.csv"]);
+    expect(&refusal(b"PK\x03\x04 and so on"), &["found a ZIP archive"]);
 }

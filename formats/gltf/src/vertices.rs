@@ -5,7 +5,7 @@
 
 use std::io::{self, Write};
 
-use runout_mesh::{COLOUR_STEPS, LANES, Mesh, UNMEASURED, Vertices, in_order, linear, palette, processors};
+use runout_mesh::{COLOUR_STEPS, Cap, LANES, Mesh, UNMEASURED, Vertices, in_order, linear, palette, processors};
 
 /// Bytes from one vertex to the next.
 pub const STRIDE: usize = 32;
@@ -44,8 +44,8 @@ impl Layout {
         let [min, max] =
             [f32::min, f32::max].map(|of| std::array::from_fn(|axis| of(corners[0][axis], corners[1][axis])));
         Self {
-            vertices: rings * angles + caps * (angles + 1),
-            indices: 6 * (rings - 1) * angles + 3 * caps * angles,
+            vertices: rings * angles + caps * Cap::vertex_count(angles),
+            indices: 6 * (rings - 1) * angles + 3 * caps * Cap::triangle_count(angles),
             min,
             max,
         }
@@ -71,7 +71,7 @@ fn y_up([x, y, z]: [f32; 3]) -> [f32; 3] {
     [x, z, -y]
 }
 
-/// Writes the chunk: the wall ring by ring, then each cap's rim and centre, then the triangles.
+/// Writes the chunk: the wall ring by ring, then each cap's own vertices, then the triangles.
 pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     let colours: [[u8; 4]; COLOUR_STEPS] = palette().map(linear_rgba);
     let together = PORTION / (STRIDE * mesh.angles());
@@ -85,7 +85,7 @@ pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     for cap in &caps {
         // glTF has no "not measured": a cap's deviation is 0 and its colour says so.
         let normal = [0.0, 0.0, cap.normal_z];
-        for position_mm in mesh.rim(cap.ring).chain([[0.0, 0.0, cap.z_mm]]) {
+        for position_mm in cap.vertices(mesh) {
             put_vertices(&mut bytes, &Vertices::one(position_mm, normal), &[linear_rgba(UNMEASURED)]);
         }
     }
@@ -102,8 +102,8 @@ pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     bytes.clear();
     let angles = mesh.angles() as u32;
     for (index, cap) in caps.iter().enumerate() {
-        let rim = mesh.rings() as u32 * angles + index as u32 * (angles + 1);
-        let triangles = cap.triangles(angles, rim + angles, rim);
+        let own = mesh.rings() * mesh.angles() + index * Cap::vertex_count(mesh.angles());
+        let triangles = cap.triangles(angles, own as u32);
         triangles.for_each(|triangle| bytes.extend_from_slice(triangle.map(u32::to_le_bytes).as_flattened()));
     }
     to.write_all(&bytes)

@@ -61,7 +61,7 @@ pub struct CaptureReport {
     pub sample_rate_hz: Option<f64>,
     /// Speed, where stated.
     pub speed_rpm: Option<f64>,
-    /// "index" or "angle_deg".
+    /// "index", "angle_deg", or "none": a trace of the mark is known by `marker` in `[load]` only.
     pub phase: &'static str,
     /// Whole turns between the first and the last mark.
     pub turns: usize,
@@ -116,8 +116,10 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
             if kind != LocationType::Group {
                 continue;
             }
-            let source = CaptureSource::open(&group, &place, &station)?;
-            let (marks, _) = source.phase.marks(source.stored.samples)?;
+            let source = CaptureSource::open(&group, &place, &station, None)?;
+            // A trace of the mark is only known by the configuration.
+            let is_known = source.phase.check().is_ok();
+            let marks = if is_known { source.marks()?.0 } else { Vec::new() };
             let capture = CaptureReport {
                 setup: setup.clone(),
                 samples: source.stored.samples,
@@ -125,8 +127,9 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
                 sample_rate_hz: source.stored.sample_rate_hz,
                 speed_rpm: source.speed_rpm,
                 phase: match source.phase {
-                    Phase::Index(..) => "index",
-                    Phase::Angle(..) => "angle_deg",
+                    Phase::Index(_) => "index",
+                    Phase::Angle(_) => "angle_deg",
+                    Phase::Trace(..) | Phase::Unknown(_) => "none",
                 },
                 turns: marks.len().saturating_sub(1),
                 channels: source.stored.sensors,
@@ -146,7 +149,7 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
 
 fn tables(file: &File, place: &Place) -> Result<Vec<TableReport>> {
     let mut tables = Vec::new();
-    for table in ["form", "motion", "harmonics", "straightness"] {
+    for table in ["form", "motion", "harmonics", "straightness", "angle"] {
         if !file.link_exists(table) {
             continue;
         }

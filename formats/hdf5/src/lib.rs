@@ -7,9 +7,14 @@
 //! /<setup>/<station>            z_mm, optionally speed_rpm
 //! /<setup>/<station>/samples    [n, channels] f64, f32, i16 or i32; sensors = ["S1", …], optionally sample_rate_hz
 //! /<setup>/<station>/index      [turns] fractional sample positions of the once-per-turn mark; or
-//! /<setup>/<station>/angle_deg  [n] spindle angle of each sample, unwrapped
+//! /<setup>/<station>/angle_deg  [n] spindle angle of each sample, unwrapped; or
+//! /<setup>/<station>/<channel>  [n] the mark as an analogue trace, also as a channel of the samples: `marker` in `[load]`
 //! /truth/<station>/…            what a simulation declares to be true
 //! ```
+//!
+//! As MATLAB and LabVIEW write it, the same is read as `[channels, n]` (the number of names in `sensors` tells), `[n, 1]` or
+//! `[1, n]`, with names that are padded with blanks or NULs, separated by commas in one text, or in a dataset
+//! `/<setup>/<station>/sensors`, there also as MATLAB's characters or cells.
 //!
 //! The C library behind it is not safe for threads; the `hdf5-metno` crate lets one thread in at a time.
 
@@ -18,6 +23,7 @@ mod inspect;
 mod measurement;
 mod node;
 mod result;
+mod text;
 
 pub use inspect::{CaptureReport, FileReport, StationReport, TableReport, inspect};
 pub use measurement::{

@@ -5,11 +5,11 @@ use std::{fmt, path::Path};
 use hdf5_metno::{
     Attribute, Dataset, File, Group, H5Type, Location,
     dataset::Layout,
-    types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode},
+    types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode},
 };
 use runout_core::{Error, Result};
 
-use crate::heaps;
+use crate::{heaps, text};
 
 /// Where something stands: `shaft.h5:/initial/s01`.
 #[derive(Debug, Clone)]
@@ -28,14 +28,27 @@ impl Place {
         Self { file: self.file.clone(), path: format!("{}{separator}{name}", self.path) }
     }
 
-    pub(crate) fn error(&self, problem: impl ToString) -> Error {
-        Error::new("read", self.to_string(), problem)
+    #[allow(clippy::needless_pass_by_value, reason = "callers give text and errors alike")]
+    pub(crate) fn error(&self, problem: impl fmt::Display) -> Error {
+        Error::new("read", self.to_string(), without_build_paths(&problem.to_string()))
     }
 }
 
 impl fmt::Display for Place {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}:{}", self.file, self.path)
+    }
+}
+
+/// A message without the folder in which the library looks for filters: it is one of the machine that compiled it.
+fn without_build_paths(problem: &str) -> String {
+    match problem.split_once("can't open directory (") {
+        Some((before, after)) => {
+            let after = after.split_once(')').map_or("", |(_, after)| after);
+            let after = after.strip_prefix(". Please verify its existence").unwrap_or(after);
+            format!("{before}the program has no such filter{after}")
+        }
+        None => problem.to_owned(),
     }
 }
 
@@ -82,6 +95,9 @@ pub(crate) fn dataset(parent: &Group, place: &Place, name: &str) -> Result<(Data
     Ok((dataset, place))
 }
 
+/// Of what holds names or settings: a rig has fewer sensors.
+const MOST_ELEMENTS: usize = 65_536;
+
 fn attribute(location: &Location, place: &Place, name: &str) -> Result<Option<Attribute>> {
     let names = location.attr_names().map_err(|error| place.error(error))?;
     if !names.iter().any(|known| known == name) {
@@ -89,10 +105,9 @@ fn attribute(location: &Location, place: &Place, name: &str) -> Result<Option<At
     }
     let at = |problem: String| place.error(format!("attribute `{name}`: {problem}"));
     let attribute = location.attr(name).map_err(|error| at(error.to_string()))?;
-    // No attribute of these formats has more elements than a rig has sensors.
     match attribute.size() {
         0 => Err(at("expected a value, found none".into())),
-        size if size > 65_536 => Err(at(format!("expected at most 65536 elements, found {size}"))),
+        size if size > MOST_ELEMENTS => Err(at(format!("expected at most {MOST_ELEMENTS} elements, found {size}"))),
         _ => Ok(Some(attribute)),
     }
 }
@@ -140,21 +155,20 @@ fn listed(values: &[f64]) -> String {
 pub(crate) fn texts(location: &Location, place: &Place, name: &str) -> Result<Option<Vec<String>>> {
     let Some(attribute) = attribute(location, place, name)? else { return Ok(None) };
     let at = |problem: String| place.error(format!("attribute `{name}`: {problem}"));
-    let found = attribute.dtype().and_then(|dtype| dtype.to_descriptor()).map_err(|error| at(error.to_string()))?;
-    let bytes: hdf5_metno::Result<Vec<Vec<u8>>> = match &found {
-        TypeDescriptor::VarLenUnicode => collect(&attribute, VarLenUnicode::as_bytes),
-        TypeDescriptor::VarLenAscii => collect(&attribute, VarLenAscii::as_bytes),
-        TypeDescriptor::FixedUnicode(size) if *size <= LONGEST_FIXED => {
-            collect(&attribute, FixedUnicode::<LONGEST_FIXED>::as_bytes)
+    text::texts(&attribute, location).map(Some).map_err(at)
+}
+
+/// The texts of a dataset.
+pub(crate) fn texts_of(group: &Group, place: &Place, name: &str) -> Result<Vec<String>> {
+    let (dataset, place) = dataset(group, place, name)?;
+    written_shape(&dataset, &place)?;
+    match dataset.size() {
+        0 => Err(place.error("expected texts, found none")),
+        size if size > MOST_ELEMENTS => {
+            Err(place.error(format!("expected at most {MOST_ELEMENTS} elements, found {size}")))
         }
-        TypeDescriptor::FixedAscii(size) if *size <= LONGEST_FIXED => {
-            collect(&attribute, FixedAscii::<LONGEST_FIXED>::as_bytes)
-        }
-        other => return Err(at(format!("expected text, found {}", type_name(other)))),
-    };
-    let bytes = bytes.map_err(|error| at(error.to_string()))?;
-    let text = |bytes| String::from_utf8(bytes).map_err(|_| at("expected text in UTF-8".into()));
-    bytes.into_iter().map(text).collect::<Result<_>>().map(Some)
+        _ => text::texts(&dataset, group).map_err(|problem| place.error(problem)),
+    }
 }
 
 /// One text of an attribute, where it is there.
@@ -164,12 +178,6 @@ pub(crate) fn text(location: &Location, place: &Place, name: &str) -> Result<Opt
         Some(mut all) if all.len() == 1 => Ok(all.pop()),
         Some(all) => Err(place.error(format!("attribute `{name}`: expected one text, found {}", all.len()))),
     }
-}
-
-const LONGEST_FIXED: usize = 1024;
-
-fn collect<T: H5Type>(attribute: &Attribute, bytes: impl Fn(&T) -> &[u8]) -> hdf5_metno::Result<Vec<Vec<u8>>> {
-    Ok(attribute.read_raw::<T>()?.iter().map(|text| bytes(text).to_vec()).collect())
 }
 
 /// An attribute that has to be there.
@@ -255,6 +263,11 @@ pub(crate) fn put_text(location: &Location, name: &str, text: &str) -> hdf5_metn
 /// Writes an attribute of one element.
 pub(crate) fn put<T: H5Type>(location: &Location, name: &str, value: &T) -> hdf5_metno::Result<()> {
     location.new_attr::<T>().create(name)?.write_scalar(value)
+}
+
+/// The same, unless it is there already.
+pub(crate) fn put_once<T: H5Type>(location: &Location, name: &str, value: &T) -> hdf5_metno::Result<()> {
+    if location.attr(name).is_ok() { Ok(()) } else { put(location, name, value) }
 }
 
 /// Writes an attribute of one element, or one element a channel.

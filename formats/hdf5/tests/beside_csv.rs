@@ -35,6 +35,7 @@ fn load_csv(folder: &Path, memory: &Memory, rig: &Rig) -> Box<dyn Recording> {
         files: Vec::new(),
         sample_rate_hz: Some(TURN as f64),
         speed_rpm: Some(60.0),
+        marker: None,
     };
     let loader = config.check(&Context { folder, rig: Some(rig) }).unwrap();
     match loader.open(Some(rig)).unwrap() {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use runout_core::{
     Error, Result,
+    marker::Marker,
     measurement::{Block, Capture, MemoryStream, Recording, SampleStream, StationKey, StationTruth},
     pipeline::registry::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
@@ -15,7 +16,14 @@ pub const TURN: usize = 50;
 
 /// Two sensors, the second of them turned round, and two setups.
 pub fn rig() -> Rig {
-    let sensor = |id: &str, sign| SensorConfig { id: id.into(), angle_deg: 0.0, z_mm: 0.0, section: id.into(), sign };
+    let sensor = |id: &str, sign| SensorConfig {
+        id: id.into(),
+        angle_deg: 0.0,
+        z_mm: 0.0,
+        section: id.into(),
+        sign,
+        ..SensorConfig::default()
+    };
     let setup = |id: &str| SetupConfig { id: id.into(), part_deg: 0.0, sensors_deg: 0.0 };
     let config = RigConfig {
         interruptions: Vec::new(),
@@ -107,8 +115,13 @@ pub fn write(recording: &Memory, rig: &Rig, path: &Path, options: &WriteOptions)
 }
 
 pub fn load(path: &Path, rig: &Rig) -> Result<Box<dyn Recording>> {
+    load_marked(path, rig, None)
+}
+
+/// The same, with the mark as an analogue trace.
+pub fn load_marked(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Box<dyn Recording>> {
     let context = Context { folder: Path::new(""), rig: Some(rig) };
-    let loader = Hdf5Config { path: path.to_owned() }.check(&context).unwrap();
+    let loader = Hdf5Config { path: path.to_owned(), marker }.check(&context).unwrap();
     match loader.open(Some(rig))? {
         Source::Turns(recording) => Ok(recording),
         Source::Points(_) => Err(Error::new("load", "a measurement", "it gave points")),

@@ -10,7 +10,7 @@ use runout_hdf5::{SampleFormat, Scale, WriteOptions};
 
 use crate::{
     double::{Memory, load, read, rig, write},
-    result,
+    other_programs, result,
 };
 
 /// Runs a script of `tests/foreign`; false where there is no h5py.
@@ -67,6 +67,18 @@ fn h5py_reads_results() {
     let path = folder.path().join("result.h5");
     result::write(&path);
     python("check_result.py", &[&path]);
+}
+
+/// The script that made the files in `data`, as this machine's h5py runs it.
+#[test]
+fn files_as_matlab_and_labview_write_them_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    if !python("write_other_programs.py", &[folder.path()]) {
+        return;
+    }
+    for name in ["matlab", "matlab-one-text", "matlab-cells", "matlab-char-matrix", "labview"] {
+        other_programs::holds_the_readings(&folder.path().join(format!("{name}.h5")), None, 0.25);
+    }
 }
 
 #[test]

@@ -6,5 +6,6 @@ mod damage;
 mod double;
 mod foreign;
 mod mismatch;
+mod other_programs;
 mod result;
 mod round_trip;

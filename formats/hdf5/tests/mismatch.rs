@@ -99,7 +99,7 @@ fn replace_samples<T: hdf5_metno::H5Type + Clone>(file: &File, shape: (usize, us
 fn types_and_shapes_are_checked() {
     expect(&after(false, |file| replace_samples(file, (500, 2), 0_u8)), &["/samples", "i32", "found u8"]);
     expect(&after(false, |file| replace_samples(file, (500, 2), 0_i16)), &["/samples", "`scale`"]);
-    expect(&after(false, |file| replace_samples(file, (500, 3), 0.0)), &["3 channels", "found 2"]);
+    expect(&after(false, |file| replace_samples(file, (500, 3), 0.0)), &["`sensors`", "[500, 3]", "found 2"]);
     expect(&after(false, |file| replace_samples(file, (40, 2), 0.0)), &["/index", "expected", "49.75"]);
     expect(&after(false, |file| replace_samples(file, (500, 2), 0.0)), &["read: "]);
     let line = after(false, |file| {

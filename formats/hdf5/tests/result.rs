@@ -9,6 +9,7 @@ use hdf5_metno::{
 use runout_core::{
     Complex64,
     atomic_file::commit_all,
+    model::diagnosis::Correction,
     pipeline::{
         registry::{Context, StageConfig},
         run::{LostOrders, RunInfo, StationResult, StationSummary, Summary},
@@ -42,6 +43,7 @@ pub fn station(name: &str) -> StationResult {
             variance: vec![0.0, 0.0, f64::NAN, 0.01, 0.04, 0.09],
             observable: vec![true, true, false, true, true, true],
             motion_covariance: None,
+            equivalents: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),
@@ -67,14 +69,24 @@ pub fn summary() -> Summary {
             z_mm: 12.5,
             captures: Vec::new(),
             sections: Vec::new(),
+            motion_along_deg: None,
+            readings: vec![],
             motion_values: Vec::new(),
             residual_rms_um: None,
             expected_residual_rms_um: None,
             chi2_per_dof: None,
+            residual_orders: None,
             truth: None,
             warnings: vec!["left out 3 points".into()],
         }],
         warnings: vec!["order 1 of the form is lost".into()],
+        effects: vec![Correction {
+            effect: "reversal-angle".into(),
+            targets: vec!["b".into()],
+            confounded_with: Vec::new(),
+            parameters: Vec::new(),
+            known: true,
+        }],
         ..Summary::default()
     }
 }
@@ -163,11 +175,14 @@ fn a_result_explains_itself() {
     }
     for name in ["re", "im", "std"] {
         let column = file.dataset(&format!("harmonics/{name}")).unwrap();
-        assert_eq!(text(&column, "unit"), "um; urad for tilt_x, tilt_y");
+        assert_eq!(text(&column, "unit"), "um; urad for tilts");
     }
     assert!(text(&file.dataset("harmonics/std").unwrap(), "meaning").starts_with("sqrt(E|delta|^2)"));
-    let warnings: Vec<String> =
-        column::<VarLenUnicode>(&file, "warnings").iter().map(|text| text.as_str().to_owned()).collect();
+    let lines = |name: &str| -> Vec<String> {
+        column::<VarLenUnicode>(&file, name).iter().map(|text| text.as_str().to_owned()).collect()
+    };
+    let warnings = lines("warnings");
+    assert_eq!(lines("effects"), ["reversal-angle b (declared as known)"]);
     assert_eq!(warnings, ["order 1 of the form is lost", "s1: left out 3 points"]);
 }
 

@@ -4,6 +4,7 @@
 //! ends where asked. A format is a [`Format`]: an extension, a unit and a function that writes one mesh; configuration,
 //! the second, magnified file, notes and atomic files are here.
 
+mod cap;
 mod colour;
 mod config;
 mod export;
@@ -11,9 +12,10 @@ mod mesh;
 mod notes;
 mod portions;
 
+pub use cap::Cap;
 pub use colour::{ColourScale, STEPS as COLOUR_STEPS, UNMEASURED, linear, palette};
 pub use config::MeshConfig;
 pub use export::Format;
-pub use mesh::{Cap, LANES, Mesh, Vertices};
+pub use mesh::{LANES, Mesh, Vertices};
 pub use notes::{InputNote, Notes};
 pub use portions::{in_order, processors};

@@ -10,7 +10,7 @@ use runout_core::{
     surface::Surface,
 };
 
-use crate::colour::ColourScale;
+use crate::{cap::Cap, colour::ColourScale};
 
 /// A surface to be drawn: rings of vertices around z, in mm as measured (z along the spindle).
 ///
@@ -62,29 +62,6 @@ impl Vertices {
     }
 }
 
-/// A flat end, from the axis to a ring. Drawn, not measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cap {
-    /// The ring that it closes.
-    pub ring: usize,
-    /// Where its centre lies on the axis, in mm.
-    pub z_mm: f64,
-    /// Its normal along z: −1 at the first ring, +1 at the last.
-    pub normal_z: f64,
-}
-
-impl Cap {
-    /// Its triangles, counter-clockwise seen from outside; `centre` is the centre's vertex, `rim` the rim's first.
-    pub fn triangles(&self, angles: u32, centre: u32, rim: u32) -> impl Iterator<Item = [u32; 3]> + use<> {
-        let up = self.normal_z > 0.0;
-        (0..angles).map(move |angle| {
-            let here = rim + angle;
-            let next = rim + if angle + 1 == angles { 0 } else { angle + 1 };
-            if up { [centre, here, next] } else { [centre, next, here] }
-        })
-    }
-}
-
 impl<'a> Mesh<'a> {
     /// A surface with its deviations drawn `scale` times larger than they are, coloured up to ±`range_um` or else to
     /// the largest deviation.
@@ -117,7 +94,7 @@ impl<'a> Mesh<'a> {
             );
             return Err(failure(problem).help("lower the magnification"));
         }
-        if surface.deviation_um.len() + 2 * (surface.angles + 1) >= u32::MAX as usize {
+        if surface.deviation_um.len() + 2 * Cap::vertex_count(surface.angles) >= u32::MAX as usize {
             return Err(failure("it has more points than 32 bits can count".into()).help("take fewer angles"));
         }
         let range_um = range_um.unwrap_or(highest.max(-lowest));

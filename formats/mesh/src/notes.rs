@@ -30,6 +30,9 @@ pub struct Notes {
     pub lost_orders: Vec<usize>,
     /// How the rings were filled between the sections.
     pub interpolation: &'static str,
+    /// Effects that the form is corrected for, with their values; none after a run.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<String>,
     /// What the ends are, where they are drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub caps: Option<&'static str>,
@@ -94,6 +97,7 @@ impl Notes {
             band_upr,
             lost_orders: summary.lost_orders.form.iter().filter(within).copied().collect(),
             interpolation: surface.interpolation,
+            effects: summary.effects.iter().map(ToString::to_string).collect(),
             caps: (!mesh.caps().is_empty()).then_some("drawn, not measured: grey"),
             checksum: format!("blake3:{checksum}"),
             checksum_of: "radius_mm, z_mm of each ring, deviation_um [ring][angle], as little-endian f64",
@@ -120,6 +124,7 @@ impl Notes {
             lines.push(format!("lost_orders: {}", orders.join(" ")));
         }
         lines.push(format!("interpolation: {}", self.interpolation));
+        lines.extend(self.effects.iter().map(|effect| format!("corrected_for: {effect}")));
         lines.extend(self.caps.map(|caps| format!("caps: {caps}")));
         lines.push(format!("checksum: {} ({})", self.checksum, self.checksum_of));
         lines.push(format!("program: {}", self.program));

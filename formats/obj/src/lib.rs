@@ -17,7 +17,7 @@ use runout_core::{
     },
     stage::Exporter,
 };
-use runout_mesh::{COLOUR_STEPS, Format, Mesh, MeshConfig, Notes, UNMEASURED, in_order, palette, processors};
+use runout_mesh::{COLOUR_STEPS, Cap, Format, Mesh, MeshConfig, Notes, UNMEASURED, in_order, palette, processors};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -46,9 +46,10 @@ pub fn register(registry: &mut Registry) {
 
 /// Rings that one thread writes out at a time: a megabyte of text with 2560 angles.
 const TOGETHER: usize = 4;
+
 /// Writes comments, vertices with their normals ring by ring, and triangles band by band.
 ///
-/// A cap shares the rim's vertices, so that the solid is closed by its very indices, and has a normal of its own.
+/// Each vertex has one normal, of the same number: readers that tell vertices apart by both find the same solid.
 fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
     let mut bytes = Vec::new();
     let mut text = Text::behind(&mut bytes);
@@ -74,30 +75,33 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
     let mut bytes = Vec::new();
     let mut text = Text::behind(&mut bytes);
     for cap in &caps {
-        text.raw("v").vector([0.0, 0.0, cap.z_mm]).raw(&colour_text(UNMEASURED));
-        text.raw("vn").vector([0.0, 0.0, cap.normal_z]).raw("\n");
+        for position_mm in cap.vertices(mesh) {
+            text.raw("v").vector(position_mm).raw(&colour_text(UNMEASURED));
+            text.raw("vn").vector([0.0, 0.0, cap.normal_z]).raw("\n");
+        }
     }
     file.write_all(&bytes)?;
     in_order(mesh.rings() - 1, TOGETHER, processors(), file, |ring, bytes| {
         let mut text = Text::behind(bytes);
-        for triangle in mesh.band(ring).flatten() {
-            // OBJ counts from 1.
-            let [a, b, c] = triangle.map(|vertex| vertex + 1);
-            text.raw("f").corner(a, a).corner(b, b).corner(c, c).raw("\n");
-        }
+        mesh.band(ring).flatten().for_each(|triangle| face(&mut text, triangle));
     })?;
     let mut bytes = Vec::new();
     let mut text = Text::behind(&mut bytes);
     let angles = mesh.angles() as u32;
-    let wall = mesh.rings() as u32 * angles;
     for (index, cap) in caps.iter().enumerate() {
-        let centre = wall + index as u32;
-        for triangle in cap.triangles(angles, centre, cap.ring as u32 * angles) {
-            let [a, b, c] = triangle.map(|vertex| vertex + 1);
-            text.raw("f").corner(a, centre + 1).corner(b, centre + 1).corner(c, centre + 1).raw("\n");
-        }
+        let own = mesh.rings() * mesh.angles() + index * Cap::vertex_count(mesh.angles());
+        cap.triangles(angles, own as u32).for_each(|triangle| face(&mut text, triangle));
     }
     file.write_all(&bytes)
+}
+
+/// A triangle's line. OBJ counts from 1.
+fn face(text: &mut Text, triangle: [u32; 3]) {
+    text.raw("f");
+    for vertex in triangle {
+        text.corner(vertex + 1, vertex + 1);
+    }
+    text.raw("\n");
 }
 
 /// Names of objects hold no blanks.

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use runout_core::{
+    azimuth::Azimuth,
     numerics::fourier,
     pipeline::run::{StationResult, Summary},
     provenance::Provenance,
@@ -18,6 +19,7 @@ pub struct Content {
     level_known: bool,
     highest_order: usize,
     highest_on_angles: usize,
+    line: Option<Azimuth>,
 }
 
 impl Content {
@@ -29,6 +31,7 @@ impl Content {
             lost.extend(separation.lost_orders(unknown));
             self.level_known |= separation.coefficients(unknown).next().is_some_and(|level| level.re != 0.0);
         }
+        self.line = self.line.or(separation.azimuth());
         let highest = separation.max_order();
         self.highest_order = self.highest_order.max(highest);
         self.highest_on_angles = self.highest_on_angles.max(highest.min(fourier::max_order(result.angles)));
@@ -46,6 +49,7 @@ impl Content {
             ("band_over_angle_upr", json!([lowest, self.highest_on_angles]).to_string()),
         ];
         entries.extend(own.map(named));
+        entries.extend(self.line.map(|line| named(("motion_along_deg", json!(line.degrees()).to_string()))));
         entries
     }
 }
@@ -53,7 +57,9 @@ impl Content {
 /// What every file says of itself.
 pub fn common(summary: &Summary, convention: &str) -> Vec<(String, String)> {
     let warnings: Vec<String> = summary.all_warnings().collect();
-    entries(&summary.title, &summary.provenance, convention, &warnings)
+    let mut entries = entries(&summary.title, &summary.provenance, convention, &warnings);
+    entries.push(named(("effects", json!(summary.effects).to_string())));
+    entries
 }
 
 /// The same, of what is no run.

@@ -4,15 +4,11 @@ use std::{collections::HashMap, iter::repeat_n, sync::Arc};
 
 use arrow_array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt32Array};
 use arrow_schema::{DataType, Field, Schema};
-use runout_core::{pipeline::run::StationResult, separation::Quantity};
-
-/// Motions in the order of their columns, with those columns' names.
-const MOTIONS: [(Quantity, &str, &str); 4] = [
-    (Quantity::X, "x_um", "error motion along x"),
-    (Quantity::Y, "y_um", "error motion along y"),
-    (Quantity::TiltX, "tilt_x_urad", "tilt about x, right-handed"),
-    (Quantity::TiltY, "tilt_y_urad", "tilt about y, right-handed"),
-];
+use runout_core::{
+    azimuth::Azimuth,
+    pipeline::run::StationResult,
+    separation::{ALONG_COLUMN, MotionColumn, Quantity, motion_columns},
+};
 
 pub(super) fn column(name: &str, kind: DataType, nullable: bool, unit: &str, meaning: &str) -> Field {
     let about = [("unit", unit), ("meaning", meaning)].map(|(key, value)| (key.to_owned(), value.to_owned()));
@@ -58,27 +54,32 @@ pub fn form(result: &StationResult) -> Vec<ArrayRef> {
     ]
 }
 
-/// Columns of `motion.parquet`.
-pub fn motion_schema() -> Schema {
+/// Columns of `motion.parquet`; `line` is that of the motion, where that is neither x nor y.
+pub fn motion_schema(line: Option<Azimuth>) -> Schema {
     let mut fields =
         vec![text("station", false, "name of the axial station"), number("angle_deg", "deg", "the spindle's angle")];
-    let value = |(quantity, name, meaning): (Quantity, &str, &str)| {
-        let meaning = format!("{meaning}; orders that are lost are left out; null where it was not solved for");
+    let (name, unit, meaning) = ALONG_COLUMN;
+    fields.extend(line.map(|_| number(name, unit, meaning)));
+    let motions = motion_columns(line);
+    let value = |MotionColumn { quantity, name, about }: &MotionColumn| {
+        let meaning = format!("{about}; orders that are lost are left out; null where it was not solved for");
         column(name, DataType::Float64, true, quantity.unit(), &meaning)
     };
-    let uncertainty = |(quantity, name, _): (Quantity, &str, &str)| {
+    let uncertainty = |MotionColumn { quantity, name, .. }: &MotionColumn| {
         let meaning = format!("standard uncertainty of {name} at any one angle, from the scatter; NaN if not known");
         column(&format!("std_{name}"), DataType::Float64, true, quantity.unit(), &meaning)
     };
-    fields.extend(MOTIONS.map(value));
-    fields.extend(MOTIONS.map(uncertainty));
+    fields.extend(motions.iter().map(value));
+    fields.extend(motions.iter().map(uncertainty));
     Schema::new(fields)
 }
 
 /// One station's rows of `motion.parquet`.
 pub fn motion(result: &StationResult) -> Vec<ArrayRef> {
     let angles = result.angles;
-    let unknowns = MOTIONS.map(|(quantity, _, _)| result.separation.position(quantity));
+    let line = result.separation.azimuth();
+    let motions = motion_columns(line).into_iter();
+    let unknowns: Vec<Option<usize>> = motions.map(|motion| result.separation.position(motion.quantity)).collect();
     let or_nulls = |values: Option<ArrayRef>| values.unwrap_or_else(|| Arc::new(Float64Array::new_null(angles)));
     let value = |unknown: Option<usize>| or_nulls(unknown.map(|unknown| numbers(result.over_angle(unknown))));
     let uncertainty = |unknown: Option<usize>| {
@@ -88,8 +89,9 @@ pub fn motion(result: &StationResult) -> Vec<ArrayRef> {
         Arc::new(StringArray::from_iter_values(repeat_n(result.station.as_str(), angles))),
         numbers(angles_deg(angles)),
     ];
-    columns.extend(unknowns.map(value));
-    columns.extend(unknowns.map(uncertainty));
+    columns.extend(line.map(|line| numbers(repeat_n(line.degrees(), angles))));
+    columns.extend(unknowns.iter().copied().map(value));
+    columns.extend(unknowns.iter().copied().map(uncertainty));
     columns
 }
 
@@ -97,7 +99,7 @@ pub fn motion(result: &StationResult) -> Vec<ArrayRef> {
 pub fn harmonics_schema() -> Schema {
     const UNIT: &str = "um; urad for tilt";
     Schema::new(vec![
-        text("quantity", false, "form, x, y, tilt_x or tilt_y"),
+        text("quantity", false, "form, x, y, tilt_x, tilt_y, along or tilt_along"),
         text("section", true, "id of the section; null for motion"),
         text("station", false, "name of the axial station"),
         column("order", DataType::UInt32, false, "1/rev", "undulations per revolution"),
@@ -147,7 +149,7 @@ pub fn harmonics(result: &StationResult) -> Vec<ArrayRef> {
     ]
 }
 
-fn angles_deg(angles: usize) -> impl Iterator<Item = f64> {
+pub(super) fn angles_deg(angles: usize) -> impl Iterator<Item = f64> {
     (0..angles).map(move |index| 360.0 * index as f64 / angles as f64)
 }
 

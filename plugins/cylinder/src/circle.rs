@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use runout_core::Complex64;
 
 use crate::{
-    least_squares,
+    least_squares::{Factored, Solution},
     robust::{Fence, correlation_factor, rms},
     scan::Scan,
 };
@@ -14,65 +14,145 @@ use crate::{
 /// Harmonics cₙ of a circle, deviation = Re Σ cₙ e^{+inα}.
 #[derive(Debug, Clone)]
 pub struct Harmonics {
-    /// From order 0, in µm.
+    /// From order 0 to the highest that the points carry, in µm.
     pub coefficients: Vec<Complex64>,
     /// Variance E|δ|² of each, in µm².
     pub variance: Vec<f64>,
-    /// Root mean square of what is left, in µm.
+    /// Along a helix: a height, in mm, and about it the change along z of level, cosine and sine at 1/rev, in µm per mm, and the
+    /// bend of the level, in µm per mm².
+    pub slopes: Option<(f64, [f64; SLOPES])>,
+    /// Variance of the level's slope in (µm/mm)², and of its bend in (µm/mm²)².
+    pub level_variance: [f64; 2],
+    /// Why orders above these are not observable, where more were asked for.
+    pub limit: Option<String>,
+    /// Root mean square of the residual, in µm.
     pub residual_rms_um: f64,
     /// Points less parameters.
     pub dof: usize,
 }
 
-/// Noise of a harmonic beside that of evenly spread points at which a circle no longer bears it.
+/// Noise of a harmonic beside that of evenly spread points above which an order is not observable.
 const WORST_NOISE_GAIN: f64 = 10.0;
+/// The lowest order of roundness: a circle that does not carry it has no form.
+const LOWEST_ORDER: usize = 2;
+/// Slopes along z of level, cosine and sine, and the bend of the level.
+const SLOPES: usize = 4;
 
 impl Harmonics {
-    /// Least squares of orders 0 to `max_order`; points measured twice, where a circle overlaps itself, count twice.
+    /// Least squares of orders 0 to `max_order`, or to the highest order that the points carry: an arc without points makes
+    /// high orders indistinguishable from low ones. Points measured twice, where a circle overlaps itself, count twice.
+    /// On turns of a helix (`about_mm`), level and centre change along z about that height: the centre linearly, the level with a bend.
     ///
     /// The variance is the residual's, raised by its correlation along the trace. Errors that vary more slowly than
     /// the highest order (drift, thermal growth, the machine's own geometry) are inside the harmonics, where nothing
-    /// tells them from form: they are not in the variance.
+    /// separates them from form: they are not in the variance.
     ///
     /// # Errors
-    /// What hinders the fit, in words.
-    pub fn fit(scan: &Scan, max_order: usize) -> Result<Self, String> {
-        let columns = 2 * max_order + 1;
+    /// When the points carry no order of roundness, in words.
+    pub fn fit(scan: &Scan, max_order: usize, about_mm: Option<f64>) -> Result<Self, String> {
+        let slopes = if about_mm.is_some() { SLOPES } else { 0 };
         let points = scan.len();
-        if points <= columns {
-            return Err(format!(
-                "{points} points cannot tell orders 0 to {max_order}, which have {columns} parameters"
-            ));
+        let most = points.saturating_sub(slopes + 2) / 2;
+        let highest = max_order.min(most);
+        if highest < LOWEST_ORDER {
+            return Err(format!("{points} points do not determine orders 0 to {LOWEST_ORDER}"));
         }
-        let basis = DMatrix::from_fn(points, columns, |row, column| basis(scan.angle_rad[row], column));
+        let matrix = DMatrix::from_fn(points, slopes + 2 * highest + 1, |row, column| {
+            let (angle, z) = (scan.angle_rad[row], scan.z_mm[row]);
+            match about_mm {
+                Some(about) if column < SLOPES => along(angle, z - about, column),
+                _ => basis(angle, column - slopes),
+            }
+        });
         let right = DVector::from_column_slice(&scan.deviation_um);
-        let unbearable = || {
+        let factored = Factored::new(matrix.clone(), right.clone());
+        let (order, found) = carried(&factored, points, slopes, highest).ok_or_else(|| {
             let [from, to] = widest_gap_deg(&scan.angle_rad);
-            format!("its points cannot tell orders 0 to {max_order}; there is none between {from:.2}° and {to:.2}°")
-        };
-        let found = least_squares::solve(basis.clone(), right.clone()).ok_or_else(unbearable)?;
-        // Evenly spread points give each cosine and sine the variance 2/n.
-        let worst = found.unit_variance.iter().fold(0.0_f64, |worst, variance| worst.max(*variance));
-        if worst * points as f64 / 2.0 > WORST_NOISE_GAIN * WORST_NOISE_GAIN {
-            return Err(unbearable());
-        }
-        let residual = right - &basis * DVector::from_column_slice(&found.values);
+            format!(
+                "its points do not determine orders 0 to {LOWEST_ORDER}; there is none between {from:.2}° and {to:.2}°"
+            )
+        })?;
+        let limit = (order < max_order).then(|| limit(scan, order, highest));
+        let columns = slopes + 2 * order + 1;
+        let residual = right - matrix.columns(0, columns) * DVector::from_column_slice(&found.values);
         let dof = points - columns;
         let variance = residual.norm_squared() / dof as f64 * correlation_factor(residual.as_slice());
-        let level = (Complex64::from(found.values[0]), variance * found.unit_variance[0]);
-        let pairs = found.values[1..].chunks_exact(2).zip(found.unit_variance[1..].chunks_exact(2));
+        let (sloped, values) = found.values.split_at(slopes);
+        let (sloped_unit, unit) = found.unit_variance.split_at(slopes);
+        let level = (Complex64::from(values[0]), variance * unit[0]);
+        let pairs = values[1..].chunks_exact(2).zip(unit[1..].chunks_exact(2));
         // a cos nα + b sin nα = Re (a − ib) e^{inα}.
         let orders = pairs.map(|(value, unit)| (Complex64::new(value[0], -value[1]), variance * (unit[0] + unit[1])));
-        let (coefficients, variance) = std::iter::once(level).chain(orders).unzip();
-        Ok(Self { coefficients, variance, residual_rms_um: rms(residual.iter().copied()), dof })
+        let (coefficients, order_variance) = std::iter::once(level).chain(orders).unzip();
+        Ok(Self {
+            coefficients,
+            variance: order_variance,
+            slopes: about_mm.zip(<[f64; SLOPES]>::try_from(sloped).ok()),
+            level_variance: [0, SLOPES - 1].map(|slope| variance * sloped_unit.get(slope).copied().unwrap_or(0.0)),
+            limit,
+            residual_rms_um: rms(residual.iter().copied()),
+            dof,
+        })
     }
 
-    /// Their sum at an angle, in µm.
+    /// The highest order.
     #[must_use]
-    pub fn value_um(&self, angle_rad: f64) -> f64 {
-        let terms = self.coefficients.iter().enumerate();
-        terms.map(|(order, value)| (value * Complex64::cis(order as f64 * angle_rad)).re).sum()
+    pub fn max_order(&self) -> usize {
+        self.coefficients.len() - 1
     }
+
+    /// Their sum at a place, in µm.
+    #[must_use]
+    pub fn value_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
+        let terms = self.coefficients.iter().enumerate();
+        let at_height: f64 = terms.map(|(order, value)| (value * Complex64::cis(order as f64 * angle_rad)).re).sum();
+        at_height + self.sloped_um(angle_rad, z_mm)
+    }
+
+    /// What the slopes add at a place, in µm.
+    #[must_use]
+    pub fn sloped_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
+        let Some((about_mm, slopes)) = self.slopes else { return 0.0 };
+        slopes.iter().enumerate().map(|(column, slope)| slope * along(angle_rad, z_mm - about_mm, column)).sum()
+    }
+}
+
+/// The highest order up to `highest` whose model has no harmonic of more than [`WORST_NOISE_GAIN`], and its solution. More
+/// orders never lower a variance, so that halving finds it.
+fn carried(factored: &Factored, points: usize, slopes: usize, highest: usize) -> Option<(usize, Solution)> {
+    let solve = |order: usize| {
+        let found = factored.leading(slopes + 2 * order + 1)?;
+        let worst = found.unit_variance[slopes..].iter().fold(0.0_f64, |worst, variance| worst.max(*variance));
+        // Evenly spread points give each cosine and sine the variance 2/n.
+        (worst * points as f64 / 2.0 <= WORST_NOISE_GAIN * WORST_NOISE_GAIN).then_some((order, found))
+    };
+    if let Some(all) = solve(highest) {
+        return Some(all);
+    }
+    let mut best = solve(LOWEST_ORDER)?;
+    let (mut low, mut high) = (LOWEST_ORDER, highest);
+    while high - low > 1 {
+        let middle = usize::midpoint(low, high);
+        match solve(middle) {
+            Some(found) => (low, best) = (middle, found),
+            None => high = middle,
+        }
+    }
+    Some(best)
+}
+
+/// Why orders above `order` are not observable.
+fn limit(scan: &Scan, order: usize, highest: usize) -> String {
+    if order == highest {
+        return format!("orders above {order} are not observable: it has {} points", scan.len());
+    }
+    let [from, to] = widest_gap_deg(&scan.angle_rad);
+    format!("orders above {order} are not observable: there is no point between {from:.2}° and {to:.2}°")
+}
+
+/// Columns t, t cos α, t sin α, t² of the height t from the middle.
+fn along(angle_rad: f64, arm_mm: f64, column: usize) -> f64 {
+    if column + 1 < SLOPES { arm_mm * basis(angle_rad, column) } else { arm_mm * arm_mm }
 }
 
 /// Columns 1, cos α, sin α, cos 2α, sin 2α …
@@ -90,6 +170,8 @@ pub struct Cleaned {
     pub distance_um: Vec<f64>,
     /// Distance from which points were left out, in µm.
     pub limit_um: f64,
+    /// Highest order of that fit.
+    pub max_order: usize,
 }
 
 /// More rounds than any circle needs; one whose borderline points alternate stops here.
@@ -102,20 +184,28 @@ impl Cleaned {
     ///
     /// # Errors
     /// What hinders the fit, in words.
-    pub fn of(scan: &Scan, max_order: usize, deviations: f64) -> Result<Self, String> {
+    pub fn of(scan: &Scan, max_order: usize, about_mm: Option<f64>, deviations: f64) -> Result<Self, String> {
         let mut kept = vec![true; scan.len()];
         for round in 1.. {
-            let fit = Harmonics::fit(&scan.keep(&kept), max_order)?;
+            let fit = Harmonics::fit(&scan.keep(&kept), max_order, about_mm)?;
             let distance_um: Vec<f64> =
-                scan.iter().map(|(angle, _, deviation)| deviation - fit.value_um(angle)).collect();
+                scan.iter().map(|(angle, z, deviation)| deviation - fit.value_um(angle, z)).collect();
             let fence = Fence::around(&distance_um, deviations);
             let next: Vec<bool> = distance_um.iter().map(|distance| fence.holds(*distance)).collect();
             if next == kept || round == ROUNDS {
-                return Ok(Self { kept, distance_um, limit_um: fence.distance });
+                return Ok(Self { kept, distance_um, limit_um: fence.distance, max_order: fit.max_order() });
             }
             kept = next;
         }
         Err("its outliers never settle".into())
+    }
+
+    /// The same for some consecutive points.
+    #[must_use]
+    pub fn range(self, start: usize, count: usize) -> Self {
+        let kept = self.kept.into_iter().skip(start).take(count).collect();
+        let distance_um = self.distance_um.into_iter().skip(start).take(count).collect();
+        Self { kept, distance_um, ..self }
     }
 
     /// Number of points left out.
@@ -183,7 +273,7 @@ mod tests {
 
     #[test]
     fn harmonics_on_uneven_overlapping_angles() {
-        let found = Harmonics::fit(&measured(|_| 0.0), 20).unwrap();
+        let found = Harmonics::fit(&measured(|_| 0.0), 20, None).unwrap();
         let expected = |order: usize| match order {
             0 => Complex64::from(0.4),
             1 => Complex64::from_polar(0.3, -1.0),
@@ -207,11 +297,11 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
-        let truth = Harmonics::fit(&measured(|_| 0.0), 20).unwrap();
+        let truth = Harmonics::fit(&measured(|_| 0.0), 20, None).unwrap();
         let (mut square, mut stated) = (0.0, 0.0);
         for _ in 0..40 {
             let noise: Vec<f64> = (0..700).map(|_| uniform()).collect();
-            let found = Harmonics::fit(&measured(|index| noise[index]), 20).unwrap();
+            let found = Harmonics::fit(&measured(|index| noise[index]), 20, None).unwrap();
             for order in 4..19 {
                 square += (found.coefficients[order] - truth.coefficients[order]).norm_sqr();
                 stated += found.variance[order];
@@ -226,23 +316,41 @@ mod tests {
     fn a_probe_that_swings_in_and_lifts_off_is_left_out() {
         let ripple = |index: usize| 0.05 * ((index * 7919 % 101) as f64 / 50.0 - 1.0);
         let scan = measured(|index| ripple(index) + if index < 4 || index == 699 { -30.0 } else { 0.0 });
-        let cleaned = Cleaned::of(&scan, 20, 5.0).unwrap();
+        let cleaned = Cleaned::of(&scan, 20, None, 5.0).unwrap();
         assert_eq!(cleaned.left_out(), 5);
         let stretches = cleaned.stretches(&scan);
         assert_eq!(stretches.iter().map(|stretch| stretch.2).collect::<Vec<_>>(), [4, 1]);
-        let clean = Cleaned::of(&measured(|_| 0.0), 20, 5.0).unwrap();
+        let clean = Cleaned::of(&measured(|_| 0.0), 20, None, 5.0).unwrap();
         assert_eq!(clean.left_out(), 0, "data without noise has no outliers");
     }
 
     #[test]
-    fn what_a_circle_cannot_tell_is_refused_with_the_place() {
+    fn an_arc_without_points_limits_the_orders() {
         let scan = measured(|_| 0.0);
-        let half: Vec<bool> = scan.angle_rad.iter().map(|angle| (1.0..5.0).contains(angle)).collect();
-        let message = Harmonics::fit(&scan.keep(&half), 20).unwrap_err();
-        // From 5 rad, 286.5° or −73.5°, to 1 rad, 57.3°, within one step of 0.5°.
-        assert!(message.contains("between -73.") && message.contains("and 57."), "{message}");
-        let few: Vec<bool> = (0..700).map(|index| index < 30).collect();
-        assert!(Harmonics::fit(&scan.keep(&few), 20).unwrap_err().contains("30 points"));
-        assert!(Harmonics::fit(&Scan::default(), 20).is_err());
+        let fit = |from: f64, to: f64, max_order: usize| {
+            let kept: Vec<bool> = scan.angle_rad.iter().map(|angle| (from..to).contains(angle)).collect();
+            Harmonics::fit(&scan.keep(&kept), max_order, None)
+        };
+        // A tenth of the circle without points carries fewer orders than 20, and the reason has its place.
+        let most = fit(0.7, 6.2, 20).unwrap();
+        let limit = most.limit.clone().unwrap();
+        assert!((4..20).contains(&most.max_order()), "{limit}");
+        assert!(limit.contains("between -4.") && limit.contains("and 40."), "{limit}");
+        // It is the highest order of which no harmonic has more than ten times the noise of even points.
+        let gain = |order: usize| {
+            let columns = 2 * order + 1;
+            let rows: Vec<f64> = scan.angle_rad.iter().copied().filter(|angle| (0.7..6.2).contains(angle)).collect();
+            let matrix = DMatrix::from_fn(rows.len(), columns, |row, column| basis(rows[row], column));
+            let inverse = (matrix.transpose() * &matrix).try_inverse().unwrap();
+            (inverse.diagonal().max() * rows.len() as f64 / 2.0).sqrt()
+        };
+        assert!(gain(most.max_order()) <= 10.0 && gain(most.max_order() + 1) > 10.0);
+        assert!(fit(0.7, 6.2, 3).unwrap().limit.is_none(), "three lobes are carried");
+        let few: Vec<bool> = (0..700).map(|index| index % 24 == 0).collect();
+        let few = Harmonics::fit(&scan.keep(&few), 20, None).unwrap();
+        assert_eq!((few.max_order(), few.limit.unwrap().contains("it has 30 points")), (14, true));
+        let message = fit(1.0, 2.0, 20).unwrap_err();
+        assert!(message.contains("between 114.") && message.contains("and 417."), "{message}");
+        assert!(Harmonics::fit(&Scan::default(), 20, None).is_err());
     }
 }

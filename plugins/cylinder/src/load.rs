@@ -33,4 +33,4 @@ impl StageConfig for CylinderTracesConfig {
     }
 }
 
-const COLUMNS: Columns = Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"] };
+const COLUMNS: Columns = Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"], optional: &[] };

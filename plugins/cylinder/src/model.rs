@@ -1,14 +1,16 @@
 //! The cylinder for the closed loop: the radius is declared, all else may be missing.
 //!
-//! With the angle α and the arm t = z − z₀ from the middle of the points, the deviation from the nominal radius is, to first
-//! order,
+//! With the angle α and the arm t = z − z₀ about the fitted axis, the distance from the nominal radius is
 //!
 //! d = r + x cos α + y sin α + t (ϕ_y cos α − ϕ_x sin α) + k t + m (t² − t̄²) + Σ_n (a_n cos nα + b_n sin nα):
 //!
-//! radius, eccentricity, tilt, taper, barrel, lobes. What first order leaves out is e²/(2R) of the axis's offset e.
+//! radius, eccentricity, tilt, taper, barrel, lobes. The points are placed about the least-squares axis first, exactly, and
+//! only its first-order run-out is added again: so the linear model has no error of second order where it is fitted.
+
+use std::f64::consts::TAU;
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Result,
     model::{
         Effect, Fit, Parameter,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term, Unseen},
@@ -22,10 +24,11 @@ use crate::{
     robust::correlation_factor,
     scan::Scan,
     separate::{Circle, LeastSquaresCylinder},
+    shape::Cylinder,
 };
 
-/// Lobes that may be missing.
-const LOBES: std::ops::RangeInclusive<usize> = 2..=8;
+/// Arcs of a single circle that are left out one after the other: shorter than half a wave of the lobes.
+const ARCS: usize = 36;
 
 /// Place, size, form: each counts from those before.
 const PLACE: usize = 0;
@@ -42,13 +45,13 @@ struct Missing {
     rank: usize,
 }
 
-/// The effects; `mean_square` is the mean of the squared arms, in mm².
-fn missing(mean_square: f64) -> Vec<Missing> {
+/// The effects, with lobes to an order; `mean_square` is the mean of the squared arms, in mm².
+fn missing(max_lobes: usize, mean_square: f64) -> Vec<Missing> {
     let one = |id: String, rank, parameters: Vec<(&str, &str, f64)>, parts: Vec<Part>| {
         let parameter =
             |(name, unit, tolerance): (&str, &str, f64)| Parameter { name: name.into(), unit: unit.into(), tolerance };
         let parameters = parameters.into_iter().map(parameter).collect();
-        Missing { effect: Effect { id, target: None, parameters }, parts, rank }
+        Missing { effect: Effect { id, targets: Vec::new(), parameters }, parts, rank }
     };
     let mut all = vec![
         one(
@@ -72,7 +75,7 @@ fn missing(mean_square: f64) -> Vec<Missing> {
             vec![Box::new(move |_, arm| arm * arm - mean_square)],
         ),
     ];
-    all.extend(LOBES.map(|order| {
+    all.extend((2..=max_lobes).map(|order| {
         let n = order as f64;
         one(
             format!("lobes-{order}"),
@@ -84,33 +87,30 @@ fn missing(mean_square: f64) -> Vec<Missing> {
     all
 }
 
-/// The circles used without their outliers, and from where z counts.
+/// The circles used without their outliers, about the least-squares axis.
 struct Basis<'a> {
     circles: Vec<Circle<'a>>,
-    middle_mm: f64,
+    /// The points of each circle about the axis, their distances with its first-order run-out.
+    placed: Vec<Scan>,
+    cylinder: Cylinder,
     missing: Vec<Missing>,
 }
 
 impl<'a> Basis<'a> {
     fn of(separator: &LeastSquaresCylinder, points: &'a Points) -> Result<Self> {
         let circles = separator.circles(points)?;
-        if circles.len() < 2 {
-            let problem = format!("it has {} circles to use; each is left out once, so two are needed", circles.len());
-            return Err(Error::new("diagnose", points.input.display().to_string(), problem));
-        }
-        let heights = || circles.iter().flat_map(|circle| &circle.scan.z_mm);
-        let [low, high] =
-            heights().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(*z), high.max(*z)]);
-        let middle_mm = 0.5 * (low + high);
-        let squares: f64 = heights().map(|z| (z - middle_mm).powi(2)).sum();
-        let missing = missing(squares / heights().count() as f64);
-        Ok(Self { circles, middle_mm, missing })
+        let cylinder = separator.fit_cylinder(points, &circles)?;
+        let placed: Vec<Scan> = circles.iter().map(|circle| place(&cylinder, &circle.scan)).collect();
+        let arms = || placed.iter().flat_map(|scan| &scan.z_mm).map(|z| arm_mm(&cylinder, *z));
+        let mean_square = arms().map(|arm| arm * arm).sum::<f64>() / arms().count() as f64;
+        let missing = missing(separator.max_lobes(), mean_square);
+        Ok(Self { circles, placed, cylinder, missing })
     }
 
     /// Columns of all effects at some points, `[effect][parameter][point]`.
-    fn columns(&self, scans: &[&Scan]) -> Vec<Vec<Vec<f64>>> {
-        let places = || scans.iter().flat_map(|scan| scan.iter());
-        let column = |part: &Part| places().map(|(angle, z, _)| part(angle, z - self.middle_mm)).collect();
+    fn columns(&self, scans: &[Scan]) -> Vec<Vec<Vec<f64>>> {
+        let places = || scans.iter().flat_map(Scan::iter);
+        let column = |part: &Part| places().map(|(angle, z, _)| part(angle, arm_mm(&self.cylinder, z))).collect();
         self.missing.iter().map(|missing| missing.parts.iter().map(column).collect()).collect()
     }
 
@@ -118,7 +118,7 @@ impl<'a> Basis<'a> {
     fn unseen(&self, separator: &LeastSquaresCylinder, points: &Points) -> Result<Vec<Unseen>> {
         let kinds = separator.unused(points).into_iter().map(|(kind, traces)| {
             let scans: Vec<Scan> = traces.iter().map(|trace| Scan::of(points, trace)).collect::<Result<_>>()?;
-            let scans: Vec<&Scan> = scans.iter().collect();
+            let scans: Vec<Scan> = scans.iter().map(|scan| place(&self.cylinder, scan)).collect();
             let values: Vec<f64> = scans.iter().flat_map(|scan| scan.deviation_um.iter().copied()).collect();
             let ids: Vec<&str> = traces.iter().map(|trace| trace.id.as_str()).collect();
             let name = format!("{kind} {}", ids.join(", "));
@@ -126,45 +126,73 @@ impl<'a> Basis<'a> {
         });
         kinds.collect()
     }
+
+    /// The group of each point and the groups' names: circles, or arcs of a single one.
+    fn groups(&self) -> (Vec<usize>, Vec<String>) {
+        if let [only] = &self.placed[..] {
+            let arc = |angle: &f64| ((angle.rem_euclid(TAU) / TAU * ARCS as f64) as usize).min(ARCS - 1);
+            let width = 360 / ARCS;
+            let names = (0..ARCS).map(|arc| format!("{}…{}°", width * arc, width * (arc + 1)));
+            return (only.angle_rad.iter().map(arc).collect(), names.collect());
+        }
+        let group = self.placed.iter().enumerate().flat_map(|(group, scan)| vec![group; scan.len()]).collect();
+        (group, self.circles.iter().map(|circle| format!("{} {}", circle.kind, circle.id)).collect())
+    }
+}
+
+/// Points about an axis, their distances from the nominal radius with the axis's first-order run-out.
+fn place(cylinder: &Cylinder, scan: &Scan) -> Scan {
+    cylinder.place(scan).less(|angle, z| -cylinder.radius_offset_um - cylinder.run_out_um(angle, z))
+}
+
+/// Height from the middle of the points; 0 where they stand at one height, and what changes along z is not observable.
+fn arm_mm(cylinder: &Cylinder, z_mm: f64) -> f64 {
+    if cylinder.tilted { z_mm - cylinder.z_mm } else { 0.0 }
 }
 
 impl PointModel for LeastSquaresCylinder {
     fn effects(&self) -> Vec<Effect> {
-        missing(0.0).into_iter().map(|missing| missing.effect).collect()
+        missing(self.max_lobes(), 0.0).into_iter().map(|missing| missing.effect).collect()
     }
 
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
         let basis = Basis::of(self, points)?;
-        let scans: Vec<&Scan> = basis.circles.iter().map(|circle| &circle.scan).collect();
+        let (group, groups) = basis.groups();
         let observations = Observations {
-            values: scans.iter().flat_map(|scan| scan.deviation_um.iter().copied()).collect(),
+            values: basis.placed.iter().flat_map(|scan| scan.deviation_um.iter().copied()).collect(),
             unit: "um".into(),
             std: None,
-            group: scans.iter().enumerate().flat_map(|(group, scan)| vec![group; scan.len()]).collect(),
-            groups: basis.circles.iter().map(|circle| format!("{} {}", circle.trace.kind, circle.trace.id)).collect(),
+            group,
+            groups,
         };
         let column = vec![1.0; observations.values.len()];
         let radius = Declared { name: "radius less nominal".into(), unit: "um".into(), column };
-        let terms = basis.missing.iter().zip(basis.columns(&scans));
+        let terms = basis.missing.iter().zip(basis.columns(&basis.placed));
         let terms =
             terms.map(|(missing, columns)| Term { effect: missing.effect.clone(), columns, rank: missing.rank });
         let model = LinearTerms::new(observations, vec![radius], terms.collect())?;
+        let highest = self.max_lobes();
+        let limit = format!("order {highest} is the highest one looked for: higher ones need a larger `max_lobes`");
+        let model = model.ending_at(format!("lobes-{highest}"), limit);
         Ok(model.predicting(basis.unseen(self, points)?))
     }
 
     fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion> {
         let basis = Basis::of(self, points)?;
         let raised = correlation_factor(&fit.remainder().residual);
+        let circles = basis.circles.iter().zip(&basis.placed);
         let mut sections: Vec<Separation> =
-            basis.circles.iter().map(|circle| section(circle, basis.middle_mm, &basis.missing, fit, raised)).collect();
+            circles.map(|(circle, placed)| self.shape(circle, placed, &basis, fit, raised)).collect();
         let place = |section: &Separation| section.sections.first().map_or(f64::NAN, |at| at.z_mm);
         sections.sort_by(|a, b| place(a).total_cmp(&place(b)));
         let offset_um = fit.declared().first().copied().unwrap_or(f64::NAN);
-        let remarks = vec![
+        let left_out = match basis.circles.len() {
+            1 => format!("each of {ARCS} arcs of the circle is held out once and predicted from the others"),
+            count => format!("each of {count} circles is held out once and predicted from the others"),
+        };
+        let mut remarks = vec![
             format!(
-                "each of {} circles is left out once and predicted from the others; outliers beyond {} MAD are set aside \
-                 before, circle by circle: {} of {} points",
-                basis.circles.len(),
+                "{left_out}; outliers beyond {} MAD are left out before, circle by circle: {} of {} points",
                 self.outlier_mad(),
                 basis.circles.iter().map(|circle| circle.measured - circle.scan.len()).sum::<usize>(),
                 basis.circles.iter().map(|circle| circle.measured).sum::<usize>()
@@ -175,50 +203,57 @@ impl PointModel for LeastSquaresCylinder {
             "form of the exports is that of the effects found (taper, barrel, lobes), not of each circle on its own"
                 .into(),
         ];
+        if !basis.cylinder.tilted {
+            remarks.push("the circles are at one height: tilt, taper and barrel are not observable".into());
+        }
         let shape = Shape { sections, radius_mm: self.nominal_mm() + 1e-3 * offset_um };
-        Ok(Conclusion { shape: Some(shape), remarks })
+        Ok(Conclusion { shape: Some(shape), table: None, remarks })
     }
 }
 
-/// Form of one circle by the effects found: what changes the size is its level, lobes are its harmonics.
-fn section(circle: &Circle, middle_mm: f64, missing: &[Missing], fit: &LinearFit, raised: f64) -> Separation {
-    let at = circle.section(*LOBES.end());
-    let z_mm = at.z_mm;
-    let orders = LOBES.end() + 1;
-    let (mut estimate, mut variance) = (vec![Complex64::ZERO; orders], vec![0.0; orders]);
-    for (effect, values, variances) in fit.effects() {
-        let Some(found) = missing.iter().find(|missing| missing.effect.id == effect.id) else { continue };
-        let lobes = effect.id.strip_prefix("lobes-").and_then(|order| order.parse::<usize>().ok());
-        match (lobes, found.rank, values) {
-            // a cos nα + b sin nα = Re (a − ib) e^{inα}.
-            (Some(order), FORM, [a, b]) => {
-                estimate[order] += Complex64::new(*a, -b);
-                variance[order] += raised * variances.iter().sum::<f64>();
-            }
-            (None, SIZE, _) => {
-                for ((part, value), unit) in found.parts.iter().zip(values).zip(&variances) {
-                    let here = part(0.0, z_mm - middle_mm);
-                    estimate[0] += here * value;
-                    variance[0] += raised * here * here * unit;
+impl LeastSquaresCylinder {
+    /// Form of one circle by the effects found: what changes the size is its level, lobes are its harmonics.
+    fn shape(&self, circle: &Circle, placed: &Scan, basis: &Basis, fit: &LinearFit, raised: f64) -> Separation {
+        let at = circle.section(placed, self.max_lobes(), &basis.cylinder);
+        let arm = arm_mm(&basis.cylinder, at.z_mm);
+        let orders = self.max_lobes() + 1;
+        let (mut estimate, mut variance) = (vec![Complex64::ZERO; orders], vec![0.0; orders]);
+        for (effect, values, variances) in fit.effects() {
+            let Some(found) = basis.missing.iter().find(|missing| missing.effect.id == effect.id) else { continue };
+            let lobes = effect.id.strip_prefix("lobes-").and_then(|order| order.parse::<usize>().ok());
+            match (lobes, found.rank, values) {
+                // a cos nα + b sin nα = Re (a − ib) e^{inα}.
+                (Some(order), FORM, [a, b]) => {
+                    estimate[order] += Complex64::new(*a, -b);
+                    variance[order] += raised * variances.iter().sum::<f64>();
                 }
+                (None, SIZE, _) => {
+                    for ((part, value), unit) in found.parts.iter().zip(values).zip(&variances) {
+                        let here = part(0.0, arm);
+                        estimate[0] += here * value;
+                        variance[0] += raised * here * here * unit;
+                    }
+                }
+                _ => {}
             }
-            _ => {}
         }
-    }
-    Separation {
-        sections: vec![at],
-        unknowns: vec![Quantity::Form(0)],
-        observable: vec![true; orders],
-        estimate,
-        variance,
-        motion_covariance: None,
-        motion_z_mm: 0.0,
-        residual: Residual {
-            rms_um: fit.remainder().rms,
-            expected_rms_um: f64::NAN,
-            chi2_per_dof: f64::NAN,
-            dof: fit.remainder().dof,
-        },
-        warnings: circle.warnings.clone(),
+        Separation {
+            sections: vec![at],
+            unknowns: vec![Quantity::Form(0)],
+            observable: vec![true; orders],
+            estimate,
+            variance,
+            motion_covariance: None,
+            equivalents: Vec::new(),
+            motion_z_mm: 0.0,
+            residual: Residual {
+                rms_um: fit.remainder().rms,
+                expected_rms_um: f64::NAN,
+                chi2_per_dof: f64::NAN,
+                dof: fit.remainder().dof,
+                orders: None,
+            },
+            warnings: circle.warnings.clone(),
+        }
     }
 }

@@ -5,7 +5,6 @@ use std::fmt;
 use crate::{
     robust::{Fence, rms},
     scan::Scan,
-    shape::Cylinder,
 };
 
 /// How far the points of traces that were not used lie from what cylinder and surface say of them.
@@ -30,20 +29,14 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// Compares measured points with `cylinder` plus `surface` (angle in rad, z in mm; `None` beyond its range).
-    pub(crate) fn of(
-        scans: &[Scan],
-        cylinder: &Cylinder,
-        surface: impl Fn(f64, f64) -> Option<f64>,
-        deviations: f64,
-    ) -> Self {
+    /// Compares points about the cylinder's axis with `surface` (angle in rad, z in mm; `None` beyond its range).
+    pub(crate) fn of(scans: &[Scan], surface: impl Fn(f64, f64) -> Option<f64>, deviations: f64) -> Self {
         let points = scans.iter().flat_map(Scan::iter);
         let (mut from_cylinder, mut from_surface) = (Vec::new(), Vec::new());
-        for (angle, z, deviation) in points.clone() {
+        for (angle, z, distance) in points.clone() {
             if let Some(form) = surface(angle, z) {
-                let remainder = deviation - cylinder.deviation_um(angle, z);
-                from_cylinder.push(remainder);
-                from_surface.push(remainder - form);
+                from_cylinder.push(distance);
+                from_surface.push(distance - form);
             }
         }
         let fence = Fence::around(&from_surface, deviations);

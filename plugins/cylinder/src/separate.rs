@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use runout_core::{
-    Error, Result,
+    Complex64, Error, Result,
     pipeline::{
         error::{Fault, known_names, within},
         registry::{Context, StageConfig},
@@ -21,7 +21,7 @@ use crate::{
     circle::{Cleaned, Harmonics, empty_stretches},
     predict::Prediction,
     robust::{median, rms},
-    scan::Scan,
+    scan::{Helix, Scan, Turn},
     shape::Cylinder,
 };
 
@@ -31,22 +31,25 @@ use crate::{
 pub struct LeastSquaresCylinderConfig {
     /// Nominal radius that the deviations are measured from, in mm.
     pub radius_mm: f64,
-    /// Traces to use, by kind or id; each must go round the part.
-    #[serde(default = "default_use", rename = "use")]
-    pub used: Vec<String>,
+    /// Traces to use, by kind or id; each must go round the part. Without it those of the kinds circle and helix.
+    #[serde(default, rename = "use")]
+    pub used: Option<Vec<String>>,
     /// Traces to hold out although `use` names them, by kind or id. The surface has to predict whatever is not used.
     #[serde(default)]
     pub hold_out: Vec<String>,
-    /// Highest order (undulations per revolution) fitted to each circle.
+    /// Highest order (undulations per revolution) fitted to each circle. An arc without points, or few points, may limit it
+    /// further.
     #[serde(default = "default_max_order")]
     pub max_order: usize,
     /// Points further than this many median absolute deviations from the fit of their circle are left out, and counted.
     #[serde(default = "default_outlier_mad")]
     pub outlier_mad: f64,
-}
-
-fn default_use() -> Vec<String> {
-    vec!["circle".into()]
+    /// Highest order of the fit that points are compared with to leave out outliers, whatever `max_order` is.
+    #[serde(default = "default_outlier_order")]
+    pub outlier_order: usize,
+    /// Highest order of lobes that `diagnose` may add.
+    #[serde(default = "default_max_lobes")]
+    pub max_lobes: usize,
 }
 
 fn default_max_order() -> usize {
@@ -57,8 +60,21 @@ fn default_outlier_mad() -> f64 {
     5.0
 }
 
+fn default_outlier_order() -> usize {
+    50
+}
+
+fn default_max_lobes() -> usize {
+    8
+}
+
+/// Kinds of traces that go round the part.
+const AROUND: [&str; 2] = ["circle", "helix"];
+
 /// Above this, one circle's matrix alone would take gigabytes.
 const HIGHEST_ORDER: usize = 2_000;
+/// Each order of lobes is a candidate of its own for `diagnose`.
+const HIGHEST_LOBES: usize = 100;
 
 impl StageConfig for LeastSquaresCylinderConfig {
     type Stage = Separator;
@@ -80,10 +96,12 @@ impl LeastSquaresCylinderConfig {
         if !(self.radius_mm.is_finite() && self.radius_mm > 0.0) {
             return Err(Fault::at("radius_mm", format!("the radius must be above 0 mm, found {}", self.radius_mm)));
         }
-        if self.used.is_empty() {
+        if self.used.as_ref().is_some_and(Vec::is_empty) {
             return Err(Fault::at("use", "expected at least one kind or trace").help("use = [\"circle\"]"));
         }
         within("max_order", "an order", self.max_order, 2..=HIGHEST_ORDER)?;
+        within("outlier_order", "an order", self.outlier_order, 2..=HIGHEST_ORDER)?;
+        within("max_lobes", "an order", self.max_lobes, 2..=HIGHEST_LOBES)?;
         if !(self.outlier_mad.is_finite() && self.outlier_mad >= 1.0) {
             let message = format!("expected at least 1 (half of the points lie nearer), found {}", self.outlier_mad);
             return Err(Fault::at("outlier_mad", message).help("a large number keeps every point"));
@@ -94,37 +112,43 @@ impl LeastSquaresCylinderConfig {
 
 /// Removes the least-squares cylinder and gives the form of each circle by harmonics.
 ///
-/// 1. Harmonics 0 to `max_order` are fitted to each circle on its own, on its actual angles; points too far from them
+/// 1. Harmonics 0 to `outlier_order` are fitted to each circle on its own, on its actual angles; points too far from them
 ///    are left out.
-/// 2. The cylinder of five parameters (radius, offset and slope of the axis) is fitted to all points kept (LSCY of ISO
-///    12180-1), and removed.
-/// 3. The harmonics of what remains are the form. Orders 0 and 1 belong to it: a measuring machine knows the level and
-///    the centre of each circle relative to the others, which is taper and bend of the part.
+/// 2. The cylinder (radius, offset and slope of the axis) is fitted to all points kept (LSCY of ISO 12180-1), and each
+///    point becomes angle, height and distance about its axis, exactly. At one height the slope is not observable: then
+///    radius and centre are fitted (LSCI of ISO 12181-1).
+/// 3. The harmonics 0 to `max_order` of the distances are the form. Orders 0 and 1 belong to it: a measuring machine knows
+///    the level and the centre of each circle relative to the others, which is taper and bend of the part.
 ///
-/// A trace that overlaps its own beginning is fitted as it is: least squares need no even angles.
+/// A trace that overlaps its own beginning is fitted as it is: least squares need no even angles. A helix is cut into its
+/// turns; what changes along z within a turn (its level and its centre) is found from it and half a turn on either side, and
+/// removed before the harmonics of the turn are fitted.
 #[derive(Debug, Clone)]
 pub struct LeastSquaresCylinder(LeastSquaresCylinderConfig);
 
-/// A circle without its outliers.
+/// A circle, or a turn of a helix, without its outliers.
 pub(crate) struct Circle<'a> {
-    pub trace: &'a Trace,
+    pub id: String,
+    pub kind: &'a str,
     pub measured: usize,
     pub scan: Scan,
+    /// Of a turn of a helix: it and half a turn on either side.
+    window: Option<Scan>,
     pub warnings: Vec<String>,
 }
 
 impl Circle<'_> {
-    /// Its place, and what the harmonics up to an order only bridge.
-    pub(crate) fn section(&self, max_order: usize) -> SectionAt {
+    /// Its place about an axis, and the arcs that harmonics up to an order only bridge. Circles at one height share it.
+    pub(crate) fn section(&self, placed: &Scan, max_order: usize, cylinder: &Cylinder) -> SectionAt {
+        let z_mm = if cylinder.tilted { placed.mean_z_mm() } else { cylinder.z_mm };
         let mut gaps = Gaps::default();
-        unseen(&self.scan, max_order).for_each(|[from, to]| gaps.add(from, to - from));
-        let z_mm = self.scan.z_mm.iter().sum::<f64>() / self.scan.len() as f64;
+        unseen(placed, max_order).for_each(|[from, to]| gaps.add(from, to - from));
         let used = self.scan.len() as f64 / self.measured as f64;
-        SectionAt { gaps, used, ..SectionAt::whole(self.trace.id.clone(), z_mm) }
+        SectionAt { gaps, used, ..SectionAt::whole(self.id.clone(), z_mm) }
     }
 }
 
-/// Stretches without a point that are longer than half a wave of the highest order, as angles in rad.
+/// Arcs without a point that are longer than half a wave of the highest order, as angles in rad.
 fn unseen(scan: &Scan, max_order: usize) -> impl Iterator<Item = [f64; 2]> {
     empty_stretches(&scan.angle_rad).into_iter().filter(move |[from, to]| to - from > PI / max_order as f64)
 }
@@ -132,7 +156,7 @@ fn unseen(scan: &Scan, max_order: usize) -> impl Iterator<Item = [f64; 2]> {
 impl PointSeparator for LeastSquaresCylinder {
     fn separate(&self, points: &Points) -> Result<Vec<Separation>> {
         let circles = self.circles(points)?;
-        let cylinder = cylinder(points, &circles)?;
+        let cylinder = cylinder(points, &circles, self.0.radius_mm)?;
         let mut sections: Vec<Separation> =
             circles.into_iter().map(|circle| self.section(points, circle, &cylinder)).collect::<Result<_>>()?;
         let place = |section: &Separation| section.sections.first().map_or(f64::NAN, |at| at.z_mm);
@@ -141,7 +165,7 @@ impl PointSeparator for LeastSquaresCylinder {
     }
 
     fn reference_radius_mm(&self, points: &Points) -> Result<f64> {
-        Ok(self.radius_mm(&self.cylinder(points)?))
+        Ok(self.cylinder(points)?.radius_mm())
     }
 
     fn needs_surface(&self) -> bool {
@@ -150,11 +174,11 @@ impl PointSeparator for LeastSquaresCylinder {
 
     fn remarks(&self, points: &Points, surface: Option<&Surface>) -> Result<Vec<String>> {
         let circles = self.circles(points)?;
-        let cylinder = cylinder(points, &circles)?;
-        let mut remarks = vec![self.describe(&circles, &cylinder)];
+        let cylinder = cylinder(points, &circles, self.0.radius_mm)?;
+        let mut remarks = Self::describe(&circles, &cylinder);
         remarks.push(format!(
-            "form is counted from that cylinder; its uncertainty is the scatter about orders 0 to {}, and holds nothing \
-             of errors of the machine that vary more slowly along a circle",
+            "form counts from it; the stated uncertainty is the scatter about orders 0 to {}: it does not include errors of the \
+             machine that vary more slowly along a circle",
             self.0.max_order
         ));
         if let Some(surface) = surface {
@@ -174,7 +198,11 @@ impl LeastSquaresCylinder {
     /// # Errors
     /// When the traces cannot tell it.
     pub fn cylinder(&self, points: &Points) -> Result<Cylinder> {
-        cylinder(points, &self.circles(points)?)
+        cylinder(points, &self.circles(points)?, self.0.radius_mm)
+    }
+
+    pub(crate) fn fit_cylinder(&self, points: &Points, circles: &[Circle]) -> Result<Cylinder> {
+        cylinder(points, circles, self.0.radius_mm)
     }
 
     /// How well a surface predicts the traces that were not used, one entry a kind.
@@ -184,8 +212,10 @@ impl LeastSquaresCylinder {
     pub fn predictions(&self, points: &Points, cylinder: &Cylinder, surface: &Surface) -> Result<Vec<Prediction>> {
         let compare = |(kind, traces): (&str, Vec<&Trace>)| {
             let scans: Vec<Scan> = traces.iter().map(|trace| Scan::of(points, trace)).collect::<Result<_>>()?;
-            let sample = |angle, z| surface.sample(angle, z);
-            let prediction = Prediction::of(&scans, cylinder, sample, self.0.outlier_mad);
+            let scans: Vec<Scan> = scans.iter().map(|scan| cylinder.place(scan)).collect();
+            let ends = surface.z_mm.first().copied().zip(surface.z_mm.last().copied());
+            let sample = |angle, z| surface.sample(angle, cylinder.at_end(z, ends));
+            let prediction = Prediction::of(&scans, sample, self.0.outlier_mad);
             let traces = traces.iter().map(|trace| trace.id.clone()).collect();
             Ok(Prediction { kind: kind.to_owned(), traces, ..prediction })
         };
@@ -212,16 +242,21 @@ impl LeastSquaresCylinder {
         self.0.radius_mm
     }
 
+    pub(crate) fn max_lobes(&self) -> usize {
+        self.0.max_lobes
+    }
+
     fn uses(&self, trace: &Trace) -> bool {
         let named = |names: &[String]| names.iter().any(|name| *name == trace.kind || *name == trace.id);
-        named(&self.0.used) && !named(&self.0.hold_out)
+        let used = self.0.used.as_ref().map_or_else(|| AROUND.contains(&trace.kind.as_str()), |names| named(names));
+        used && !named(&self.0.hold_out)
     }
 
     /// The traces used, each without its outliers.
     pub(crate) fn circles<'a>(&self, points: &'a Points) -> Result<Vec<Circle<'a>>> {
         let known: Vec<&str> =
             points.traces.iter().flat_map(|trace| [trace.kind.as_str(), trace.id.as_str()]).collect();
-        for name in self.0.used.iter().chain(&self.0.hold_out) {
+        for name in self.0.used.iter().flatten().chain(&self.0.hold_out) {
             if !known.contains(&name.as_str()) {
                 let mut known = known.clone();
                 known.sort_unstable();
@@ -231,69 +266,143 @@ impl LeastSquaresCylinder {
                     .help(known_names(name, known)));
             }
         }
-        points.traces.iter().filter(|trace| self.uses(trace)).map(|trace| self.circle(points, trace)).collect()
+        let used = points.traces.iter().filter(|trace| self.uses(trace));
+        let revolutions: Result<Vec<Vec<Circle>>> = used.map(|trace| self.revolutions(points, trace)).collect();
+        Ok(revolutions?.into_iter().flatten().collect())
     }
 
-    fn circle<'a>(&self, points: &'a Points, trace: &'a Trace) -> Result<Circle<'a>> {
-        let (max_order, outlier_mad) = (self.0.max_order, self.0.outlier_mad);
+    /// A circle, or the turns of a helix.
+    fn revolutions<'a>(&self, points: &'a Points, trace: &'a Trace) -> Result<Vec<Circle<'a>>> {
         let all = Scan::of(points, trace)?;
-        let cleaned = Cleaned::of(&all, max_order, outlier_mad).map_err(|problem| unfit(points, trace, &problem))?;
-        let scan = all.keep(&cleaned.kept);
-        let mut warnings = Vec::new();
-        if cleaned.left_out() > 0 {
-            warnings.push(format!("{} {}: {}", trace.kind, trace.id, left_out(&cleaned, &all, outlier_mad)));
-        }
-        for [from, to] in unseen(&scan, max_order).map(|ends| ends.map(f64::to_degrees)) {
-            let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");
-            warnings.push(format!("{} {}: {gap}", trace.kind, trace.id));
-        }
-        Ok(Circle { trace, measured: all.len(), scan, warnings })
+        let Some(helix) = Helix::of(&all) else {
+            let whole = Turn { points: 0..all.len(), window: 0..all.len() };
+            return Ok(vec![self.circle(points, trace, &all, &whole, None)?]);
+        };
+        let turns = helix.turns.iter().zip(1..);
+        turns.map(|(turn, number)| self.circle(points, trace, &all, turn, Some((&helix, number)))).collect()
     }
 
-    fn section(&self, points: &Points, circle: Circle, cylinder: &Cylinder) -> Result<Separation> {
-        let remainder = circle.scan.less(|angle, z| cylinder.deviation_um(angle, z));
-        let fit =
-            Harmonics::fit(&remainder, self.0.max_order).map_err(|problem| unfit(points, circle.trace, &problem))?;
+    /// One revolution of a trace; `helix` and the number of the turn where it is one.
+    fn circle<'a>(
+        &self,
+        points: &Points,
+        trace: &'a Trace,
+        all: &Scan,
+        turn: &Turn,
+        helix: Option<(&Helix, usize)>,
+    ) -> Result<Circle<'a>> {
+        let window = all.range(turn.window.clone());
+        let measured = all.range(turn.points.clone());
+        let about_mm = helix.map(|_| measured.mean_z_mm());
+        let cleaned = Cleaned::of(&window, self.0.outlier_order, about_mm, self.0.outlier_mad)
+            .map_err(|problem| unfit(points, trace, &problem))?;
+        let kept_window = window.keep(&cleaned.kept);
+        let cleaned = cleaned.range(turn.points.start - turn.window.start, measured.len());
+        let scan = measured.keep(&cleaned.kept);
+        let id = helix.map_or_else(|| trace.id.clone(), |(_, number)| format!("{}.{number}", trace.id));
+        let mut warnings = Vec::new();
+        if let Some((helix, 1)) = helix {
+            warnings.push(format!(
+                "{} {}: it is a helix of {:.4} mm a turn; each of its {} turns is a section, and {} points behind the last \
+                 one are not used",
+                trace.kind,
+                trace.id,
+                helix.pitch_mm,
+                helix.turns.len(),
+                helix.behind
+            ));
+        }
+        if cleaned.left_out() > 0 {
+            warnings.push(format!("{} {id}: {}", trace.kind, left_out(&cleaned, &measured, self.0.outlier_mad)));
+        }
+        let window = helix.map(|_| kept_window);
+        Ok(Circle { id, kind: &trace.kind, measured: measured.len(), scan, window, warnings })
+    }
+
+    fn section(&self, points: &Points, mut circle: Circle, cylinder: &Cylinder) -> Result<Separation> {
+        let mut placed = cylinder.place(&circle.scan);
+        let unfit = |problem: String| {
+            Error::new("fit harmonics to", format!("{} of {}", circle.id, points.input.display()), problem)
+                .help("leave the trace out of `use`")
+        };
+        let mut level_variance = [0.0; 2];
+        let mut height_mm = 0.0;
+        if let Some(window) = &circle.window {
+            let along =
+                Harmonics::fit(&cylinder.place(window), self.0.max_order, Some(placed.mean_z_mm())).map_err(unfit)?;
+            placed = placed.less(|angle, z| along.sloped_um(angle, z));
+            let [low, high] = placed.z_range_mm();
+            (level_variance, height_mm) = (along.level_variance, high - low);
+        }
+        let fit = Harmonics::fit(&placed, self.0.max_order, None).map_err(unfit)?;
+        let order = fit.max_order();
+        let named = format!("{} {}", circle.kind, circle.id);
+        circle.warnings.extend(fit.limit.iter().map(|limit| format!("{named}: {limit}")));
+        for [from, to] in unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)) {
+            let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");
+            circle.warnings.push(format!("{named}: {gap}"));
+        }
+        let orders = self.0.max_order + 1;
+        let (mut estimate, mut variance) = (fit.coefficients, fit.variance);
+        // Over a turn of height h, t has the coefficients h/(πn), and t² has h²/(πn)².
+        for (order, variance) in variance.iter_mut().enumerate().skip(1) {
+            let share = (height_mm / (PI * order as f64)).powi(2);
+            *variance += level_variance[0] * share + level_variance[1] * share * share;
+        }
+        let mut observable = vec![true; estimate.len()];
+        estimate.resize(orders, Complex64::new(f64::NAN, f64::NAN));
+        variance.resize(orders, f64::NAN);
+        observable.resize(orders, false);
         Ok(Separation {
-            sections: vec![circle.section(self.0.max_order)],
+            sections: vec![circle.section(&placed, order, cylinder)],
             unknowns: vec![Quantity::Form(0)],
-            observable: vec![true; fit.coefficients.len()],
-            estimate: fit.coefficients,
-            variance: fit.variance,
+            observable,
+            estimate,
+            variance,
             motion_covariance: None,
+            equivalents: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual {
                 rms_um: fit.residual_rms_um,
                 expected_rms_um: f64::NAN,
                 chi2_per_dof: f64::NAN,
                 dof: fit.dof,
+                orders: None,
             },
             warnings: circle.warnings,
         })
     }
 
-    /// Radius of a cylinder that was fitted to deviations from the nominal one.
-    fn radius_mm(&self, cylinder: &Cylinder) -> f64 {
-        self.0.radius_mm + 1e-3 * cylinder.radius_offset_um
-    }
-
-    fn describe(&self, circles: &[Circle], cylinder: &Cylinder) -> String {
-        let left = |circle: &Circle| circle.scan.less(|angle, z| cylinder.deviation_um(angle, z)).deviation_um;
-        let rms_um = rms(circles.iter().flat_map(left));
+    fn describe(circles: &[Circle], cylinder: &Cylinder) -> Vec<String> {
+        let rms_um = rms(circles.iter().flat_map(|circle| cylinder.place(&circle.scan).deviation_um));
         let used: usize = circles.iter().map(|circle| circle.scan.len()).sum();
         let measured: usize = circles.iter().map(|circle| circle.measured).sum();
+        let counted = format!("{} ({used} of {measured} points)", count_of(circles.len()));
+        let Cylinder { x_um, y_um, z_mm, .. } = cylinder;
+        let radius_mm = cylinder.radius_mm();
+        if !cylinder.tilted {
+            let ellipse_um = 1e3 * radius_mm * 0.25e-6;
+            return vec![
+                format!(
+                    "least-squares circle of {counted} at one height, z = {z_mm:.3} mm: radius {radius_mm:.5} mm; centre \
+                     ({x_um:.3}, {y_um:.3}) µm; it leaves {rms_um:.3} µm rms"
+                ),
+                format!(
+                    "the tilt of the axis is not observable at one height: a tilt of 1 mrad adds an ellipse of \
+                     {ellipse_um:.4} µm at 2/rev, and grows with its square"
+                ),
+            ];
+        }
         let [tilt_x, tilt_y] = cylinder.tilt_urad();
-        format!(
-            "least-squares cylinder of {} circles ({used} of {measured} points): radius {:.5} mm; axis through \
-             ({:.3}, {:.3}) µm at z = {:.3} mm, tilted by {tilt_x:.1} µrad about x and {tilt_y:.1} µrad about y; it leaves \
-             {rms_um:.3} µm rms",
-            circles.len(),
-            self.radius_mm(cylinder),
-            cylinder.x_um,
-            cylinder.y_um,
-            cylinder.z_mm,
-        )
+        vec![format!(
+            "least-squares cylinder of {counted}: radius {radius_mm:.5} mm; axis through ({x_um:.3}, {y_um:.3}) µm at \
+             z = {z_mm:.3} mm, tilted by {tilt_x:.1} µrad about x and {tilt_y:.1} µrad about y; it leaves {rms_um:.3} µm rms"
+        )]
     }
+}
+
+fn count_of(circles: usize) -> String {
+    if circles == 1 { "1 circle".into() } else { format!("{circles} circles") }
 }
 
 /// "left out 3 of 1046 points …", with their places.
@@ -311,44 +420,40 @@ fn left_out(cleaned: &Cleaned, scan: &Scan, outlier_mad: f64) -> String {
     }
     let farthest = cleaned.distance_um.iter().fold(0.0_f64, |far, off| if off.abs() > far.abs() { *off } else { far });
     format!(
-        "left out {} of {} points, further than {outlier_mad} MAD ({:.2} µm) from the fit, the farthest {farthest:.1} µm: \
-         at {}",
+        "left out {} of {} points, further than {outlier_mad} MAD ({:.2} µm) from the fit of orders 0 to {}, the \
+         farthest {farthest:.1} µm: at {}",
         cleaned.left_out(),
         scan.len(),
         cleaned.limit_um,
+        cleaned.max_order,
         places.join(", ")
     )
 }
 
-fn cylinder(points: &Points, circles: &[Circle]) -> Result<Cylinder> {
+fn cylinder(points: &Points, circles: &[Circle], nominal_mm: f64) -> Result<Cylinder> {
     let object = points.input.display().to_string();
     let refuse = |problem: &str| Error::new("fit a cylinder to", &object, problem);
     if circles.is_empty() {
         return Err(refuse("every trace that could be used is held out").help("shorten `hold_out`"));
     }
-    // The axis's slope needs circles that stand further apart than each wavers along z.
-    let heights: Vec<f64> = circles.iter().map(|circle| median(circle.scan.z_mm.iter().copied())).collect();
+    let scans: Vec<Scan> = circles.iter().map(|circle| circle.scan.clone()).collect();
+    Cylinder::fit(&scans, nominal_mm, tilt_observable(circles))
+        .ok_or_else(|| refuse("its points do not determine radius and axis"))
+}
+
+/// Whether circles stand further apart than each wavers along z, or are turns of a helix: else the axis's slope is not
+/// observable.
+fn tilt_observable(circles: &[Circle]) -> bool {
+    let heights = || circles.iter().map(|circle| median(circle.scan.z_mm.iter().copied()));
     let waver = |circle: &Circle| {
-        let range = circle
-            .scan
-            .z_mm
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(*z), high.max(*z)]);
-        range[1] - range[0]
+        let [low, high] = circle.scan.z_range_mm();
+        if circle.window.is_some() { 0.0 } else { high - low }
     };
     let widest = circles.iter().map(waver).fold(0.0, f64::max);
-    let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if high - low <= widest {
-        let problem =
-            format!("its {} circles stand at one height, z = {low:.3} mm: the axis's tilt is unknown", circles.len());
-        return Err(refuse(&problem).help("a cylinder takes circles at two heights or more"));
-    }
-    let scans: Vec<Scan> = circles.iter().map(|circle| circle.scan.clone()).collect();
-    Cylinder::fit(&scans).ok_or_else(|| refuse("its points cannot tell the five parameters"))
+    heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min) > widest
 }
 
 fn unfit(points: &Points, trace: &Trace, problem: &str) -> Error {
     Error::new("fit harmonics to", format!("trace {} of {}", trace.id, points.input.display()), problem)
-        .help("lower `max_order`, or leave the trace out of `use`")
+        .help("leave the trace out of `use`")
 }

@@ -262,10 +262,12 @@ impl Averager for SynchronousAverage {
             mean: outcome.mean,
             covariance: outcome.covariance,
             scatter: outcome.scatter,
+            levels: outcome.levels,
             split: outcome.split,
             spread: outcome.spread,
             turns: count,
             speed_rpm,
+            sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,
             warnings,
         })

@@ -18,8 +18,8 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub struct QuadratureSamplesConfig {
     /// CSV file with the columns phase_deg and radius_counts, in any order: the angle and the length of the pair (cosine,
-    /// sine). A column deviation_counts is left alone. Separated by comma, semicolon or tab; the last two allow a decimal
-    /// comma.
+    /// sine). Optional: time_s, and reference_deg, the true angle in degrees of the signal's own period, from any zero. A column
+    /// deviation_counts is ignored. Separated by comma, semicolon or tab; the last two allow a decimal comma.
     pub path: PathBuf,
 }
 
@@ -34,4 +34,8 @@ impl StageConfig for QuadratureSamplesConfig {
     }
 }
 
-const NUMBERS: Numbers = Numbers { read: &["phase_deg", "radius_counts"], ignored: &["deviation_counts"] };
+const NUMBERS: Numbers = Numbers {
+    read: &["phase_deg", "radius_counts"],
+    optional: &["time_s", "reference_deg"],
+    ignored: &["deviation_counts"],
+};

@@ -1,18 +1,15 @@
 //! The separator `quadrature`: a model of a quadrature signal for the closed loop.
 //!
-//! The pair (cosine, sine) = R·(cos θ, (1 + ε)·sin(θ + α)) + (x₀, y₀), seen at its own phase φ, has to first order the radius
-//!
-//! r(φ) = R·(1 + ε/2) + x₀ cos φ + y₀ sin φ − (ε R/2) cos 2φ + (α R/2) sin 2φ
-//!
-//! (Heydemann, Appl. Opt. 20 (1981) 3382, expanded). What first order leaves out is below ε²R and x₀²/R: 0.1 counts for
-//! errors of 1 % on 500 counts. Orders from 3 have no such simple cause: signals that are no sines.
+//! Without a reference angle the data are the radius over the pair's own phase, and each order of it has two possible causes that
+//! do the opposite to the angle ([`crate::components`]). With a reference angle θ the data are both parts of z e^{−iθ}, in which
+//! the components are linear, exactly, and no two of them are alike; the held-out error is that of the angle.
 
 use std::f64::consts::TAU;
 
 use runout_core::{
-    Error, Result,
+    Complex64, Error, Result,
     model::{
-        Effect, Parameter,
+        Effect,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     pipeline::{
@@ -24,6 +21,12 @@ use runout_core::{
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+use crate::{
+    angle::Correction,
+    components::{Component, UNIT},
+    signal::{Signal, least_squares},
+};
 
 /// `[separate] plugin = "quadrature"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -54,7 +57,8 @@ impl StageConfig for QuadratureConfig {
     type Stage = Separator;
 
     const NAME: &'static str = "quadrature";
-    const ABOUT: &'static str = "offset, gain ratio, angle and harmonics of a quadrature signal, for `diagnose`";
+    const ABOUT: &'static str =
+        "offset, gain ratio, angle and harmonics of a quadrature signal, and its angle, for `diagnose`";
 
     fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
         Ok(Separator::Model(Box::new(self.model()?)))
@@ -77,82 +81,192 @@ impl QuadratureConfig {
 #[derive(Debug, Clone)]
 pub struct Quadrature(QuadratureConfig);
 
-const UNIT: &str = "counts";
-/// What could usually be expected, relative to the radius: 1 % of offset, gain ratio and angle.
-const USUAL: f64 = 0.01;
+/// The name of the table of angles.
+pub const TABLE: &str = "angle";
+/// A reference that does not follow the phase within this, in rad, is none of it.
+const FAR_OFF: f64 = 0.5;
+const TOLD_APART: &str = "a reference angle: the column reference_deg; or signals that are known to be sines: \
+    `[diagnose] effects = [\"quadrature-offset\", \"quadrature-gain-and-angle\"]`";
 
-impl Quadrature {
-    /// What a signal of a radius may lack, by order from 1.
-    fn effects_on(&self, radius: f64) -> Vec<Effect> {
-        let usual = USUAL * radius;
-        let pair = |id: String, [first, second]: [(&str, &str, f64); 2]| {
-            let parameter = |(name, unit, tolerance): (&str, &str, f64)| Parameter {
-                name: name.into(),
-                unit: unit.into(),
-                tolerance,
-            };
-            Effect { id, target: None, parameters: vec![parameter(first), parameter(second)] }
+/// Samples as the model takes them.
+pub struct Samples {
+    pub phase_rad: Vec<f64>,
+    pub radius: Vec<f64>,
+    /// The true angle with the phase's zero, where it is known.
+    pub true_rad: Option<Vec<f64>>,
+}
+
+impl Samples {
+    fn of(points: &Points) -> Result<Self> {
+        let rad = |name: &str| -> Result<Vec<f64>> {
+            Ok(points.column(name)?.iter().map(|degrees| degrees.to_radians()).collect())
         };
-        let wave = |size: f64| [("cosine", UNIT, size), ("sine", UNIT, size)];
-        let mut effects = vec![
-            pair("quadrature-offset".into(), wave(usual)),
-            pair("quadrature-gain-and-angle".into(), [("gain_ratio_less_1", "", USUAL), ("angle_error", "rad", USUAL)]),
-        ];
-        effects.extend((3..=self.0.max_order).map(|order| pair(format!("harmonic-{order}"), wave(0.1 * usual))));
-        effects
+        let phase_rad = rad("phase_deg")?;
+        let radius = points.column("radius_counts")?.to_vec();
+        let refuse = |problem: String| Error::new("fit", points.input.display().to_string(), problem);
+        let mean = radius.iter().sum::<f64>() / radius.len() as f64;
+        if !(mean.is_finite() && mean > 0.0) {
+            return Err(refuse(format!("its mean radius is {mean}: there is no circle")));
+        }
+        let true_rad = rad("reference_deg").ok().map(|reference| {
+            let ahead = phase_rad.iter().zip(&reference).map(|(phase, reference)| Complex64::cis(phase - reference));
+            let mean = ahead.sum::<Complex64>() / reference.len() as f64;
+            // The length of the mean is 1 − σ²/2.
+            if 1.0 - mean.norm() > 0.5 * FAR_OFF * FAR_OFF {
+                return Err(refuse("the column reference_deg does not follow phase_deg".into())
+                    .help("give the reference in degrees of the signal's own period, growing with the phase"));
+            }
+            Ok(reference.iter().map(|reference| reference + mean.arg()).collect())
+        });
+        Ok(Self { phase_rad, radius, true_rad: true_rad.transpose()? })
+    }
+
+    /// Mean of the radius, in counts.
+    fn mean_radius(&self) -> f64 {
+        self.radius.iter().sum::<f64>() / self.radius.len() as f64
+    }
+
+    /// Where each sample is on the circle: the true angle, or the phase.
+    fn angles(&self) -> &[f64] {
+        self.true_rad.as_deref().unwrap_or(&self.phase_rad)
+    }
+
+    /// The radius; with a reference both parts of z e^{−iθ}, the one along the circle behind the other.
+    fn values(&self) -> Vec<f64> {
+        let Some(angles) = &self.true_rad else { return self.radius.clone() };
+        let z = self.radius.iter().zip(&self.phase_rad).zip(angles);
+        let turned: Vec<Complex64> =
+            z.map(|((radius, phase), angle)| Complex64::from_polar(*radius, phase - angle)).collect();
+        turned.iter().map(|z| z.re).chain(turned.iter().map(|z| z.im)).collect()
+    }
+
+    /// What is always fitted: the radius, and with a reference the zero of the angle.
+    fn declared(&self) -> Vec<Declared> {
+        let count = self.phase_rad.len();
+        let rows = if self.true_rad.is_some() { 2 * count } else { count };
+        let part = |name: &str, of: std::ops::Range<usize>| {
+            let column = (0..rows).map(|row| if of.contains(&row) { 1.0 } else { 0.0 }).collect();
+            Declared { name: name.into(), unit: UNIT.into(), column }
+        };
+        let mut declared = vec![part("radius", 0..count)];
+        if rows > count {
+            declared.push(part("zero of the angle", count..rows));
+        }
+        declared
+    }
+
+    /// The values of a linear model, exact where it is fitted; radius, and parameters of gain ratio and quadrature angle, there.
+    ///
+    /// What the radius over the phase has beyond first order is taken out of it, as if all components were backward ones: of
+    /// components that the radius alone does not decide, it is not known better.
+    fn linearised(&self, max_order: usize) -> Result<(Vec<f64>, f64, [f64; 2])> {
+        let mut values = self.values();
+        let gain = Component::of_order(2)[0];
+        let (radius, waves) = if self.true_rad.is_some() {
+            let all = Component::all(max_order);
+            let waves = all.iter().flat_map(|component| [0, 1].map(|wave| self.column(*component, wave)));
+            let waves = waves.map(|column| Declared { name: "component".into(), unit: UNIT.into(), column });
+            let found = least_squares(values.clone(), self.declared().into_iter().chain(waves).collect())?;
+            let place = self.declared().len() + 2 * all.iter().position(|component| *component == gain).unwrap_or(0);
+            (found[0], [found[place], found[place + 1]])
+        } else {
+            let backward: Vec<Component> = (1..=max_order).map(|order| Component::of_order(order)[0]).collect();
+            let signal = Signal::fit(&self.phase_rad, &self.radius, &[], &backward, &[])?;
+            if !signal.is_usable() {
+                return Ok((values, self.mean_radius(), [0.0; 2]));
+            }
+            for (value, phase) in values.iter_mut().zip(&self.phase_rad) {
+                let first_order = signal.components.iter().map(|(component, p)| {
+                    let [cosine, sine] = component.across(*phase);
+                    p.re * cosine + p.im * sine
+                });
+                *value += signal.radius + first_order.sum::<f64>() - signal.radius_at_phase(*phase);
+            }
+            let p =
+                signal.components.iter().find(|(component, _)| *component == gain).map_or(Complex64::ZERO, |(_, p)| *p);
+            (signal.radius, [p.re, p.im])
+        };
+        let parameters = gain.parameters(radius, waves);
+        let slopes = gain.slopes(radius, parameters);
+        let beyond: [f64; 2] =
+            [0, 1].map(|wave| parameters[0] * slopes[0][wave] + parameters[1] * slopes[1][wave] - waves[wave]);
+        for (wave, share) in beyond.into_iter().enumerate() {
+            let column = self.column(gain, wave);
+            values.iter_mut().zip(column).for_each(|(value, entry)| *value += share * entry);
+        }
+        Ok((values, radius, parameters))
+    }
+
+    /// What the cosine or the sine of a component in the radius adds to the values.
+    fn column(&self, component: Component, wave: usize) -> Vec<f64> {
+        let across = self.angles().iter().map(|angle| component.across(*angle)[wave]);
+        let along = self.true_rad.iter().flatten().map(|angle| component.along(*angle)[wave]);
+        across.chain(along).collect()
     }
 }
 
 impl PointModel for Quadrature {
     fn effects(&self) -> Vec<Effect> {
-        self.effects_on(1.0)
+        Component::all(self.0.max_order).into_iter().map(|component| component.effect(1.0)).collect()
+    }
+
+    fn table(&self) -> Option<&'static str> {
+        Some(TABLE)
     }
 
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
-        let phase: Vec<f64> = points.column("phase_deg")?.iter().map(|phase| phase.to_radians()).collect();
-        let radius = points.column("radius_counts")?;
-        let refuse = |problem: String| Error::new("fit", points.input.display().to_string(), problem);
-        if phase.len() < 2 * self.0.blocks {
-            let problem = format!("it has {} samples for {} blocks", phase.len(), self.0.blocks);
-            return Err(refuse(problem).help("ask for fewer `blocks`"));
+        let samples = Samples::of(points)?;
+        let count = samples.phase_rad.len();
+        if count < 2 * self.0.blocks {
+            let problem = format!("it has {count} samples for {} blocks", self.0.blocks);
+            let error = Error::new("fit", points.input.display().to_string(), problem);
+            return Err(error.help("ask for fewer `blocks`"));
         }
-        let mean = radius.iter().sum::<f64>() / radius.len() as f64;
-        if mean <= 0.0 {
-            return Err(refuse(format!("its mean radius is {mean}: there is no circle")));
-        }
-        let wave = |order: usize, size: f64, function: fn(f64) -> f64| -> Vec<f64> {
-            phase.iter().map(|phase| size * function(order as f64 * phase)).collect()
-        };
-        let terms = (1..).zip(self.effects_on(mean)).map(|(order, effect)| {
-            let [cosine, sine] = if order == 2 { [-0.5 * mean, 0.5 * mean] } else { [1.0; 2] };
-            Term {
-                effect,
-                columns: vec![wave(order, cosine, f64::cos), wave(order, sine, f64::sin)],
-                rank: usize::from(order > 2),
-            }
+        let (values, radius, gain_and_angle) = samples.linearised(self.0.max_order)?;
+        let terms = Component::all(self.0.max_order).into_iter().map(|component| {
+            let waves = [0, 1].map(|wave| samples.column(component, wave));
+            let columns = component.slopes(radius, gain_and_angle).map(|[cosine, sine]| {
+                waves[0].iter().zip(&waves[1]).map(|(first, second)| cosine * first + sine * second).collect()
+            });
+            let rank = usize::from(component.order() > 2);
+            Term { effect: component.effect(radius), columns: columns.into(), rank }
         });
+        let group = blocks(samples.angles(), self.0.blocks);
+        let rows = values.len();
         let observations = Observations {
-            values: radius.to_vec(),
+            group: group.into_iter().cycle().take(rows).collect(),
+            values,
             unit: UNIT.into(),
             std: None,
-            group: blocks(&phase, self.0.blocks),
             groups: (1..=self.0.blocks).map(|block| format!("block {block}")).collect(),
         };
-        let circle = Declared { name: "radius".into(), unit: UNIT.into(), column: vec![1.0; phase.len()] };
-        LinearTerms::new(observations, vec![circle], terms.collect())
+        let highest = self.0.max_order;
+        let limit = format!("`separate.max_order` is {highest}");
+        let model = LinearTerms::new(observations, samples.declared(), terms.collect())?;
+        let model = Component::of_order(highest)
+            .into_iter()
+            .fold(model, |model, component| model.ending_at(component.id(), limit.clone()));
+        if samples.true_rad.is_some() {
+            return Ok(model.judged_by(count..rows));
+        }
+        Ok(model.told_apart_by(TOLD_APART))
     }
 
-    fn conclude(&self, points: &Points, _fit: &LinearFit) -> Result<Conclusion> {
-        let samples = points.column("phase_deg")?.len();
+    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion> {
+        let samples = Samples::of(points)?;
+        let count = samples.phase_rad.len();
         let blocks = format!(
             "left out one after the other: {} blocks of {} or {} samples next to each other in phase",
             self.0.blocks,
-            samples / self.0.blocks,
-            samples.div_ceil(self.0.blocks)
+            count / self.0.blocks,
+            count.div_ceil(self.0.blocks)
         );
         let evidence = "the noise is not known from elsewhere and samples count as independent: evidence and standard \
             uncertainties flatter, and the blocks left out decide";
-        Ok(Conclusion { shape: None, remarks: vec![blocks, evidence.to_owned()] })
+        let correction = Correction::of(&samples, self.0.max_order, fit)?;
+        let mut remarks = vec![blocks, evidence.to_owned()];
+        remarks.extend(correction.remarks());
+        Ok(Conclusion { shape: None, table: Some(correction.table(points, &samples)), remarks })
     }
 }
 

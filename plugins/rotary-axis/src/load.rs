@@ -34,4 +34,5 @@ impl StageConfig for RTestPointsConfig {
     }
 }
 
-const NUMBERS: Numbers = Numbers { read: &["a_deg", "c_deg", "dx_mm", "dy_mm", "dz_mm"], ignored: &["point"] };
+const NUMBERS: Numbers =
+    Numbers { read: &["a_deg", "c_deg", "dx_mm", "dy_mm", "dz_mm"], optional: &[], ignored: &["point"] };

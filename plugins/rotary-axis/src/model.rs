@@ -100,7 +100,7 @@ impl PointModel for RTest {
         let harmonic = |order: usize| {
             let names = COORDINATES.iter().flat_map(|(name, _)| [format!("{name}_cosine"), format!("{name}_sine")]);
             let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
-            Effect { id: format!("harmonic-{order}"), target: None, parameters }
+            Effect { id: format!("harmonic-{order}"), targets: Vec::new(), parameters }
         };
         (2..=self.0.max_order).map(harmonic).collect()
     }
@@ -140,8 +140,10 @@ impl PointModel for RTest {
             groups: used.iter().map(|(_, c)| format!("C = {c}°")).collect(),
         };
         let object = points.input.display();
-        LinearTerms::new(observations, declared.collect(), terms.collect())
-            .map_err(|error| Error::new("fit the installation to", object.to_string(), error))
+        let model = LinearTerms::new(observations, declared.collect(), terms.collect())
+            .map_err(|error| Error::new("fit the installation to", object.to_string(), error))?;
+        let highest = self.0.max_order;
+        Ok(model.ending_at(format!("harmonic-{highest}"), format!("`separate.max_order` is {highest}")))
     }
 
     fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion> {
@@ -167,6 +169,6 @@ impl PointModel for RTest {
                 held_out_rms / self.0.std_um
             ));
         }
-        Ok(Conclusion { shape: None, remarks })
+        Ok(Conclusion { shape: None, table: None, remarks })
     }
 }

@@ -22,6 +22,7 @@ fn rig() -> Rig {
         z_mm: 0.0,
         section: "s".into(),
         sign: 1,
+        ..SensorConfig::default()
     };
     let setup = |(index, part_deg): (usize, &f64)| SetupConfig {
         id: format!("{index}"),
@@ -64,12 +65,12 @@ fn profile(setup: usize) -> Profile {
         mean: (0..ORDERS * channels).map(mean).collect(),
         covariance: Some(matrices.clone()),
         scatter: Some(matrices),
-        split: None,
         spread: None,
         turns: TurnCount { recorded: TURNS, used: TURNS, ..TurnCount::default() },
         speed_rpm: Some(600.0),
         responses: Vec::new(),
         warnings: Vec::new(),
+        ..Profile::default()
     }
 }
 

@@ -5,6 +5,7 @@ use std::{f64::consts::FRAC_PI_2, sync::Arc};
 pub use runout_core::separation::UM_PER_MM_URAD;
 use runout_core::{
     Complex64,
+    azimuth::Azimuth,
     numerics::least_squares::PivotedQr,
     rig::Rig,
     separation::{Assessment, OrderAssessment, Quantity},
@@ -64,6 +65,8 @@ pub struct Reading {
     pub lever_mm: f64,
     /// Synchronous motion in this setup over that in the first.
     pub motion_ratio: f64,
+    /// ±1 as the rig declares it: readings are multiplied by it as they are read.
+    pub declared_sign: f64,
 }
 
 /// The unknowns at order 1, where each clamping has an eccentricity of its own in each section.
@@ -101,25 +104,31 @@ impl Layout {
                     part_angle_rad: angle_rad - clamping.part_rad,
                     lever_mm: sensor.z_mm - mean_z_mm,
                     motion_ratio: 1.0,
+                    declared_sign: sensor.sign,
                 });
             }
         }
         let sees_x = readings.iter().any(|reading| reading.angle_rad.cos().abs() > ALONG_AXIS);
         let sees_y = readings.iter().any(|reading| reading.angle_rad.sin().abs() > ALONG_AXIS);
+        let one_line = readings.first().map(|first| Azimuth::of(first.angle_rad)).filter(|_| {
+            let across = |reading: &Reading| (reading.angle_rad - readings[0].angle_rad).sin().abs();
+            sees_x && sees_y && readings.iter().all(|reading| across(reading) <= ALONG_AXIS)
+        });
         let sees_tilt = readings.iter().any(|reading| reading.lever_mm != 0.0);
         let looked_at = |section: &usize| rig.sensors.iter().any(|sensor| sensor.section == *section);
         let sections: Vec<usize> = (0..rig.sections.len()).filter(looked_at).collect();
         let mut unknowns: Vec<Quantity> = sections.iter().copied().map(Quantity::Form).collect();
-        for (quantity, seen) in [
-            (Quantity::X, sees_x),
-            (Quantity::Y, sees_y),
-            (Quantity::TiltX, sees_tilt && sees_y),
-            (Quantity::TiltY, sees_tilt && sees_x),
-        ] {
-            if seen {
-                unknowns.push(quantity);
-            }
-        }
+        let motions = match one_line {
+            // Neither x nor y is observable, but what is along the line.
+            Some(line) => vec![(Quantity::Along(line), true), (Quantity::TiltAlong(line), sees_tilt)],
+            None => vec![
+                (Quantity::X, sees_x),
+                (Quantity::Y, sees_y),
+                (Quantity::TiltX, sees_tilt && sees_y),
+                (Quantity::TiltY, sees_tilt && sees_x),
+            ],
+        };
+        unknowns.extend(motions.into_iter().filter(|(_, seen)| *seen).map(|(quantity, _)| quantity));
         Self {
             readings,
             unknowns,
@@ -150,15 +159,36 @@ impl Layout {
         self.odd_motion
     }
 
+    /// ±1 of each sensor, as the rig declares it.
+    pub(crate) fn declared_signs(&self) -> Vec<f64> {
+        let first = self.readings.iter().take_while(|reading| reading.setup == 0);
+        first.map(|reading| reading.declared_sign).collect()
+    }
+
     /// The layout as effects change it: where sensors and part truly are, how much the spindle moves.
     #[must_use]
     pub fn altered(&self, alterations: &Alterations) -> Self {
         let mut layout = self.clone();
         layout.odd_motion &= !alterations.even_order_motion;
+        if alterations.rotation_reversed {
+            layout.direction = -layout.direction;
+        }
         for reading in &mut layout.readings {
             let (sensor, setup) = (&alterations.sensors[reading.sensor], &alterations.setups[reading.setup]);
-            reading.angle_rad += sensor.angle_rad;
-            reading.part_angle_rad += sensor.angle_rad - setup.part_rad;
+            let place =
+                alterations.clampings[reading.setup] * alterations.places.len() + alterations.places[reading.sensor];
+            let declared = &self.readings[place];
+            reading.section = declared.section;
+            reading.lever_mm = declared.lever_mm;
+            reading.angle_rad = declared.angle_rad;
+            reading.part_angle_rad = declared.part_angle_rad;
+            if alterations.part_angles_reversed {
+                // θ' + β for θ' − β.
+                reading.part_angle_rad = 2.0 * reading.angle_rad - reading.part_angle_rad;
+            }
+            let turned = sensor.angle_rad + setup.sensors_rad;
+            reading.angle_rad += turned;
+            reading.part_angle_rad += turned - setup.part_rad;
             reading.lever_mm += sensor.z_mm;
             reading.motion_ratio *= 1.0 + setup.motion;
         }
@@ -186,6 +216,8 @@ impl Layout {
             Quantity::Y => sine(),
             Quantity::TiltX => -lever * sine(),
             Quantity::TiltY => lever * cosine(),
+            Quantity::Along(azimuth) => exact_cos(reading.angle_rad - azimuth.radians()),
+            Quantity::TiltAlong(azimuth) => lever * exact_cos(reading.angle_rad - azimuth.radians()),
         };
         Complex64::from(self.motion_sign(reading.setup, order) * reading.motion_ratio * motion)
     }
@@ -214,7 +246,7 @@ impl Layout {
             |setup| self.sections.iter().map(move |section| FirstOrder::Eccentricity { setup, section: *section });
         let mut unknowns: Vec<FirstOrder> = setups.flat_map(each).collect();
         unknowns.push(FirstOrder::CounterRotatingShift);
-        if self.unknowns.iter().any(|unknown| matches!(unknown, Quantity::TiltX | Quantity::TiltY)) {
+        if self.unknowns.iter().any(|unknown| unknown.is_tilt()) {
             unknowns.push(FirstOrder::CounterRotatingTilt);
         }
         unknowns
@@ -267,10 +299,30 @@ impl Layout {
     #[must_use]
     pub fn to_reference(&self, mean_z_mm: f64) -> ToReference {
         let lever = mean_z_mm * UM_PER_MM_URAD;
-        let position = |wanted| self.unknowns.iter().position(|unknown| *unknown == wanted);
-        let tilt = |(shift, tilt, factor)| Some((position(shift)?, position(tilt)?, factor));
-        let pairs = [(Quantity::X, Quantity::TiltY, -lever), (Quantity::Y, Quantity::TiltX, lever)];
-        ToReference { width: self.unknowns.len(), pairs: pairs.into_iter().filter_map(tilt).collect() }
+        let pairs = self.shifts_with_tilts().map(|(shift, tilt, factor)| (shift, tilt, -factor * lever)).collect();
+        ToReference { width: self.unknowns.len(), pairs }
+    }
+
+    /// Places of the displacements and of the tilts that change them along z, where both are unknowns, and the factor.
+    fn shifts_with_tilts(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        self.unknowns.iter().enumerate().filter_map(|(shift, quantity)| {
+            let (tilt, factor) = quantity.moved_by_tilt()?;
+            Some((shift, self.unknowns.iter().position(|unknown| *unknown == tilt)?, factor))
+        })
+    }
+
+    /// What to know of motion where all sensors look along one line.
+    #[must_use]
+    pub fn one_line_note(&self) -> Option<String> {
+        let shifts: Vec<Quantity> = self.unknowns.iter().copied().filter(|unknown| unknown.is_shift()).collect();
+        match shifts[..] {
+            [Quantity::Along(line)] => Some(format!(
+                "all sensors look along one line: motion is observable along {line} from x towards y only, and is given there as \
+                 `along`"
+            )),
+            [axis] => Some(format!("all sensors look along one line: motion is observable along {} only", axis.id())),
+            _ => None,
+        }
     }
 
     /// Whether each unknown can be told at an order.
@@ -293,8 +345,8 @@ impl Layout {
             for (quantity, observable) in self.unknowns.iter().zip(&mut observable) {
                 *observable &= match quantity {
                     Quantity::Form(_) => true,
-                    Quantity::X | Quantity::Y => told(FirstOrder::CounterRotatingShift),
-                    Quantity::TiltX | Quantity::TiltY => told(FirstOrder::CounterRotatingTilt),
+                    motion if motion.is_tilt() => told(FirstOrder::CounterRotatingTilt),
+                    _ => told(FirstOrder::CounterRotatingShift),
                 };
             }
         } else if self.max_noise_gain.is_finite() {
@@ -303,11 +355,8 @@ impl Layout {
             }
         }
         // Motion is reported at the spindle's reference, where shift and tilt mix.
-        for (shift, tilt) in [(Quantity::X, Quantity::TiltY), (Quantity::Y, Quantity::TiltX)] {
-            let position = |wanted| self.unknowns.iter().position(|unknown| *unknown == wanted);
-            if let (Some(shift), Some(tilt)) = (position(shift), position(tilt)) {
-                observable[shift] &= observable[tilt];
-            }
+        for (shift, tilt, _) in self.shifts_with_tilts() {
+            observable[shift] &= observable[tilt];
         }
         observable
     }
@@ -318,7 +367,7 @@ impl Layout {
         let rms_lever = (squares / self.readings.len() as f64).sqrt() * UM_PER_MM_URAD;
         let (width, covariance) = (self.unknowns.len(), qr.covariance());
         self.unknowns.iter().enumerate().map(move |(index, unknown)| {
-            let lever = if matches!(unknown, Quantity::TiltX | Quantity::TiltY) { rms_lever } else { 1.0 };
+            let lever = if unknown.is_tilt() { rms_lever } else { 1.0 };
             covariance[index * width + index].re.sqrt() * lever > self.max_noise_gain
         })
     }
@@ -328,7 +377,8 @@ impl Layout {
     #[must_use]
     pub fn assess(&self, max_order: usize) -> Assessment {
         let orders = (1..=max_order).map(|order| self.assess_order(order)).collect();
-        Assessment { unknowns: self.unknowns.clone(), orders, unused: Vec::new(), notes: Vec::new() }
+        let notes = self.one_line_note().into_iter().collect();
+        Assessment { unknowns: self.unknowns.clone(), orders, unused: Vec::new(), notes }
     }
 
     fn assess_order(&self, order: usize) -> OrderAssessment {

@@ -181,6 +181,48 @@ fn known_motion_comes_back_within_its_uncertainty() {
     }
 }
 
+/// Probes at 30° observe motion along 30°, and nothing else of it.
+#[test]
+fn motion_along_an_oblique_line_comes_back() {
+    for rotation in [Rotation::Ccw, Rotation::Cw] {
+        let mut config = spindle(rotation);
+        let line_deg = 30.0_f64;
+        config.rig.sensors.retain(|sensor| ["S1", "S3"].contains(&sensor.id.as_str()));
+        // On opposite sides: one line all the same.
+        config.rig.sensors[0].angle_deg = line_deg;
+        config.rig.sensors[1].angle_deg = line_deg + 180.0;
+        config.rig.setups.truncate(2);
+        (config.rig.setups[1].part_deg, config.rig.setups[1].sensors_deg) = (180.0, 180.0);
+        let line = LineConfig { order: std::f64::consts::SQRT_2, amplitude_um: LINE.0, direction_deg: line_deg + 50.0 };
+        config.asynchronous.lines = vec![line];
+        let (separation, profiles, slope) = measured(&config);
+        assert_eq!(separation.azimuth().unwrap().to_string(), "30°");
+        assert!(separation.unknowns.iter().all(|unknown| unknown.is_form() || unknown.azimuth().is_some()));
+        let values = values(&separation, &profiles, slope);
+        let (sine, cosine) = line_deg.to_radians().sin_cos();
+        let [x, y, tilt_x, tilt_y] = [sum(&X), sum(&Y), sum(&TILT_X), sum(&TILT_Y)];
+        let tilt = |angle: f64| cosine * value(&tilt_y, angle) - sine * value(&tilt_x, angle);
+        let along = |angle: f64| cosine * value(&x, angle) + sine * value(&y, angle) + PLANE_MM * 1e-3 * tilt(angle);
+        let asynchronous = 2.0 * LINE.0 * 50.0_f64.to_radians().cos();
+        let synchronous = [range(along), range(tilt)];
+        for (symbol, truth) in [
+            ("synchronous-radial-along", synchronous[0]),
+            ("residual-synchronous-tilt-along", synchronous[1]),
+            ("asynchronous-radial-along", asynchronous),
+            ("total-radial-along", synchronous[0] + asynchronous),
+        ] {
+            let found = find(&values, symbol);
+            println!("{symbol}: {:.5} {}, truth {truth:.5}; {}", found.value, found.unit, found.source);
+            // Across the line the part moves unseen by 2 µm at 1/rev: (2 µm)²/(2·30 mm) and the form's slope, below 0.02 µm, and
+            // of sections 30 mm apart 30 times as much of tilt.
+            let tolerance = if found.unit == "urad" { 0.6 } else { 0.03 };
+            assert!((found.value - truth).abs() < tolerance, "{symbol}: {found:?}, truth {truth}");
+            assert!(found.unit == "urad" || found.source.contains("at 30° from x"), "{}", found.source);
+        }
+        assert!(values.iter().all(|value| value.symbol.ends_with("along")), "neither x nor y is observable");
+    }
+}
+
 /// Without asynchronous motion the spread is what noise makes, by the stated factor.
 #[test]
 fn noise_enters_by_the_stated_factor() {
@@ -211,7 +253,13 @@ fn sensors_that_look_along_one_direction_tell_that_one() {
         assert!(matches!(weights[..], [(0, found)] if (found - weight).abs() < 1e-15), "{weights:?}");
     }
     let oblique = rig(&[(45.0, 0.0, "a")], &[(0.0, 0.0), (180.0, 180.0)]);
-    assert_eq!(HarmonicLeastSquares::new(&oblique, false, Weighting::None).projection(0), None);
+    let separator = HarmonicLeastSquares::new(&oblique, false, Weighting::None);
+    for (setup, weight) in [(0, 1.0), (1, -1.0)] {
+        let projection = separator.projection(setup).unwrap();
+        let [(Quantity::Along(line), weights)] = &projection.rows[..] else { panic!("{projection:?}") };
+        assert_eq!(line.to_string(), "45°");
+        assert!(matches!(weights[..], [(0, found)] if (found - weight).abs() < 1e-15), "{weights:?}");
+    }
     let four = rig(&FOUR_SENSORS, &[(0.0, 0.0)]);
     let rows = HarmonicLeastSquares::new(&four, false, Weighting::None).projection(0).unwrap().rows;
     let told: Vec<Quantity> = rows.iter().map(|(quantity, _)| *quantity).collect();

@@ -79,9 +79,9 @@ fn a_full_reversal_is_blind_to_the_angle_of_the_part() {
     let unseen = foresight.blind_to.iter().find(|unseen| unseen.blind.effect == "reversal-angle").unwrap();
     // Form is off by δ/2 times its slope: n c/2 with c = A/n at 39 orders, √(39/2) A/2 where A²/2 Σ 1/n² is (4 µm)².
     let squares: f64 = (2..=40_u32).map(|order| f64::from(order).powi(-2)).sum();
-    let turned = 0.5 * (39.0 / 2.0_f64).sqrt() * 4.0 * (2.0 / squares).sqrt();
+    let turned = 0.5 * (39.0 / 2.0_f64).sqrt() * 4.0 * (2.0 / squares).sqrt() * 1.0_f64.to_radians();
     let form = unseen.bias.iter().find(|bias| bias.on == "form").unwrap();
-    assert_eq!(form.unit, "um/rad");
+    assert_eq!(form.unit, "um/deg");
     // The two sections' forms are drawn; 15 %: three times the scatter of their sizes.
     assert!((form.value / turned - 1.0).abs() < 0.15, "{} and {turned}", form.value);
 }
@@ -130,8 +130,8 @@ fn the_loop_finds_what_was_foreseen() {
     let size = |effect: &str, target: &str| 3.0 * visible_from(&foresight, effect, Some(target));
     let campaigns = [
         ("sensor-gain", "S1", format!(r#""relative_gain":{}"#, size("sensor-gain", "S1"))),
-        ("sensor-angle", "S3", format!(r#""angle_deg":{}"#, size("sensor-angle", "S3").to_degrees())),
-        ("reversal-angle", "b", format!(r#""angle_deg":{}"#, size("reversal-angle", "b").to_degrees())),
+        ("sensor-angle", "S3", format!(r#""angle_deg":{}"#, size("sensor-angle", "S3"))),
+        ("reversal-angle", "b", format!(r#""angle_deg":{}"#, size("reversal-angle", "b"))),
         ("setup-motion-change", "c", format!(r#""ratio":{}"#, 1.0 + size("setup-motion-change", "c"))),
         ("sensor-nonlinearity", "S2", format!(r#""quadratic_per_um":{}"#, size("sensor-nonlinearity", "S2"))),
     ];

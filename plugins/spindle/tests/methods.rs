@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{FOUR_SENSORS, Truth, coefficient_error, disturb, linear_station, random_sum, rig};
+use common::{FOUR_SENSORS, Sum, Truth, coefficient_error, disturb, linear_station, random_sum, rig};
 use runout_core::{
     Complex64,
     rig::{Rig, Rotation},
@@ -93,6 +93,8 @@ fn closed_forms_equal_least_squares() {
     let two = [(90.0, 100.0, "a"), (90.0, 130.0, "b")];
     agree::<DonaldsonReversal>("donaldson, two sections", &two, &[(33.0, 12.0), (213.0, 192.0)], none);
     agree::<DonaldsonReversal>("donaldson, oblique", &[(40.0, 100.0, "a")], &REVERSAL, none);
+    let oblique = [(210.0, 100.0, "a"), (210.0, 130.0, "b")];
+    agree::<DonaldsonReversal>("donaldson, oblique, two sections", &oblique, &[(33.0, 12.0), (213.0, 192.0)], none);
     let steps =
         |count: i32| (0..count).map(|step| (f64::from(step) * 360.0 / f64::from(count), 0.0)).collect::<Vec<_>>();
     agree::<MultiStep>("multi-step, 7 equal", &[(0.0, 100.0, "a")], &steps(7), none);
@@ -108,6 +110,27 @@ fn closed_forms_equal_least_squares() {
     agree::<ThreePoint>("three-point, two sections", &twice, &[(0.0, 0.0)], 30.0);
 }
 
+/// A motion from x, y and the tilts about them, order by order.
+fn combined(motion: &[Sum; 4], quantity: Quantity) -> Sum {
+    let (sine, cosine) = quantity.azimuth().map_or((0.0, 0.0), |line| line.degrees().to_radians().sin_cos());
+    let shares = match quantity {
+        Quantity::Form(_) => [0.0; 4],
+        Quantity::X => [1.0, 0.0, 0.0, 0.0],
+        Quantity::Y => [0.0, 1.0, 0.0, 0.0],
+        Quantity::TiltX => [0.0, 0.0, 1.0, 0.0],
+        Quantity::TiltY => [0.0, 0.0, 0.0, 1.0],
+        Quantity::Along(_) => [cosine, sine, 0.0, 0.0],
+        Quantity::TiltAlong(_) => [0.0, 0.0, -sine, cosine],
+    };
+    let of_order = |order: usize| {
+        let parts = motion.iter().zip(shares).flat_map(|(sum, share)| sum.iter().map(move |term| (term, share)));
+        let parts = parts.filter(|((known, ..), _)| *known == order);
+        let sum: Complex64 = parts.map(|((_, size, phase), share)| Complex64::from_polar(size * share, *phase)).sum();
+        (order, sum.norm(), sum.arg())
+    };
+    (2..=90).map(of_order).collect()
+}
+
 /// The truth from a rig by least squares, within rounding times the layout's noise gain; and what it cannot tell.
 fn recovers(name: &str, sensors: &[(f64, f64, &str)], setups: &[(f64, f64)], lost: &dyn Fn(usize) -> bool) {
     let rig = rig(sensors, setups);
@@ -121,14 +144,11 @@ fn recovers(name: &str, sensors: &[(f64, f64, &str)], setups: &[(f64, f64)], los
     }
     for (unknown, quantity) in separation.unknowns.iter().enumerate() {
         let sum = match quantity {
-            Quantity::Form(section) => &truth.form_um[*section],
-            Quantity::X => &truth.motion[0],
-            Quantity::Y => &truth.motion[1],
-            Quantity::TiltX => &truth.motion[2],
-            Quantity::TiltY => &truth.motion[3],
+            Quantity::Form(section) => truth.form_um[*section].clone(),
+            motion => combined(&truth.motion, *motion),
         };
         for order in (2..=separation.max_order()).filter(|order| !lost(*order)) {
-            let error = coefficient_error(&separation, unknown, order, sum);
+            let error = coefficient_error(&separation, unknown, order, &sum);
             let gain = assessment.orders[order - 1].noise_gain[unknown];
             // 1e-13 µm: rounding of readings of some 10 µm.
             assert!(error < 1e-13 * gain.max(1.0), "{name}, {quantity:?}, order {order}: {error:e}, gain {gain}");
@@ -148,6 +168,10 @@ fn the_general_separator_takes_arbitrary_angles_and_hybrids() {
     recovers("three and two probes, reversed", &two_sections, &REVERSAL, &none);
     let steps: Vec<_> = (0..5).map(|step| (72.0 * f64::from(step), 0.0)).collect();
     // x and y are seen, so 1/rev is told by the clamping rule; multiples of 5 are not.
+    // All along one line: motion there is all that is observable, and 1/rev is eccentricity as well as motion.
+    let oblique = [(30.0, 100.0, "a"), (210.0, 130.0, "b")];
+    recovers("one line at 30°, reversed", &oblique, &REVERSAL, &none);
+    recovers("one line at 120°", &[(-60.0, 0.0, "a")], &[(0.0, 0.0), (50.0, 0.0), (97.3, 180.0)], &none);
     recovers("two probes, five steps", &[(0.0, 0.0, "a"), (90.0, 0.0, "a")], &steps, &|order| order % 5 == 0);
 }
 

@@ -233,11 +233,11 @@ fn setups_in_another_order_are_suspected() {
     assert!(warnings.iter().any(|warning| warning.contains("swapped")), "{warnings:?}");
 }
 
-/// Sensors fixed and the part reversed: even orders are lost. Simulated in the time domain; what the warning is about is measured
-/// against the truth of the simulator.
+/// Sensors fixed and the part reversed: even orders are lost, and what exact geometry carries out of them into the others is in
+/// their uncertainty. Simulated in the time domain, beside the truth of the simulator.
 #[test]
-fn lost_orders_that_a_large_eccentricity_carries_are_said() {
-    for (offset_um, far) in [(150.0, true), (0.5, false)] {
+fn what_lost_orders_carry_is_in_the_uncertainty() {
+    for offset_um in [0.5, 8.0, 30.0, 150.0] {
         let mut config = campaign(1, "[]");
         config.rig.setups.truncate(2);
         config.rig.setups[1].part_deg = 180.0;
@@ -255,8 +255,8 @@ fn lost_orders_that_a_large_eccentricity_carries_are_said() {
         });
         let off = off.fold(0.0, f64::max);
         println!("simulated, {offset_um} µm off centre: form off by up to {off:.1} stated std, {:?}", found.warnings);
-        let said = found.warnings.iter().any(|warning| warning.contains("orders of form are lost"));
-        assert_eq!(said, far, "{:?}", found.warnings);
-        assert_eq!(off > 5.0, far, "{off}");
+        // Of 29 orders the worst; without the lost orders' share it is above 5 at 150 µm.
+        assert!(off < 4.0, "{off}");
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
     }
 }

@@ -13,18 +13,37 @@ const UNEVEN: f64 = 2.0;
 /// It is linear in the readings: an offset and a slope go through unchanged. Of a wave of length λ read every h the
 /// cubic leaves up to (3/128)·(2πh/λ)⁴ of its amplitude.
 pub fn cubic(z_mm: &[f64], readings_um: &[f64], at: f64) -> f64 {
+    let (first, count) = around(z_mm, at);
+    let knots = || z_mm.iter().enumerate().skip(first).take(count);
+    let weight = |own: usize, z: f64| -> f64 {
+        knots().filter(|(other, _)| *other != own).map(|(_, other)| (at - other) / (z - other)).product()
+    };
+    knots().zip(readings_um.iter().skip(first)).map(|((own, z), reading)| weight(own, *z) * reading).sum()
+}
+
+/// The derivative of [`cubic`] by `at`.
+pub fn cubic_slope(z_mm: &[f64], readings_um: &[f64], at: f64) -> f64 {
+    let (first, count) = around(z_mm, at);
+    let knots = || z_mm.iter().enumerate().skip(first).take(count);
+    let others = |own: usize| knots().filter(move |(other, _)| *other != own);
+    let weight = |own: usize, z: f64| -> f64 {
+        let without = |left: usize| -> f64 {
+            others(own).filter(|(other, _)| *other != left).map(|(_, other)| (at - other) / (z - other)).product()
+        };
+        others(own).map(|(left, other)| without(left) / (z - other)).sum()
+    };
+    knots().zip(readings_um.iter().skip(first)).map(|((own, z), reading)| weight(own, *z) * reading).sum()
+}
+
+/// The first of the knots that a place is interpolated between, and their number.
+fn around(z_mm: &[f64], at: f64) -> (usize, usize) {
     let interval = z_mm.partition_point(|z| *z <= at).saturating_sub(1).min(z_mm.len().saturating_sub(2));
     let around = interval.saturating_sub(1).min(z_mm.len().saturating_sub(KNOTS));
     let spacings = z_mm.iter().skip(around).take(KNOTS).zip(z_mm.iter().skip(around + 1).take(KNOTS - 1));
     let (least, most) = spacings
         .map(|(lower, upper)| upper - lower)
         .fold((f64::INFINITY, 0.0_f64), |(least, most), spacing| (least.min(spacing), most.max(spacing)));
-    let (first, count) = if most <= UNEVEN * least { (around, KNOTS) } else { (interval, 2) };
-    let knots = || z_mm.iter().enumerate().skip(first).take(count);
-    let weight = |own: usize, z: f64| -> f64 {
-        knots().filter(|(other, _)| *other != own).map(|(_, other)| (at - other) / (z - other)).product()
-    };
-    knots().zip(readings_um.iter().skip(first)).map(|((own, z), reading)| weight(own, *z) * reading).sum()
+    if most <= UNEVEN * least { (around, KNOTS) } else { (interval, 2) }
 }
 
 #[cfg(test)]
@@ -41,6 +60,10 @@ mod tests {
             let expected = 2.0 - at + 0.5 * at * at - 0.1 * f64::powi(at, 3);
             // 1e-13: rounding of terms near 20.
             assert!((cubic(&z, &readings, at) - expected).abs() < 1e-13, "{at}");
+        }
+        for at in [0.3, 1.7, 2.9, 4.0, 5.9] {
+            let expected = -1.0 + at - 0.3 * f64::powi(at, 2);
+            assert!((cubic_slope(&z, &readings, at) - expected).abs() < 1e-12, "{at}");
         }
         for (z_mm, reading) in z.iter().zip(readings) {
             assert_eq!(cubic(&z, &readings, *z_mm), reading);

@@ -4,19 +4,31 @@
 //! turned by 180° about its axis and the probe looks at the same line of it from the opposite side. The loader
 //! `axial-traces` reads traces of both setups; the separator `axial-reversal` tells part and slide apart.
 
+mod diagnose;
+mod effects;
+mod grid;
 mod interpolate;
 mod load;
+mod model;
+mod moves;
 mod positions;
 mod separate;
+mod spline;
 mod trace;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{
+    effects::EffectEntry,
+    registry::{Plugin, Registry},
+};
 
 pub use load::AxialTracesConfig;
 pub use separate::{AxialReversal, AxialReversalConfig};
 
-/// Adds the loader `axial-traces` and the separator `axial-reversal`.
+/// Adds the loader `axial-traces`, the separator `axial-reversal` and what a reversal may lack.
 pub fn register(registry: &mut Registry) {
     registry.loaders.add(Plugin::of::<AxialTracesConfig>());
     registry.separators.add(Plugin::of::<AxialReversalConfig>());
+    for kind in effects::KINDS {
+        registry.effects.add(EffectEntry::new(kind.id(), kind.about(), kind.parameters(), kind));
+    }
 }

@@ -9,7 +9,7 @@ use runout_core::{
     },
     stage::Loader,
 };
-use runout_traces::Columns;
+use runout_traces::{Columns, Optional};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -19,6 +19,8 @@ use serde::Deserialize;
 pub struct AxialTracesConfig {
     /// CSV file with the columns trace, setup, z_mm, reading_um, in any order; the points of a trace follow one
     /// another, with z rising or falling throughout. A reading grows when the surface comes nearer to the probe.
+    /// Optional columns: flag (1 leaves the point out, 0 uses it) and time_s (for drifts along a trace; without it a trace
+    /// is taken to run at constant speed in the order of its rows).
     /// Separated by comma, semicolon or tab; the last two allow a decimal comma.
     pub path: PathBuf,
 }
@@ -34,4 +36,8 @@ impl StageConfig for AxialTracesConfig {
     }
 }
 
-const COLUMNS: Columns = Columns { kind: "setup", numbers: &["z_mm", "reading_um"] };
+const COLUMNS: Columns = Columns {
+    kind: "setup",
+    numbers: &["z_mm", "reading_um"],
+    optional: &[Optional::Number("time_s"), Optional::Flag("flag")],
+};

@@ -21,8 +21,13 @@ pub fn common_range(file: &Path, all: &[&AxialTrace]) -> Result<[f64; 2]> {
         (Some(latest), Some(earliest)) if start(&latest) < end(&earliest) => Ok([start(&latest), end(&earliest)]),
         (Some(latest), Some(earliest)) => {
             let (begins, ends) = (start(&latest), end(&earliest));
-            let problem =
-                format!("trace {} begins at {begins} mm, where {} has ended ({ends} mm)", latest.id, earliest.id);
+            let [of_latest, of_earliest] =
+                [latest, earliest].map(|trace| trace.rows.map(|row| row.to_string()).join(" to "));
+            let problem = format!(
+                "trace {} begins at {begins} mm, where {} has ended ({ends} mm): column z_mm, points {of_latest} and \
+                 {of_earliest} of the file",
+                latest.id, earliest.id
+            );
             Err(Error::new("separate", file.display().to_string(), problem)
                 .help("all traces have to share a range of z, in the part's own coordinate"))
         }

@@ -2,20 +2,20 @@
 
 use runout_core::{
     Error, Result,
-    evaluate::straightness::about_lsli_um,
     pipeline::{
         error::{Fault, known_names},
         registry::{Context, StageConfig},
     },
     points::Points,
-    stage::{Separator, TraceSeparator},
+    stage::{Separator, TraceModel, TraceSeparator},
     straightness::Straightness,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    interpolate::cubic,
+    grid::{Split, smooth},
+    moves::{grid, rows},
     positions::{coarsest_mm, common_range, positions},
     trace::AxialTrace,
 };
@@ -35,6 +35,34 @@ pub struct AxialReversalConfig {
     /// coarsest trace, so that both ends of the common range have one.
     #[serde(default)]
     pub step_mm: Option<f64>,
+    /// The slide has no waves shorter than this, in mm. Declare it where the slide's guideway and bearings bear it out: shorter
+    /// waves are then the part's, the setups can contradict each other, and `diagnose` finds a shift between them.
+    #[serde(default)]
+    pub slide_cutoff_mm: Option<f64>,
+    /// Standard deviation of one reading, in µm, where it is known from elsewhere; `diagnose` can then say whether noise only
+    /// is left.
+    #[serde(default)]
+    pub reading_std_um: Option<f64>,
+    /// Largest axial shift of a trace that is looked for, in mm.
+    #[serde(default = "default_max_shift_mm")]
+    pub max_shift_mm: f64,
+}
+
+impl Default for AxialReversalConfig {
+    fn default() -> Self {
+        Self {
+            initial: default_initial(),
+            reversed: default_reversed(),
+            step_mm: None,
+            slide_cutoff_mm: None,
+            reading_std_um: None,
+            max_shift_mm: default_max_shift_mm(),
+        }
+    }
+}
+
+fn default_max_shift_mm() -> f64 {
+    1.0
 }
 
 fn default_initial() -> String {
@@ -65,11 +93,19 @@ impl AxialReversalConfig {
         if self.initial == self.reversed {
             return Err(Fault::at("reversed", format!("both setups are named `{}`", self.reversed)));
         }
-        match self.step_mm {
-            Some(step) if !(step.is_finite() && step > 0.0) => {
-                Err(Fault::at("step_mm", format!("the step must be above 0 mm, found {step}")))
+        let positive = [
+            ("step_mm", "the step", "mm", self.step_mm),
+            ("slide_cutoff_mm", "the slide's shortest wave", "mm", self.slide_cutoff_mm),
+            ("reading_std_um", "the standard deviation", "µm", self.reading_std_um),
+            ("max_shift_mm", "the largest shift", "mm", Some(self.max_shift_mm)),
+        ];
+        let wrong = |value: f64| !(value.is_finite() && value > 0.0);
+        match positive.into_iter().find(|(.., value)| value.is_some_and(wrong)) {
+            Some((key, what, unit, value)) => {
+                let found = value.unwrap_or_default();
+                Err(Fault::at(key, format!("{what} must be above 0 {unit}, found {found}")))
             }
-            _ => Ok(AxialReversal(self)),
+            None => Ok(AxialReversal(self)),
         }
     }
 }
@@ -78,57 +114,88 @@ impl AxialReversalConfig {
 /// offset and a slope of its own (straightedge reversal: C. J. Evans, R. J. Hocken, W. T. Estler, "Self-calibration:
 /// reversal, redundancy, error separation, and 'absolute testing'", CIRP Annals 45(2), 617-634 (1996)).
 ///
-/// 1. Every trace is interpolated on common positions, within the range that all of them cover.
+/// 1. Every trace is interpolated on common positions, within the range that all of them cover. In a gap it has no value.
 /// 2. Its least-squares line there is removed: with common positions that is the joint least-squares alignment of all
-///    traces.
-/// 3. With the mean m of each setup, part = (m₁ + m₂)/2 and slide = (m₁ − m₂)/2.
+///    traces. Gaps are filled from the other traces until the same holds.
+/// 3. With the mean m of each setup, part = (m₁ + m₂)/2 and slide = (m₁ − m₂)/2. With a bound on the slide's waves, the slide
+///    is the least-squares spline of that, and the part is what the traces have without it.
 /// 4. With k₁ and k₂ traces, the scatter s² about the setups' means, pooled at each position over k₁ + k₂ − 2 degrees
 ///    of freedom, gives both the variance s²(1/k₁ + 1/k₂)/4.
 #[derive(Debug, Clone)]
-pub struct AxialReversal(AxialReversalConfig);
+pub struct AxialReversal(pub(crate) AxialReversalConfig);
 
 /// Positions closer than this share of the coarsest spacing are worth a word.
 const FINER: f64 = 0.75;
 
+/// Traces of both setups, one after the other.
+pub(crate) struct Traces {
+    pub all: Vec<AxialTrace>,
+    /// Setup of each: 0 or 1.
+    pub setups: Vec<usize>,
+}
+
 impl TraceSeparator for AxialReversal {
     fn separate(&self, points: &Points) -> Result<Straightness> {
+        let traces = self.traces(points)?;
+        let mut result = self.straightness(points, &traces, 1.0, None)?.0;
+        result.warnings.extend(self.contradictions(points, &traces)?);
+        Ok(result)
+    }
+
+    fn model(&self) -> Option<&dyn TraceModel> {
+        Some(self)
+    }
+}
+
+impl AxialReversal {
+    /// The traces of a file.
+    pub(crate) fn traces(&self, points: &Points) -> Result<Traces> {
         let setups = [traces_of(points, &self.0.initial)?, traces_of(points, &self.0.reversed)?];
-        let all: Vec<&AxialTrace> = setups.iter().flatten().collect();
+        let numbers = setups.iter().enumerate().flat_map(|(setup, traces)| vec![setup; traces.len()]).collect();
+        Ok(Traces { all: setups.into_iter().flatten().collect(), setups: numbers })
+    }
+
+    /// Part and slide of traces as they are; the reversed setup sees this share of the part's deviation.
+    /// Positions are given, or found as a run does.
+    pub(crate) fn straightness(
+        &self,
+        points: &Points,
+        traces: &Traces,
+        cosine: f64,
+        on: Option<&[f64]>,
+    ) -> Result<(Straightness, Split)> {
+        let all: Vec<&AxialTrace> = traces.all.iter().collect();
         let range = common_range(&points.input, &all)?;
-        let z_mm = positions(self.0.step_mm, &points.input, &all, range)?;
-        let aligned = setups.each_ref().map(|traces| -> Vec<Vec<f64>> {
-            let on_positions = |trace: &AxialTrace| -> Vec<f64> {
-                z_mm.iter().map(|at| cubic(&trace.z_mm, &trace.reading_um, *at)).collect()
-            };
-            traces.iter().map(|trace| about_lsli_um(&z_mm, &on_positions(trace))).collect()
-        });
-        let means = aligned.each_ref().map(|traces| mean(traces, z_mm.len()));
-        let combined = |sign: f64| -> Vec<f64> {
-            means[0].iter().zip(&means[1]).map(|(initial, reversed)| 0.5 * (initial + sign * reversed)).collect()
+        let z_mm = match on {
+            Some(z_mm) => z_mm.to_vec(),
+            None => positions(self.0.step_mm, &points.input, &all, range)?,
         };
-        let counts = aligned.each_ref().map(Vec::len);
-        let degrees_of_freedom = counts[0] + counts[1] - 2;
-        let variance: Vec<f64> = (0..z_mm.len())
-            .map(|at| {
-                let about = |(traces, mean): (&Vec<Vec<f64>>, &Vec<f64>)| -> f64 {
-                    traces.iter().map(|trace| (trace[at] - mean[at]).powi(2)).sum()
-                };
-                // 0/0 is NaN: no repeats, no scatter.
-                aligned.iter().zip(&means).map(about).sum::<f64>() / degrees_of_freedom as f64
-            })
-            .collect();
-        let share = 0.25 * counts.map(|count| (count as f64).recip()).iter().sum::<f64>();
-        let std_um: Vec<f64> = variance.iter().map(|variance| (share * variance).sqrt()).collect();
-        Ok(Straightness {
-            part_um: combined(1.0),
-            slide_um: combined(-1.0),
-            part_std_um: std_um.clone(),
-            slide_std_um: std_um,
-            repeatability_um: (variance.iter().sum::<f64>() / variance.len() as f64).sqrt(),
-            degrees_of_freedom,
-            warnings: self.warnings(points, &all, range, &z_mm, counts),
-            z_mm,
-        })
+        let mut grid = grid(&z_mm, None, &traces.setups, &traces.all, cosine);
+        if grid.z_mm.len() < 3 {
+            let problem = "a setup has no readings at nearly all positions: its traces have gaps there";
+            return Err(Error::new("separate", points.input.display().to_string(), problem));
+        }
+        grid.smooth = self.0.slide_cutoff_mm.map(|cutoff| smooth(&grid.z_mm, cutoff));
+        let split = grid.split(&rows(&grid, &traces.all));
+        let counts = [0, 1].map(|setup| traces.setups.iter().filter(|own| **own == setup).count());
+        let mut warnings = self.warnings(points, &all, range, &z_mm, counts);
+        if grid.z_mm.len() < z_mm.len() {
+            let lacking = z_mm.len() - grid.z_mm.len();
+            warnings.push(format!("{lacking} of {} positions are left out: a setup has no readings there", z_mm.len()));
+        }
+        let repeated = split.variance.iter().sum::<f64>() / split.variance.len() as f64;
+        let [part_std_um, slide_std_um] = split.std_um.clone();
+        let result = Straightness {
+            z_mm: grid.z_mm.clone(),
+            part_um: split.part_um.clone(),
+            slide_um: split.slide_um.clone(),
+            part_std_um,
+            slide_std_um,
+            repeatability_um: if counts == [1, 1] { f64::NAN } else { repeated.sqrt() },
+            degrees_of_freedom: counts[0] + counts[1] - 2,
+            warnings,
+        };
+        Ok((result, split))
     }
 }
 
@@ -154,7 +221,9 @@ impl AxialReversal {
         if !beyond.is_empty() {
             let [first, last] = range;
             let left_out = beyond.join(", ");
-            warnings.push(format!("all traces share z = {first} to {last} mm; points beyond it left out: {left_out}"));
+            warnings.push(format!(
+                "all traces share z = {first:.4} to {last:.4} mm; points beyond it left out: {left_out}"
+            ));
         }
         let own = |trace: &&AxialTrace| z_mm.iter().all(|at| trace.z_mm.binary_search_by(|z| z.total_cmp(at)).is_ok());
         if let (false, [first, second, ..], Some(end)) = (all.iter().all(own), z_mm, z_mm.last()) {
@@ -163,9 +232,24 @@ impl AxialReversal {
             let rest = range[1] - end;
             let rest = if rest > 1e-6 * step { format!("; the last {rest:.4} mm hold none") } else { String::new() };
             warnings.push(format!("readings are interpolated (cubic) on positions {step:.4} mm apart{finer}{rest}"));
-            warnings.extend(all.iter().flat_map(|trace| trace.gaps(range, step)));
+        }
+        let mean_step = (range[1] - range[0]) / (z_mm.len().max(2) - 1) as f64;
+        for trace in all {
+            let gaps = trace.gaps(range, mean_step);
+            warnings.extend(gaps.into_iter().map(|[from, to]| {
+                format!("trace {} has no points from {from:.4} to {to:.4} mm: it is left out there", trace.id)
+            }));
+        }
+        let flagged = all.iter().filter(|trace| trace.flagged > 0);
+        let flagged: Vec<String> = flagged.map(|trace| format!("{} {}", trace.id, trace.flagged)).collect();
+        if !flagged.is_empty() {
+            warnings.push(format!("points left out by their flag: {}", flagged.join(", ")));
         }
         warnings.push(match counts {
+            [1, 1] if self.0.slide_cutoff_mm.is_some() => {
+                "one trace in each setup: uncertainty is the difference of both at waves that the slide does not have"
+                    .into()
+            }
             [1, 1] => "one trace in each setup: nothing tells the uncertainty; repeat each at least once".into(),
             [first, second] => {
                 let dof = first + second - 2;
@@ -196,9 +280,4 @@ fn traces_of(points: &Points, setup: &str) -> Result<Vec<AxialTrace>> {
         return Err(Error::new("separate", "part and slide", problem).help(known_names(setup, known)));
     }
     Ok(traces)
-}
-
-fn mean(traces: &[Vec<f64>], positions: usize) -> Vec<f64> {
-    let at = |position: usize| traces.iter().map(|trace| trace[position]).sum::<f64>() / traces.len() as f64;
-    (0..positions).map(at).collect()
 }

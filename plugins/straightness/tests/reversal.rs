@@ -15,7 +15,7 @@ use runout_core::{
 use runout_straightness::{AxialReversal, AxialReversalConfig};
 
 fn config(step_mm: Option<f64>) -> AxialReversalConfig {
-    AxialReversalConfig { initial: "initial".into(), reversed: "reversed".into(), step_mm }
+    AxialReversalConfig { step_mm, ..AxialReversalConfig::default() }
 }
 
 fn separator(step_mm: Option<f64>) -> AxialReversal {

@@ -59,6 +59,25 @@ pub struct Columns<'a> {
     pub kind: &'a str,
     /// Numbers, one a point; the unit is part of the name.
     pub numbers: &'a [&'a str],
+    /// Columns that a file may have besides.
+    pub optional: &'a [Optional<'a>],
+}
+
+/// A column that a file may have.
+#[derive(Debug, Clone, Copy)]
+pub enum Optional<'a> {
+    /// Of numbers.
+    Number(&'a str),
+    /// Of 0 and 1.
+    Flag(&'a str),
+}
+
+impl<'a> Optional<'a> {
+    fn name(self) -> &'a str {
+        match self {
+            Self::Number(name) | Self::Flag(name) => name,
+        }
+    }
 }
 
 /// The columns of a file of points that belong to no trace: numbers, one a point.
@@ -66,6 +85,8 @@ pub struct Columns<'a> {
 pub struct Numbers<'a> {
     /// Read.
     pub read: &'a [&'a str],
+    /// Read where they are there.
+    pub optional: &'a [&'a str],
     /// Known, and left alone.
     pub ignored: &'a [&'a str],
 }
@@ -80,12 +101,14 @@ impl Numbers<'_> {
         let failure = |problem: &dyn std::fmt::Display| Error::new("read", &shown, problem);
         let (mut reader, decimal_comma) = open(path)?;
         let header = reader.byte_headers().map_err(|error| failure(&error))?;
-        let places = places(header, self.read, self.ignored, &shown)?;
-        let mut values = vec![Vec::new(); self.read.len()];
+        let there = self.optional.iter().filter(|name| header.iter().any(|found| found == name.as_bytes()));
+        let read: Vec<&str> = self.read.iter().chain(there).copied().collect();
+        let places = places(header, &read, &[], self.ignored, &shown)?;
+        let mut values = vec![Vec::new(); read.len()];
         let mut record = ByteRecord::new();
         while reader.read_byte_record(&mut record).map_err(|error| failure(&error))? {
             let cells = Cells { record: &record, file: &shown, decimal_comma };
-            for (column, (place, name)) in values.iter_mut().zip(places.iter().zip(self.read)) {
+            for (column, (place, name)) in values.iter_mut().zip(places.iter().zip(&read)) {
                 column.push(cells.number(*place, name)?);
             }
         }
@@ -93,7 +116,7 @@ impl Numbers<'_> {
         if points.is_empty() {
             return Err(Error::new("read", shown, "it holds no points"));
         }
-        let columns = self.read.iter().zip(values);
+        let columns = read.iter().zip(values);
         let columns = columns.map(|(name, values)| Column { name: (*name).to_owned(), values }).collect();
         let traces = vec![Trace { id: trace.to_owned(), kind: trace.to_owned(), points }];
         Ok(Points { input: path.to_path_buf(), columns, traces })
@@ -108,15 +131,16 @@ fn open(path: &Path) -> Result<(csv::Reader<BufReader<File>>, bool)> {
     Ok((ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(file), delimiter != b','))
 }
 
-/// Where the wanted columns stand; refuses those that are neither wanted nor ignored.
-fn places(header: &ByteRecord, wanted: &[&str], ignored: &[&str], file: &str) -> Result<Vec<usize>> {
+/// Where the wanted columns stand; refuses those that are neither wanted, optional nor ignored.
+fn places(header: &ByteRecord, wanted: &[&str], optional: &[&str], ignored: &[&str], file: &str) -> Result<Vec<usize>> {
     let names: Vec<String> = header.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
     let refuse = |problem: String| {
-        let help = format!("the columns are {}", wanted.join(", "));
+        let besides = if optional.is_empty() { String::new() } else { format!("; optional: {}", optional.join(", ")) };
+        let help = format!("the columns are {}{besides}", wanted.join(", "));
         Error::new("read", format!("{file}, line 1"), problem).help(help)
     };
     for (index, name) in names.iter().enumerate() {
-        if !wanted.contains(&name.as_str()) && !ignored.contains(&name.as_str()) {
+        if [wanted, optional, ignored].iter().all(|known| !known.contains(&name.as_str())) {
             return Err(refuse(format!("unknown column `{name}`")));
         }
         if names[..index].contains(name) {
@@ -131,10 +155,11 @@ fn places(header: &ByteRecord, wanted: &[&str], ignored: &[&str], file: &str) ->
 }
 
 /// Where the columns stand in the file.
-struct Layout {
+struct Layout<'a> {
     trace: usize,
     kind: usize,
-    numbers: Vec<usize>,
+    /// Place, name, and whether it is a flag.
+    numbers: Vec<(usize, &'a str, bool)>,
 }
 
 impl Columns<'_> {
@@ -147,14 +172,14 @@ impl Columns<'_> {
         let failure = |problem: &dyn std::fmt::Display| Error::new("read", &shown, problem);
         let (mut reader, decimal_comma) = open(path)?;
         let layout = self.layout(reader.byte_headers().map_err(|error| failure(&error))?, &shown)?;
-        let mut values = vec![Vec::new(); self.numbers.len()];
+        let mut values = vec![Vec::new(); layout.numbers.len()];
         let mut traces: Vec<Trace> = Vec::new();
         let mut record = ByteRecord::new();
         let mut row = 0;
         while reader.read_byte_record(&mut record).map_err(|error| failure(&error))? {
             let cells = Cells { record: &record, file: &shown, decimal_comma };
-            for (column, (place, name)) in values.iter_mut().zip(layout.numbers.iter().zip(self.numbers)) {
-                column.push(cells.number(*place, name)?);
+            for (column, (place, name, is_flag)) in values.iter_mut().zip(&layout.numbers) {
+                column.push(if *is_flag { cells.flag(*place, name)? } else { cells.number(*place, name)? });
             }
             let (id, kind) = (cells.text(layout.trace, TRACE)?, cells.text(layout.kind, self.kind)?);
             match traces.last_mut() {
@@ -171,13 +196,13 @@ impl Columns<'_> {
         if traces.is_empty() {
             return Err(Error::new("read", shown, "it holds no points"));
         }
-        let columns = self.numbers.iter().zip(values);
-        let columns = columns.map(|(name, values)| Column { name: (*name).to_owned(), values }).collect();
+        let columns = layout.numbers.iter().zip(values);
+        let columns = columns.map(|((_, name, _), values)| Column { name: (*name).to_owned(), values }).collect();
         Ok(Points { input: path.to_path_buf(), columns, traces })
     }
 
     /// Why a trace cannot come back.
-    fn again(&self, known: &Trace, kind: &str, cells: &Cells, layout: &Layout) -> Error {
+    fn again(&self, known: &Trace, kind: &str, cells: &Cells, layout: &Layout<'_>) -> Error {
         let id = &known.id;
         if known.kind == kind {
             let problem = format!("trace {id} has ended above; the points of a trace follow one another");
@@ -187,11 +212,16 @@ impl Columns<'_> {
         cells.refuse(layout.kind, self.kind, &problem).help("give each trace a name of its own")
     }
 
-    fn layout(&self, header: &ByteRecord, file: &str) -> Result<Layout> {
+    fn layout(&self, header: &ByteRecord, file: &str) -> Result<Layout<'_>> {
         let wanted = [&[TRACE, self.kind], self.numbers].concat();
-        let mut places = places(header, &wanted, &[], file)?;
-        let numbers = places.split_off(2);
-        Ok(Layout { trace: places[0], kind: places[1], numbers })
+        let optional: Vec<&str> = self.optional.iter().map(|column| column.name()).collect();
+        let mut places = places(header, &wanted, &optional, &[], file)?;
+        let numbers = places.split_off(2).into_iter().zip(self.numbers).map(|(place, name)| (place, *name, false));
+        let besides = self.optional.iter().filter_map(|column| {
+            let place = header.iter().position(|found| found == column.name().as_bytes())?;
+            Some((place, column.name(), matches!(column, Optional::Flag(_))))
+        });
+        Ok(Layout { trace: places[0], kind: places[1], numbers: numbers.chain(besides).collect() })
     }
 }
 
@@ -231,6 +261,17 @@ impl Cells<'_> {
         }
     }
 
+    fn flag(&self, place: usize, name: &str) -> Result<f64> {
+        match self.text(place, name)? {
+            "0" => Ok(0.0),
+            "1" => Ok(1.0),
+            other => {
+                let problem = format!("expected 0 (used) or 1 (left out), found `{other}`");
+                Err(self.refuse(place, name, &problem))
+            }
+        }
+    }
+
     fn refuse(&self, place: usize, name: &str, problem: &str) -> Error {
         let line = self.record.position().map_or(0, csv::Position::line);
         Error::new("read", format!("{}, line {line}, column {} ({name})", self.file, place + 1), problem)
@@ -243,7 +284,8 @@ mod tests {
 
     use super::*;
 
-    const COLUMNS: Columns = Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"] };
+    const COLUMNS: Columns =
+        Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"], optional: &[Optional::Flag("flag")] };
 
     fn from(text: &str) -> Result<Points> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
@@ -265,8 +307,22 @@ mod tests {
     }
 
     #[test]
+    fn a_column_of_flags_may_be_there() {
+        let points =
+            from("flag,trace,kind,z_mm,angle_deg,deviation_um\n0,A,circle,1,0,-2\n1,A,circle,1,90,3\n").unwrap();
+        assert_eq!(points.column("flag").unwrap(), [0.0, 1.0]);
+        assert_eq!(points.column("deviation_um").unwrap(), [-2.0, 3.0]);
+        for cell in ["2", "true", "0.0", "-1", "nan"] {
+            let text = format!("trace,kind,z_mm,angle_deg,deviation_um,flag\nA,circle,1,0,-2,{cell}\n");
+            let message = from(&text).unwrap_err().to_string();
+            let expected = format!("line 2, column 6 (flag): expected 0 (used) or 1 (left out), found `{cell}`");
+            assert!(message.contains(&expected), "{message}");
+        }
+    }
+
+    #[test]
     fn points_without_traces() {
-        let numbers = Numbers { read: &["phase_deg", "radius_counts"], ignored: &["note"] };
+        let numbers = Numbers { read: &["phase_deg", "radius_counts"], optional: &["time_s"], ignored: &["note"] };
         let read = |text: &str| {
             let mut file = tempfile::NamedTempFile::new().unwrap();
             file.write_all(text.as_bytes()).unwrap();
@@ -276,6 +332,9 @@ mod tests {
         assert_eq!(points.column("phase_deg").unwrap(), [0.0, 90.25]);
         assert_eq!(points.column("radius_counts").unwrap(), [500.5, 501.0]);
         assert_eq!(points.traces, [Trace { id: "signal".into(), kind: "signal".into(), points: 0..2 }]);
+        assert!(points.column("time_s").is_err());
+        let timed = read("time_s,phase_deg,radius_counts\n0.5,1,2\n").unwrap();
+        assert_eq!(timed.column("time_s").unwrap(), [0.5]);
         assert!(read("phase_deg\n1\n").unwrap_err().to_string().contains("`radius_counts` is missing"));
         assert!(read("phase_deg,radius_counts\n").unwrap_err().to_string().contains("no points"));
         assert!(read("phase_deg,radius_counts\n1,x\n").unwrap_err().to_string().contains("line 2, column 2"));

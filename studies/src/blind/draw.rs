@@ -81,6 +81,7 @@ impl Layout {
                     z_mm,
                     section: section.into(),
                     sign: 1,
+                    ..SensorConfig::default()
                 };
                 rig.sensors = (1..).zip(places).map(sensor).collect();
                 rig
@@ -115,8 +116,8 @@ pub struct Planted {
     pub size: String,
 }
 
-/// Ids of the effects that are planted.
-pub const EFFECTS: [&str; 13] = [
+/// The effects that are planted: their ids, and a speed ripple of a single setup.
+pub const EFFECTS: [&str; 21] = [
     "sensor-gain",
     "sensor-angle",
     "sensor-axial-position",
@@ -130,6 +131,14 @@ pub const EFFECTS: [&str; 13] = [
     "filter-attenuation",
     "axial-motion",
     "asynchronous-line",
+    "sensor-line",
+    "speed-ripple-of-setup",
+    "sensors-angle",
+    "sensor-sign",
+    "sensors-swapped",
+    "setups-swapped",
+    "rotation-reversed",
+    "part-angle-sign",
 ];
 /// Those of which two are planted at a time.
 const PAIRED: [&str; 7] = [

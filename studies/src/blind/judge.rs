@@ -41,6 +41,8 @@ pub struct Judged {
     pub false_alarms: Vec<String>,
     /// Errors of the form.
     pub form: FormErrors,
+    /// The largest error of a motion (x, y, a tilt) over what is stated of it, root mean squares over the angles.
+    pub motion_ratio: f64,
 }
 
 /// What became of a planted effect.
@@ -109,6 +111,11 @@ pub fn judge(campaign: Campaign) -> Result<Judged> {
             (_, Some(Effect::AsynchronousLine(line))) => {
                 line.amplitude_um > campaign.config.asynchronous.rms_um.unwrap_or_default()
             }
+            // It shows in one of the channels.
+            (_, Some(Effect::SensorLine(line))) => {
+                let channels = campaign.config.rig.sensors.len() as f64;
+                line.amplitude_um > channels.sqrt() * campaign.config.asynchronous.rms_um.unwrap_or_default()
+            }
             (Kind::Pair, _) => alone(index)?,
             _ => visible(&said.diagnosis),
         };
@@ -124,7 +131,8 @@ pub fn judge(campaign: Campaign) -> Result<Judged> {
     let there = |added: &&Added| !campaign.planted.iter().any(|planted| holds(added, planted));
     let false_alarms = said.diagnosis.added.iter().filter(there).map(name).collect();
     let form = form_errors(&said, &sound.as_ref().map_or(&said, |run| &run.said).after, &truth);
-    Ok(Judged { campaign, diagnosis: said.diagnosis, effects, false_alarms, form })
+    let motion_ratio = motion_ratio(&said, &truth);
+    Ok(Judged { campaign, diagnosis: said.diagnosis, effects, false_alarms, form, motion_ratio })
 }
 
 /// Whether the declared model leaves more than noise; without a measure of noise, whatever is planted should show.
@@ -157,8 +165,9 @@ fn within(added: &Added, planted: &Planted) -> [usize; 2] {
         return counts;
     }
     for (name, truth) in &planted.parameters {
-        let Some(found) = added.parameters.iter().find(|one| one.name == *name && one.std > 0.0) else { continue };
-        counts[0] += usize::from((found.value - truth).abs() <= 2.0 * found.std);
+        let Some(found) = added.parameters.iter().find(|one| one.name == *name) else { continue };
+        let Some(std) = found.std.filter(|std| *std > 0.0) else { continue };
+        counts[0] += usize::from((found.value - truth).abs() <= 2.0 * std);
         counts[1] += 1;
     }
     counts
@@ -194,7 +203,37 @@ fn form_errors(said: &StationDiagnosis, sound: &[Separation], truth: &StationTru
     FormErrors { sound, before, after, stated }
 }
 
+/// The largest error over stated uncertainty of x, y and the tilts; NaN where no truth is known.
+fn motion_ratio(said: &StationDiagnosis, truth: &StationTruth) -> f64 {
+    let (Some(after), Some(curves)) = (said.after.first(), &truth.motion) else { return f64::NAN };
+    let width = after.unknowns.len();
+    let quantities = [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY];
+    let ratios = quantities.iter().zip(curves).filter_map(|(quantity, curve)| {
+        let unknown = after.position(*quantity)?;
+        let mut fourier = Fourier::new(curve.len());
+        let mut harmonics = vec![Complex64::ZERO; fourier.max_order() + 1];
+        fourier.analyse(curve.iter().copied(), &mut harmonics);
+        let (mut error, mut stated) = (0.0, 0.0);
+        for order in BAND {
+            let index = order * width + unknown;
+            if after.observable.get(index).is_some_and(|observable| *observable) {
+                let truth = harmonics.get(order).copied().unwrap_or_default().conj();
+                error += (after.estimate[index] - truth).norm_sqr();
+                stated += after.variance[index];
+            }
+        }
+        (stated > 0.0).then(|| (error / stated).sqrt())
+    });
+    ratios.fold(f64::NAN, f64::max)
+}
+
 impl Judged {
+    /// Whether the data do not decide between effects.
+    #[must_use]
+    pub fn is_confounded(&self) -> bool {
+        self.diagnosis.added.iter().any(|added| !added.confounded_with.is_empty())
+    }
+
     /// What is not as it should be, in words; nothing where all is well.
     #[must_use]
     pub fn failures(&self) -> Vec<String> {
@@ -251,7 +290,10 @@ impl Judged {
             let values: Vec<String> = added
                 .parameters
                 .iter()
-                .map(|one| format!("{} {:.3e} ± {:.1e}", one.name, one.value, one.std))
+                .map(|one| {
+                    let std = one.std.map(|std| format!(" ± {std:.1e}")).unwrap_or_default();
+                    format!("{} {:.3e}{std}", one.name, one.value)
+                })
                 .collect();
             let set = match added.confounded_with.len() {
                 0 => String::new(),

@@ -2,7 +2,8 @@
 
 use runout_spindle::simulate::{
     AsynchronousLine, AxialMotion, Backlash, Dent, Effect, EvenOrderMotion, FilterAttenuation, MotionHarmonic,
-    ReversalAngle, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity, SetupMotionChange, SlippedProbe,
+    PartAngleSign, ReversalAngle, RotationReversed, SensorAngle, SensorAxialPosition, SensorGain, SensorLine,
+    SensorNonlinearity, SensorSign, SensorsAngle, SensorsSwapped, SetupMotionChange, SetupsSwapped, SlippedProbe,
     SpeedRipple, SpindleConfig, Step, ThermalDrift,
 };
 
@@ -21,8 +22,12 @@ impl Draw {
                 let size = format!("eccentricity {:.0} µm", config.eccentricity.offset_um);
                 return planted("second-order-geometry", None, vec![], size);
             }
-            "reversal-angle" | "setup-motion-change" => self.of_setup(id, large, config),
+            "reversal-angle" | "sensors-angle" | "setup-motion-change" => self.of_setup(id, large, config),
             "speed-ripple" => self.speed_ripple(large),
+            "speed-ripple-of-setup" => self.speed_ripple_of_setup(large, config),
+            "sensor-sign" | "sensors-swapped" | "setups-swapped" | "rotation-reversed" | "part-angle-sign" => {
+                self.mistake(id, config)
+            }
             "even-order-motion" | "axial-motion" | "asynchronous-line" => self.of_motion(id),
             "dent" | "backlash" | "step" | "slipped-probe" => self.stranger(id, config),
             _ => self.of_sensor(id, large, config),
@@ -35,14 +40,14 @@ impl Draw {
     fn of_sensor(&mut self, id: &str, large: bool, config: &SpindleConfig) -> (Effect, Planted) {
         match id {
             "sensor-gain" => {
-                let (target, relative_gain) = (self.sensor(config), self.signed(2e-4, 0.05, large));
+                let (target, relative_gain) = (self.sensor(config), self.signed(2e-4, 0.1, large));
                 let size = format!("{:+.2} %", 100.0 * relative_gain);
                 let planted = planted("sensor-gain", Some(&target), vec![("gain", relative_gain)], size);
                 (Effect::SensorGain(SensorGain { targets: vec![target], relative_gain, declared: false }), planted)
             }
             "sensor-angle" => {
                 let (target, angle_deg) = (self.sensor(config), self.signed(0.003, 2.0, large));
-                let parameters = vec![("angle", angle_deg.to_radians())];
+                let parameters = vec![("angle", angle_deg)];
                 let planted = planted("sensor-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
                 (Effect::SensorAngle(SensorAngle { targets: vec![target], angle_deg, declared: false }), planted)
             }
@@ -63,16 +68,8 @@ impl Draw {
                 let effect = SensorNonlinearity { targets, quadratic_per_um, cubic_per_um2, declared: false };
                 (Effect::SensorNonlinearity(effect), planted)
             }
-            "thermal-drift" => {
-                let (target, rate_um_per_rev) = (self.sensor(config), self.signed(0.02, 2.0, large));
-                let time_constant_turns = self.size(10.0, 60.0);
-                let parameters = vec![("rate", rate_um_per_rev), ("time-constant", time_constant_turns)];
-                let size = format!("{rate_um_per_rev:+.3} µm/rev, {time_constant_turns:.0} turns");
-                let planted = planted("thermal-drift", Some(&target), parameters, size);
-                let targets = vec![target];
-                let effect = ThermalDrift { targets, rate_um_per_rev, time_constant_turns, declared: false };
-                (Effect::ThermalDrift(effect), planted)
-            }
+            "thermal-drift" => self.drift(large, config),
+            "sensor-line" => self.pick_up(config),
             _ => {
                 let (target, cutoff_hz) = (self.sensor(config), self.size(300.0, 2100.0));
                 // The digital filter is not quite the analogue one that the loop finds: no parameter to compare.
@@ -83,17 +80,68 @@ impl Draw {
         }
     }
 
+    /// A drift along a straight line or with a time constant, in all captures or in one.
+    fn drift(&mut self, large: bool, config: &SpindleConfig) -> (Effect, Planted) {
+        let (target, rate_um_per_rev) = (self.sensor(config), self.signed(0.02, 2.0, large));
+        let time_constant_turns = if self.below(2) == 0 { None } else { Some(self.size(10.0, 60.0)) };
+        let turns = config.recording.revolutions as f64;
+        let over_capture = |tau: f64| -rate_um_per_rev * tau * (-turns / tau).exp_m1();
+        let over_capture = time_constant_turns.map_or(rate_um_per_rev * turns, over_capture);
+        let mut parameters = vec![("over-capture", over_capture)];
+        let mut size = format!("{rate_um_per_rev:+.3} µm/rev, {over_capture:+.2} µm over a capture");
+        if let Some(turns) = time_constant_turns {
+            parameters.push(("time-constant", turns));
+            size = format!("{size}, {turns:.0} turns");
+        }
+        let mut setups = Vec::new();
+        if self.below(4) == 0 {
+            let setup = self.later_setup(config);
+            // Captures that differ have a parameter each.
+            parameters.retain(|(name, _)| *name == "time-constant");
+            size = format!("{size} in {setup} only");
+            setups.push(setup);
+        }
+        let planted = planted("thermal-drift", Some(&target), parameters, size);
+        let targets = vec![target];
+        let effect = ThermalDrift { targets, rate_um_per_rev, time_constant_turns, setups, declared: false };
+        (Effect::ThermalDrift(effect), planted)
+    }
+
+    /// Mains or another line in one channel.
+    fn pick_up(&mut self, config: &SpindleConfig) -> (Effect, Planted) {
+        let (target, amplitude_um) = (self.sensor(config), self.size(0.02, 2.0));
+        let turns_hz = config.recording.speed_rpm / 60.0;
+        let frequency_hz = match self.below(3) {
+            0 => 60.0,
+            1 => 60.0 * (1 + self.below(3)) as f64 + 0.07,
+            _ => (self.below(12) as f64 + self.between(0.2, 0.8)) * turns_hz,
+        };
+        let parameters = vec![("frequency", frequency_hz), ("amplitude", amplitude_um)];
+        let size = format!("{amplitude_um:.3} µm at {frequency_hz:.2} Hz");
+        let planted = planted("sensor-line", Some(&target), parameters, size);
+        let targets = vec![target];
+        let effect =
+            SensorLine { targets, frequency_hz: Some(frequency_hz), order: None, amplitude_um, declared: false };
+        (Effect::SensorLine(effect), planted)
+    }
+
     /// Effects of a setup.
     fn of_setup(&mut self, id: &str, large: bool, config: &SpindleConfig) -> (Effect, Planted) {
         let target = self.later_setup(config);
         if id == "reversal-angle" {
             let angle_deg = self.signed(0.003, 1.0, large);
-            let parameters = vec![("angle", angle_deg.to_radians())];
+            let parameters = vec![("angle", angle_deg)];
             let planted = planted("reversal-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
             return (
                 Effect::ReversalAngle(ReversalAngle { targets: vec![target], angle_deg, declared: false }),
                 planted,
             );
+        }
+        if id == "sensors-angle" {
+            let angle_deg = self.signed(0.003, 1.0, large);
+            let parameters = vec![("angle", angle_deg)];
+            let planted = planted("sensors-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
+            return (Effect::SensorsAngle(SensorsAngle { targets: vec![target], angle_deg, declared: false }), planted);
         }
         let ratio = 1.0 + self.signed(0.003, 0.3, large);
         let size = format!("{ratio:.3}");
@@ -105,15 +153,63 @@ impl Draw {
     fn speed_ripple(&mut self, large: bool) -> (Effect, Planted) {
         let order = 1 + self.below(4);
         let amplitude = self.signed(1e-4, 0.01, large).abs();
-        let parameters = vec![("amplitude", amplitude), ("order", order as f64)];
+        let parameters = vec![("amplitude", amplitude.to_degrees()), ("order", order as f64)];
         let planted = planted("speed-ripple", None, parameters, format!("{amplitude:.1e} rad at {order}/rev"));
         let effect = SpeedRipple {
             order: order as f64,
             amplitude_deg: amplitude.to_degrees(),
             phase_deg: self.between(0.0, 360.0),
+            targets: vec![],
             declared: false,
         };
         (Effect::SpeedRipple(effect), planted)
+    }
+
+    fn speed_ripple_of_setup(&mut self, large: bool, config: &SpindleConfig) -> (Effect, Planted) {
+        let target = config.rig.setups[self.below(config.rig.setups.len())].id.clone();
+        match self.speed_ripple(large) {
+            (Effect::SpeedRipple(ripple), common) => {
+                let effect = SpeedRipple { targets: vec![target.clone()], ..ripple };
+                (Effect::SpeedRipple(effect), Planted { target: Some(target), ..common })
+            }
+            other => other,
+        }
+    }
+
+    /// The rig file is wrong.
+    fn mistake(&mut self, id: &str, config: &SpindleConfig) -> (Effect, Planted) {
+        let named = |id: &'static str, targets: &[String]| {
+            let target = (!targets.is_empty()).then(|| targets.join(" "));
+            planted(id, target.as_ref(), vec![], String::new())
+        };
+        let declared = false;
+        match id {
+            "sensor-sign" => {
+                let targets = vec![self.sensor(config)];
+                let planted = named("sensor-sign", &targets);
+                (Effect::SensorSign(SensorSign { targets, declared }), planted)
+            }
+            "sensors-swapped" => {
+                let targets = self.two(config.rig.sensors.len()).map(|index| config.rig.sensors[index].id.clone());
+                let planted = named("sensors-swapped", &targets);
+                (Effect::SensorsSwapped(SensorsSwapped { targets, declared }), planted)
+            }
+            "setups-swapped" => {
+                let targets = self.two(config.rig.setups.len()).map(|index| config.rig.setups[index].id.clone());
+                let planted = named("setups-swapped", &targets);
+                (Effect::SetupsSwapped(SetupsSwapped { targets, declared }), planted)
+            }
+            "rotation-reversed" => {
+                (Effect::RotationReversed(RotationReversed { declared }), named("rotation-reversed", &[]))
+            }
+            _ => (Effect::PartAngleSign(PartAngleSign { declared }), named("part-angle-sign", &[])),
+        }
+    }
+
+    /// Two different places among `count`, the first one before the second.
+    fn two(&mut self, count: usize) -> [usize; 2] {
+        let first = self.below(count - 1);
+        [first, first + 1 + self.below(count - 1 - first)]
     }
 
     /// Motion that the declared model does not have.

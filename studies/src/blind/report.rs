@@ -12,7 +12,7 @@ use super::{
 /// Everything as Markdown.
 #[must_use]
 pub fn report(all: &[Judged]) -> String {
-    [effects(all), clean(all), strangers(all), form(all), failures(all)].join("\n")
+    [effects(all), clean(all), strangers(all), form(all), confounded(all), failures(all)].join("\n")
 }
 
 fn of(all: &[Judged], kind: Kind) -> Vec<&Judged> {
@@ -28,7 +28,10 @@ fn effects(all: &[Judged]) -> String {
     for id in EFFECTS {
         let these: Vec<&Judged> =
             single.iter().filter(|judged| judged.campaign.planted.iter().any(|one| one.id == id)).copied().collect();
-        row(&mut text, id, &these);
+        // A ripple of one setup counts as a ripple.
+        if !these.is_empty() {
+            row(&mut text, id, &these);
+        }
     }
     row(&mut text, "**single effects**", &single);
     let pairs = of(all, Kind::Pair);
@@ -149,6 +152,47 @@ fn form(all: &[Judged]) -> String {
                 two(&after),
                 quantile(&gain, 1.0),
                 two(&stated)
+            ),
+        );
+    }
+    text
+}
+
+/// Campaigns that end with a confounded set.
+fn confounded(all: &[Judged]) -> String {
+    let mut text = String::from(
+        "| campaigns with a confounded set | campaigns | form after / before: largest | form within 2 std | motion within 2 std | form error / stated: largest | motion error / stated: largest |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for rig in Layout::ALL {
+        let these: Vec<&Judged> = all
+            .iter()
+            .filter(|judged| {
+                judged.campaign.rig == rig && judged.campaign.kind != Kind::Stranger && judged.is_confounded()
+            })
+            .collect();
+        if these.is_empty() {
+            continue;
+        }
+        let largest =
+            |value: &dyn Fn(&Judged) -> f64| these.iter().map(|judged| value(judged)).fold(f64::NAN, f64::max);
+        let within = |value: &dyn Fn(&Judged) -> f64| {
+            let count = these.iter().filter(|judged| value(judged) <= 2.0).count();
+            format!("{}{count}", percent(count, these.len()))
+        };
+        let form = |judged: &Judged| judged.form.after / judged.form.stated;
+        let motion = |judged: &Judged| judged.motion_ratio;
+        line(
+            &mut text,
+            format_args!(
+                "| {} | {} | {:.3} | {} | {} | {:.2} | {:.2} |",
+                rig.name(),
+                these.len(),
+                largest(&|judged| judged.form.after / judged.form.before),
+                within(&form),
+                within(&motion),
+                largest(&form),
+                largest(&motion),
             ),
         );
     }

@@ -6,15 +6,18 @@ use super::*;
 fn level(residual_rms_um: f64, chi2_per_dof: f64) -> Level {
     Level {
         residual_rms_um,
+        degrees_of_freedom: 900,
         noise_floor_um: Some(0.0065),
         chi2_per_dof: Some(chi2_per_dof),
         held_out_rms_um: Some(1.01 * residual_rms_um),
+        held_out_expected_rms_um: Some(0.0067),
         unit: None,
+        orders: None,
     }
 }
 
 fn estimate(name: &str, value: f64, std: f64, unit: &str) -> Estimated {
-    Estimated { name: name.into(), value, std, unit: unit.into() }
+    Estimated { name: name.into(), value, std: Some(std), unit: unit.into() }
 }
 
 fn blind(effect: &str, target: &str, value: f64) -> Blind {
@@ -28,6 +31,7 @@ fn at_the_floor() -> Diagnosis {
         before: level(0.0066, 1.02),
         added: vec![],
         after: level(0.0066, 1.02),
+        nothing_separated: false,
         moved: vec![],
         unexplained: vec![],
         blind_to: vec![
@@ -39,6 +43,7 @@ fn at_the_floor() -> Diagnosis {
         lost_orders: Some(LostOrders { form: vec![], motion: vec![1] }),
         truth: None,
         warnings: vec![],
+        outputs: vec![],
     }
 }
 
@@ -50,8 +55,10 @@ fn diagnosed() -> Diagnosis {
         confounded_with: vec![],
         told_apart_by: None,
         parameters: vec![estimate("quadratic", 1.712e-3, 2.3e-5, "1/um"), estimate("cubic", -4.04e-7, 3.1e-8, "1/um2")],
+        change: Some("sensors.0.quadratic_per_um = 0.001712\nsensors.0.cubic_per_um2 = -4.04e-7".into()),
         residual_rms_um: step(0.0593, 0.0266),
         held_out_rms_um: step(0.0595, 0.0268),
+        held_out_expected_rms_um: Some(0.0067),
         delta_bic: -4120.3,
         p_value: 0.0,
     };
@@ -60,9 +67,11 @@ fn diagnosed() -> Diagnosis {
         targets: vec!["S3".into()],
         confounded_with: vec!["sensor-gain S4".into()],
         told_apart_by: Some("a third sensor in section b".into()),
-        parameters: vec![estimate("gain", 0.0171, 0.0002, "")],
+        parameters: vec![Estimated { std: None, ..estimate("gain", 0.0171, 0.0, "") }],
+        change: None,
         residual_rms_um: step(0.0266, 0.0102),
         held_out_rms_um: Step { before: Some(0.0268), after: None },
+        held_out_expected_rms_um: None,
         delta_bic: -88.2,
         p_value: 3.2e-18,
     };
@@ -73,6 +82,9 @@ fn diagnosed() -> Diagnosis {
         after,
         std,
         unit: "um".into(),
+        reference: (value == "RONt").then(|| "LSCI".into()),
+        filter: (value == "RONt").then(|| "none".into()),
+        lost_orders: if value == "RONt" { vec![3, 6, 9, 12] } else { vec![] },
     };
     Diagnosis {
         verdict: Verdict::Unexplained,
@@ -101,6 +113,7 @@ fn diagnosed() -> Diagnosis {
         }],
         truth: Some(Truth { form_rms_error_um: step(0.0937, 0.0081) }),
         warnings: vec!["the speed is 3 % off the stated one".into()],
+        outputs: vec!["out/diagnosed/form.parquet".into(), "out/diagnosed/diagnosis.json".into()],
         ..at_the_floor()
     }
 }
@@ -120,6 +133,7 @@ fn noise_that_is_not_known_and_another_unit() {
     let level = |residual| Level {
         noise_floor_um: None,
         chi2_per_dof: None,
+        held_out_expected_rms_um: None,
         unit: Some("counts".into()),
         ..level(residual, 0.0)
     };
@@ -127,11 +141,12 @@ fn noise_that_is_not_known_and_another_unit() {
         effect: "offset".into(),
         targets: vec![],
         parameters: vec![estimate("sine", 12.31, 0.04, "counts")],
+        held_out_expected_rms_um: None,
         p_value: 0.002,
         ..diagnosed().added.remove(0)
     };
     let diagnosis = Diagnosis {
-        verdict: Verdict::Explained,
+        verdict: Verdict::Improved,
         before: level(3.4),
         added: vec![added],
         after: level(0.7),

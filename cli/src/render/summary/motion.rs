@@ -4,7 +4,7 @@ use runout_core::{evaluate::Value, pipeline::run::StationSummary};
 
 use super::{std_of, unit};
 use crate::render::{
-    number::{significant, spread, with_std},
+    number::{lacking, significant, spread, with_std},
     page::Page,
     table::Table,
 };
@@ -24,13 +24,18 @@ pub fn section(page: &mut Page, stations: &[StationSummary]) {
             directions.push(direction);
         }
     }
+    let line = stations.iter().find_map(|station| station.motion_along_deg);
+    let named = |direction: &str| match line {
+        Some(line_deg) => direction.replace("along", &format!("along {line_deg}°")),
+        None => direction.to_owned(),
+    };
     let mut table = Table::new(1, std::iter::once("").chain(KINDS));
     for (direction, unit) in &directions {
         let cell = |kind: &str| {
             let found = values().filter(|value| parts(value) == (kind, direction.clone()));
             cell(&found.collect::<Vec<_>>())
         };
-        table.row(std::iter::once(format!("{direction} {unit}")).chain(KINDS.map(cell)));
+        table.row(std::iter::once(format!("{} {unit}", named(direction))).chain(KINDS.map(cell)));
     }
     let of = if stations.len() > 1 { ", lowest to highest of the stations" } else { "" };
     page.headed_table(format_args!("Error motion of the axis, peak to valley about {}{of}", first.reference), &table);
@@ -59,10 +64,13 @@ fn parts(value: &Value) -> (&str, String) {
 fn cell(values: &[&Value]) -> String {
     match values {
         [] => String::new(),
-        [only] if std_of(only).is_some() => with_std(only.value, std_of(only)),
-        [only] => significant(only.value, 4),
+        [only] if std_of(only).is_some() => with_std(only.value, std_of(only)) + &lacking(&only.lost_orders),
+        [only] => significant(only.value, 4) + &lacking(&only.lost_orders),
         several => match spread(several.iter().map(|value| value.value)) {
-            Some([low, _, high]) => format!("{} to {}", significant(low, 3), significant(high, 3)),
+            Some([low, _, high]) => {
+                let lost = several.first().map_or_else(String::new, |value| lacking(&value.lost_orders));
+                format!("{} to {}{lost}", significant(low, 3), significant(high, 3))
+            }
             None => String::new(),
         },
     }

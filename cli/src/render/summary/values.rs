@@ -7,7 +7,7 @@ use runout_core::{
 
 use super::{FEW_STATIONS, known, std_of, unit};
 use crate::render::{
-    number::{significant, with_std},
+    number::{lacking, significant, with_std},
     page::Page,
     table::Table,
 };
@@ -22,6 +22,7 @@ pub fn part(page: &mut Page, summary: &Summary) {
             Some(std) => with_std(value.value, Some(std)),
             None => significant(value.value, 4),
         };
+        let number = number + &lacking(&value.lost_orders);
         table.row([format!("{} {}", value.symbol, unit(&value.unit)), value.reference.clone(), number]);
     }
     page.headed_table("The whole part", &table);

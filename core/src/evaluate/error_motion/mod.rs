@@ -52,7 +52,7 @@ pub const CENTRE: Centre = Centre::Plot(Reference::LeastSquares);
 const STANDARD: &str = "ISO 230-7:2015";
 
 /// Symbol and unit of every value that there may be.
-pub const SYMBOLS: [(&str, &str); 20] = [
+pub const SYMBOLS: [(&str, &str); 26] = [
     ("synchronous-radial-x", "µm"),
     ("synchronous-radial-y", "µm"),
     ("synchronous-radial-rotating", "µm"),
@@ -73,6 +73,12 @@ pub const SYMBOLS: [(&str, &str); 20] = [
     ("asynchronous-tilt-rotating", "µrad"),
     ("fundamental-radial", "µm"),
     ("fundamental-tilt", "µrad"),
+    ("synchronous-radial-along", "µm"),
+    ("total-radial-along", "µm"),
+    ("asynchronous-radial-along", "µm"),
+    ("residual-synchronous-tilt-along", "µrad"),
+    ("total-tilt-along", "µrad"),
+    ("asynchronous-tilt-along", "µrad"),
 ];
 /// Two-sided 95 % quantiles of Student's distribution for 1, 2, 3, … degrees of freedom.
 const STUDENT_95: [f64; 10] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23];
@@ -87,13 +93,10 @@ impl ErrorMotion<'_> {
         let Some(first) = spreads.first() else { return Vec::new() };
         let z_mm = first.projection.z_mm + self.z_mm;
         let mut values = Vec::new();
-        for direction in Direction::ALL {
+        for direction in directions(&spreads) {
             // Setups that do not tell a direction, as sensors that all look along another one, have no part in it.
             let told: Vec<&Spread> =
                 spreads.iter().copied().filter(|spread| spread.in_direction(direction).is_some()).collect();
-            if told.is_empty() {
-                continue;
-            }
             let synchronous = Synchronous::new(self.separation, &first.projection, direction, z_mm);
             if let Some(plot) = synchronous.filter(|plot| !plot.is_lost()) {
                 for centre in centres {
@@ -175,8 +178,8 @@ impl ErrorMotion<'_> {
     /// Standard uncertainty of a range over turns from the form's slope: nothing tells it from motion along the sensor. It is
     /// at most the slope times the range across, in every sensor of the combination, and as likely to be anything below.
     fn carried(&self, direction: Direction, spreads: &[&Spread]) -> f64 {
-        let radial = [Direction::X, Direction::Y, Direction::Rotating];
-        let across = radial.iter().flat_map(|direction| spreads.iter().map(|spread| widest(spread, *direction)));
+        let radial = directions(spreads).into_iter().filter(|direction| !direction.is_tilt());
+        let across = radial.flat_map(|direction| spreads.iter().map(move |spread| widest(spread, direction)));
         let reach = spreads.iter().map(|spread| spread.reach(direction)).fold(0.0, f64::max);
         self.slope * across.fold(0.0, f64::max) * reach / 3.0_f64.sqrt()
     }
@@ -213,6 +216,20 @@ impl ErrorMotion<'_> {
             }),
         })
     }
+}
+
+/// The directions that some setup gives, each once.
+fn directions(spreads: &[&Spread]) -> Vec<Direction> {
+    let mut directions: Vec<Direction> = Vec::new();
+    for direction in spreads.iter().flat_map(|spread| &spread.directions) {
+        if !directions.contains(direction) {
+            directions.push(*direction);
+        }
+    }
+    // In the same order, whichever setup gives them.
+    directions
+        .sort_by_key(|direction| Direction::ALL.iter().position(|known| known == direction).unwrap_or(usize::MAX));
+    directions
 }
 
 /// The largest spread of a setup's turns at one angle.
@@ -278,6 +295,8 @@ fn id(direction: Direction) -> &'static str {
         Direction::TiltX => "tilt-x",
         Direction::TiltY => "tilt-y",
         Direction::RotatingTilt => "tilt-rotating",
+        Direction::Along(_) => "radial-along",
+        Direction::TiltAlong(_) => "tilt-along",
     }
 }
 
@@ -294,6 +313,12 @@ fn described(direction: Direction, z_mm: f64) -> String {
         Direction::TiltX => "tilt about x, fixed sensitive direction".into(),
         Direction::TiltY => "tilt about y, fixed sensitive direction".into(),
         Direction::RotatingTilt => "tilt, rotating sensitive direction".into(),
+        Direction::Along(azimuth) => {
+            format!("radial, fixed sensitive direction at {azimuth} from x towards y, at z = {z_mm} mm")
+        }
+        Direction::TiltAlong(azimuth) => {
+            format!("tilt towards the fixed sensitive direction at {azimuth} from x towards y")
+        }
     }
 }
 

@@ -166,11 +166,7 @@ impl Motion {
             let before = separation.unknowns.iter().take(unknown).filter(|other| !other.is_form()).count();
             Some((unknown, before, factor))
         };
-        let tilt = match quantity {
-            Quantity::X => term(Quantity::TiltY, lever),
-            Quantity::Y => term(Quantity::TiltX, -lever),
-            _ => None,
-        };
+        let tilt = quantity.moved_by_tilt().and_then(|(tilt, factor)| term(tilt, factor * lever));
         Some(Self { terms: std::iter::once(term(quantity, 1.0)?).chain(tilt).collect() })
     }
 

@@ -11,7 +11,7 @@ const TOLD: f64 = 1e-12;
 
 /// A = Q·R by modified Gram-Schmidt, twice; dependent columns have none in Q.
 #[derive(Debug, Clone)]
-pub(super) struct Basis {
+pub struct Basis {
     /// Q, `[column][point]`.
     orthonormal: Vec<Vec<f64>>,
     /// R, `[column]`: the column's shares of those of Q so far.
@@ -19,11 +19,14 @@ pub(super) struct Basis {
 }
 
 impl Basis {
+    /// Of columns, one after the other.
+    #[must_use]
     pub fn of(columns: Vec<Vec<f64>>) -> Self {
         Self { orthonormal: Vec::new(), shares: Vec::new() }.extended(columns)
     }
 
     /// With more columns.
+    #[must_use]
     pub fn extended(&self, columns: Vec<Vec<f64>>) -> Self {
         let mut made = self.clone();
         for mut column in columns {
@@ -49,12 +52,23 @@ impl Basis {
         made
     }
 
+    /// Number of independent columns.
+    #[must_use]
     pub fn rank(&self) -> usize {
         self.orthonormal.len()
     }
 
+    /// Whether a column is in the span of those before it.
+    #[must_use]
     pub fn dependent(&self) -> bool {
         self.rank() < self.shares.len()
+    }
+
+    /// Share of each place in the span: the diagonal of Q·Qᵀ.
+    #[must_use]
+    pub fn leverage(&self) -> Vec<f64> {
+        let places = self.orthonormal.first().map_or(0, Vec::len);
+        (0..places).map(|place| self.orthonormal.iter().map(|column| column[place] * column[place]).sum()).collect()
     }
 
     /// Takes out of `values` what the columns can make.
@@ -66,11 +80,13 @@ impl Basis {
     }
 
     /// x with |A·x − values| least, for independent columns: R·x = Qᵀ·values.
+    #[must_use]
     pub fn coefficients(&self, values: &[f64]) -> Vec<f64> {
         self.solve_upper(self.orthonormal.iter().map(|column| dot(column, values)).collect())
     }
 
     /// Diagonal of (AᵀA)⁻¹ = R⁻¹·R⁻ᵀ.
+    #[must_use]
     pub fn unit_variance(&self) -> Vec<f64> {
         let count = self.rank();
         let mut variance = vec![0.0; count];
@@ -93,6 +109,7 @@ impl Basis {
     ///
     /// With r what the fit to all points leaves, it is r_g + Q_g·(1 − Q_gᵀQ_g)⁻¹·Q_gᵀr_g: the others' normal matrix is
     /// 1 − Q_gᵀQ_g, well conditioned because Q is orthonormal. A direction that only the group tells is predicted as 0.
+    #[must_use]
     pub fn left_out(&self, values: &[f64], groups: &[Vec<usize>]) -> Vec<f64> {
         let count = self.rank();
         let full: Vec<f64> = self.orthonormal.iter().map(|column| dot(column, values)).collect();
@@ -100,9 +117,7 @@ impl Basis {
         self.remove_from(&mut left);
         let mut found = left.clone();
         for points in groups {
-            let inside = DMatrix::from_fn(points.len(), count, |row, column| self.orthonormal[column][points[row]]);
-            let others = DMatrix::identity(count, count) - inside.tr_mul(&inside);
-            let told = SymmetricEigen::new(others);
+            let (inside, told) = self.without(points);
             let mut change = vec![0.0; count];
             for (direction, weight) in told.eigenvectors.column_iter().zip(told.eigenvalues.iter()) {
                 let step = if *weight > TOLD {
@@ -118,5 +133,33 @@ impl Basis {
             }
         }
         found
+    }
+
+    /// Root mean square of [`left_out`](Self::left_out) of independent noise of standard deviation 1 in `points` values.
+    ///
+    /// A group's own noise has the covariance 1, that of its prediction Q_g·(1 − Q_gᵀQ_g)⁻¹·Q_gᵀ.
+    #[must_use]
+    pub fn left_out_gain(&self, groups: &[Vec<usize>], points: usize) -> f64 {
+        let predicted = groups.iter().map(|group| {
+            let (inside, told) = self.without(group);
+            let directions = told.eigenvectors.column_iter().zip(told.eigenvalues.iter());
+            let told = directions.filter(|(_, weight)| **weight > TOLD);
+            told.map(|(direction, weight)| (&inside * direction).norm_squared() / weight).sum::<f64>()
+        });
+        (1.0 + predicted.sum::<f64>() / points.max(1) as f64).sqrt()
+    }
+
+    /// What some points decide of a fit, in parameters: tr Q_gᵀQ_g.
+    #[must_use]
+    pub fn weight(&self, points: &[usize]) -> f64 {
+        self.orthonormal.iter().flat_map(|column| points.iter().map(|point| column[*point].powi(2))).sum()
+    }
+
+    /// The rows of Q of some points, and the normal matrix of the others, 1 − Q_gᵀQ_g, by its eigenvalues.
+    fn without(&self, points: &[usize]) -> (DMatrix<f64>, SymmetricEigen<f64, nalgebra::Dyn>) {
+        let count = self.rank();
+        let inside = DMatrix::from_fn(points.len(), count, |row, column| self.orthonormal[column][points[row]]);
+        let others = DMatrix::identity(count, count) - inside.tr_mul(&inside);
+        (inside, SymmetricEigen::new(others))
     }
 }

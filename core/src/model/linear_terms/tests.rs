@@ -12,7 +12,7 @@ fn noise(seed: &mut u64) -> f64 {
 fn term(id: &str, columns: Vec<Vec<f64>>) -> Term {
     let parameter = |index: usize| Parameter { name: format!("p{index}"), unit: "um".into(), tolerance: 1.0 };
     let parameters = (0..columns.len()).map(parameter).collect();
-    Term { effect: Effect { id: id.into(), target: None, parameters }, columns, rank: 0 }
+    Term { effect: Effect { id: id.into(), targets: Vec::new(), parameters }, columns, rank: 0 }
 }
 
 /// 90 points in six groups; a level and a slope are declared, a square and a pair of waves may be missing.
@@ -126,6 +126,53 @@ fn groups_left_out_are_predicted_by_the_others() {
         assert!((remainder.held_out_chi2 / squares - 1.0).abs() < 1e-9, "{} {squares}", remainder.held_out_chi2);
         assert!((remainder.held_out_rms - (squares / 90.0).sqrt()).abs() < 1e-10);
         assert!(!remainder.noise_is_known());
+    }
+}
+
+/// What the held-out rms is on average over noise alone, in groups of unequal leverage.
+#[test]
+fn held_out_noise_is_as_expected() {
+    let mut seed = 23;
+    let x: Vec<f64> = (0..24).map(|index| f64::from(index).powi(2) / 60.0).collect();
+    let column = |f: fn(f64) -> f64| x.iter().map(|x| f(*x)).collect::<Vec<f64>>();
+    let declared = |name: &str, column| Declared { name: name.into(), unit: "um".into(), column };
+    let (mut squares, mut expected) = (0.0, 0.0);
+    for _ in 0..2000 {
+        let observations = Observations {
+            // Twelve uniform numbers have the variance 1.
+            values: x.iter().map(|_| 0.3 * (0..12).map(|_| noise(&mut seed)).sum::<f64>()).collect(),
+            unit: "um".into(),
+            std: Some(0.3),
+            group: (0..24).map(|index| index / 4).collect(),
+            groups: (0..6).map(|group| format!("group {group}")).collect(),
+        };
+        let declared = vec![declared("level", column(|_| 1.0)), declared("slope", column(|x| x))];
+        let model = LinearTerms::new(observations, declared, vec![term("square", vec![column(|x| x * x)])]).unwrap();
+        let fit = model.fit(&[Setting { effect: 0, values: vec![0.0] }]).unwrap();
+        squares += fit.remainder().held_out_rms.powi(2) / 2000.0;
+        expected = fit.remainder().held_out_expected_rms;
+    }
+    // 2000 means of 24 squares: 1.5 % for independent ones, more because the last group is extrapolated.
+    assert!((squares.sqrt() / expected - 1.0).abs() < 0.05 && expected > 0.31, "{} {expected}", squares.sqrt());
+}
+
+/// A group that is ten times as noisy is named by itself, also at the end, where all others fit worse because of it.
+#[test]
+fn a_bad_group_is_named() {
+    for bad in 0..6 {
+        let Made { model, .. } = made(None);
+        let Data { mut observations, declared, terms, .. } = (*model.0).clone();
+        let mut seed = 31;
+        let sound = LinearTerms::new(observations.clone(), declared.clone(), terms.clone()).unwrap();
+        let waves = [Setting { effect: 0, values: vec![4e-4] }, Setting { effect: 1, values: vec![0.0, 0.3] }];
+        assert!(sound.fit(&waves).unwrap().far_worse().is_empty());
+        for (value, group) in observations.values.iter_mut().zip(&observations.group) {
+            *value += if *group == bad { 0.5 * noise(&mut seed) } else { 0.0 };
+        }
+        let named = LinearTerms::new(observations, declared, terms).unwrap().fit(&waves).unwrap().far_worse();
+        assert_eq!(named.len(), 1, "{named:?}");
+        assert!(named[0].place.starts_with(&format!("group {bad}: ")), "{named:?}");
+        assert!((0.07..0.3).contains(&named[0].rms_um), "{named:?}");
     }
 }
 

@@ -12,6 +12,12 @@ use crate::{
 
 /// Below this share of the methods' own values, and of their own uncertainties, two results are equal to rounding.
 const ROUNDING: f64 = 1e-9;
+/// Where two results follow alike from the readings (their difference scatters by less than this share of their own
+/// uncertainties),
+const ALIKE: f64 = 1e-6;
+/// a difference below this share of those is none: an uncertainty has at most two significant digits (GUM 7.2.6). Methods of one
+/// formula differ by so much where they share what no reading tells otherwise, and exact geometry depends on it.
+const NEGLIGIBLE: f64 = 1e-2;
 /// Scatter below this share of the values is rounding: turns that are all alike say nothing of the uncertainty.
 const NO_SCATTER: f64 = 1e-12;
 
@@ -37,8 +43,10 @@ pub(super) fn quantities(
         Quantity::Form(section) => (0, *section),
         Quantity::X => (1, 0),
         Quantity::Y => (2, 0),
-        Quantity::TiltX => (3, 0),
-        Quantity::TiltY => (4, 0),
+        Quantity::Along(_) => (3, 0),
+        Quantity::TiltX => (4, 0),
+        Quantity::TiltY => (5, 0),
+        Quantity::TiltAlong(_) => (6, 0),
     });
     let compare = |quantity: Quantity| QuantityComparison {
         quantity: quantity.id().to_owned(),
@@ -87,8 +95,7 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
         method: name.to_owned(),
         z_mm: match quantity {
             Quantity::Form(section) => result.separation.sections.get(section).map(|at| at.z_mm),
-            Quantity::X | Quantity::Y => Some(one.motion_z_mm),
-            Quantity::TiltX | Quantity::TiltY => None,
+            motion => motion.is_shift().then_some(one.motion_z_mm),
         },
         rms: rms(counted().map(|(value, _)| value.norm_sqr()).sum()),
         std: known(rms(counted().map(|(_, variance)| variance).sum())),
@@ -105,7 +112,7 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
 
 fn difference(name: &str, quantity: Quantity, pair: [&Estimates; 2], scatter: &Scatter) -> Option<Difference> {
     let unknowns = [pair[0].position(quantity)?, pair[1].position(quantity)?];
-    let in_plane = matches!(quantity, Quantity::X | Quantity::Y);
+    let in_plane = quantity.is_shift();
     let mut moved = None;
     let mut pair = pair;
     if in_plane && !pair[0].in_plane(pair[1].motion_z_mm) {
@@ -174,10 +181,13 @@ fn compared(quantity: Quantity, pair: [&Estimates; 2], unknowns: [usize; 2], sca
 
 /// E_n = |d| / (2 u), with `own` the larger of both methods' standard uncertainties and `size` their rms value.
 ///
-/// Equal to rounding is 0. Where the two follow alike from the readings and yet differ, u is as small as rounding makes
-/// it, and E_n large. `None` without scatter.
+/// Equal to rounding is 0, and so is a negligible difference of two that follow alike from the readings. Where these differ by
+/// more, u is as small as rounding makes it, and E_n large. `None` without scatter.
 fn normalised(distance: f64, std: f64, own: f64, size: f64) -> Option<f64> {
     if distance <= ROUNDING * size && (std <= ROUNDING * own || own <= NO_SCATTER * size) {
+        return Some(0.0);
+    }
+    if own > NO_SCATTER * size && std <= ALIKE * own && distance <= NEGLIGIBLE * own {
         return Some(0.0);
     }
     (std.is_finite() && own > NO_SCATTER * size).then(|| distance / (2.0 * std.max(ROUNDING * own)))
@@ -195,6 +205,10 @@ mod tests {
         assert_eq!(normalised(1e-12, 0.0, 0.0, 4.0), Some(0.0), "turns that are all alike");
         assert_eq!(normalised(0.02, 0.0, 0.0, 4.0), None, "turns that are all alike say nothing of a difference");
         assert_eq!(normalised(0.02, f64::NAN, f64::NAN, 4.0), None, "one turn");
+        assert_eq!(normalised(3e-7, 1e-17, 0.02, 4.0), Some(0.0), "three-point by formula and by least squares");
+        let told = normalised(3e-3, 1e-17, 0.02, 4.0).unwrap_or_default();
+        assert!(told > 1e6, "more than the two digits of an uncertainty: {told}");
+        assert_eq!(normalised(1e-4, 5e-5, 0.02, 4.0), Some(1.0), "scatter of their own");
         let systematic = normalised(0.02, 0.0, 0.01, 4.0).unwrap_or_default();
         assert!(systematic > 1e6 && systematic.is_finite(), "no scatter explains it");
     }

@@ -100,7 +100,7 @@ impl Estimates {
     }
 
     pub fn tells_tilt(&self) -> bool {
-        self.unknowns.iter().any(|unknown| matches!(unknown, Quantity::TiltX | Quantity::TiltY))
+        self.unknowns.iter().any(|unknown| unknown.is_tilt())
     }
 
     pub fn in_plane(&self, z_mm: f64) -> bool {
@@ -116,12 +116,12 @@ impl Estimates {
         if !self.tells_tilt() {
             return None;
         }
-        let lever = (z_mm - self.motion_z_mm) * UM_PER_MM_URAD;
+        let distance = (z_mm - self.motion_z_mm) * UM_PER_MM_URAD;
         let mut moved = Self { motion_z_mm: z_mm, ..self.clone() };
         let (width, readings) = (self.unknowns.len(), self.sensitivity.readings);
-        for (shift, tilt, lever) in [(Quantity::X, Quantity::TiltY, lever), (Quantity::Y, Quantity::TiltX, -lever)] {
-            let Some(shift) = self.position(shift) else { continue };
-            let tilt = self.position(tilt);
+        for (shift, quantity) in self.unknowns.iter().enumerate() {
+            let Some((tilt, factor)) = quantity.moved_by_tilt() else { continue };
+            let (tilt, lever) = (self.position(tilt), factor * distance);
             for order in 0..=self.max_order() {
                 let index = order * width + shift;
                 let turned = tilt.and_then(|tilt| Some((self.told(order, tilt)?.0, self.row(order, tilt))));

@@ -27,7 +27,10 @@ pub struct DiagnoseConfig {
     /// Share of the turns, at the end of each recording, that no fit sees and that every effect must explain. Measured points
     /// are left out group by group instead (circle, block, point).
     pub hold_out: Option<f64>,
-    /// Where `diagnosis.json` goes; beside the first export without it.
+    /// Folder for the exports of the final model: folders of exporters become this one, files go into it. Without it they go to
+    /// `diagnosed/` in the folders of `run`'s exports.
+    pub out: Option<PathBuf>,
+    /// Where `diagnosis.json` goes; beside the first export of the final model without it.
     pub path: Option<PathBuf>,
 }
 
@@ -61,7 +64,7 @@ impl Default for Effects {
 pub struct KnownEffect {
     /// Its id.
     pub effect: String,
-    /// The sensor or setup that it acts on; nothing for the whole.
+    /// The sensor or setup that it acts on, or two with a space between; nothing for the whole.
     pub target: Option<String>,
     /// Its parameters by name, in their units; those that are not named are 0.
     pub values: BTreeMap<String, f64>,
@@ -72,10 +75,16 @@ pub struct KnownEffect {
 pub struct Diagnose {
     /// How the loop runs.
     pub settings: Settings,
+    /// Effects of known size whose targets only the data name; not yet in `settings`.
+    pub named: Vec<KnownEffect>,
     /// Share of the turns held out, where it is configured.
     pub hold_out: Option<f64>,
+    /// Folder of the exports as configured, relative to the TOML.
+    pub out: Option<PathBuf>,
     /// Where the diagnosis goes, where it is configured.
     pub path: Option<PathBuf>,
+    /// Where the corrected rig goes, where it is asked for: a file of TOML that can stand for `[rig]`.
+    pub write_rig: Option<PathBuf>,
 }
 
 impl DiagnoseConfig {
@@ -83,7 +92,13 @@ impl DiagnoseConfig {
     ///
     /// # Errors
     /// The first that cannot be, with its key.
-    pub(crate) fn check(self, folder: &Path, kind: SourceKind, effects: &[Effect]) -> Result<Diagnose, Fault> {
+    pub(crate) fn check(
+        self,
+        folder: &Path,
+        kind: SourceKind,
+        effects: &[Effect],
+        data_name_targets: bool,
+    ) -> Result<Diagnose, Fault> {
         if let Some(share) = self.hold_out {
             if !(share > 0.0 && share < 1.0) {
                 return Err(Fault::at("hold_out", format!("expected a share between 0 and 1, found {share}")));
@@ -92,6 +107,9 @@ impl DiagnoseConfig {
                 let fault = Fault::at("hold_out", "measured points are left out group by group, not by a share");
                 return Err(fault.help("leave `hold_out` out"));
             }
+        }
+        if self.out.as_ref().is_some_and(|out| out.as_os_str().is_empty()) {
+            return Err(Fault::at("out", "expected the name of a folder"));
         }
         let chosen = match self.effects {
             Effects::Word(AllEffects::All) => None,
@@ -103,10 +121,30 @@ impl DiagnoseConfig {
             }
         };
         let known = self.known.iter().enumerate();
+        let setting = |known: &KnownEffect| {
+            let anywhere = KnownEffect { target: None, ..known.clone() };
+            if data_name_targets { anywhere.setting(effects) } else { known.setting(effects) }
+        };
+        let known: Vec<Setting> = known
+            .map(|(index, known)| setting(known).map_err(|fault| fault.under_item("known", index)))
+            .collect::<Result<_, _>>()?;
+        let (known, named) = if data_name_targets { (Vec::new(), self.known) } else { (known, Vec::new()) };
+        let settings = Settings { effects: chosen, known, ..Settings::default() };
+        let path = self.path.map(|path| folder.join(path));
+        Ok(Diagnose { settings, named, hold_out: self.hold_out, out: self.out, path, write_rig: None })
+    }
+}
+
+impl Diagnose {
+    /// The loop's settings for effects whose targets the data name.
+    ///
+    /// # Errors
+    /// When an effect of known size has a target that the data do not have.
+    pub(crate) fn settings_for(&self, effects: &[Effect]) -> Result<Settings, Fault> {
+        let known = self.named.iter().enumerate();
         let known =
             known.map(|(index, known)| known.setting(effects).map_err(|fault| fault.under_item("known", index)));
-        let settings = Settings { effects: chosen, known: known.collect::<Result<_, _>>()?, ..Settings::default() };
-        Ok(Diagnose { settings, hold_out: self.hold_out, path: self.path.map(|path| folder.join(path)) })
+        Ok(Settings { known: known.collect::<Result<_, _>>()?, ..self.settings.clone() })
     }
 }
 
@@ -125,11 +163,14 @@ impl KnownEffect {
     fn setting(&self, effects: &[Effect]) -> Result<Setting, Fault> {
         exists(&self.effect, effects).map_err(|fault| fault.under("effect"))?;
         let of_this_id = || effects.iter().enumerate().filter(|(_, effect)| effect.id == self.effect);
-        let Some((index, effect)) = of_this_id().find(|(_, effect)| effect.target == self.target) else {
-            let target = |target: &Option<String>| target.clone().unwrap_or_else(|| "none".into());
-            let targets: Vec<String> = of_this_id().map(|(_, effect)| target(&effect.target)).collect();
+        let at = |targets: &[String]| if targets.is_empty() { "none".into() } else { targets.join(" ") };
+        let named: Vec<String> =
+            self.target.iter().flat_map(|target| target.split_whitespace()).map(Into::into).collect();
+        let acts_there = |effect: &Effect| effect.targets.iter().eq(&self.target) || effect.targets == named;
+        let Some((index, effect)) = of_this_id().find(|(_, effect)| acts_there(effect)) else {
+            let targets: Vec<String> = of_this_id().map(|(_, effect)| at(&effect.targets)).collect();
             let key = if self.target.is_some() { "target" } else { "effect" };
-            let fault = Fault::at(key, format!("`{}` cannot act on `{}`", self.effect, target(&self.target)));
+            let fault = Fault::at(key, format!("`{}` cannot act on `{}`", self.effect, at(self.target.as_slice())));
             return Err(fault.help(format!("its targets: {}", targets.join(", "))));
         };
         let names = || effect.parameters.iter().map(|parameter| parameter.name.as_str());
@@ -158,12 +199,12 @@ mod tests {
     fn effect(target: &str) -> Effect {
         let parameter = |name: &str| Parameter { name: name.into(), unit: "um".into(), tolerance: 1.0 };
         let parameters = vec![parameter("x"), parameter("y")];
-        Effect { id: "offset".into(), target: Some(target.into()), parameters }
+        Effect { id: "offset".into(), targets: vec![target.into()], parameters }
     }
 
     fn checked(text: &str) -> Result<Diagnose, Fault> {
         let config = toml::from_str::<DiagnoseConfig>(text).unwrap();
-        config.check(Path::new(""), SourceKind::Turns, &[effect("S1"), effect("S2")])
+        config.check(Path::new(""), SourceKind::Turns, &[effect("S1"), effect("S2")], false)
     }
 
     #[test]

@@ -184,6 +184,13 @@ impl Evaluate {
         }
     }
 
+    /// The first peak-to-valley of a section that these give, unfiltered, and nothing else; about LSCI where they give none.
+    #[must_use]
+    pub fn first_ront(&self) -> Self {
+        let first = self.references.first().filter(|_| self.has(Group::Roundness)).copied();
+        Self { references: vec![first.unwrap_or(Reference::LeastSquares)], ..Self::ront() }
+    }
+
     /// Nothing.
     #[must_use]
     pub fn nothing() -> Self {

@@ -17,14 +17,16 @@ use crate::{
 /// The values of a section whose nominal radius is known.
 pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<Value> {
     let Some(form) = Form::of(result, section, radius_mm) else { return Vec::new() };
-    let mut values = Vec::new();
-    for cutoff in evaluate.cutoffs_upr(form.held.highest) {
-        let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
-        let papers_ra = cutoff.is_none() && evaluate.has(Group::Texture);
-        values.extend(form.round(&Filter::low_pass(cutoff), references, papers_ra));
-    }
-    if let (true, Some(lambda_c)) = (evaluate.has(Group::Texture), evaluate.lambda_c_mm) {
-        values.extend(form.texture(&Filter::between(evaluate.lambda_s_mm, Some(lambda_c), radius_mm), lambda_c));
+    let mut values = form.values(evaluate);
+    let equivalents: Vec<Vec<Value>> =
+        form.equivalents.iter().map(|harmonics| form.exactly(harmonics).values(evaluate)).collect();
+    for value in &mut values {
+        let same = |other: &&Value| {
+            (&other.symbol, &other.filter, &other.reference) == (&value.symbol, &value.filter, &value.reference)
+        };
+        let others: Vec<f64> =
+            equivalents.iter().filter_map(|all| all.iter().find(same)).map(|other| other.value).collect();
+        value.uncertainty = value.uncertainty.take().map(|known| known.with_equivalents(value.value, &others));
     }
     values
 }
@@ -52,6 +54,9 @@ pub(in crate::pipeline) fn steepest_um_per_deg(profile_um: &[f64]) -> f64 {
 /// One section's form without level and centring, which are no form deviation also where the method knows them.
 struct Form {
     harmonics: Vec<Complex64>,
+    /// Those of the solutions between which the data do not decide, and this is the mean of.
+    equivalents: Vec<Vec<Complex64>>,
+    /// Of noise.
     variance: Vec<f64>,
     held: Held,
     angles: usize,
@@ -64,8 +69,10 @@ impl Form {
     fn of(result: &StationResult, section: usize, radius_mm: f64) -> Option<Self> {
         let separation = &result.separation;
         let unknown = separation.position(Quantity::Form(section))?;
-        let harmonics = separation.coefficients(unknown).enumerate();
-        let width = separation.unknowns.len();
+        let from_two = |harmonics: Vec<Complex64>| {
+            let each = harmonics.into_iter().enumerate();
+            each.map(|(order, value)| if order < 2 { Complex64::ZERO } else { value }).collect()
+        };
         let at = separation.sections.get(section)?.clone();
         let held = Held {
             highest: separation.max_order(),
@@ -74,14 +81,35 @@ impl Form {
         };
         // Of a form of which nothing can be told, nothing is a value.
         (result.angles > 1 && held.lost.len() < held.highest.saturating_sub(1)).then(|| Self {
-            harmonics: harmonics.map(|(order, value)| if order < 2 { Complex64::ZERO } else { value }).collect(),
-            variance: separation.variance.iter().skip(unknown).step_by(width).copied().collect(),
+            harmonics: from_two(separation.coefficients(unknown).collect()),
+            equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),
+            variance: separation.noise_variance(unknown),
             held,
             angles: result.angles,
             radius_mm,
             seed: seed(&[&result.station, &at.id]),
             at,
         })
+    }
+
+    /// Another form of the same section, taken as exact.
+    fn exactly(&self, harmonics: &[Complex64]) -> Self {
+        let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
+        Self { harmonics, equivalents, variance, held: self.held.clone(), at: self.at.clone(), ..*self }
+    }
+
+    fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
+        let mut values = Vec::new();
+        for cutoff in evaluate.cutoffs_upr(self.held.highest) {
+            let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
+            let papers_ra = cutoff.is_none() && evaluate.has(Group::Texture);
+            values.extend(self.round(&Filter::low_pass(cutoff), references, papers_ra));
+        }
+        if let (true, Some(lambda_c)) = (evaluate.has(Group::Texture), evaluate.lambda_c_mm) {
+            let filter = Filter::between(evaluate.lambda_s_mm, Some(lambda_c), self.radius_mm);
+            values.extend(self.texture(&filter, lambda_c));
+        }
+        values
     }
 
     /// Everything that is computed from one filtered profile on equal angles, with what so many draws of its errors make of

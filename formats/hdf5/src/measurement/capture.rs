@@ -1,14 +1,18 @@
 //! One capture in a file: everything but its samples, read and checked.
 
 use hdf5_metno::{Dataset, Group};
-use ndarray::s;
-use runout_core::{Result, encoder::EncoderScan};
+use runout_core::{
+    Result,
+    encoder::EncoderScan,
+    marker::{Marker, MarkerScan},
+};
 
-use super::{ANGLE, INDEX, SAMPLES, samples::StoredSamples};
+use super::{
+    ANGLE, INDEX, SAMPLES,
+    line::{Line, each},
+    samples::StoredSamples,
+};
 use crate::node::{self, Place};
-
-/// Elements that are read at a time where they pass through once.
-const SCAN: usize = 65_536;
 
 /// One capture, opened.
 #[derive(Debug)]
@@ -22,95 +26,160 @@ pub(crate) struct CaptureSource {
     pub(crate) phase: Phase,
 }
 
-/// How turns are told.
+/// How turns are known.
 #[derive(Debug)]
 pub(crate) enum Phase {
     /// Sample positions of the once-per-turn mark.
-    Index(Dataset, Place),
+    Index(Line),
     /// Angle of each sample.
-    Angle(Dataset, Place),
+    Angle(Line),
+    /// The mark as an analogue trace.
+    Trace(Trace, Marker),
+    /// Nothing that was asked for.
+    Unknown(Place),
+}
+
+/// Where the trace of the mark is.
+#[derive(Debug)]
+pub(crate) enum Trace {
+    /// A channel of the samples.
+    Channel(usize),
+    /// A dataset of its own.
+    Line(Line),
 }
 
 impl CaptureSource {
-    /// Reads the attributes and shapes of `/<setup>/<station>`.
-    pub(crate) fn open(setup: &Group, setup_place: &Place, station: &str) -> Result<Self> {
+    /// Reads the attributes and shapes of `/<setup>/<station>`; turns are known by the trace of a marker where one is named.
+    pub(crate) fn open(setup: &Group, setup_place: &Place, station: &str, marker: Option<&Marker>) -> Result<Self> {
         let (group, place) = node::group(setup, setup_place, station)?;
         let z_mm = node::needed(node::number(&group, &place, "z_mm")?, &place, "z_mm")?;
         let speed_rpm = node::positive(&group, &place, "speed_rpm")?;
         let (dataset, samples_place) = node::dataset(&group, &place, SAMPLES)?;
-        let stored = StoredSamples::read(&dataset, &samples_place)?;
-        let phase = Phase::open(&group, &place, stored.samples)?;
+        let stored = StoredSamples::read(&group, &dataset, &samples_place)?;
+        let phase = match marker {
+            Some(marker) => Phase::Trace(Trace::open(&group, &place, &stored, marker)?, marker.clone()),
+            None => Phase::open(&group, &place, stored.samples)?,
+        };
         Ok(Self { place, z_mm, speed_rpm, dataset, samples_place, stored, phase })
     }
+
+    /// Sample positions at which turns begin, and the scan that says how to read the encoder.
+    pub(crate) fn marks(&self) -> Result<(Vec<f64>, Option<EncoderScan>)> {
+        match &self.phase {
+            Phase::Index(line) => Ok((positions(line, self.stored.samples)?, None)),
+            Phase::Angle(line) => {
+                let mut scan = EncoderScan::default();
+                line.each(|angle_deg| {
+                    scan.push(angle_deg)
+                        .map_err(|fault| line.place().error(format!("sample {}: {fault}", fault.sample)))
+                })?;
+                Ok((scan.marks().to_vec(), Some(scan)))
+            }
+            Phase::Trace(trace, marker) => Ok((self.crossings(trace, marker)?, None)),
+            Phase::Unknown(place) => Err(neither(place)),
+        }
+    }
+
+    fn crossings(&self, trace: &Trace, marker: &Marker) -> Result<Vec<f64>> {
+        let mut scan = MarkerScan::new(marker);
+        let mut sample = 0;
+        let place = match trace {
+            Trace::Channel(_) => &self.samples_place,
+            Trace::Line(line) => line.place(),
+        };
+        let mut take = |value: f64| {
+            sample += 1;
+            scan.push(value).map_err(|problem| place.error(format!("sample {}: {problem}", sample - 1)))
+        };
+        match trace {
+            Trace::Channel(channel) => {
+                let (gain, zero) = (self.stored.scale[*channel], self.stored.offset[*channel]);
+                let read = |range| self.stored.orientation.channel(&self.dataset, range, *channel);
+                each(
+                    self.stored.samples,
+                    |range| read(range).map_err(|error| place.error(error)),
+                    |code| take(code * gain + zero),
+                )?;
+            }
+            Trace::Line(line) => line.each(take)?,
+        }
+        let help = "set `threshold` and `hysteresis` of `marker` in [load] between its levels";
+        scan.marks().map_err(|problem| place.error(problem).help(help))
+    }
+}
+
+/// Neither marks nor angles.
+fn neither(place: &Place) -> runout_core::Error {
+    place.error(format!("expected a dataset `{INDEX}` or `{ANGLE}`, found neither")).help(
+        "where a channel holds the mark as a voltage, name it in [load]: marker = { channel = \"…\", threshold = …, hysteresis = … }",
+    )
 }
 
 impl Phase {
     fn open(group: &Group, place: &Place, samples: usize) -> Result<Self> {
-        let line = |name: &str| -> Result<(Dataset, Place, usize)> {
-            let (dataset, place) = node::dataset(group, place, name)?;
-            let found = node::element_type(&dataset, &place)?;
-            if !node::is_number(&found) {
-                return Err(place.error(format!("expected f64, found {}", node::type_name(&found))));
-            }
-            match node::written_shape(&dataset, &place)?.as_slice() {
-                [length] => Ok((dataset, place, *length)),
-                other => Err(place.error(format!("expected one dimension, found the shape {other:?}"))),
-            }
-        };
         if group.link_exists(ANGLE) {
-            let (dataset, place, length) = line(ANGLE)?;
-            if length != samples {
-                return Err(place.error(format!("expected an angle for each of {samples} samples, found {length}")));
+            let line = Line::open(group, place, ANGLE)?;
+            if line.length() != samples {
+                let problem = format!("expected an angle for each of {samples} samples, found {}", line.length());
+                return Err(line.place().error(problem));
             }
-            return Ok(Self::Angle(dataset, place));
+            return Ok(Self::Angle(line));
         }
         if !group.link_exists(INDEX) {
-            return Err(place.error(format!("expected a dataset `{INDEX}` or `{ANGLE}`, found neither")));
+            return Ok(Self::Unknown(place.clone()));
         }
-        let (dataset, place, length) = line(INDEX)?;
-        if length > samples {
-            return Err(place.error(format!("expected fewer marks than the {samples} samples, found {length}")));
+        let line = Line::open(group, place, INDEX)?;
+        if line.length() > samples {
+            let problem = format!("expected fewer marks than the {samples} samples, found {}", line.length());
+            return Err(line.place().error(problem));
         }
-        Ok(Self::Index(dataset, place))
+        Ok(Self::Index(line))
     }
 
-    /// Sample positions at which turns begin, and the scan that tells how to read the encoder.
-    pub(crate) fn marks(&self, samples: usize) -> Result<(Vec<f64>, Option<EncoderScan>)> {
+    /// Refuses a capture whose turns are not known.
+    pub(crate) fn check(&self) -> Result<()> {
         match self {
-            Self::Index(dataset, place) => {
-                let mut marks: Vec<f64> = Vec::new();
-                each(dataset, place, |value| {
-                    let expected = match marks.last() {
-                        Some(last) if value <= *last => format!("a position above {last}"),
-                        _ if (-1.0..=samples as f64).contains(&value) => {
-                            marks.push(value);
-                            return Ok(());
-                        }
-                        _ => format!("a sample position from 0 to {samples}"),
-                    };
-                    Err(place.error(format!("mark {}: expected {expected}, found {value}", marks.len())))
-                })?;
-                Ok((marks, None))
-            }
-            Self::Angle(dataset, place) => {
-                let mut scan = EncoderScan::default();
-                each(dataset, place, |angle_deg| {
-                    scan.push(angle_deg).map_err(|fault| place.error(format!("sample {}: {fault}", fault.sample)))
-                })?;
-                Ok((scan.marks().to_vec(), Some(scan)))
-            }
+            Self::Unknown(place) => Err(neither(place)),
+            _ => Ok(()),
         }
     }
 }
 
-/// Reads a line of numbers in blocks.
-fn each(dataset: &Dataset, place: &Place, mut take: impl FnMut(f64) -> Result<()>) -> Result<()> {
-    let length = dataset.size();
-    for start in (0..length).step_by(SCAN) {
-        let block = dataset.read_slice_1d::<f64, _>(s![start..length.min(start + SCAN)]);
-        for value in block.map_err(|error| place.error(error))? {
-            take(value)?;
+impl Trace {
+    fn open(group: &Group, place: &Place, stored: &StoredSamples, marker: &Marker) -> Result<Self> {
+        if let Some(channel) = stored.sensors.iter().position(|name| *name == marker.channel) {
+            return Ok(Self::Channel(channel));
         }
+        if !group.link_exists(&marker.channel) {
+            let problem = format!(
+                "expected a channel or a dataset `{}` with the mark, found the channels {}",
+                marker.channel,
+                stored.sensors.join(", ")
+            );
+            return Err(place.error(problem).help("correct `channel` of `marker` in [load]"));
+        }
+        let line = Line::open(group, place, &marker.channel)?;
+        if line.length() != stored.samples {
+            let problem = format!("expected a value for each of {} samples, found {}", stored.samples, line.length());
+            return Err(line.place().error(problem));
+        }
+        Ok(Self::Line(line))
     }
-    Ok(())
+}
+
+/// Sample positions of marks.
+fn positions(line: &Line, samples: usize) -> Result<Vec<f64>> {
+    let mut marks: Vec<f64> = Vec::new();
+    line.each(|value| {
+        let expected = match marks.last() {
+            Some(last) if value <= *last => format!("a position above {last}"),
+            _ if (-1.0..=samples as f64).contains(&value) => {
+                marks.push(value);
+                return Ok(());
+            }
+            _ => format!("a sample position from 0 to {samples}"),
+        };
+        Err(line.place().error(format!("mark {}: expected {expected}, found {value}", marks.len())))
+    })?;
+    Ok(marks)
 }

@@ -6,6 +6,7 @@ use hdf5_metno::{File, LocationType, dataset::Layout};
 use runout_core::{
     Error, Result,
     checksum::Checksum,
+    marker::Marker,
     measurement::{Recording, SampleStream, StationKey, StationTruth},
     pipeline::{
         error::Fault,
@@ -20,6 +21,7 @@ use serde::Deserialize;
 use super::{
     TRUTH,
     capture::{CaptureSource, Phase},
+    orientation::Orientation,
     stream::{Hdf5Stream, columns_of},
     truth,
 };
@@ -34,6 +36,9 @@ use crate::{
 pub struct Hdf5Config {
     /// The file, relative to the TOML.
     pub path: PathBuf,
+    /// The once-per-turn mark as an analogue trace, instead of a dataset `index`: a channel of the samples, or a dataset of the
+    /// station. A turn begins where it crosses a threshold, between two samples.
+    pub marker: Option<Marker>,
 }
 
 impl StageConfig for Hdf5Config {
@@ -45,12 +50,16 @@ impl StageConfig for Hdf5Config {
         if self.path.as_os_str().is_empty() {
             return Err(Fault::at("path", "expected the path of a measurement file, found none"));
         }
-        Ok(Box::new(Hdf5Loader { path: context.path(&self.path) }))
+        if let Some(marker) = &self.marker {
+            marker.check_with(context.rig).map_err(|fault| fault.under("marker"))?;
+        }
+        Ok(Box::new(Hdf5Loader { path: context.path(&self.path), marker: self.marker }))
     }
 }
 
 struct Hdf5Loader {
     path: PathBuf,
+    marker: Option<Marker>,
 }
 
 impl Loader for Hdf5Loader {
@@ -62,7 +71,7 @@ impl Loader for Hdf5Loader {
         let rig = rig.ok_or_else(|| {
             Error::new("open", self.path.display().to_string(), "recorded turns need a [rig] to tell the sensors")
         })?;
-        Ok(Source::Turns(Box::new(Hdf5Recording::open(&self.path, rig)?)))
+        Ok(Source::Turns(Box::new(Hdf5Recording::open(&self.path, rig, self.marker.clone())?)))
     }
 }
 
@@ -72,6 +81,7 @@ struct Hdf5Recording {
     place: Place,
     path: PathBuf,
     rig: Rig,
+    marker: Option<Marker>,
     stations: Vec<StationKey>,
     remarks: Vec<String>,
     checksum: Checksum,
@@ -84,7 +94,7 @@ const SAME_STATION_MM: f64 = 0.001;
 
 impl Hdf5Recording {
     /// Opens a file and checks everything but the samples themselves.
-    fn open(path: &Path, rig: &Rig) -> Result<Self> {
+    fn open(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Self> {
         let (file, place) = node::open(path)?;
         check_format(&file, &place)?;
         let mut remarks = Vec::new();
@@ -97,10 +107,15 @@ impl Hdf5Recording {
             let mut z_mm = None;
             for setup in &setups {
                 let (group, setup_place) = node::group(&file, &place, setup)?;
-                let source = CaptureSource::open(&group, &setup_place, &name)?;
+                let source = CaptureSource::open(&group, &setup_place, &name, marker.as_ref())?;
+                source.phase.check()?;
                 columns_of(&source.stored.sensors, rig, &source.samples_place)?;
-                is_plain &= source.dataset.layout() == Layout::Contiguous;
-                for id in source.stored.sensors.iter().filter(|id| rig.sensor(id).is_none()) {
+                is_plain &= source.dataset.layout() == Layout::Contiguous
+                    && source.stored.orientation == Orientation::SampleRows;
+                let named = |id: &&String| {
+                    rig.sensor(id).is_some() || marker.as_ref().is_some_and(|marker| marker.channel == **id)
+                };
+                for id in source.stored.sensors.iter().filter(|id| !named(id)) {
                     if !extra_channels.contains(id) {
                         extra_channels.push(id.clone());
                     }
@@ -127,7 +142,7 @@ impl Hdf5Recording {
         keys.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm).then_with(|| a.name.cmp(&b.name)));
         let (path, rig, stations) = (path.to_owned(), rig.clone(), keys);
         let checksum = Checksum::of(&path);
-        Ok(Self { file, place, path, rig, stations, remarks, checksum, is_plain })
+        Ok(Self { file, place, path, rig, marker, stations, remarks, checksum, is_plain })
     }
 }
 
@@ -141,7 +156,7 @@ impl Recording for Hdf5Recording {
             return Err(self.place.error(format!("there is no station {station} in setup {setup}")));
         };
         let (group, place) = node::group(&self.file, &self.place, &at.id)?;
-        let mut source = CaptureSource::open(&group, &place, &key.name)?;
+        let mut source = CaptureSource::open(&group, &place, &key.name, self.marker.as_ref())?;
         source.z_mm = key.z_mm;
         Ok(Box::new(Hdf5Stream::new(source, &self.rig, setup, &key.name, self.checksum.reader())?))
     }

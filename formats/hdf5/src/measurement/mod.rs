@@ -2,7 +2,9 @@
 
 mod capture;
 mod coding;
+mod line;
 pub mod loader;
+mod orientation;
 mod rows;
 pub mod samples;
 mod stream;
@@ -13,6 +15,8 @@ pub(crate) use capture::{CaptureSource, Phase};
 
 /// Samples of all channels; attributes `sensors`, `sample_rate_hz`, and for integers `scale`, `offset`.
 pub(crate) const SAMPLES: &str = "samples";
+/// Names of the channels.
+pub(crate) const SENSORS: &str = "sensors";
 /// Sample positions of the once-per-turn mark.
 pub(crate) const INDEX: &str = "index";
 /// Spindle angle of each sample.

@@ -9,15 +9,16 @@ use std::{
 
 use bytemuck::Pod;
 use hdf5_metno::{Dataset, Datatype, H5Type, dataset::Layout};
-use ndarray::s;
 use runout_core::{Result, checksum::Reader};
 
+use super::orientation::Orientation;
 use crate::node::Place;
 
 /// The rows of some neighbouring columns.
 pub(super) struct Rows {
     dataset: Dataset,
     place: Place,
+    orientation: Orientation,
     columns: Range<usize>,
     /// The file and where the dataset begins in it.
     plain: Option<(File, u64)>,
@@ -29,10 +30,11 @@ impl Rows {
     pub(super) fn new<T: H5Type + Pod + PartialEq>(
         dataset: Dataset,
         place: Place,
+        orientation: Orientation,
         columns: Range<usize>,
         checksum: Reader,
     ) -> Result<Self> {
-        let mut rows = Self { dataset, place, columns, plain: None, checksum };
+        let mut rows = Self { dataset, place, orientation, columns, plain: None, checksum };
         rows.plain = rows.beginning::<T>().and_then(|start| Some((File::open(rows.dataset.filename()).ok()?, start)));
         if rows.plain.is_some() && !rows.agree::<T>()? {
             rows.plain = None;
@@ -46,12 +48,16 @@ impl Rows {
         let [_, columns] = self.dataset.shape()[..] else { return None };
         let alike = self.dataset.dtype().ok()? == Datatype::from_type::<T>().ok()?;
         let whole = self.columns == (0..columns);
-        (alike && whole && matches!(self.dataset.layout(), Layout::Contiguous)).then(|| self.dataset.offset())?
+        (alike
+            && whole
+            && self.orientation == Orientation::SampleRows
+            && matches!(self.dataset.layout(), Layout::Contiguous))
+        .then(|| self.dataset.offset())?
     }
 
     /// Whether first and last row are the same either way.
     fn agree<T: H5Type + Pod + PartialEq>(&mut self) -> Result<bool> {
-        let last = self.dataset.shape().first().map_or(0, |rows| rows.saturating_sub(1));
+        let last = self.orientation.samples_of(&self.dataset.shape()).map_or(0, |rows| rows.saturating_sub(1));
         for row in [0, last] {
             let mut straight = Vec::<T>::new();
             let read = self.read(&(row..row + 1), &mut straight).is_ok();
@@ -78,13 +84,9 @@ impl Rows {
         Ok(())
     }
 
-    fn through<T: H5Type>(&self, rows: &Range<usize>) -> Result<Vec<T>> {
-        let found = self.dataset.read_slice_2d::<T, _>(s![rows.clone(), self.columns.clone()]);
-        let found = found.map_err(|error| self.place.error(format!("{}: {error}", named(rows))))?;
-        // A fresh array in the order of rows begins where its memory does.
-        let ordered = found.is_standard_layout();
-        let (flat, _) = found.into_raw_vec_and_offset();
-        if ordered { Ok(flat) } else { Err(self.place.error("the samples came in another order")) }
+    fn through<T: H5Type + Copy>(&self, rows: &Range<usize>) -> Result<Vec<T>> {
+        let found = self.orientation.rows(&self.dataset, rows, &self.columns);
+        found.map_err(|error| self.place.error(format!("{}: {error}", named(rows))))
     }
 }
 
@@ -96,6 +98,7 @@ fn named(rows: &Range<usize>) -> String {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
+    use ndarray::s;
     use runout_core::checksum::Checksum;
 
     use super::*;
@@ -104,10 +107,10 @@ mod tests {
     const COLUMNS: usize = 3;
 
     /// Rows 7 to 432, and whether they came straight from the file.
-    fn read(dataset: Dataset, columns: Range<usize>) -> (Vec<f64>, bool) {
+    fn read(dataset: Dataset, orientation: Orientation, columns: Range<usize>) -> (Vec<f64>, bool) {
         let place = Place::root(std::path::Path::new("rows.h5"));
         let checksum = Checksum::of(std::path::Path::new("rows.h5")).reader();
-        let mut rows = Rows::new::<f64>(dataset, place, columns, checksum).unwrap();
+        let mut rows = Rows::new::<f64>(dataset, place, orientation, columns, checksum).unwrap();
         let mut found = vec![9.0; 4];
         rows.read(&(7..433), &mut found).unwrap();
         (found, rows.plain.is_some())
@@ -128,13 +131,22 @@ mod tests {
             let elsewhere = folder.path().join("elsewhere.bin").display().to_string();
             let external = file.new_dataset_builder().external(&elsewhere, 0, ROWS * COLUMNS * size_of::<f64>());
             external.with_data(&values).create("external").unwrap();
+            let turned = values.t().as_standard_layout().to_owned();
+            file.new_dataset_builder().with_data(&turned).create("turned").unwrap();
+            file.new_dataset_builder().with_data(&turned).chunk((1, 64)).deflate(1).create("turned, packed").unwrap();
         }
         let file = hdf5_metno::File::open(&path).unwrap();
         let expected: Vec<f64> = values.slice(s![7..433, ..]).iter().copied().collect();
         for (name, straight) in [("plain", true), ("packed", false), ("single", false), ("external", false)] {
-            assert_eq!(read(file.dataset(name).unwrap(), 0..COLUMNS), (expected.clone(), straight), "{name}");
+            let found = read(file.dataset(name).unwrap(), Orientation::SampleRows, 0..COLUMNS);
+            assert_eq!(found, (expected.clone(), straight), "{name}");
         }
         let some: Vec<f64> = values.slice(s![7..433, 1..3]).iter().copied().collect();
-        assert_eq!(read(file.dataset("plain").unwrap(), 1..3), (some, false));
+        assert_eq!(read(file.dataset("plain").unwrap(), Orientation::SampleRows, 1..3), (some.clone(), false));
+        for name in ["turned", "turned, packed"] {
+            let dataset = || file.dataset(name).unwrap();
+            assert_eq!(read(dataset(), Orientation::ChannelRows, 0..COLUMNS), (expected.clone(), false), "{name}");
+            assert_eq!(read(dataset(), Orientation::ChannelRows, 1..3), (some.clone(), false), "{name}");
+        }
     }
 }

@@ -1,11 +1,12 @@
 //! How samples are stored: floats in µm, or a converter's codes with scale and offset.
 
 use hdf5_metno::{
-    Dataset,
+    Dataset, Group,
     types::{FloatSize, IntSize, TypeDescriptor},
 };
 use runout_core::Result;
 
+use super::{SENSORS, orientation::Orientation};
 use crate::node::{self, Place};
 
 /// How a file's samples are to be written.
@@ -79,11 +80,12 @@ impl SampleType {
 pub(crate) struct StoredSamples {
     pub(crate) kind: SampleType,
     pub(crate) samples: usize,
-    /// Channel names, one a column.
+    pub(crate) orientation: Orientation,
+    /// Names of the channels.
     pub(crate) sensors: Vec<String>,
-    /// µm a code, one a column.
+    /// µm a code, one a channel.
     pub(crate) scale: Vec<f64>,
-    /// µm at code 0, one a column.
+    /// µm at code 0, one a channel.
     pub(crate) offset: Vec<f64>,
     /// Lowest and highest code that the converter gives.
     pub(crate) limits: Option<[f64; 2]>,
@@ -92,25 +94,21 @@ pub(crate) struct StoredSamples {
 
 impl StoredSamples {
     /// Reads everything but the samples, and checks that it fits together.
-    pub(crate) fn read(dataset: &Dataset, place: &Place) -> Result<Self> {
+    pub(crate) fn read(group: &Group, dataset: &Dataset, place: &Place) -> Result<Self> {
         let descriptor = node::element_type(dataset, place)?;
         let kind = SampleType::of(&descriptor).ok_or_else(|| {
             place.error(format!("expected samples of f64, f32, i16 or i32, found {}", node::type_name(&descriptor)))
         })?;
         let shape = node::written_shape(dataset, place)?;
-        let &[samples, channels] = shape.as_slice() else {
+        if shape.len() != 2 {
             return Err(place.error(format!("expected the shape [samples, channels], found {shape:?}")));
-        };
-        if samples == 0 || channels == 0 {
+        }
+        if shape.contains(&0) {
             return Err(place.error(format!("expected samples, found the shape {shape:?}")));
         }
-        let sensors = node::needed(node::texts(dataset, place, "sensors")?, place, "sensors")?;
-        if sensors.len() != channels {
-            return Err(place.error(format!(
-                "attribute `sensors`: expected one name for each of {channels} channels, found {}",
-                sensors.len()
-            )));
-        }
+        let sensors = names(group, dataset, place, &shape)?;
+        let (samples, orientation) = Orientation::of(&shape, sensors.len()).map_err(|problem| place.error(problem))?;
+        let channels = sensors.len();
         let integer = kind.code_range().is_some();
         let per_channel = |name: &str, default: f64| -> Result<Vec<f64>> {
             let values = match node::numbers(dataset, place, name)? {
@@ -146,6 +144,7 @@ impl StoredSamples {
         Ok(Self {
             kind,
             samples,
+            orientation,
             sensors,
             scale,
             offset: per_channel("offset", 0.0)?,
@@ -153,4 +152,26 @@ impl StoredSamples {
             sample_rate_hz: node::positive(dataset, place, "sample_rate_hz")?,
         })
     }
+}
+
+/// Names of the channels: the attribute of the samples, or a dataset beside them, which more programs can write as texts.
+fn names(group: &Group, dataset: &Dataset, place: &Place, shape: &[usize]) -> Result<Vec<String>> {
+    let found = match node::texts(dataset, place, SENSORS)? {
+        None if group.link_exists(SENSORS) => Some(node::texts_of(group, place, SENSORS)?),
+        found => found,
+    };
+    let names = node::needed(found, place, SENSORS)?;
+    // A program that writes one text only may list the names in it.
+    Ok(match &names[..] {
+        [list] if !shape.contains(&1) => listed(list),
+        _ => names,
+    })
+}
+
+/// The names in a text like "S1, S2" or "S1 S2".
+fn listed(list: &str) -> Vec<String> {
+    let comma = list.contains([',', ';']);
+    let names =
+        list.split(|character: char| if comma { [',', ';'].contains(&character) } else { character.is_whitespace() });
+    names.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty()).collect()
 }

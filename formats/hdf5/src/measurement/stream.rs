@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use bytemuck::Pod;
-use hdf5_metno::{Dataset, H5Type};
-use ndarray::s;
+use hdf5_metno::H5Type;
 use runout_core::{
     Error, Result,
     checksum::Reader,
@@ -16,6 +15,7 @@ use runout_core::{
 
 use super::{
     capture::{CaptureSource, Phase},
+    line::Line,
     rows::Rows,
     samples::SampleType,
 };
@@ -44,7 +44,7 @@ pub(super) struct Hdf5Stream {
     read_columns: usize,
     columns: Vec<Column>,
     is_plain: bool,
-    encoder: Option<(Dataset, Place, EncoderScan)>,
+    encoder: Option<(Line, EncoderScan)>,
     block_samples: usize,
     next: usize,
     samples: usize,
@@ -73,7 +73,7 @@ impl Hdf5Stream {
             };
             columns.iter().map(limits_um).collect()
         });
-        let (marks, scan) = source.phase.marks(stored.samples)?;
+        let (marks, scan) = source.marks()?;
         let capture = Capture {
             object: source.place.to_string(),
             setup,
@@ -91,13 +91,14 @@ impl Hdf5Stream {
             responses: Vec::new(),
         };
         let encoder = match (source.phase, scan) {
-            (Phase::Angle(dataset, place), Some(scan)) => Some((dataset, place, scan)),
+            (Phase::Angle(line), Some(scan)) => Some((line, scan)),
             _ => None,
         };
         let read = first_column..last_column + 1;
         let plain =
             |(index, column): (usize, &Column)| column.offset == index && (column.gain, column.zero_um) == (1.0, 0.0);
-        let block_samples = block_samples(source.dataset.chunk().as_deref(), read.len());
+        let chunk = source.dataset.chunk().and_then(|chunk| stored.orientation.samples_of(&chunk));
+        let block_samples = block_samples(chunk, read.len());
         let rows = match stored.kind {
             SampleType::F64 => Rows::new::<f64>,
             SampleType::F32 => Rows::new::<f32>,
@@ -109,7 +110,7 @@ impl Hdf5Stream {
             samples: stored.samples,
             kind: stored.kind,
             capture,
-            rows: rows(source.dataset, source.samples_place, read.clone(), checksum)?,
+            rows: rows(source.dataset, source.samples_place, stored.orientation, read.clone(), checksum)?,
             read_columns: read.len(),
             is_plain: columns.len() == read.len() && columns.iter().enumerate().all(plain),
             columns,
@@ -186,9 +187,8 @@ impl SampleStream for Hdf5Stream {
             SampleType::I32 => self.read::<i32>(&rows, &mut samples)?,
         }
         block.samples = samples;
-        if let Some((dataset, place, scan)) = &self.encoder {
-            let angles = dataset.read_slice_1d::<f64, _>(s![rows.clone()]).map_err(|error| place.error(error))?;
-            block.angle_rev.extend(angles.iter().map(|angle_deg| scan.turns(*angle_deg)));
+        if let Some((line, scan)) = &self.encoder {
+            block.angle_rev.extend(line.read(rows.clone())?.into_iter().map(|angle_deg| scan.turns(angle_deg)));
         }
         self.next = rows.end;
         Ok(true)
@@ -217,12 +217,12 @@ fn missing(id: &str, sensors: &[String], place: &Place) -> Error {
 }
 
 /// Whole chunks at a time, so that none is unpacked twice.
-fn block_samples(chunk: Option<&[usize]>, columns: usize) -> usize {
+fn block_samples(chunk: Option<usize>, columns: usize) -> usize {
     let columns = columns.max(1);
     let [usual, longest] = [BLOCK, BLOCK_ELEMENTS].map(|elements| (elements / columns).max(1));
     match chunk {
-        Some([rows, ..]) if *rows >= usual => (*rows).min(longest),
-        Some([rows, ..]) if *rows > 0 => usual - usual % rows,
+        Some(rows) if rows >= usual => rows.min(longest),
+        Some(rows) if rows > 0 => usual - usual % rows,
         _ => usual,
     }
 }

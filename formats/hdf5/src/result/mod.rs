@@ -3,17 +3,21 @@
 //! ```text
 //! /            format = "runout-result", version = 1, title, program, convention
 //! /form        section, station, z_mm, angle_deg, form_um, std_um: one dataset a column
-//! /motion      station, angle_deg, x_um, y_um, tilt_x_urad, tilt_y_urad, and std_… of each
+//! /motion      station, angle_deg, x_um, y_um, tilt_x_urad, tilt_y_urad, and std_… of each; where motion is observable along
+//!              one line only, along_um, tilt_along_urad, and along_deg (also the attribute motion_along_deg of the file)
 //! /harmonics   quantity, section, station, order, re, im, std, observable
 //! /provenance  configuration, inputs/{path, bytes, blake3}
 //! /straightness z_mm, part_um, part_std_um, slide_um, slide_std_um; then there is no form, motion and harmonics
+//! /angle       of a quadrature signal: index or time_s, phase_deg, corrected_deg, std_deg; then there is nothing else
 //! /warnings    [n] texts: the run's, then each station's behind its name
+//! /effects     [n] texts: the effects that the results are corrected for, with their values; none after a run
 //! /summary     the run's summary as JSON
 //! ```
 //!
 //! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; texts of the tables are
 //! UTF-8 of fixed length (`.asstr()` in h5py). Each column has the attributes `unit` and `meaning`. What was not solved for, and what the layout cannot tell, is NaN.
 
+mod numbers;
 mod straightness;
 mod table;
 
@@ -30,7 +34,7 @@ use runout_core::{
     },
     provenance::Input,
     separation::{CONVENTION, Quantity},
-    stage::{Export, Exporter, StraightnessExporter},
+    stage::{Export, Exporter, StraightnessExporter, TableExporter},
     surface::Surface,
 };
 use schemars::JsonSchema;
@@ -70,6 +74,10 @@ impl Exporter for ResultExporter {
     }
 
     fn straightness(&self) -> Option<&dyn StraightnessExporter> {
+        Some(self)
+    }
+
+    fn tables(&self) -> Option<&dyn TableExporter> {
         Some(self)
     }
 
@@ -138,6 +146,7 @@ fn complete(file: &File, summary: &Summary) -> hdf5_metno::Result<()> {
         .map_err(|error| hdf5_metno::Error::from(format!("the summary: {error}")))?;
     put_dataset(file, "summary", &json)?;
     put_texts(file, "warnings", summary.all_warnings())?;
+    put_texts(file, "effects", summary.effects.iter().map(ToString::to_string))?;
     let group = file.create_group("provenance")?;
     put_dataset(&group, "configuration", &provenance.configuration)?;
     let inputs = group.create_group("inputs")?;
@@ -153,26 +162,23 @@ impl<const N: usize> Export for ResultExport<N> {
     fn station(&mut self, result: &StationResult) -> Result<()> {
         let name = table::name(&result.station).map_err(|error| self.failure(error))?;
         let separation = &result.separation;
-        let mut motions = [None; 4];
         for (unknown, quantity) in separation.unknowns.iter().enumerate() {
             let written = match quantity {
                 Quantity::Form(section) => match separation.sections.get(*section) {
                     Some(section) => self.form.append(result, &name, section, unknown),
                     None => Err(format!("the form of section {section} has no section").into()),
                 },
-                motion => {
-                    if let Some(place) = table::MOTION.iter().position(|(known, ..)| known == motion) {
-                        motions[place] = Some(unknown);
-                    }
-                    Ok(())
-                }
+                _ => Ok(()),
             };
             written
                 .and_then(|()| self.harmonics.append(separation, &name, unknown))
                 .map_err(|error| self.failure(error))?;
         }
-        if motions.iter().any(Option::is_some) {
-            self.motion.append(result, &name, motions).map_err(|error| self.failure(error))?;
+        if separation.unknowns.iter().any(|unknown| !unknown.is_form()) {
+            self.motion.append(result, &name).map_err(|error| self.failure(error))?;
+        }
+        if let Some(line) = separation.azimuth() {
+            node::put_once(&self.file, "motion_along_deg", &line.degrees()).map_err(|error| self.failure(error))?;
         }
         Ok(())
     }

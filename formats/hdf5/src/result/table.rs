@@ -7,7 +7,7 @@ use ndarray::{ArrayView1, s};
 use runout_core::{
     Complex64,
     pipeline::run::StationResult,
-    separation::{Quantity, SectionAt, Separation},
+    separation::{ALONG_COLUMN, MotionColumn, Quantity, SectionAt, Separation, motion_columns},
 };
 
 use crate::node;
@@ -24,14 +24,6 @@ pub(super) const LONG: usize = 64;
 const CHUNK_ROWS: usize = 8192;
 /// Higher levels take several times as long for some percent less.
 const DEFLATE: u8 = 1;
-
-/// Quantity, name of its column, and what it is.
-pub(super) const MOTION: [(Quantity, &str, &str); 4] = [
-    (Quantity::X, "x_um", "error motion along x"),
-    (Quantity::Y, "y_um", "error motion along y"),
-    (Quantity::TiltX, "tilt_x_urad", "tilt about x, right-handed"),
-    (Quantity::TiltY, "tilt_y_urad", "tilt about y, right-handed"),
-];
 
 /// A name as tables hold it.
 pub(super) fn name<const N: usize>(text: &str) -> Result<Name<N>> {
@@ -145,40 +137,58 @@ impl<const N: usize> FormTable<N> {
 
 /// Error motion over the spindle's angle.
 pub(super) struct MotionTable<const N: usize> {
+    group: Group,
     station: Column<Name<N>>,
     angle_deg: Column<f64>,
-    /// Value and standard uncertainty of each of [`MOTION`].
-    motions: Vec<[Column<f64>; 2]>,
+    /// The line of the motion, where that is neither x nor y.
+    along_deg: Option<Column<f64>>,
+    /// Value and standard uncertainty.
+    motions: Vec<(Quantity, [Column<f64>; 2])>,
 }
 
 impl<const N: usize> MotionTable<N> {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("motion")?;
-        let pair = |(quantity, name, what): &(Quantity, &str, &str)| {
-            let meaning = format!("{what}; orders that are lost are left out; NaN where it was not solved for");
-            let value = Column::create(&group, name, quantity.unit(), Measured, &meaning)?;
-            let std = Column::create(&group, &format!("std_{name}"), quantity.unit(), Repeated, &std_of(name))?;
-            Ok([value, std])
-        };
-        Ok(Self {
+        let mut table = Self {
             station: Column::create(&group, "station", "", Repeated, STATION)?,
             angle_deg: Column::create(&group, "angle_deg", "deg", Repeated, "the spindle's angle")?,
-            motions: MOTION.iter().map(pair).collect::<Result<_>>()?,
-        })
+            along_deg: None,
+            motions: Vec::new(),
+            group,
+        };
+        table.add_columns(motion_columns(None))?;
+        Ok(table)
     }
 
-    /// Adds one station; `unknowns` are those behind [`MOTION`], where they were solved for.
-    pub(super) fn append(
-        &mut self,
-        result: &StationResult,
-        station: &Name<N>,
-        unknowns: [Option<usize>; 4],
-    ) -> Result<()> {
+    fn add_columns(&mut self, columns: Vec<MotionColumn>) -> Result<()> {
+        for MotionColumn { quantity, name, about } in columns {
+            if self.motions.iter().any(|(known, _)| *known == quantity) {
+                continue;
+            }
+            let meaning = format!("{about}; orders that are lost are left out; NaN where it was not solved for");
+            let value = Column::create(&self.group, name, quantity.unit(), Measured, &meaning)?;
+            let std = Column::create(&self.group, &format!("std_{name}"), quantity.unit(), Repeated, &std_of(name))?;
+            self.motions.push((quantity, [value, std]));
+        }
+        Ok(())
+    }
+
+    /// Adds one station; the first one tells whether motion is along a line only.
+    pub(super) fn append(&mut self, result: &StationResult, station: &Name<N>) -> Result<()> {
+        let separation = &result.separation;
+        if let (Some(line), None) = (separation.azimuth(), &self.along_deg) {
+            let (name, unit, meaning) = ALONG_COLUMN;
+            self.along_deg = Some(Column::create(&self.group, name, unit, Repeated, meaning)?);
+            self.add_columns(motion_columns(Some(line)))?;
+        }
         let rows = result.angles;
         self.station.repeat(station, rows)?;
         self.angle_deg.append(&angles_deg(rows))?;
-        for ([value, std], unknown) in self.motions.iter_mut().zip(unknowns) {
-            if let Some(unknown) = unknown {
+        if let (Some(line), Some(column)) = (separation.azimuth(), &mut self.along_deg) {
+            column.repeat(&line.degrees(), rows)?;
+        }
+        for (quantity, [value, std]) in &mut self.motions {
+            if let Some(unknown) = separation.position(*quantity) {
                 value.append(&result.over_angle(unknown))?;
                 std.repeat(&result.separation.angle_std(unknown), rows)?;
             } else {
@@ -203,13 +213,19 @@ pub(super) struct HarmonicsTable<const N: usize> {
 }
 
 /// Unit of coefficients, whose rows are of all quantities.
-const MIXED: &str = "um; urad for tilt_x, tilt_y";
+const MIXED: &str = "um; urad for tilts";
 
 impl<const N: usize> HarmonicsTable<N> {
     pub(super) fn create(file: &File) -> Result<Self> {
         let group = file.create_group("harmonics")?;
         Ok(Self {
-            quantity: Column::create(&group, "quantity", "", Repeated, "form, x, y, tilt_x or tilt_y")?,
+            quantity: Column::create(
+                &group,
+                "quantity",
+                "",
+                Repeated,
+                "form, x, y, tilt_x, tilt_y, along or tilt_along",
+            )?,
             section: Column::create(&group, "section", "", Repeated, "id of the section; empty for motion")?,
             station: Column::create(&group, "station", "", Repeated, STATION)?,
             order: Column::create(&group, "order", "1/rev", Repeated, "undulations per revolution")?,

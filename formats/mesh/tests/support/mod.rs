@@ -108,6 +108,7 @@ fn station() -> StationResult {
             observable: vec![true; estimate.len()],
             estimate,
             motion_covariance: None,
+            equivalents: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),
@@ -144,6 +145,27 @@ pub fn trimesh(file: &Path) -> Option<serde_json::Value> {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../mesh/tests/support/trimesh_report.py");
     let output = Command::new(&python).arg(script).arg(file).output().unwrap();
     Some(report(&output))
+}
+
+/// One watertight piece, as trimesh loads it, with and without its merging of vertices; and for MeshLab where it is installed.
+pub fn closed(found: &serde_json::Value) {
+    for way in ["as_written", "merged"] {
+        let solid = &found[way];
+        for key in ["watertight", "winding_consistent", "is_volume"] {
+            assert_eq!(solid[key], true, "{way}, {key}: {found:#}");
+        }
+        assert_eq!(solid["body_count"], 1, "{way}: {found:#}");
+        assert!(solid["volume"].as_f64().unwrap() > 0.0, "{way}: {found:#}");
+    }
+    if let Some(meshlab) = found["meshlab"].as_object() {
+        for (key, expected) in
+            [("boundary_edges", 0), ("non_two_manifold_edges", 0), ("connected_components_number", 1)]
+        {
+            assert_eq!(meshlab[key], expected, "{key}: {found:#}");
+        }
+    } else {
+        skip("pymeshlab is not installed for RUNOUT_PYTHON (default python3)");
+    }
 }
 
 /// The JSON that a foreign program printed.

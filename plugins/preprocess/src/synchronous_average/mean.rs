@@ -8,6 +8,7 @@ use runout_core::{
         fourier::Fourier,
         lanes::{Arithmetic, FusedWork, fused},
     },
+    profile::Neighbours,
 };
 
 use super::{scatter::Scatter, slow::Slow};
@@ -94,7 +95,12 @@ impl Mean {
 
     /// Covariance of the mean, `[order][channel][channel]`; `None` below two turns. See [`Slow`].
     pub(super) fn covariance(&self) -> Option<Vec<Complex64>> {
-        self.slow.covariance(&self.sum, self.turns, self.size).or_else(|| self.scatter())
+        self.neighbours().map(|neighbours| neighbours.covariance()).or_else(|| self.scatter())
+    }
+
+    /// What that covariance is taken from; `None` below three turns.
+    pub(super) fn neighbours(&self) -> Option<Neighbours> {
+        self.slow.neighbours(&self.sum, self.turns, self.size)
     }
 
     /// What the covariance of the mean would be with independent turns, `[order][channel][channel]`; `None` below two

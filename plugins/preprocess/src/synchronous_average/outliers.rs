@@ -62,7 +62,7 @@ impl Outliers {
                 farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
             if outlier.is_none() {
                 means.next().copy_from_slice(&readings);
-                means.add(turn.number, &harmonics, &motion);
+                means.add(&turn, &harmonics, &motion);
             }
             judged.push(Verdict { turn, outlier: outlier.map(|(channel, _)| (channel, distances[channel])) });
         }

@@ -6,7 +6,7 @@ use runout_core::{
     Complex64,
     measurement::{Block, Capture, Defect},
     numerics::{fourier::max_order, lanes::fused},
-    profile::{RejectedTurn, Rejection, Split},
+    profile::{RejectedTurn, Rejection, Split, TurnLevels},
     spread::Spread,
     stage::Wanted,
 };
@@ -32,6 +32,7 @@ pub(super) struct Outcome {
     pub mean: Vec<Complex64>,
     pub covariance: Option<Vec<Complex64>>,
     pub scatter: Option<Vec<Complex64>>,
+    pub levels: TurnLevels,
     pub split: Option<Split>,
     pub spread: Option<Spread>,
     pub used: usize,
@@ -148,6 +149,7 @@ impl<'a> Resampling<'a> {
             covariance: self.means.whole.covariance(),
             scatter: self.means.whole.scatter(),
             used: self.means.whole.turns(),
+            levels: self.means.levels(),
             split: self.means.split(),
             spread: self.means.spread(),
             used_samples: self.used_samples,
@@ -208,7 +210,7 @@ impl<'a> Resampling<'a> {
         }
         match &mut self.outliers {
             None => {
-                self.means.add(turn.number, &self.harmonics, motion);
+                self.means.add(&turn, &self.harmonics, motion);
                 self.used_samples += turn.samples();
             }
             Some(outliers) => {

@@ -14,6 +14,7 @@ use std::{cell::RefCell, f64::consts::TAU};
 use runout_core::{
     Complex64,
     numerics::lanes::{Arithmetic, load},
+    profile::Neighbours,
 };
 use rustfft::FftPlanner;
 
@@ -92,21 +93,20 @@ impl Slow {
         }
     }
 
-    /// Covariance of the mean, `[order][channel][channel]`; `sum` is that of the turns less the pivot. `None` where there
+    /// What the covariance of the mean is taken from; `sum` is that of the turns less the pivot. `None` where there
     /// are too few turns to have neighbours.
     ///
     /// Between the marks the phase goes on: with Uₖ(Φ) = Σ e^{−2πikm/T} u_m(Φ), the record's transforms at n + k/T and
     /// n − k/T are those of Uₖ e^{−ikΦ/T} at n and −n, as u real makes U₋ₖ its conjugate.
-    pub(super) fn covariance(&self, sum: &[f64], turns: usize, size: Size) -> Option<Vec<Complex64>> {
+    pub(super) fn neighbours(&self, sum: &[f64], turns: usize, size: Size) -> Option<Neighbours> {
         if self.neighbours == 0 || turns < 3 {
             return None;
         }
         let Size { channels, angles, orders } = size;
-        let mut covariance = vec![Complex64::ZERO; orders * channels * channels];
-        let scale = 1.0 / (2.0 * self.neighbours as f64 * (turns * turns) as f64);
         let transform = PLANNER.with_borrow_mut(|planner| planner.plan_fft_inverse(angles));
         let mut scratch = vec![Complex64::ZERO; transform.get_inplace_scratch_len()];
         let mut signal = vec![Complex64::ZERO; angles];
+        let mut coefficients = Vec::with_capacity(2 * self.neighbours);
         for neighbour in 0..self.neighbours {
             let [cosine, sine] = [2 * neighbour, 2 * neighbour + 1];
             let step = Complex64::cis(-TAU * (neighbour + 1) as f64 / (self.planned * angles) as f64);
@@ -115,7 +115,7 @@ impl Slow {
             for channel in 0..channels {
                 let range = channel * angles..(channel + 1) * angles;
                 let sums = self.sums[cosine][range.clone()].iter().zip(&self.sums[sine][range.clone()]);
-                let mut phase = Complex64::from(1.0 / angles as f64);
+                let mut phase = Complex64::from(1.0 / (angles * turns) as f64);
                 for (value, (sum, (in_phase, quadrature))) in signal.iter_mut().zip(sum[range].iter().zip(sums)) {
                     let mean = sum / turns as f64;
                     let [re, im] = [(in_phase, cosine), (quadrature, sine)].map(|(s, i)| s - mean * self.phase_sums[i]);
@@ -129,25 +129,9 @@ impl Slow {
                     sides[1][order * channels + channel] = scale * signal[(angles - order) % angles].conj();
                 }
             }
-            for side in &sides {
-                let each = side.chunks_exact(channels).zip(covariance.chunks_exact_mut(channels * channels));
-                for (values, covariance) in each {
-                    for (place, (row, target)) in values.iter().zip(covariance.chunks_exact_mut(channels)).enumerate() {
-                        let row = row * scale;
-                        target.iter_mut().zip(&values[..=place]).for_each(|(to, column)| *to += row * column.conj());
-                    }
-                }
-            }
+            coefficients.extend(sides);
         }
-        for covariance in covariance.chunks_exact_mut(channels * channels) {
-            for row in 0..channels {
-                covariance[row * channels + row].im = 0.0;
-                for column in 0..row {
-                    covariance[column * channels + row] = covariance[row * channels + column].conj();
-                }
-            }
-        }
-        Some(covariance)
+        Some(Neighbours { period: self.planned, channels, angles, coefficients })
     }
 }
 

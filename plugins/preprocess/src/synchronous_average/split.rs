@@ -2,13 +2,14 @@
 
 use runout_core::{
     Complex64,
-    profile::{Part, Split, TURN_ORDERS, Turns},
+    profile::{Neighbours, Part, Split, TURN_ORDERS, TurnLevels, Turns},
     spread::Spread,
 };
 
 use super::{
     mean::{Mean, Size},
     spread::Extremes,
+    turns::Turn,
 };
 
 /// Turns that are summed together at most: the sums are then read and written once for all of them.
@@ -31,6 +32,9 @@ pub(super) struct Means {
     pending: usize,
     /// Of so many turns, one is looked at.
     stride: usize,
+    /// Equal angles of a turn.
+    angles: usize,
+    levels: TurnLevels,
 }
 
 struct Parts {
@@ -53,6 +57,7 @@ impl Means {
                 fit: Mean::new(size, fitted),
                 held_out: Mean::new(size, last),
                 turns: Turns {
+                    spans: Vec::with_capacity(planned),
                     numbers: Vec::with_capacity(planned),
                     orders: kept,
                     channels: size.channels,
@@ -71,6 +76,8 @@ impl Means {
             readings,
             pending: 0,
             stride: stride.max(1),
+            angles: size.angles,
+            levels: TurnLevels::default(),
         }
     }
 
@@ -89,11 +96,14 @@ impl Means {
         self.turns().is_multiple_of(self.stride)
     }
 
-    /// Takes the turn of this number, whose readings are where the [next](Self::next) turn's are to be, with its
+    /// Takes a turn, whose readings are where the [next](Self::next) turn's are to be, with its
     /// harmonics, `[channel][order]`, and its motion.
-    pub fn add(&mut self, number: usize, harmonics: &[Complex64], motion: &[f64]) {
+    pub fn add(&mut self, turn: &Turn, harmonics: &[Complex64], motion: &[f64]) {
         let looked_at = self.looks_at_next();
         let taken = self.turns();
+        let readings = &self.waiting[self.pending * self.readings..][..self.readings];
+        self.levels.numbers.push(turn.number);
+        self.levels.levels_um.extend(readings.chunks_exact(self.angles).map(mean));
         self.pending += 1;
         if looked_at {
             self.whole.look_at(harmonics);
@@ -102,7 +112,8 @@ impl Means {
         if let Some(Parts { fitted, fit, held_out, turns }) = &mut self.parts {
             let part = if taken < *fitted { fit } else { held_out };
             part.look_at(harmonics);
-            turns.numbers.push(number);
+            turns.numbers.push(turn.number);
+            turns.spans.push([turn.start, turn.end]);
             let orders = harmonics.len() / turns.channels;
             turns.harmonics.extend((0..turns.orders).flat_map(|order| harmonics[order..].iter().step_by(orders)));
             full |= taken + 1 == *fitted;
@@ -134,26 +145,53 @@ impl Means {
         self.extremes.take().and_then(Extremes::spread)
     }
 
+    /// Mean levels of the turns taken.
+    pub fn levels(&mut self) -> TurnLevels {
+        std::mem::take(&mut self.levels)
+    }
+
     /// The parts; `None` where too few turns are left to fill them.
     pub fn split(&self) -> Option<Split> {
         let parts = self.parts.as_ref().filter(|parts| parts.held_out.turns() > 0)?;
         let fitted = parts.fit.turns();
-        let part = |mean: &Mean, turns| Part {
-            mean: mean.mean(),
-            covariance: mean.covariance(),
-            scatter: mean.scatter(),
-            turns,
+        let part = |mean: &Mean, turns| {
+            let neighbours = mean.neighbours();
+            Part {
+                mean: mean.mean(),
+                covariance: neighbours.as_ref().map(Neighbours::covariance).or_else(|| mean.scatter()),
+                scatter: mean.scatter(),
+                neighbours,
+                turns,
+            }
         };
         Some(Split {
             fit: part(&parts.fit, 0..fitted),
             held_out: part(&parts.held_out, fitted..fitted + parts.held_out.turns()),
+            neighbours: self.whole.neighbours(),
             turns: parts.turns.clone(),
         })
     }
 }
 
+/// Mean of readings.
+fn mean(readings: &[f64]) -> f64 {
+    /// Sums side by side: the compiler keeps the order of additions.
+    const LANES: usize = 8;
+    let mut sums = [0.0; LANES];
+    let chunks = readings.chunks_exact(LANES);
+    let rest: f64 = chunks.remainder().iter().sum();
+    for chunk in chunks {
+        sums.iter_mut().zip(chunk).for_each(|(sum, value)| *sum += value);
+    }
+    (sums.iter().sum::<f64>() + rest) / readings.len().max(1) as f64
+}
+
 /// Leaves out the orders from `orders` on.
 pub(super) fn truncate(split: &mut Split, orders: usize, channels: usize) {
+    let parts = [&mut split.fit.neighbours, &mut split.held_out.neighbours, &mut split.neighbours];
+    for coefficients in parts.into_iter().flatten().flat_map(|neighbours| &mut neighbours.coefficients) {
+        coefficients.truncate(orders * channels);
+    }
     for part in [&mut split.fit, &mut split.held_out] {
         part.mean.truncate(orders * channels);
         for matrices in [&mut part.covariance, &mut part.scatter].into_iter().flatten() {

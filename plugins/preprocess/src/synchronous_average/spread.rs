@@ -47,14 +47,14 @@ impl Motion {
     pub(super) fn spread(&self) -> Extremes {
         let rows = &self.projection.rows;
         let place = |wanted: Quantity| rows.iter().position(|(quantity, _)| *quantity == wanted);
-        let told = |direction: &Direction| {
+        let places = |direction: Direction| {
             let (first, second) = direction.parts();
             Some(match second {
-                None => (*direction, place(first)?, None),
-                Some((second, factor)) => (*direction, place(first)?, Some((place(second)?, factor))),
+                None => (direction, place(first)?, None),
+                Some((second, factor)) => (direction, place(first)?, Some((place(second)?, factor))),
             })
         };
-        let directions: Vec<Place> = Direction::ALL.iter().filter_map(told).collect();
+        let directions: Vec<Place> = self.projection.directions().into_iter().filter_map(places).collect();
         let angle = |step: usize| self.projection.rotation * TAU * step as f64 / self.angles as f64;
         let length = directions.len() * self.angles;
         Extremes {

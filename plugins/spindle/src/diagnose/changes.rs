@@ -11,8 +11,8 @@ use runout_core::{
     stage::Station,
 };
 
-use super::drift::Creeping;
-use crate::{effects::creep, selection::Selection, separators::Readings};
+use super::drift::{self, Creeping};
+use crate::{selection::Selection, separators::Readings};
 
 /// Turns that both sides of a change have at least, and the fewest in all.
 const SIDE: usize = 4;
@@ -59,7 +59,9 @@ fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[O
     if count < FEWEST || turns.orders <= FIRST_ORDER {
         return None;
     }
-    let series = Series::new(turns, channels, creeping, profile.turn_angles);
+    let series = Series::new(turns, channels, |channel, turn, order| {
+        drift::in_turn(creeping.get(channel).and_then(Option::as_ref), setup, turn, order, profile.turn_angles)
+    });
     let weights = series.weights()?;
     // Sums of squares between the turns before and after, and of what wanders: in units of the turns' scatter.
     let mut best: Option<(f64, usize)> = None;
@@ -99,17 +101,17 @@ struct Series {
 }
 
 impl Series {
-    fn new(turns: &Turns, channels: &[usize], creeping: &[Option<Creeping>], angles: usize) -> Self {
+    /// `creep` gives what a channel's drift puts into a turn at an order.
+    fn new(turns: &Turns, channels: &[usize], creep: impl Fn(usize, usize, usize) -> Complex64) -> Self {
         let (count, width) = (turns.count(), channels.len());
         let mut values = Vec::with_capacity(turns.orders * count * width);
         for order in 0..turns.orders {
             let start = values.len();
             for turn in 0..count {
-                values.extend(channels.iter().zip(creeping).map(|(channel, creeping)| {
-                    // A drift is no change for good.
-                    let creep_um = creeping.filter(|known| known.certain).map_or(0.0, |known| known.in_turn(turn));
-                    turns.at(turn, order, *channel) - creep_um * creep(order, angles)
-                }));
+                // A drift is no change for good.
+                let steady =
+                    |(index, channel): (usize, &usize)| turns.at(turn, order, *channel) - creep(index, turn, order);
+                values.extend(channels.iter().enumerate().map(steady));
             }
             for channel in 0..width {
                 let at = || (start + channel..start + count * width).step_by(width);

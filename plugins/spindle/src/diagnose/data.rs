@@ -2,19 +2,24 @@
 
 use std::sync::Arc;
 
-use runout_core::{Complex64, Result, model::Effect, stage::Station};
+use runout_core::{
+    Complex64, Error, Result,
+    model::{Effect, Setting},
+    profile::{self, Profile, Split},
+    stage::Station,
+};
 
 use super::{
     TRACED_ORDERS,
     changes::{self, Change},
-    drift::Creeping,
+    drift::{self, Creeping, Part},
     lines::{self, Line},
 };
 use crate::{
     effects::{Alterations, SpindleEffect},
     layout::Layout,
     selection::Selection,
-    separators::{Blocks, Operators, Propagation, Readings, apply, smooth, whitening},
+    separators::{Blocks, Operators, Propagation, Readings, apply, leak, smooth, whitening},
 };
 
 /// Orders to each side over which the noise in the residual's space is averaged, beyond what covariances are.
@@ -43,6 +48,26 @@ pub struct Place {
     pub effect: Effect,
 }
 
+/// What effects at these places change together.
+///
+/// # Errors
+/// When there is no such effect.
+pub fn altered(
+    layout: &Layout,
+    kinds: &[Arc<dyn SpindleEffect>],
+    places: &[Place],
+    applied: &[Setting],
+) -> Result<Alterations> {
+    let mut alterations = Alterations::none(layout);
+    for setting in applied {
+        let place = places.get(setting.effect).ok_or_else(|| {
+            Error::new("apply", format!("effect {}", setting.effect), "there is no such effect in this rig")
+        })?;
+        kinds[place.kind].alter(place.index, &setting.values, &mut alterations);
+    }
+    Ok(alterations)
+}
+
 impl Shared {
     pub fn kind(&self, place: usize) -> &dyn SpindleEffect {
         &*self.kinds[self.places[place].kind]
@@ -68,21 +93,60 @@ impl Shared {
 /// One station's readings.
 pub struct StationData {
     pub name: String,
-    pub z_mm: f64,
+    /// The turns that are fitted.
+    pub part: Part,
     pub readings: Readings,
     /// Turns that the fit does not see.
     pub held_out: Option<Readings>,
     /// W of each order from 1; nothing without a scatter.
     pub weights: Option<Vec<Blocks>>,
     /// Mean square of a weighted residual's degree of freedom, by order from 1: 1 for independent turns.
-    pub floor: Vec<f64>,
+    floor: Vec<f64>,
+    /// Share of the readings' variance that lost orders carry into an order from 1.
+    carried: Vec<f64>,
+    /// All of it where motion is no longer assumed to be odd, and even orders are lost.
+    freed: Option<Box<Weighed>>,
     /// What the single turns show.
     pub seen: Arc<Seen>,
     /// Leak of each line into the readings.
     pub leaks: Vec<Vec<Complex64>>,
-    /// Sensor, mean creep a turn and its standard uncertainty, where the levels tell a drift for certain: one observation
+    /// Sensor, mean creep a turn where it is largest and its standard uncertainty, where the levels tell a drift for certain: one observation
     /// more, since a creep of one sensor can look like a motion in the averaged turn.
     pub creeps: Vec<(usize, f64, f64)>,
+}
+
+/// Readings with what lost orders carry into others, and what follows from their uncertainty.
+struct Weighed {
+    readings: Readings,
+    weights: Option<Vec<Blocks>>,
+    floor: Vec<f64>,
+    /// Share of the readings' variance that lost orders carry into an order from 1.
+    carried: Vec<f64>,
+}
+
+impl Weighed {
+    fn new(layout: &Layout, selection: &Selection, mut readings: Readings) -> Self {
+        let before = variances(&readings);
+        leak::widen(layout, selection.rig.part_radius_mm, &mut readings);
+        let after = variances(&readings);
+        let weights = whitening(&readings);
+        let floor = weights.as_ref().map_or_else(Vec::new, |weights| floor(layout, &readings, weights));
+        let carried =
+            before.iter().zip(&after).map(|(before, after)| if *after > 0.0 { 1.0 - before / after } else { 0.0 });
+        Self { readings, weights, floor, carried: carried.collect() }
+    }
+}
+
+/// Variance of the readings that weights are made of, summed over all readings, by order from 1.
+fn variances(readings: &Readings) -> Vec<f64> {
+    let sensors = readings.count / readings.turns.len().max(1);
+    let of = |order: usize| {
+        let matrices = readings.scatter.iter().flatten();
+        let diagonal =
+            matrices.filter_map(|matrix| matrix.get(order * sensors * sensors..(order + 1) * sensors * sensors));
+        diagonal.flat_map(|matrix| matrix.iter().step_by(sensors + 1)).map(|entry| entry.re).sum()
+    };
+    (1..=readings.max_order).map(of).collect()
 }
 
 /// What the single turns of a station show, and their average does not.
@@ -97,12 +161,12 @@ pub struct Seen {
 
 impl Seen {
     /// `creeping` is what the levels of all stations say of each sensor.
-    pub fn new(selection: &Selection, layout: &Layout, station: &Station, creeping: &[Option<Creeping>]) -> Self {
-        let max_order = station.profiles.iter().map(runout_core::profile::Profile::max_order).min().unwrap_or(0);
+    pub fn new(selection: &Selection, layout: &Layout, station: &Station, creeping: Vec<Option<Creeping>>) -> Self {
+        let max_order = station.profiles.iter().map(Profile::max_order).min().unwrap_or(0);
         Self {
-            changes: changes::changes(selection, station, creeping),
+            changes: changes::changes(selection, station, &creeping),
             lines: lines::lines(selection, layout, station, max_order),
-            creeping: creeping.to_vec(),
+            creeping,
         }
     }
 }
@@ -110,28 +174,39 @@ impl Seen {
 impl StationData {
     /// All turns and orders.
     pub fn whole(selection: &Selection, layout: &Layout, station: &Station, seen: &Arc<Seen>) -> Result<Self> {
-        Self::new(selection, layout, station, station, None, Arc::clone(seen))
+        let steadied = |profile: &Profile| {
+            let mut steadied = Profile { split: None, ..profile.clone() };
+            let neighbours = profile.split.as_ref().and_then(|split| split.neighbours.as_ref());
+            drift::steady(&mut steadied, neighbours, selection, &seen.creeping, Part::All);
+            steadied
+        };
+        if seen.creeping.iter().flatten().all(|creeping| !creeping.certain()) {
+            return Self::new(selection, layout, station, None, Part::All, Arc::clone(seen));
+        }
+        let profiles = station.profiles.iter().map(steadied).collect();
+        let steadied = Station { name: station.name.clone(), z_mm: station.z_mm, profiles };
+        Self::new(selection, layout, &steadied, None, Part::All, Arc::clone(seen))
     }
 
     /// The turns to fit and those held out, low orders only; all turns where none are held out.
     pub fn split(selection: &Selection, layout: &Layout, station: &Station, seen: &Arc<Seen>) -> Result<Self> {
-        let part = |which: fn(&runout_core::profile::Split) -> &runout_core::profile::Part| -> Option<Station> {
-            let profile = |profile: &runout_core::profile::Profile| {
+        let part = |part: Part, which: fn(&Split) -> &profile::Part| -> Option<Station> {
+            let profile = |profile: &Profile| {
                 let split = profile.split.as_ref()?;
-                Some(split.profile(profile, which(split)))
+                let turns = which(split);
+                let mut steadied = split.profile(profile, turns);
+                drift::steady(&mut steadied, turns.neighbours.as_ref(), selection, &seen.creeping, part);
+                Some(steadied)
             };
             let profiles = station.profiles.iter().map(profile).collect::<Option<_>>()?;
             Some(Station { name: station.name.clone(), z_mm: station.z_mm, profiles })
         };
-        let (fit, held_out) = (part(|split| &split.fit), part(|split| &split.held_out));
-        let mut data = {
-            let fit = fit.as_ref().unwrap_or(station);
-            Self::new(selection, layout, fit, station, held_out.as_ref(), Arc::clone(seen))?
-        };
-        data.readings.truncate(TRACED_ORDERS);
-        if let Some(held_out) = &mut data.held_out {
-            held_out.truncate(TRACED_ORDERS);
-        }
+        let fit = part(Part::Fitted, |split| &split.fit);
+        let held_out = part(Part::HeldOut, |split| &split.held_out);
+        let fitted = if fit.is_some() { Part::Fitted } else { Part::All };
+        let station = fit.as_ref().unwrap_or(station);
+        let mut data = Self::new(selection, layout, station, held_out.as_ref(), fitted, Arc::clone(seen))?;
+        data.truncate(TRACED_ORDERS);
         Ok(data)
     }
 
@@ -139,34 +214,63 @@ impl StationData {
         selection: &Selection,
         layout: &Layout,
         fit: &Station,
-        whole: &Station,
         held_out: Option<&Station>,
+        part: Part,
         seen: Arc<Seen>,
     ) -> Result<Self> {
         let mut readings = Readings::gather(selection, layout, fit)?;
-        let all = std::ptr::eq(fit, whole);
         for (sensor, creeping) in seen.creeping.iter().enumerate() {
             if let Some(creeping) = creeping {
-                creeping.take_out(&mut readings, sensor, all);
+                creeping.take_out_of_scatter(&mut readings, sensor, part);
             }
         }
-        let leaks = seen.lines.iter().map(|line| line.leak[if all { 2 } else { 0 }].clone()).collect();
+        let leaks = seen.lines.iter().map(|line| line.leak(part).to_vec()).collect();
         let creeps = seen.creeping.iter().enumerate().filter_map(|(sensor, creeping)| {
-            let (creep, std) = creeping.filter(|creeping| creeping.certain)?.observed(all);
+            let (creep, std) = creeping.as_ref().filter(|creeping| creeping.certain())?.observed(part);
             Some((sensor, creep, std))
         });
         let creeps = creeps.collect();
         smooth(&mut readings);
         seen.changes.iter().for_each(|change| change.widen(&mut readings));
         let held_out = held_out.map(|station| Readings::gather(selection, layout, station)).transpose()?;
-        let weights = whitening(&readings);
-        let floor = weights.as_ref().map_or_else(Vec::new, |weights| floor(layout, &readings, weights));
-        Ok(Self { name: whole.name.clone(), z_mm: whole.z_mm, seen, leaks, creeps, readings, held_out, weights, floor })
+        let freed = layout.assumes_odd_motion().then(|| {
+            let freed = Alterations { even_order_motion: true, ..Alterations::none(layout) };
+            Box::new(Weighed::new(&layout.altered(&freed), selection, readings.clone()))
+        });
+        let Weighed { readings, weights, floor, carried } = Weighed::new(layout, selection, readings);
+        let name = fit.name.clone();
+        Ok(Self { name, part, readings, held_out, weights, floor, carried, freed, seen, leaks, creeps })
     }
 
-    /// The station without its profiles.
-    pub fn key(&self) -> Station {
-        Station { name: self.name.clone(), z_mm: self.z_mm, profiles: Vec::new() }
+    /// Effects as they act on the turns fitted, or on those held out: a creep differs between setups and slows down.
+    pub fn altered(&self, alterations: &Alterations, turns: Part) -> Alterations {
+        let mut altered = alterations.clone();
+        for (sensor, creeping) in altered.sensors.iter_mut().zip(&self.seen.creeping) {
+            sensor.creep_shares = creeping.as_ref().map_or_else(Vec::new, |creeping| creeping.shares(turns, self.part));
+        }
+        altered
+    }
+
+    /// Leaves out the orders above `max_order`.
+    fn truncate(&mut self, max_order: usize) {
+        self.readings.truncate(max_order);
+        self.held_out.iter_mut().for_each(|held_out| held_out.truncate(max_order));
+        self.freed.iter_mut().for_each(|freed| freed.readings.truncate(max_order));
+    }
+
+    /// The readings, with the uncertainty that they have where some effects are applied.
+    pub fn readings(&self, alterations: &Alterations) -> &Readings {
+        self.freed(alterations).map_or(&self.readings, |freed| &freed.readings)
+    }
+
+    /// Share of the variance at an order from 1 that lost orders carry into it.
+    pub fn carried(&self, order: usize, alterations: &Alterations) -> f64 {
+        let carried = self.freed(alterations).map_or(&self.carried, |freed| &freed.carried);
+        carried.get(order - 1).copied().unwrap_or(0.0)
+    }
+
+    fn freed(&self, alterations: &Alterations) -> Option<&Weighed> {
+        self.freed.as_deref().filter(|_| alterations.even_order_motion)
     }
 
     /// W of an order from 1 for displacements: that of the readings times what they respond with.
@@ -174,13 +278,17 @@ impl StationData {
         let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order);
         let setups = self.readings.turns.len();
         let unweighted = || Blocks::identity(self.readings.count / setups, setups);
-        let weights = self.weights.as_ref().map_or_else(unweighted, |weights| weights[order - 1].clone());
+        let weights = self.freed(alterations).map_or(&self.weights, |freed| &freed.weights);
+        let weights = weights.as_ref().map_or_else(unweighted, |weights| weights[order - 1].clone());
         weights.with_columns_scaled(response)
     }
 
     /// Noise of the residual's degrees of freedom at an order from 1, as a standard deviation of weighted residuals.
-    pub fn floor_std(&self, order: usize) -> f64 {
-        self.floor.get(order - 1).map_or(1.0, |square| square.sqrt())
+    pub fn floor_std(&self, order: usize, alterations: &Alterations) -> f64 {
+        self.freed(alterations)
+            .map_or(&self.floor, |freed| &freed.floor)
+            .get(order - 1)
+            .map_or(1.0, |square| square.sqrt())
     }
 }
 
@@ -210,6 +318,23 @@ fn floor(layout: &Layout, readings: &Readings, weights: &[Blocks]) -> Vec<f64> {
         })
         .map(|square| if square > 0.0 { square } else { 1.0 })
         .collect()
+}
+
+/// The same where some readings are 0 at all orders: those that an effect leaves alone.
+pub fn project_some(
+    matrices: &[Vec<Complex64>],
+    harmonics: &[Complex64],
+    count: usize,
+    mut take: impl FnMut(Complex64),
+) {
+    let changes =
+        |reading: &usize| harmonics.iter().skip(*reading).step_by(count).any(|value| *value != Complex64::ZERO);
+    let changed: Vec<usize> = (0..count).filter(changes).collect();
+    for (matrix, readings) in matrices.iter().zip(harmonics.chunks_exact(count).skip(1)) {
+        for row in matrix.chunks_exact(count) {
+            take(changed.iter().map(|reading| row[*reading] * readings[*reading]).sum());
+        }
+    }
 }
 
 /// Matrix (`[row][column]`) times each order's readings, into a harmonic array of the same shape.

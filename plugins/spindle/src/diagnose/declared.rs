@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use runout_core::{
     Result,
-    model::{Effect, closed_loop::Settings},
+    model::{Effect, Setting, closed_loop::Settings},
     pipeline::effects::EffectCatalogue,
     stage::{Station, StationDiagnosis, StationModel},
 };
 
-use super::{diagnose, places};
+use super::{data::Place, declared_by, diagnose, places};
 use crate::{effects::SpindleEffect, layout::Layout, selection::Selection};
 
 /// A rig, how its readings are taken, and the effects that it may lack.
@@ -18,6 +18,7 @@ pub struct DeclaredSpindle {
     layout: Layout,
     second_order: bool,
     kinds: Vec<Arc<dyn SpindleEffect>>,
+    places: Vec<Place>,
     effects: Vec<Effect>,
 }
 
@@ -26,14 +27,19 @@ impl DeclaredSpindle {
     #[must_use]
     pub fn new(selection: Selection, layout: Layout, second_order: bool, catalogue: &EffectCatalogue) -> Self {
         let kinds = catalogue.of::<Arc<dyn SpindleEffect>>();
-        let effects = places(&kinds, &selection, &layout, second_order).into_iter().map(|place| place.effect).collect();
-        Self { selection, layout, second_order, kinds, effects }
+        let places = places(&kinds, &selection, &layout, second_order);
+        let effects = places.iter().map(|place| place.effect.clone()).collect();
+        Self { selection, layout, second_order, kinds, places, effects }
     }
 }
 
 impl StationModel for DeclaredSpindle {
     fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    fn changes(&self, effect: usize, applied: &[Setting]) -> Vec<String> {
+        declared_by(&self.selection, &self.layout, &self.kinds, &self.places, effect, applied)
     }
 
     fn diagnose(&self, stations: &[Station], settings: &Settings) -> Result<StationDiagnosis> {

@@ -1,290 +1,309 @@
-//! Drift from the levels of the turns: what a sensor creeps over a capture, in all captures alike.
+//! Drift from the levels of the turns (`runout_core::creep`): what it puts into averages and their covariance.
+
+use std::{ops::Range, sync::Arc};
 
 use runout_core::{
-    model::{
-        diagnosis::{Diagnosis, Estimated},
-        evidence::f_tail,
-    },
-    profile::{Profile, Split},
+    Complex64,
+    creep::{Creep, Levels, creeps},
+    model::diagnosis::{Diagnosis, Estimated},
+    profile::{Neighbours, Profile},
     stage::Station,
 };
 
 use super::data::Shared;
 use crate::{selection::Selection, separators::Readings};
 
-/// Fewest turns of a capture.
-const FEWEST: usize = 8;
-/// Two-sided 95 % quantiles of Student's distribution for 1, 2, 3, … degrees of freedom.
-const STUDENT_95: [f64; 8] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31];
-/// Time constants that are tried, in turns: from 1 to 1000 by equal ratios.
-const TRIED: usize = 61;
-
-/// rate·τ·(1 − e^{−t/τ}) of one sensor, in each capture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Creeping {
-    /// At the start, in µm per turn.
-    pub rate_um_per_rev: f64,
-    /// τ, in turns.
-    pub time_constant_turns: f64,
-    /// Standard uncertainty of the rate.
-    pub rate_std: f64,
-    /// And of τ.
-    pub time_constant_std: f64,
-    /// Whether it is the same in every capture, and far above what the levels wander.
-    pub certain: bool,
-    /// Turns of the first part that is fitted, and of a capture.
-    fitted: usize,
-    turns: usize,
-    /// Stations that it is taken from.
-    stations: usize,
-}
-
-/// Levels wander with asynchronous motion: neighbours depend on each other, over some turns.
-const TURNS_ALIKE: f64 = 4.0;
 /// Share of a variance that stays whatever is taken out of it.
 const LEAST_LEFT: f64 = 0.05;
-/// A drift is certain above this many standard uncertainties of its rate,
-const CERTAIN: f64 = 6.0;
-/// and where captures that only wander would agree on it so well with less than this chance.
-const AGREEMENT: f64 = 0.01;
+/// Neighbouring levels that count as one observation.
+const ALIKE: f64 = 4.0;
+/// Drifts are one displacement where it leaves less than this share of them.
+const ONE_DISPLACEMENT: f64 = 0.1;
+
+/// One sensor's creep in the captures of a station.
+#[derive(Debug, Clone)]
+pub struct Creeping {
+    /// Of all stations.
+    pub creep: Arc<Creep>,
+    /// Place among the creep's captures of the station's first setup.
+    first: usize,
+    setups: Vec<Capture>,
+    /// Stations that it is taken from.
+    stations: usize,
+    /// χ² of the levels of turns held out, about those of the turns fitted: without and with the creep.
+    pub held_out: [f64; 2],
+}
+
+/// The turns of a capture.
+#[derive(Debug, Clone)]
+struct Capture {
+    /// Turns since the first one at which each turn begins.
+    starts: Vec<f64>,
+    /// How many of them are fitted.
+    fitted: usize,
+}
 
 impl Creeping {
-    /// Mean creep a turn over a range of turns, in µm.
-    fn over(&self, from: usize, to: usize) -> f64 {
-        let at = |turn: usize| -(-(turn as f64) / self.time_constant_turns).exp_m1();
-        self.rate_um_per_rev * self.time_constant_turns * (at(to) - at(from)) / (to.max(from + 1) - from) as f64
+    pub fn certain(&self) -> bool {
+        self.creep.certain
     }
 
-    /// Creep over one turn, in µm.
-    pub fn in_turn(&self, turn: usize) -> f64 {
-        self.over(turn, turn + 1)
+    /// Creep over one turn of a setup, in µm.
+    pub fn in_turn(&self, setup: usize, turn: usize) -> f64 {
+        let start = self.setups.get(setup).and_then(|capture| capture.starts.get(turn)).copied().unwrap_or(turn as f64);
+        self.creep.over(self.first + setup, start, start + 1.0)
     }
 
-    /// Mean creep a turn over the turns fitted (or all), and its standard uncertainty as one of the stations tells it, in µm.
-    pub fn observed(&self, whole: bool) -> (f64, f64) {
-        let creep = self.over(0, if whole { self.turns } else { self.fitted });
-        (creep, (creep * self.rate_std / self.rate_um_per_rev).abs() * (self.stations as f64).sqrt())
+    /// Level and rise of some turns of a setup, in µm.
+    fn course(&self, setup: usize, turns: Range<usize>) -> Vec<[f64; 2]> {
+        let Some(capture) = self.setups.get(setup) else { return Vec::new() };
+        let starts = capture.starts.get(turns).unwrap_or_default();
+        let level = |start: f64| self.creep.over(self.first + setup, 0.0, start + 0.5) * (start + 0.5).max(1.0);
+        let rise = |start: f64| self.creep.over(self.first + setup, start, start + 1.0);
+        starts.iter().map(|start| [level(*start), rise(*start)]).collect()
     }
 
-    /// Takes out of covariances what a drift that is certain puts into them: over the record it is no noise.
-    ///
-    /// A creep by s a turn leaks s/(πn) into the mean at order n, and as much into the neighbours that its covariance is
-    /// taken from; single turns differ by what their creep does.
-    pub fn take_out(&self, readings: &mut Readings, sensor: usize, whole: bool) {
-        if !self.certain {
+    fn turns(&self, setup: usize, part: Part) -> Range<usize> {
+        let Some(Capture { starts, fitted }) = self.setups.get(setup) else { return 0..0 };
+        match part {
+            Part::Fitted => 0..*fitted,
+            Part::HeldOut => *fitted..starts.len(),
+            Part::All => 0..starts.len(),
+        }
+    }
+
+    /// Mean creep a turn in a setup, in µm.
+    fn mean(&self, setup: usize, part: Part) -> f64 {
+        let course = self.course(setup, self.turns(setup, part));
+        course.iter().map(|[_, rise]| rise).sum::<f64>() / course.len().max(1) as f64
+    }
+
+    /// Mean creep a turn where it is largest in any station, over all turns or those fitted, in µm.
+    fn reference(&self, part: Part) -> f64 {
+        let largest = self.creep.largest();
+        let turns = match part {
+            Part::All => self.creep.turns,
+            _ => self.setups.iter().map(|capture| capture.fitted).max().unwrap_or(0) as f64,
+        };
+        self.creep.over(largest, 0.0, turns)
+    }
+
+    /// The reference creep and its standard uncertainty as one of the stations tells it, in µm a turn.
+    pub fn observed(&self, part: Part) -> (f64, f64) {
+        let creep = self.reference(part);
+        let rate = self.creep.rates.get(self.creep.largest()).copied().unwrap_or(0.0);
+        let share = if rate == 0.0 { 1.0 } else { creep / rate };
+        (creep, (share * self.creep.rate_std).abs() * (self.stations as f64).sqrt())
+    }
+
+    /// Mean creep a turn in each setup, over the reference of the turns that are fitted to.
+    pub fn shares(&self, of: Part, reference: Part) -> Vec<f64> {
+        let reference = self.reference(reference);
+        let share = |setup| if reference == 0.0 { 1.0 } else { self.mean(setup, of) / reference };
+        (0..self.setups.len()).map(share).collect()
+    }
+
+    /// Takes out of the scatter of single turns by how much their creep differs.
+    pub fn take_out_of_scatter(&self, readings: &mut Readings, sensor: usize, part: Part) {
+        if !self.certain() {
             return;
         }
-        let turns = if whole { self.turns } else { self.fitted };
-        let mean = self.over(0, turns);
-        let spread = (0..turns).map(|turn| (self.in_turn(turn) - mean).powi(2)).sum::<f64>() / (turns * turns) as f64;
         let sensors = readings.count / readings.turns.len().max(1);
-        for (matrices, square) in [(&mut readings.covariance, mean * mean), (&mut readings.scatter, spread)] {
-            for matrices in matrices.iter_mut().flatten() {
-                for order in 2..matrices.len() / (sensors * sensors) {
-                    let matrix = &mut matrices[order * sensors * sensors..(order + 1) * sensors * sensors];
-                    let leak = square / (std::f64::consts::PI * order as f64).powi(2);
-                    let variance = matrix[sensor * sensors + sensor].re;
-                    let left = (variance - leak).max(LEAST_LEFT * variance);
-                    // Row and column alike, so that it stays a covariance.
-                    let share = if variance > 0.0 { (left / variance).sqrt() } else { 1.0 };
-                    for other in 0..sensors {
-                        matrix[sensor * sensors + other] *= share;
-                        matrix[other * sensors + sensor] *= share;
-                    }
+        for (setup, matrices) in readings.scatter.iter_mut().flatten().enumerate() {
+            let mean = self.mean(setup, part);
+            let course = self.course(setup, self.turns(setup, part));
+            let turns = course.len().max(1) as f64;
+            let spread = course.iter().map(|[_, rise]| (rise - mean).powi(2)).sum::<f64>() / (turns * turns);
+            for (order, matrix) in matrices.chunks_exact_mut(sensors * sensors).enumerate().skip(2) {
+                let leak = spread / (std::f64::consts::PI * order as f64).powi(2);
+                let variance = matrix[sensor * sensors + sensor].re;
+                let left = (variance - leak).max(LEAST_LEFT * variance);
+                // Row and column alike, so that it stays a covariance.
+                let share = if variance > 0.0 { (left / variance).sqrt() } else { 1.0 };
+                for other in 0..sensors {
+                    matrix[sensor * sensors + other] *= share;
+                    matrix[other * sensors + sensor] *= share;
                 }
             }
         }
     }
-
-    /// Creep of the held-out turns over that of the fitted ones.
-    pub fn held_out_share(&self) -> f64 {
-        let fitted = self.over(0, self.fitted);
-        if fitted.abs() > 0.0 { self.over(self.fitted, self.turns) / fitted } else { 1.0 }
-    }
 }
 
-/// What the levels of the turns say of each sensor.
-pub fn creeping(selection: &Selection, stations: &[Station]) -> Vec<Option<Creeping>> {
-    let levels: Vec<Option<Levels>> =
-        selection.sensors.iter().map(|sensor| Levels::of_sensor(*sensor, stations)).collect();
-    let known: Vec<&Levels> = levels.iter().flatten().collect();
-    levels.iter().map(|levels| levels.as_ref()?.fit(&known)).collect()
+/// Which turns of a capture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Those that the loop fits.
+    Fitted,
+    /// Those that it does not.
+    HeldOut,
+    /// All of them.
+    All,
 }
 
-/// Levels of one sensor's turns.
-struct Levels {
-    /// About the mean of each capture, which has a level of its own, `[capture][turn]`.
-    captures: Vec<Vec<f64>>,
-    /// Their mean, `[turn]`.
-    mean: Vec<f64>,
-    fitted: usize,
-    stations: usize,
-}
-
-impl Levels {
-    fn of_sensor(sensor: usize, stations: &[Station]) -> Option<Self> {
-        let profiles = || stations.iter().flat_map(|station| &station.profiles);
-        let splits: Option<Vec<_>> = profiles().map(|profile| profile.split.as_ref()).collect();
-        let splits = splits?;
-        let turns = splits.iter().map(|split| split.turns.count()).min().filter(|turns| *turns >= FEWEST)?;
-        let capture = |(profile, split): (&Profile, &&Split)| {
-            let channel = profile.sensors.iter().position(|known| *known == sensor)?;
-            Some(about_mean(split.turns.levels(channel).take(turns).collect()))
-        };
-        let captures: Vec<Vec<f64>> = profiles().zip(&splits).map(capture).collect::<Option<_>>()?;
-        let share = 1.0 / captures.len() as f64;
-        let mean = (0..turns).map(|turn| captures.iter().map(|capture| capture[turn]).sum::<f64>() * share).collect();
-        Some(Self { captures, mean, fitted: splits.last()?.fit.turns.len(), stations: stations.len() })
-    }
-
-    /// Rate and time constant of the mean over the captures; what all sensors wander from one to the other gives their
-    /// uncertainty.
-    fn fit(&self, all: &[&Self]) -> Option<Creeping> {
-        let turns = self.mean.len();
-        let fit = |tau: f64| {
-            let shape = shape(tau, turns);
-            let rate = dot(&shape, &self.mean) / dot(&shape, &shape);
-            (shape.iter().zip(&self.mean).map(|(a, b)| (b - rate * a).powi(2)).sum::<f64>(), rate)
-        };
-        let tau_of = |step: usize| 10.0_f64.powf(3.0 * step as f64 / (TRIED - 1) as f64);
-        let best = (0..TRIED).map(|step| (fit(tau_of(step)).0, step)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
-        // Between the neighbours of the best one.
-        let (mut low, mut high) = (tau_of(best.saturating_sub(1)), tau_of((best + 1).min(TRIED - 1)));
-        for _ in 0..40 {
-            let third = (high - low) / 3.0;
-            if fit(low + third).0 < fit(high - third).0 { high -= third } else { low += third }
+/// Takes out of the covariance of a profile's mean what drifts that are certain put into it: over the record they are no noise.
+pub fn steady(
+    profile: &mut Profile,
+    neighbours: Option<&Neighbours>,
+    selection: &Selection,
+    creeping: &[Option<Creeping>],
+    part: Part,
+) {
+    let Some(setup) = selection.setups.iter().position(|setup| *setup == profile.setup) else { return };
+    let known = selection.sensors.iter().zip(creeping);
+    let certain = known.filter_map(|(sensor, creeping)| Some((sensor, creeping.as_ref().filter(|one| one.certain())?)));
+    let mut certain = certain.peekable();
+    let (Some(_), Some(mut neighbours)) = (certain.peek(), neighbours.cloned()) else { return };
+    for (sensor, creeping) in certain {
+        if let Some(channel) = profile.sensors.iter().position(|known| known == sensor) {
+            neighbours.take_out(channel, &creeping.course(setup, creeping.turns(setup, part)));
         }
-        let tau = 0.5 * (low + high);
-        let (left, rate) = fit(tau);
-        let partials = Partials::new(rate, tau, turns);
-        // Turns that wander together count as one; captures tell how far they do, as far as there are enough of them.
-        let noise = left * TURNS_ALIKE / (turns as f64 - 3.0);
-        let [rate_std, time_constant_std] = match partials.between(all) {
-            Some(between) => [0, 1].map(|which| partials.std(noise, which).max(between[which])),
-            None => [0, 1].map(|which| partials.std(noise, which)),
-        };
-        // A drift comes with every capture; what wanders does not.
-        let alike = partials.chance_of_agreement(rate, all) * (all.len() as f64) < AGREEMENT;
-        Some(Creeping {
-            certain: alike && rate.abs() > CERTAIN * partials.std(noise, 0),
-            rate_um_per_rev: rate,
-            time_constant_turns: tau,
-            rate_std,
-            time_constant_std,
-            fitted: self.fitted,
-            turns,
-            stations: self.stations,
-        })
     }
+    profile.covariance = Some(neighbours.covariance());
 }
 
-/// How levels change with rate and time constant.
-struct Partials {
-    by_rate: Vec<f64>,
-    by_tau: Vec<f64>,
-    /// Their products: rate with rate, rate with τ, τ with τ.
-    normal: [f64; 3],
-    determinant: f64,
+/// What the levels of the turns say of each sensor's creep, `[station][sensor]`.
+pub fn creeping(selection: &Selection, stations: &[Station]) -> Vec<Vec<Option<Creeping>>> {
+    let of_capture = |sensor: usize, station: &Station, setup: &usize| -> Option<Levels> {
+        let profile = station.profiles.iter().find(|profile| profile.setup == *setup)?;
+        let channel = profile.sensors.iter().position(|known| *known == sensor)?;
+        let turns = &profile.split.as_ref()?.turns;
+        Some(Levels::new(turns.numbers.iter().copied().zip(turns.levels(channel))))
+    };
+    let of_sensor = |sensor: &usize| -> Vec<Levels> {
+        let captures = stations.iter().flat_map(|station| selection.setups.iter().map(move |setup| (station, setup)));
+        let levels: Option<Vec<Levels>> =
+            captures.map(|(station, setup)| of_capture(*sensor, station, setup)).collect();
+        levels.unwrap_or_default()
+    };
+    let levels: Vec<Vec<Levels>> = selection.sensors.iter().map(of_sensor).collect();
+    let creeps: Vec<Option<Arc<Creep>>> = creeps(&levels).into_iter().map(|creep| creep.map(Arc::new)).collect();
+    let of_station = |(index, station): (usize, &Station)| {
+        let setups = captures(selection, station);
+        let each = creeps.iter().zip(&selection.sensors).map(|(creep, sensor)| {
+            let mut creeping = Creeping {
+                creep: Arc::clone(creep.as_ref()?),
+                first: index * selection.setups.len(),
+                setups: setups.clone()?,
+                stations: stations.len(),
+                held_out: [0.0; 2],
+            };
+            creeping.held_out = held_out(&creeping, selection, station, *sensor);
+            Some(creeping)
+        });
+        each.collect()
+    };
+    stations.iter().enumerate().map(of_station).collect()
 }
 
-impl Partials {
-    fn new(rate: f64, tau: f64, turns: usize) -> Self {
-        let step = 1e-3 * tau;
-        let by_rate = shape(tau, turns);
-        let (above, below) = (shape(tau + step, turns), shape(tau - step, turns));
-        let by_tau: Vec<f64> = above.iter().zip(&below).map(|(a, b)| rate * (a - b) / (2.0 * step)).collect();
-        let normal = [dot(&by_rate, &by_rate), dot(&by_rate, &by_tau), dot(&by_tau, &by_tau)];
-        let determinant = (normal[0] * normal[2] - normal[1] * normal[1]).max(f64::MIN_POSITIVE);
-        Self { by_rate, by_tau, normal, determinant }
-    }
+fn captures(selection: &Selection, station: &Station) -> Option<Vec<Capture>> {
+    let capture = |setup: &usize| {
+        let profile = station.profiles.iter().find(|profile| profile.setup == *setup)?;
+        let split = profile.split.as_ref()?;
+        let numbers = &split.turns.numbers;
+        let starts = numbers.iter().map(|number| (number - numbers[0]) as f64).collect();
+        Some(Capture { starts, fitted: split.fit.turns.len() })
+    };
+    selection.setups.iter().map(capture).collect()
+}
 
-    /// Of rate (0) or τ (1), from the variance of independent turns.
-    fn std(&self, noise: f64, which: usize) -> f64 {
-        (noise * self.normal[2 * (1 - which)] / self.determinant).sqrt()
-    }
-
-    /// Rate and τ that explain a curve beside those found.
-    fn solve(&self, curve: &[f64]) -> [f64; 2] {
-        let (a, b) = (dot(&self.by_rate, curve), dot(&self.by_tau, curve));
-        let [aa, ab, bb] = self.normal;
-        [(a * bb - b * ab) / self.determinant, (b * aa - a * ab) / self.determinant]
-    }
-
-    /// Chance of captures that only wander agreeing so well on a rate, with τ as it is: Student's distribution, with how far
-    /// the rates of all sensors differ from one capture to the other. 0 for a single one, which has none to agree with.
-    fn chance_of_agreement(&self, rate: f64, all: &[&Levels]) -> f64 {
-        let captures = all.iter().map(|levels| levels.captures.len()).min().unwrap_or(0);
-        if captures < 2 {
-            return 0.0;
-        }
-        let of = |curve: &[f64]| dot(&self.by_rate, curve) / self.normal[0];
-        let off = |levels: &Levels| {
-            let mean = of(&levels.mean);
-            levels.captures.iter().map(|capture| (of(capture) - mean).powi(2)).sum::<f64>()
-        };
-        let squares: f64 = all.iter().map(|levels| off(levels)).sum();
-        let variance = squares / (captures * (captures - 1) * all.len()) as f64;
-        f_tail(rate * rate / variance.max(f64::MIN_POSITIVE), 1.0, freedom(captures, all) as f64)
-    }
-
-    /// Standard uncertainty of the mean of rate and τ, from how captures differ in all sensors: for few degrees of freedom
-    /// as much larger as Student's distribution is wider, so that twice it holds 95 %.
-    fn between(&self, all: &[&Levels]) -> Option<[f64; 2]> {
-        let captures = all.iter().map(|levels| levels.captures.len()).min().filter(|captures| *captures >= 2)?;
-        let mut squares = [0.0; 2];
-        for levels in all {
-            for capture in &levels.captures {
-                let off: Vec<f64> = capture.iter().zip(&levels.mean).map(|(one, mean)| one - mean).collect();
-                squares.iter_mut().zip(self.solve(&off)).for_each(|(sum, value)| *sum += value * value);
+/// χ² of the levels of the turns held out about those of the turns fitted, without and with the creep, in units of what the
+/// creep leaves of the latter.
+fn held_out(creeping: &Creeping, selection: &Selection, station: &Station, sensor: usize) -> [f64; 2] {
+    let mut chi2 = [0.0; 2];
+    for (index, setup) in selection.setups.iter().enumerate() {
+        let Some(profile) = station.profiles.iter().find(|profile| profile.setup == *setup) else { continue };
+        let Some(split) = &profile.split else { continue };
+        let Some(channel) = profile.sensors.iter().position(|known| *known == sensor) else { continue };
+        let levels: Vec<f64> = split.turns.levels(channel).collect();
+        let course = creeping.course(index, 0..levels.len());
+        let left: Vec<f64> = levels.iter().zip(&course).map(|(level, [course, _])| level - course).collect();
+        let fitted = split.fit.turns.len().min(levels.len());
+        let mean = |values: &[f64]| values[..fitted].iter().sum::<f64>() / fitted.max(1) as f64;
+        let means = [mean(&levels), mean(&left)];
+        let square = left[..fitted].iter().map(|value| (value - means[1]).powi(2)).sum::<f64>() / fitted.max(1) as f64;
+        if square > 0.0 {
+            for ((chi2, values), mean) in chi2.iter_mut().zip([&levels, &left]).zip(means) {
+                *chi2 += values[fitted..].iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (ALIKE * square);
             }
         }
-        let wider = STUDENT_95.get(freedom(captures, all) - 1).map_or(1.0, |quantile| 0.5 * quantile);
-        let count = (captures * (captures - 1) * all.len()) as f64;
-        Some(squares.map(|sum| wider * (sum / count).sqrt()))
     }
+    chi2
 }
 
-/// Independent differences between captures: sensors see two directions between them.
-fn freedom(captures: usize, all: &[&Levels]) -> usize {
-    (captures - 1) * all.len().min(2)
-}
-
-/// τ(1 − e^{−t/τ}) at the turns' middles, about its mean.
-fn shape(tau: f64, turns: usize) -> Vec<f64> {
-    about_mean((0..turns).map(|turn| -tau * (-(turn as f64 + 0.5) / tau).exp_m1()).collect())
-}
-
-fn about_mean(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    for value in &mut values {
-        *value -= mean;
-    }
-    values
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Says a drift that was found by its rate and time constant, where the levels tell them.
-pub fn say_rates(diagnosis: &mut Diagnosis, shared: &Shared) {
+/// Says a drift that was found by what it is over the capture, its rate, and its time constant where that is determined.
+pub fn say(diagnosis: &mut Diagnosis, shared: &Shared) {
+    let rig = &shared.selection.rig;
+    let mut drifts = vec![0.0; rig.sensors.len()];
     for added in diagnosis.added.iter_mut().filter(|added| added.effect == "thermal-drift") {
-        let sensors = &shared.selection.rig.sensors;
-        let sensor = added.targets.first().and_then(|id| sensors.iter().position(|sensor| sensor.id == *id));
-        let Some(creeping) = sensor.and_then(|sensor| *shared.data.first()?.seen.creeping.get(sensor)?) else {
-            continue;
+        let sensor = added.targets.first().and_then(|id| rig.sensors.iter().position(|sensor| sensor.id == *id));
+        let creeping = sensor.and_then(|sensor| {
+            let of_station = |station: &super::data::StationData| station.seen.creeping.get(sensor)?.clone();
+            let all = shared.data.iter().filter_map(of_station);
+            // Where captures differ, the station that has the largest.
+            let has_largest = |one: &Creeping| {
+                one.creep.shared || (one.first..one.first + one.setups.len()).contains(&one.creep.largest())
+            };
+            all.into_iter().find(has_largest)
+        });
+        let (Some(sensor), Some(creeping)) = (sensor, creeping) else { continue };
+        let creep = &creeping.creep;
+        let said = |name: String, value: f64, std: f64, unit: &str| {
+            let std = std.is_finite().then_some(std);
+            Estimated { name, value, std, unit: unit.into() }
         };
-        let said = |name: &str, value: f64, std: f64, unit: &str| Estimated {
-            name: name.into(),
-            value,
-            std,
-            unit: unit.into(),
+        added.parameters = if creep.shared {
+            drifts[sensor] = creep.over_capture(0);
+            vec![
+                said("over-capture".into(), creep.over_capture(0), creep.over_capture_std, "um"),
+                said("rate".into(), creep.rates[0], creep.rate_std, "um/rev"),
+            ]
+        } else {
+            let setups = rig.setups.iter().enumerate().take(creeping.setups.len());
+            let over = |(index, setup): (usize, &runout_core::rig::Setup)| {
+                let over_um = creep.over_capture(creeping.first + index);
+                said(format!("over-capture-{}", setup.id), over_um, creep.over_capture_std, "um")
+            };
+            setups.map(over).collect()
         };
-        let creep = std::mem::take(&mut added.parameters);
-        added.parameters = vec![
-            said("rate", creeping.rate_um_per_rev, creeping.rate_std, "um/rev"),
-            said("time-constant", creeping.time_constant_turns, creeping.time_constant_std, "rev"),
-        ];
-        added.parameters.extend(creep);
+        if let Some([tau, std]) = creep.time_constant {
+            added.parameters.push(said("time-constant".into(), tau, std, "rev"));
+        }
     }
+    diagnosis.warnings.extend(one_displacement(&drifts, shared));
+}
+
+/// Drifts of several sensors that are one displacement of the part beside all sensors.
+fn one_displacement(drifts: &[f64], shared: &Shared) -> Option<String> {
+    let sensors = &shared.selection.rig.sensors;
+    if drifts.iter().filter(|drift| **drift != 0.0).count() < 3 {
+        return None;
+    }
+    let (mut cc, mut cs, mut ss, mut c, mut s) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (sensor, drift) in sensors.iter().zip(drifts) {
+        let (sine, cosine) = sensor.angle_rad.sin_cos();
+        (cc, cs, ss) = (cc + cosine * cosine, cs + cosine * sine, ss + sine * sine);
+        (c, s) = (c + drift * cosine, s + drift * sine);
+    }
+    let determinant = cc * ss - cs * cs;
+    if determinant < 1e-6 {
+        return None;
+    }
+    let (x, y) = ((c * ss - s * cs) / determinant, (s * cc - c * cs) / determinant);
+    let left = |(sensor, drift): (&runout_core::rig::Sensor, &f64)| {
+        (drift - x * sensor.angle_rad.cos() - y * sensor.angle_rad.sin()).powi(2)
+    };
+    let left: f64 = sensors.iter().zip(drifts).map(left).sum();
+    let all: f64 = drifts.iter().map(|drift| drift * drift).sum();
+    (left < ONE_DISPLACEMENT * ONE_DISPLACEMENT * all).then(|| {
+        format!(
+            "the drifts of the sensors fit one displacement of the part beside all of them, x {x:+.3} µm and y {y:+.3} µm over each \
+             capture: the part, the spindle or the holder of all sensors moves"
+        )
+    })
+}
+
+/// Creep of a turn at an order, for what happens within turns.
+pub fn in_turn(creeping: Option<&Creeping>, setup: usize, turn: usize, order: usize, angles: usize) -> Complex64 {
+    let creep_um = creeping.filter(|known| known.certain()).map_or(0.0, |known| known.in_turn(setup, turn));
+    creep_um * crate::effects::creep(order, angles)
 }

@@ -4,15 +4,18 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64, Error, Result,
-    evaluate::{roundness::ront_lsci_um, uncertainty},
-    model::{Bias, Fit, Outcome, Remainder, Setting, diagnosis::Unexplained},
-    numerics::fourier::Fourier,
+    model::{
+        Bias, Fit, Outcome, Remainder, Setting,
+        diagnosis::Unexplained,
+        evidence::{Group, far_worse},
+    },
     separation::{Quantity, Residual, Separation},
     stage::Station,
 };
 
 use super::{
-    data::{Shared, StationData, project},
+    data::{self, Shared, StationData, project, project_some},
+    drift::Part,
     strangers,
 };
 use crate::{
@@ -28,11 +31,16 @@ pub struct SpindleFit {
     layout: Layout,
     stations: Vec<Solved>,
     remainder: Remainder,
+    /// Other fits between which and this one the data do not decide, and the weights of this one and of them.
+    others: Vec<SpindleFit>,
+    weights: Vec<f64>,
 }
 
 /// One station's solution.
 pub(super) struct Solved {
     pub operators: Operators,
+    /// Effects as they act on the turns fitted.
+    alterations: Alterations,
     propagation: Option<Propagation>,
     pub estimate: Estimate,
     /// Readings taken back to displacements.
@@ -41,19 +49,11 @@ pub(super) struct Solved {
     pub linear: Vec<Complex64>,
     /// W (I − A P) of each order from 1, over the noise of a real degree of freedom.
     pub whitened: Vec<Vec<Complex64>>,
-    /// What is not known of effects, `[order][unknown]`, added to the variances.
-    widened: Vec<f64>,
 }
 
 impl SpindleFit {
     pub(super) fn new(shared: Arc<Shared>, applied: &[Setting]) -> Result<Self> {
-        let mut alterations = Alterations::none(&shared.layout);
-        for setting in applied {
-            let place = shared.places.get(setting.effect).ok_or_else(|| {
-                Error::new("apply", format!("effect {}", setting.effect), "there is no such effect in this rig")
-            })?;
-            shared.kind(setting.effect).alter(place.index, &setting.values, &mut alterations);
-        }
+        let alterations = data::altered(&shared.layout, &shared.kinds, &shared.places, applied)?;
         if !alterations.are_possible() {
             return Err(Error::new("apply", "effects", "their values are beyond all bounds"));
         }
@@ -61,19 +61,51 @@ impl SpindleFit {
         let stations: Vec<Solved> =
             shared.data.iter().map(|data| Solved::new(&shared, data, &layout, &alterations)).collect();
         let remainder = remainder(&shared, &stations, &layout, &alterations);
-        Ok(Self { shared, alterations, layout, stations, remainder })
+        Ok(Self { shared, alterations, layout, stations, remainder, others: Vec::new(), weights: vec![1.0] })
     }
 
-    /// The layout with the effects applied.
-    #[must_use]
-    pub fn layout(&self) -> &Layout {
-        &self.layout
+    /// The layout with the effects applied, of this fit and of those that are mixed with it.
+    pub fn layouts(&self) -> impl Iterator<Item = &Layout> {
+        std::iter::once(&self.layout).chain(self.others.iter().map(|other| &other.layout))
     }
 
-    /// Numbers of the asynchronous lines that are taken out.
+    /// Lowest and highest order at which a reading is redundant.
+    pub(super) fn redundant(&self) -> Option<[usize; 2]> {
+        let of_stations = self.stations.iter().filter_map(|station| station.residual().orders);
+        of_stations.reduce(|[low, high], [lowest, highest]| [low.min(lowest), high.max(highest)])
+    }
+
+    /// How far form and motion of another fit are, root mean square over sections and directions, in µm.
     #[must_use]
-    pub(super) fn lines(&self) -> &[usize] {
-        &self.alterations.lines
+    pub(super) fn apart_um(&self, other: &Self) -> [f64; 2] {
+        let width = self.layout.unknowns.len();
+        let (mut squares, mut counts) = ([0.0; 2], [0_usize; 2]);
+        for (unknown, quantity) in self.layout.unknowns.iter().enumerate() {
+            let place = match quantity {
+                Quantity::Form(_) => 0,
+                Quantity::X | Quantity::Y => 1,
+                _ => continue,
+            };
+            counts[place] += self.stations.len();
+            let each = self.differences(other).skip(unknown).step_by(width);
+            squares[place] += each.map(|difference| difference.norm_sqr()).sum::<f64>();
+        }
+        [0, 1].map(|place| (0.5 * squares[place] / counts[place].max(1) as f64).sqrt())
+    }
+
+    /// Estimates less those of another fit, `[station][order from 1][unknown]`.
+    fn differences<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = Complex64> + 'a {
+        // The unknown of a form is the conjugate where the part turns clockwise.
+        let mirrored = self.layout.direction * other.layout.direction < 0.0;
+        self.stations.iter().zip(&other.stations).flat_map(move |(solved, there)| {
+            (1..=solved.corrected.max_order.min(there.corrected.max_order)).flat_map(move |order| {
+                self.layout.unknowns.iter().enumerate().map(move |(unknown, quantity)| {
+                    let value = there.estimate.told(order, unknown);
+                    let value = if mirrored && quantity.is_form() { value.conj() } else { value };
+                    solved.estimate.told(order, unknown) - value
+                })
+            })
+        })
     }
 
     /// Highest order fitted.
@@ -85,7 +117,7 @@ impl SpindleFit {
     fn predicted(&self, station: usize) -> Predicted<'_> {
         let solved = &self.stations[station];
         let readings = &solved.corrected;
-        Predicted::new(&self.layout, &self.alterations, &solved.estimate, readings)
+        Predicted::new(&self.layout, &solved.alterations, &solved.estimate, readings)
     }
 
     fn partials(&self, effect: usize, station: usize) -> Vec<Vec<Complex64>> {
@@ -96,13 +128,23 @@ impl SpindleFit {
     /// Form and motion, one entry a station.
     #[must_use]
     pub fn separations(&self, stations: &[Station]) -> Vec<Separation> {
+        let others: Vec<Vec<Separation>> = self.others.iter().map(|other| other.own_separations(stations)).collect();
+        let own = self.own_separations(stations).into_iter().enumerate();
+        let mixture = |(station, own): (usize, Separation)| {
+            let equivalents = others.iter().filter_map(|other| other.get(station).cloned());
+            let all: Vec<Separation> = std::iter::once(own.clone()).chain(equivalents).collect();
+            if all.len() == 1 { own } else { Separation::mixture(&self.weights, &all).unwrap_or(own) }
+        };
+        own.map(mixture).collect()
+    }
+
+    /// Without what is mixed with it.
+    fn own_separations(&self, stations: &[Station]) -> Vec<Separation> {
         let solver = self.shared.solver(&self.layout, &self.alterations);
         let each = self.stations.iter().zip(stations).map(|(solved, station)| {
             let propagation = solved.propagation.as_ref();
             let residual = solved.residual();
-            let mut separation = solver.report(station, &solved.operators, &solved.estimate, propagation, residual);
-            separation.variance.iter_mut().zip(&solved.widened).for_each(|(variance, more)| *variance += more);
-            separation
+            solver.report(station, &solved.operators, &solved.estimate, propagation, residual)
         });
         each.collect()
     }
@@ -116,11 +158,14 @@ impl Shared {
 
 impl Solved {
     fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
-        let mut corrected = data.readings.clone();
-        for leak in alterations.lines.iter().filter_map(|line| data.leaks.get(*line)) {
-            corrected.mean.iter_mut().zip(leak).for_each(|(mean, leak)| *mean -= leak);
+        let mut corrected = data.readings(alterations).clone();
+        for (number, (line, leak)) in data.seen.lines.iter().zip(&data.leaks).enumerate() {
+            if alterations.lines.contains(&(number, line.row().0)) {
+                line.take_out(leak, layout, &mut corrected.mean);
+            }
         }
-        alterations.correct(layout, &mut corrected);
+        let altered = data.altered(alterations, data.part);
+        altered.correct(layout, &mut corrected);
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.
         let weights: Vec<_> = (1..=max_order).map(|order| data.weights_of(order, layout, alterations)).collect();
@@ -139,16 +184,15 @@ impl Solved {
                 let left = leftover(&system.matrix, &operators.orders[order - 1].operator, count);
                 let mut left = weights[order - 1].times(&left, count);
                 // A real degree of freedom has half of a complex one's square.
-                let scale = std::f64::consts::SQRT_2 / data.floor_std(order);
+                let scale = std::f64::consts::SQRT_2 / data.floor_std(order, alterations);
                 for entry in &mut left {
                     *entry *= scale;
                 }
                 left
             })
             .collect();
-        let widened = vec![0.0; (max_order + 1) * layout.unknowns.len()];
         let propagation = Propagation::of(&corrected, &operators);
-        Self { operators, propagation, estimate, corrected, linear, whitened, widened }
+        Self { operators, alterations: altered, propagation, estimate, corrected, linear, whitened }
     }
 
     fn residual(&self) -> Residual {
@@ -186,7 +230,8 @@ fn axial(
 fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations: &Alterations) -> Remainder {
     let (mut residual, mut stretches) = (Vec::new(), Vec::with_capacity(stations.len()));
     let (mut dof, mut squares, mut expected, mut readings) = (0, 0.0, 0.0, 0);
-    let (mut held_squares, mut held_chi2, mut held_readings) = (0.0, 0.0, 0);
+    let mut held = HeldOut { chi2: 0.0, squares: 0.0, expected: 0.0 };
+    let (mut held_readings, mut disturbed) = (0, 0.0);
     for (solved, data) in stations.iter().zip(&shared.data) {
         let count = solved.corrected.count;
         project(&solved.whitened, &solved.linear, count, |_, values| {
@@ -197,10 +242,15 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
             dof += 1;
         }
         for (number, line) in data.seen.lines.iter().enumerate() {
-            residual.push(if alterations.lines.contains(&number) { 0.0 } else { line.evidence.sqrt() });
+            let (sensor, evidence) = line.row();
+            residual.push(if alterations.lines.contains(&(number, sensor)) { 0.0 } else { evidence.sqrt() });
             dof += 1;
         }
         stretches.push(residual.len() - stretches.iter().sum::<usize>());
+        for (index, operator) in solved.operators.orders.iter().enumerate() {
+            let freedom = 2 * count.saturating_sub(operator.rank);
+            disturbed += freedom as f64 * data.carried(index + 1, alterations);
+        }
         let level = solved.residual();
         if level.dof > 0 {
             dof += level.dof;
@@ -208,9 +258,10 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
             expected += level.expected_rms_um.powi(2) * count as f64;
         }
         readings += count;
-        if let Some((chi2, sum)) = held_out(data, solved, layout, alterations) {
-            held_chi2 += chi2;
-            held_squares += sum;
+        if let Some(found) = held_out(data, solved, layout, alterations) {
+            held.chi2 += found.chi2;
+            held.squares += found.squares;
+            held.expected += found.expected;
             held_readings += count;
         }
     }
@@ -222,25 +273,38 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
         dof,
         rms: share(squares, readings),
         noise_floor: if known { share(expected, readings) } else { f64::NAN },
-        held_out_rms: share(0.5 * held_squares, held_readings),
-        held_out_chi2: if held_readings > 0 { held_chi2 } else { f64::NAN },
+        held_out_rms: share(0.5 * held.squares, held_readings),
+        disturbed_chi2: if known { disturbed } else { 0.0 },
+        held_out_expected_rms: if known { share(0.5 * held.expected, held_readings) } else { f64::NAN },
+        held_out_chi2: if held_readings > 0 { held.chi2 } else { f64::NAN },
         unit: "um".into(),
     }
 }
 
-/// χ² and sum of squares (µm²) of what the fit leaves of the turns held out.
-fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &Alterations) -> Option<(f64, f64)> {
+/// Residual on the turns held out, summed over orders and readings.
+struct HeldOut {
+    /// Weighted squares.
+    chi2: f64,
+    /// Squares, in µm².
+    squares: f64,
+    /// Squares expected from noise, in µm²; NaN where it is not known.
+    expected: f64,
+}
+
+fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &Alterations) -> Option<HeldOut> {
     let mut held = data.held_out.clone()?;
-    let mut later = alterations.clone();
-    for (sensor, creeping) in later.sensors.iter_mut().zip(&data.seen.creeping) {
-        sensor.creep_share = creeping.map_or(1.0, |creeping| creeping.held_out_share());
-    }
+    let later = data.altered(alterations, Part::HeldOut);
     let (mut chi2, mut squares) = (0.0, 0.0);
     for (number, line) in data.seen.lines.iter().enumerate() {
-        let taken_out = alterations.lines.contains(&number);
-        chi2 += line.held_out[usize::from(taken_out)];
+        let taken_out = alterations.lines.contains(&(number, line.row().0));
+        chi2 += line.held_out()[usize::from(taken_out)];
         if taken_out {
-            held.mean.iter_mut().zip(&line.leak[1]).for_each(|(mean, leak)| *mean -= leak);
+            line.take_out(line.leak(Part::HeldOut), layout, &mut held.mean);
+        }
+    }
+    for (sensor, creeping) in alterations.sensors.iter().zip(&data.seen.creeping) {
+        if let Some(creeping) = creeping.as_ref().filter(|creeping| creeping.certain()) {
+            chi2 += creeping.held_out[usize::from(sensor.creep_um != 0.0)];
         }
     }
     later.correct(layout, &mut held);
@@ -262,9 +326,35 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
         let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order).norm_sqr();
         squares += left.iter().enumerate().map(|(index, value)| value.norm_sqr() * response(index)).sum::<f64>();
         let weighted = data.weights_of(order, layout, alterations).times(&left, 1);
-        chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / data.floor_std(order).powi(2);
+        chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / data.floor_std(order, alterations).powi(2);
     }
-    Some((chi2, squares))
+    let expected = held_out_expected(solved, &held);
+    Some(HeldOut { chi2, squares, expected })
+}
+
+/// Squares expected from noise of what the fit leaves of the turns held out, in µm²: tr Σ of their mean, and tr(A·P·Σ·Pᴴ·Aᴴ) of
+/// its prediction by the turns fitted. Both parts of a capture are taken as independent. NaN where their covariance is not known.
+fn held_out_expected(solved: &Solved, held: &Readings) -> f64 {
+    let (Some(propagation), Some(setups)) = (&solved.propagation, &held.covariance) else { return f64::NAN };
+    let sensors = held.count / setups.len().max(1);
+    let orders = 1..=held.max_order.min(solved.corrected.max_order);
+    let noise = orders.clone().flat_map(|order| {
+        let block = order * sensors * sensors..(order + 1) * sensors * sensors;
+        setups.iter().flat_map(move |setup| setup[block.clone()].iter().step_by(sensors + 1)).map(|entry| entry.re)
+    });
+    let predicted = orders.map(|order| {
+        let width = solved.operators.systems[order - 1].columns;
+        let covariance = &propagation.covariance[order - 1];
+        let readings = solved.operators.systems[order - 1].matrix.chunks_exact(width);
+        readings
+            .map(|row| row.iter().zip(apply(covariance, &conjugated(row))).map(|(a, b)| (a * b).re).sum::<f64>())
+            .sum::<f64>()
+    });
+    noise.sum::<f64>() + predicted.sum::<f64>()
+}
+
+fn conjugated(row: &[Complex64]) -> Vec<Complex64> {
+    row.iter().map(Complex64::conj).collect()
 }
 
 impl Fit for SpindleFit {
@@ -280,8 +370,8 @@ impl Fit for SpindleFit {
         for (index, solved) in self.stations.iter().enumerate() {
             for (parameter, (partial, column)) in self.partials(effect, index).iter().zip(&mut signature).enumerate() {
                 // What the model predicts more of, the residual has less of.
-                project(&solved.whitened, partial, solved.corrected.count, |_, values| {
-                    column.extend(values.iter().flat_map(|value| [-value.re, -value.im]));
+                project_some(&solved.whitened, partial, solved.corrected.count, |value| {
+                    column.extend([-value.re, -value.im]);
                 });
                 let creeps = self.shared.data[index].creeps.iter();
                 column.extend(creeps.map(|(sensor, _, std)| {
@@ -304,7 +394,7 @@ impl Fit for SpindleFit {
                 let squares: f64 = solved.moved_by(partial, unknown).map(|(_, value)| value.norm_sqr()).sum();
                 match quantity {
                     Quantity::Form(_) => (form, forms) = (form + squares, forms + 1),
-                    Quantity::X | Quantity::Y => (shift, shifts) = (shift + squares, shifts + 1),
+                    motion if motion.is_shift() => (shift, shifts) = (shift + squares, shifts + 1),
                     _ => {}
                 }
             }
@@ -326,8 +416,9 @@ impl Fit for SpindleFit {
     fn results(&self) -> Vec<f64> {
         let told = self.stations.iter().flat_map(|solved| {
             self.layout.forms().flat_map(move |unknown| {
-                solved.told_orders(unknown).flat_map(move |order| {
-                    let value = solved.estimate.told(order, unknown);
+                (2..=solved.corrected.max_order).flat_map(move |order| {
+                    let observable = solved.operators.observable(order)[unknown];
+                    let value = if observable { solved.estimate.told(order, unknown) } else { LOST };
                     [value.re, value.im]
                 })
             })
@@ -335,33 +426,14 @@ impl Fit for SpindleFit {
         told.collect()
     }
 
-    fn moves(&self, effect: usize) -> Vec<Vec<f64>> {
-        let parameters = self.shared.places[effect].effect.parameters.len();
-        let mut moves = vec![Vec::new(); parameters];
-        for (station, solved) in self.stations.iter().enumerate() {
-            for (partial, column) in self.partials(effect, station).iter().zip(&mut moves) {
-                for unknown in self.layout.forms() {
-                    // What an effect explains of the readings is no form.
-                    column.extend(solved.moved_by(partial, unknown).flat_map(|(_, value)| [-value.re, -value.im]));
-                }
-            }
-        }
-        moves
+    fn mix(&mut self, weights: &[f64], others: Vec<Self>) {
+        self.weights = weights.to_vec();
+        self.others = others;
     }
 
+    /// None: values of form and motion are those that a run computes from [`separations`](Self::separations).
     fn values(&self) -> Vec<Outcome> {
-        let mut values = Vec::new();
-        let stations: Vec<Station> = self.shared.data.iter().map(StationData::key).collect();
-        let several = stations.len() > 1;
-        for (separation, station) in self.separations(&stations).iter().zip(&stations) {
-            for (unknown, quantity) in separation.unknowns.iter().enumerate() {
-                let Quantity::Form(section) = quantity else { continue };
-                let Some(at) = separation.sections.get(*section) else { continue };
-                let place = if several { format!("{}@{}", at.id, station.name) } else { at.id.clone() };
-                values.extend(form_values(separation, unknown, &place));
-            }
-        }
-        values
+        Vec::new()
     }
 
     fn widen(&mut self, effects: &[usize], covariance: &[Vec<f64>]) {
@@ -370,18 +442,48 @@ impl Fit for SpindleFit {
             let partials: Vec<Vec<Complex64>> =
                 effects.iter().flat_map(|effect| self.partials(*effect, station)).collect();
             let solved = &mut self.stations[station];
-            for unknown in 0..width {
-                let moved: Vec<Vec<(usize, Complex64)>> =
-                    partials.iter().map(|partial| solved.moved_by(partial, unknown).collect()).collect();
-                for (i, of_i) in moved.iter().enumerate() {
-                    for (j, of_j) in moved.iter().enumerate() {
-                        for ((order, a), (_, b)) in of_i.iter().zip(of_j) {
-                            solved.widened[order * width + unknown] += (a * b.conj()).re * covariance[i][j];
-                        }
-                    }
+            let moved: Vec<Vec<Vec<(usize, Complex64)>>> = partials
+                .iter()
+                .map(|partial| (0..width).map(|unknown| solved.moved_by(partial, unknown).collect()).collect())
+                .collect();
+            let Some(propagation) = &mut solved.propagation else { continue };
+            for (of_i, row) in moved.iter().zip(covariance) {
+                for (of_j, entry) in moved.iter().zip(row) {
+                    add_products(&mut propagation.covariance, [of_i, of_j], *entry);
                 }
             }
         }
+    }
+
+    fn far_worse(&self) -> Vec<Unexplained> {
+        // Where the noise is known, it says what is too much.
+        if self.remainder.noise_is_known() {
+            return Vec::new();
+        }
+        let captures =
+            self.stations.iter().map(|solved| strangers::captures(solved, self.shared.selection.rig.setups.len()));
+        let captures: Vec<Vec<Group>> = captures.collect();
+        let setups = captures.first().map_or(1, Vec::len).max(1);
+        let all = captures.concat();
+        let found = far_worse(&all).into_iter().map(|capture| {
+            let rms = |group: &Group| (0.5 * group.squares / group.freedom).sqrt();
+            let mut others: Vec<f64> = all.iter().map(rms).collect();
+            others.sort_by(f64::total_cmp);
+            let (rms_um, median) = (rms(&all[capture]), others[others.len() / 2]);
+            Unexplained {
+                sensor: None,
+                setup: self.shared.selection.rig.setups.get(capture % setups).map(|setup| setup.id.clone()),
+                orders: [1, self.max_order()],
+                rms_um: rms_um * (self.max_order() as f64).sqrt(),
+                place: format!(
+                    "station {}: {:.1} times the median of {} captures",
+                    self.shared.data[capture / setups].name,
+                    rms_um / median,
+                    all.len()
+                ),
+            }
+        });
+        found.collect()
     }
 
     fn unexplained(&self) -> Vec<Unexplained> {
@@ -394,12 +496,33 @@ impl Fit for SpindleFit {
 
     fn told_apart_by(&self, effects: &[usize]) -> Option<String> {
         let on = |effect: &usize| self.shared.kind(*effect).about().acts_on;
-        let more = if effects.iter().all(|effect| on(effect) == ActsOn::Sensor) {
+        let of_sensors = [ActsOn::Sensor, ActsOn::SensorPair, ActsOn::SensorCopy];
+        let more = if effects.iter().all(|effect| of_sensors.contains(&on(effect))) {
             "a third sensor in the section"
         } else {
             "another setup with the part at an angle that no other setup has"
         };
         Some(format!("{more}; `runout plan` tries what helps"))
+    }
+}
+
+/// An order that is not observable.
+const LOST: Complex64 = Complex64::new(f64::NAN, f64::NAN);
+
+/// Adds factor·a·bᴴ to each order's covariance of the unknowns, `[order from 1][unknown][unknown]`, for how these move,
+/// `[unknown]`, by order.
+fn add_products(covariance: &mut [Vec<Complex64>], [a, b]: [&[Vec<(usize, Complex64)>]; 2], factor: f64) {
+    let width = a.len();
+    for (row, of_row) in a.iter().enumerate() {
+        for (column, of_column) in b.iter().enumerate() {
+            let mut matching = of_column.iter().peekable();
+            for (order, of_a) in of_row {
+                while matching.next_if(|(other, _)| other < order).is_some() {}
+                if let Some((_, of_b)) = matching.next_if(|(other, _)| other == order) {
+                    covariance[order - 1][row * width + column] += of_a * of_b.conj() * factor;
+                }
+            }
+        }
     }
 }
 
@@ -422,27 +545,4 @@ impl Solved {
     fn told_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
         (2..=self.corrected.max_order).filter(move |order| self.operators.observable(*order)[unknown])
     }
-}
-
-/// RONt and root mean square of a form.
-fn form_values(separation: &Separation, unknown: usize, place: &str) -> [Outcome; 2] {
-    let width = separation.unknowns.len();
-    let from_two = |(order, value)| if order < 2 { Complex64::ZERO } else { value };
-    let harmonics = separation.coefficients(unknown).enumerate().map(from_two);
-    let angles = (2 * separation.max_order() + 2).next_power_of_two();
-    let form_um = Fourier::new(angles).synthesise(harmonics).to_vec();
-    let rms = |profile: &[f64]| (profile.iter().map(|value| value * value).sum::<f64>() / angles as f64).sqrt();
-    let variance: Vec<f64> = separation.variance.iter().skip(unknown).step_by(width).copied().collect();
-    let values = |profile: &[f64]| [ront_lsci_um(profile), rms(profile)];
-    let stds = uncertainty::monte_carlo(&form_um, &variance, uncertainty::seed(&[place]), values)
-        .map_or([f64::NAN; 2], |found| found.map(|each| each.std));
-    let [ront, form_rms] = values(&form_um);
-    let outcome = |value: &str, number: f64, std: f64| Outcome {
-        value: value.into(),
-        section: Some(place.into()),
-        number,
-        std,
-        unit: "um".into(),
-    };
-    [outcome("RONt", ront, stds[0]), outcome("form rms", form_rms, stds[1])]
 }

@@ -6,6 +6,8 @@ mod declared;
 mod drift;
 mod fit;
 mod lines;
+mod mistakes;
+mod rig_keys;
 mod strangers;
 
 use std::sync::Arc;
@@ -13,17 +15,20 @@ use std::sync::Arc;
 use runout_core::{
     Result,
     model::{
-        Effect, Model, Setting,
+        Effect, Fit, Model, Setting,
         closed_loop::{self, Settings},
         diagnosis::{Estimated, LostOrders, Unexplained, Verdict},
     },
+    rig::Rig,
+    separation::NOTHING_SEPARATED,
     stage::{Station, StationDiagnosis},
 };
 
 use crate::{
-    effects::{ActsOn, SpindleEffect},
+    effects::{ActsOn, SpindleEffect, ordered_pairs, pair_of, pairs},
     layout::Layout,
     selection::Selection,
+    separators::wiring,
 };
 use changes::Change;
 use data::{Seen, Shared, StationData};
@@ -56,8 +61,9 @@ impl SpindleModel {
         let effects: Arc<[Arc<dyn SpindleEffect>]> = effects.into();
         let places = places(&effects, &selection, &layout, second_order);
         let creeping = drift::creeping(&selection, stations);
-        let seen = |station| Arc::new(Seen::new(&selection, &layout, station, &creeping));
-        let seen: Vec<Arc<Seen>> = stations.iter().map(seen).collect();
+        let seen = stations.iter().zip(creeping);
+        let seen = seen.map(|(station, creeping)| Arc::new(Seen::new(&selection, &layout, station, creeping)));
+        let seen: Vec<Arc<Seen>> = seen.collect();
         let each = |data: fn(&Selection, &Layout, &Station, &Arc<Seen>) -> Result<StationData>| {
             let stations = stations.iter().zip(&seen);
             stations.map(|(station, seen)| data(&selection, &layout, station, seen)).collect::<Result<Vec<_>>>()
@@ -101,18 +107,54 @@ fn places(
         if effect.is_declared(layout, second_order) {
             continue;
         }
-        let targets: Vec<(usize, Option<String>)> = match about.acts_on {
-            ActsOn::Sensor => rig.sensors.iter().map(|sensor| Some(sensor.id.clone())).enumerate().collect(),
-            ActsOn::LaterSetup => rig.setups.iter().map(|setup| Some(setup.id.clone())).enumerate().skip(1).collect(),
-            ActsOn::Rig => vec![(0, None)],
-        };
-        places.extend(targets.into_iter().map(|(index, target)| data::Place {
+        places.extend(targets(about.acts_on, rig).into_iter().map(|(index, targets)| data::Place {
             kind,
             index,
-            effect: Effect { id: about.id.into(), target, parameters: about.parameters.clone() },
+            effect: Effect { id: about.id.into(), targets, parameters: about.parameters.clone() },
         }));
     }
     places
+}
+
+/// Lines of TOML that declare an effect in the rig, at the values that are applied.
+fn declared_by(
+    selection: &Selection,
+    layout: &Layout,
+    kinds: &[Arc<dyn SpindleEffect>],
+    places: &[data::Place],
+    effect: usize,
+    applied: &[Setting],
+) -> Vec<String> {
+    let of = |place: &data::Place| {
+        if let Some(mistake) = kinds[place.kind].mistake() {
+            return Some(mistake.change(place.index, &selection.rig, &selection.sensors, &selection.setups));
+        }
+        let key = kinds[place.kind].rig_key()?;
+        let alterations = data::altered(layout, kinds, places, applied).ok()?;
+        Some(rig_keys::lines(selection, &alterations, key, place.index))
+    };
+    places.get(effect).and_then(of).unwrap_or_default()
+}
+
+/// Where an effect may act: its target as [`SpindleEffect`] counts it, and the ids.
+fn targets(acts_on: ActsOn, rig: &Rig) -> Vec<(usize, Vec<String>)> {
+    let sensor = |index: usize| rig.sensors[index].id.clone();
+    let setup = |index: usize| rig.setups[index].id.clone();
+    let (sensors, setups) = (rig.sensors.len(), rig.setups.len());
+    match acts_on {
+        ActsOn::Sensor => (0..sensors).map(|index| (index, vec![sensor(index)])).collect(),
+        ActsOn::Setup => (0..setups).map(|index| (index, vec![setup(index)])).collect(),
+        ActsOn::LaterSetup => (1..setups).map(|index| (index, vec![setup(index)])).collect(),
+        ActsOn::SensorPair => pairs(sensors).map(|pair| (pair, pair_of(pair, sensors).map(sensor).to_vec())).collect(),
+        ActsOn::SensorCopy => {
+            ordered_pairs(sensors).map(|pair| (pair, pair_of(pair, sensors).map(sensor).to_vec())).collect()
+        }
+        ActsOn::SetupCopy => {
+            ordered_pairs(setups).map(|pair| (pair, pair_of(pair, setups).map(setup).to_vec())).collect()
+        }
+        ActsOn::SetupPair => pairs(setups).map(|pair| (pair, pair_of(pair, setups).map(setup).to_vec())).collect(),
+        ActsOn::Rig => vec![(0, Vec::new())],
+    }
 }
 
 impl Model for SpindleModel {
@@ -126,8 +168,45 @@ impl Model for SpindleModel {
         SpindleFit::new(Arc::clone(&self.traced), applied)
     }
 
+    fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
+        self.traced.kind(effect).is_possible(values)
+    }
+
+    fn is_seen_besides(&self, effect: usize) -> bool {
+        of_turns(self, &self.traced.places[effect])
+    }
+
+    fn is_mistake(&self, effect: usize) -> bool {
+        self.traced.kind(effect).mistake().is_some()
+    }
+
+    fn suspected_mistakes(&self, applied: &[Setting]) -> Vec<Vec<usize>> {
+        self.suspects(applied)
+    }
+
+    fn parts(&self, effect: usize) -> Vec<usize> {
+        let (whole, about) = (self.traced.kind(effect), self.traced.kind(effect).about());
+        if about.acts_on != ActsOn::Rig || whole.order().is_none() {
+            return Vec::new();
+        }
+        let of_a_setup = |place: &usize| {
+            let kind = self.traced.kind(*place);
+            kind.about().acts_on == ActsOn::Setup && kind.about().id == about.id && kind.order() == whole.order()
+        };
+        (0..self.traced.places.len()).filter(of_a_setup).collect()
+    }
+
     fn present(&self, effect: usize, estimated: Vec<Estimated>) -> Vec<Estimated> {
         self.traced.kind(effect).present(estimated)
+    }
+
+    fn last_of_list(&self, effect: usize) -> Option<String> {
+        self.traced.kind(effect).last_of_list()
+    }
+
+    fn changes(&self, effect: usize, applied: &[Setting]) -> Vec<String> {
+        let Shared { selection, layout, kinds, places, .. } = &*self.traced;
+        declared_by(selection, layout, kinds, places, effect, applied)
     }
 
     fn whole(&self) -> &Self {
@@ -161,20 +240,56 @@ pub fn diagnose(
     let steady = |place: &data::Place| {
         let creeping = creeping.get(place.index).and_then(Option::as_ref);
         model.traced.kinds[place.kind].about().id == "thermal-drift"
-            && creeping.is_some_and(|creeping| !creeping.certain)
+            && creeping.is_some_and(|creeping| !creeping.certain())
     };
-    let places = model.traced.places.iter().enumerate().filter(|(_, place)| slipped(place) || steady(place));
+    // Lines are there or not, and of one kind: what no station has is no candidate.
+    let no_line = |place: &data::Place| {
+        let kind = &*model.traced.kinds[place.kind];
+        let sensor = (kind.about().acts_on == ActsOn::Sensor).then_some(place.index);
+        kind.line().is_some_and(|number| {
+            let has = |station: &StationData| {
+                let line = station.seen.lines.get(number);
+                line.is_some_and(|line| line.row().0 == sensor)
+            };
+            !model.traced.data.iter().any(has)
+        })
+    };
+    let left_out =
+        |place: &data::Place| no_line(place) || steady(place) || (slipped(place) && !of_turns(&model, place));
+    let places = model.traced.places.iter().enumerate().filter(|(_, place)| left_out(place));
     let left_out = places.map(|(index, _)| index).chain(settings.left_out.iter().copied()).collect();
-    let closed = closed_loop::diagnose(&model, &Settings { left_out, ..settings.clone() })?;
+    // What single turns show for certain leaves room for what only averages show.
+    let shown = model.traced.places.iter().filter(|place| of_turns(&model, place) && !no_line(place) && !steady(place));
+    let max_added = settings.max_added + shown.count();
+    let closed = closed_loop::diagnose(&model, &Settings { left_out, max_added, ..settings.clone() })?;
     let mut diagnosis = closed.diagnosis;
-    drift::say_rates(&mut diagnosis, &model.traced);
-    lines::say(&mut diagnosis, &model.traced, closed.after.lines());
+    drift::say(&mut diagnosis, &model.traced);
+    lines::say(&mut diagnosis, &model.traced, stations);
+    // The values of one member of a confounded set are conditional on a choice that the data do not make.
+    for added in diagnosis.added.iter_mut().filter(|added| !added.confounded_with.is_empty()) {
+        added.parameters.iter_mut().for_each(|parameter| parameter.std = None);
+    }
     let changes: Vec<Unexplained> = changes.iter().map(|change| change.said(&model.traced.selection)).collect();
     if !changes.is_empty() {
-        diagnosis.verdict = Verdict::Unexplained;
+        if closed.after.remainder().noise_is_known() {
+            diagnosis.verdict = Verdict::Unexplained;
+        }
         diagnosis.unexplained.splice(..0, changes);
     }
+    diagnosis.warnings.extend(model.advice(&closed.settings));
+    model.join_swaps(&mut diagnosis, &closed.settings);
+    diagnosis.blind_to.extend(model.unobservable(&closed.settings)?);
     diagnosis.lost_orders = Some(lost_orders(&closed.after));
+    (diagnosis.before.orders, diagnosis.after.orders) = (closed.before.redundant(), closed.after.redundant());
+    let copies = model.traced.data.iter().flat_map(|data| wiring::copies(&model.traced.selection.rig, &data.readings));
+    diagnosis.warnings.extend(copies);
+    let highest = TRACED_ORDERS.min(closed.after.max_order());
+    if model.traced.layout.assess(highest).tells_no_form() {
+        // Single turns may show a drift or a line all the same; the averaged turn shows nothing.
+        diagnosis.nothing_separated = true;
+        diagnosis.verdict = if diagnosis.added.is_empty() { Verdict::NothingFound } else { Verdict::Improved };
+        diagnosis.warnings.insert(0, NOTHING_SEPARATED.into());
+    }
     diagnosis.warnings.extend(model.traced.warnings());
     Ok(StationDiagnosis {
         diagnosis,
@@ -183,7 +298,25 @@ pub fn diagnose(
     })
 }
 
+fn is_line(model: &SpindleModel, place: &data::Place) -> bool {
+    model.traced.kinds[place.kind].line().is_some()
+}
+
+/// Whether single turns show an effect.
+fn of_turns(model: &SpindleModel, place: &data::Place) -> bool {
+    is_line(model, place) || model.traced.kinds[place.kind].about().id == "thermal-drift"
+}
+
 fn lost_orders(fit: &SpindleFit) -> LostOrders {
-    let assessment = fit.layout().assess(TRACED_ORDERS.min(fit.max_order()));
-    LostOrders { form: assessment.lost_form_orders(), motion: assessment.lost_motion_orders() }
+    let mut lost = LostOrders::default();
+    for layout in fit.layouts() {
+        let assessment = layout.assess(TRACED_ORDERS.min(fit.max_order()));
+        lost.form.extend(assessment.lost_form_orders());
+        lost.motion.extend(assessment.lost_motion_orders());
+    }
+    for orders in [&mut lost.form, &mut lost.motion] {
+        orders.sort_unstable();
+        orders.dedup();
+    }
+    lost
 }

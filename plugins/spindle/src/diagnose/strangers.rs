@@ -1,6 +1,11 @@
 //! Where something is that no effect explains: in which sensor and setup, at which orders, over which angles.
 
-use runout_core::{Complex64, model::diagnosis::Unexplained, numerics::fourier::Fourier, rig::Rig};
+use runout_core::{
+    Complex64,
+    model::{diagnosis::Unexplained, evidence::Group},
+    numerics::fourier::Fourier,
+    rig::Rig,
+};
 
 use super::{data::project, fit::Solved};
 use crate::layout::Layout;
@@ -62,6 +67,24 @@ pub fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexpla
         rms_um: (0.5 * sum).sqrt(),
         place: place(harmonics),
     })
+}
+
+/// Squares (µm²) that an unweighted fit leaves of each setup's readings, and their complex degrees of freedom: the trace of
+/// I − A·P over them.
+pub fn captures(solved: &Solved, setups: usize) -> Vec<Group> {
+    let count = solved.corrected.count;
+    let sensors = (count / setups.max(1)).max(1);
+    let mut groups = vec![Group { squares: 0.0, freedom: 0.0 }; setups];
+    project(&solved.whitened, &solved.linear, count, |order, residual| {
+        let matrix = &solved.whitened[order - 1];
+        for (reading, value) in residual.iter().enumerate() {
+            let group = &mut groups[reading / sensors];
+            // Residuals carry √2, so that a real degree of freedom has the mean square of a complex one's noise.
+            group.squares += 0.5 * value.norm_sqr();
+            group.freedom += matrix[reading * (count + 1)].re / std::f64::consts::SQRT_2;
+        }
+    });
+    groups
 }
 
 /// The order at which a sum from one end passes a limit.

@@ -2,7 +2,7 @@
 
 use std::{fmt, sync::Arc};
 
-use runout_core::{Complex64, numerics::fourier::Fourier};
+use runout_core::{Complex64, numerics::fourier::Fourier, rig};
 
 use crate::{
     layout::Layout,
@@ -11,17 +11,27 @@ use crate::{
 
 /// Everything that effects change, at its declared value until one does.
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_excessive_bools, reason = "each is an effect that is there or not")]
 pub struct Alterations {
     /// One entry a sensor.
     pub sensors: Vec<SensorAlteration>,
     /// One entry a setup.
     pub setups: Vec<SetupAlteration>,
-    /// Uneven speed within the turn.
-    pub ripples: Vec<Harmonic>,
     /// Motion along the axis, in µm.
     pub axial_um: Vec<Harmonic>,
-    /// Lines of the turns' spectrum that are taken out of the averages, by number.
-    pub lines: Vec<usize>,
+    /// Lines of the turns' spectrum that are taken out of the averages, by number: of a sensor (the first of those that have it), or of
+    /// the axis.
+    pub lines: Vec<(usize, Option<usize>)>,
+    /// Of each channel, the sensor whose declared place it has.
+    pub places: Vec<usize>,
+    /// Of each setup, the one whose declared clamping it has.
+    pub clampings: Vec<usize>,
+    /// As the rig declares them, one a sensor: ±1.
+    pub declared_signs: Vec<f64>,
+    /// Whether the part turns the other way than declared.
+    pub rotation_reversed: bool,
+    /// Whether the part's angles count the other way than declared.
+    pub part_angles_reversed: bool,
     /// Whether motion keeps the sign of even orders, where the separator assumes otherwise.
     pub even_order_motion: bool,
     /// Whether geometry is exact, where the separator leaves it linear.
@@ -31,6 +41,8 @@ pub struct Alterations {
 /// One sensor.
 #[derive(Debug, Clone)]
 pub struct SensorAlteration {
+    /// −1 where readings have the opposite sign to that declared, else +1.
+    pub sign: f64,
     /// Relative gain less 1.
     pub gain: f64,
     /// True less declared angle, in rad.
@@ -45,8 +57,8 @@ pub struct SensorAlteration {
     pub cubic_per_um2: f64,
     /// Creep over the averaged turn, in µm.
     pub creep_um: f64,
-    /// Creep over the turns at hand, over that of the turns which `creep_um` is meant for.
-    pub creep_share: f64,
+    /// In each setup, creep over the turns at hand, over that which `creep_um` is meant for; 1 without it.
+    pub creep_shares: Vec<f64>,
     /// Reciprocal of the order at which a first-order low-pass is −3 dB.
     pub inverse_cutoff: f64,
     /// What a channel does besides, order by order: for effects of other crates.
@@ -75,8 +87,12 @@ impl fmt::Debug for Transfer {
 pub struct SetupAlteration {
     /// True less declared angle of the part, in rad.
     pub part_rad: f64,
+    /// True less declared angle of all sensors, in rad.
+    pub sensors_rad: f64,
     /// Motion over that of the first setup, less 1.
     pub motion: f64,
+    /// Uneven speed within the turn.
+    pub ripples: Vec<Harmonic>,
 }
 
 /// cosine·cos(order·Φ) + sine·sin(order·Φ).
@@ -108,7 +124,11 @@ impl Alterations {
         Self {
             sensors: vec![SensorAlteration::NONE; count(|reading| reading.sensor)],
             setups: vec![SetupAlteration::default(); count(|reading| reading.setup)],
-            ripples: Vec::new(),
+            places: (0..count(|reading| reading.sensor)).collect(),
+            clampings: (0..count(|reading| reading.setup)).collect(),
+            declared_signs: layout.declared_signs(),
+            rotation_reversed: false,
+            part_angles_reversed: false,
             axial_um: Vec::new(),
             lines: Vec::new(),
             even_order_motion: false,
@@ -122,14 +142,15 @@ impl Alterations {
         let sensor = |sensor: &SensorAlteration| {
             sensor.gain.abs() < 0.9 && sensor.angle_rad.abs() < 0.5 && sensor.inverse_cutoff > -0.1
         };
-        let setup = |setup: &SetupAlteration| setup.part_rad.abs() < 0.5 && setup.motion > -0.95;
-        let ripple: f64 =
-            self.ripples.iter().map(|ripple| ripple.order as f64 * ripple.cosine.hypot(ripple.sine)).sum();
+        let steepness = |setup: &SetupAlteration| -> f64 {
+            setup.ripples.iter().map(|ripple| ripple.order as f64 * ripple.cosine.hypot(ripple.sine)).sum()
+        };
+        let setup = |setup: &SetupAlteration| {
+            let angles = [setup.part_rad, setup.sensors_rad];
+            angles.iter().all(|angle| angle.abs() < 0.5) && setup.motion > -0.95 && steepness(setup) < 0.5
+        };
         let numbers = self.sensors.iter().flat_map(|s| [s.quadratic_per_um, s.cubic_per_um2, s.creep_um, s.z_mm]);
-        self.sensors.iter().all(sensor)
-            && self.setups.iter().all(setup)
-            && ripple < 0.5
-            && numbers.into_iter().all(f64::is_finite)
+        self.sensors.iter().all(sensor) && self.setups.iter().all(setup) && numbers.into_iter().all(f64::is_finite)
     }
 
     /// Takes averaged readings (`[order][reading]`, orders from 0) back to displacements: creep, gain and
@@ -141,25 +162,29 @@ impl Alterations {
         for (index, reading) in layout.readings.iter().enumerate() {
             let sensor = &self.sensors[reading.sensor];
             let angles = turn_angles.get(reading.setup).copied().unwrap_or_default();
+            let share = sensor.creep_share(reading.setup);
             for (order, row) in mean.chunks_exact_mut(count).enumerate() {
                 let value = &mut row[index];
-                *value -= sensor.creep_um * sensor.creep_share * creep(order, angles);
+                *value -= sensor.creep_um * share * creep(order, angles);
                 *value /= sensor.response(order);
             }
             let curved = sensor.quadratic_per_um != 0.0 || sensor.cubic_per_um2 != 0.0;
-            if curved || !self.ripples.is_empty() {
+            let setup = &self.setups[reading.setup];
+            if curved || !setup.ripples.is_empty() {
                 let harmonics = mean.iter().skip(index).step_by(count).copied();
-                let harmonics: Vec<Complex64> = if self.ripples.is_empty() {
+                let harmonics: Vec<Complex64> = if setup.ripples.is_empty() {
                     curve.mapped(harmonics, |_, value| sensor.straightened(value))
                 } else {
                     let straight = curve.mapped(harmonics, |_, value| sensor.straightened(value));
-                    curve.at_angles(&straight, |angle| self.recorded_at(angle))
+                    curve.at_angles(&straight, |angle| setup.recorded_at(angle))
                 };
                 mean.iter_mut().skip(index).step_by(count).zip(harmonics).for_each(|(to, from)| *to = from);
             }
         }
     }
+}
 
+impl SetupAlteration {
     /// The angle at which the recording believes to be when the spindle is at this one: φ + ε(φ) = Φ, with ε 0 at the marks.
     fn recorded_at(&self, angle_rad: f64) -> f64 {
         let early = |angle: f64| self.ripples.iter().map(|ripple| ripple.at(angle) - ripple.cosine).sum::<f64>();
@@ -175,6 +200,7 @@ impl Alterations {
 impl SensorAlteration {
     /// A sensor as declared.
     pub const NONE: Self = Self {
+        sign: 1.0,
         gain: 0.0,
         angle_rad: 0.0,
         z_mm: 0.0,
@@ -182,7 +208,7 @@ impl SensorAlteration {
         quadratic_per_um: 0.0,
         cubic_per_um2: 0.0,
         creep_um: 0.0,
-        creep_share: 1.0,
+        creep_shares: Vec::new(),
         inverse_cutoff: 0.0,
         transfers: Vec::new(),
     };
@@ -190,22 +216,19 @@ impl SensorAlteration {
     /// Reading over displacement at an order: gain, low-pass and what else the channel does.
     #[must_use]
     pub fn response(&self, order: usize) -> Complex64 {
-        let known = (1.0 + self.gain) / Complex64::new(1.0, -(order as f64) * self.inverse_cutoff);
+        let known = self.sign * (1.0 + self.gain) / Complex64::new(1.0, -(order as f64) * self.inverse_cutoff);
         self.transfers.iter().fold(known, |response, transfer| response * (transfer.0)(order))
     }
 
-    /// u from u + quadratic·u² + cubic·u³, by Newton's method.
+    /// Creep in a setup, over that which `creep_um` is meant for.
+    #[must_use]
+    pub fn creep_share(&self, setup: usize) -> f64 {
+        self.creep_shares.get(setup).copied().unwrap_or(1.0)
+    }
+
+    /// u from u + quadratic·u² + cubic·u³; the reading itself where that cannot be had.
     fn straightened(&self, reading_um: f64) -> f64 {
-        let (a, b) = (self.quadratic_per_um, self.cubic_per_um2);
-        let mut u = reading_um;
-        for _ in 0..4 {
-            let slope = 1.0 + u * (2.0 * a + 3.0 * b * u);
-            if slope.abs() < 0.1 {
-                return u;
-            }
-            u -= (u * (1.0 + u * (a + b * u)) - reading_um) / slope;
-        }
-        u
+        rig::straightened(reading_um, self.quadratic_per_um, self.cubic_per_um2).unwrap_or(reading_um)
     }
 }
 

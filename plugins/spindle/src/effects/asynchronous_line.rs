@@ -1,10 +1,10 @@
-//! `asynchronous-line`: the axis moves at an order that is not whole, as by a bearing's cage, a belt or the mains. The averaged
+//! `asynchronous-line`: the axis moves at an order that is not whole, as by a bearing's cage or a belt. The averaged
 //! turn hides it, all but a leak; the turns show it (`diagnose/lines.rs`), and there its size and order are fitted. Here it
 //! is only there or not.
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
+use super::{About, ActsOn, Alterations, MOST_LINES, Predicted, SpindleEffect};
 
 /// A line of the turns' spectrum.
 pub struct AsynchronousLine {
@@ -23,10 +23,18 @@ impl SpindleEffect for AsynchronousLine {
     }
 
     fn alter(&self, _target: usize, _values: &[f64], alterations: &mut Alterations) {
-        alterations.lines.push(self.number);
+        alterations.lines.push((self.number, None));
     }
 
     fn partials(&self, _target: usize, _predicted: &Predicted) -> Vec<Vec<Complex64>> {
         Vec::new()
+    }
+
+    fn last_of_list(&self) -> Option<String> {
+        (self.number + 1 == MOST_LINES).then(|| format!("{MOST_LINES} lines are looked for at most"))
+    }
+
+    fn line(&self) -> Option<usize> {
+        Some(self.number)
     }
 }

@@ -3,7 +3,7 @@
 
 use runout_core::{Complex64, model::diagnosis::Estimated};
 
-use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_amplitude, parameter};
+use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_amplitude, last_order, parameter};
 
 /// Axial error motion of one order.
 pub struct AxialMotion {
@@ -22,12 +22,13 @@ impl SpindleEffect for AxialMotion {
     }
 
     fn partials(&self, _target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
-        let order = self.order as f64;
+        let products = predicted.modulated(&predicted.along_z, self.order, |_| true);
         // µm of motion along z are 1e-3 mm.
-        vec![
-            predicted.curves(&predicted.along_z, |_| true, |angle, slope| -1e-3 * slope * (order * angle).cos()),
-            predicted.curves(&predicted.along_z, |_| true, |angle, slope| -1e-3 * slope * (order * angle).sin()),
-        ]
+        products.into_iter().map(|product| product.into_iter().map(|value| -1e-3 * value).collect()).collect()
+    }
+
+    fn last_of_list(&self) -> Option<String> {
+        last_order(self.order)
     }
 
     fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {

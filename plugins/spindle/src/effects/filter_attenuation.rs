@@ -30,11 +30,16 @@ impl SpindleEffect for FilterAttenuation {
         vec![predicted.each(|reading| reading.sensor == target, |order, at| change(order) * predicted.readings[at])]
     }
 
+    fn is_possible(&self, values: &[f64]) -> bool {
+        // A negative one amplifies.
+        values.first().is_some_and(|inverse_cutoff| *inverse_cutoff > 0.0)
+    }
+
     fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {
         let cut_off = |inverse: Estimated| Estimated {
             name: "cut-off".into(),
             value: inverse.value.recip(),
-            std: inverse.std / (inverse.value * inverse.value),
+            std: inverse.std.map(|std| std / (inverse.value * inverse.value)),
             unit: "1/rev".into(),
         };
         estimated.into_iter().map(cut_off).collect()

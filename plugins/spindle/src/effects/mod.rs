@@ -2,7 +2,8 @@
 //!
 //! An effect says what it is described by, how it changes the model when applied ([`Alterations`]), and how it changes the
 //! readings per unit of each parameter. Readings are u = form + motion along the sensor (`physics.md` section 1). Partials are
-//! those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied.
+//! those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied. Parameters are in the units in
+//! which a rig or a scenario is written: angles in degrees, places in mm.
 //!
 //! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own whose `register` adds it
 //! by [`entry`] (`examples/14-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
@@ -12,13 +13,16 @@ mod asynchronous_line;
 mod axial_motion;
 mod even_order_motion;
 mod filter_attenuation;
+mod mistakes;
 mod predicted;
 mod reversal_angle;
 mod second_order_geometry;
 mod sensor_angle;
 mod sensor_axial_position;
 mod sensor_gain;
+mod sensor_line;
 mod sensor_nonlinearity;
+mod sensors_angle;
 mod setup_motion_change;
 mod speed_ripple;
 mod thermal_drift;
@@ -32,6 +36,7 @@ use runout_core::{
 };
 
 pub use alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, Transfer, creep};
+pub use mistakes::{Mistake, ordered_pairs, pair_of, pairs};
 pub use predicted::Predicted;
 
 use crate::layout::Layout;
@@ -58,6 +63,36 @@ pub trait SpindleEffect: Send + Sync {
         Vec::new()
     }
 
+    /// The order of an effect that is there at several orders, each by itself.
+    fn order(&self) -> Option<usize> {
+        None
+    }
+
+    /// Which mistake in the rig file it is, where it is one.
+    fn mistake(&self) -> Option<Mistake> {
+        None
+    }
+
+    /// Whether its parameters can have these values.
+    fn is_possible(&self, _values: &[f64]) -> bool {
+        true
+    }
+
+    /// What ends the list of effects (orders, lines) of which this one is the last.
+    fn last_of_list(&self) -> Option<String> {
+        None
+    }
+
+    /// The keys of the rig that declare what it changes; nothing where a rig has none for it.
+    fn rig_key(&self) -> Option<RigKey> {
+        None
+    }
+
+    /// The number of the line in the turns' spectrum that it is, where it is one.
+    fn line(&self) -> Option<usize> {
+        None
+    }
+
     /// Its parameters as people say them.
     fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {
         estimated
@@ -82,10 +117,35 @@ pub struct About {
 pub enum ActsOn {
     /// Any one sensor.
     Sensor,
+    /// Any two sensors: the target is first · (number of sensors) + second.
+    SensorPair,
+    /// The same in either order: the second instead of the first is another target.
+    SensorCopy,
+    /// Any setup.
+    Setup,
     /// Any setup but the first, which the others are counted from.
     LaterSetup,
+    /// Any two setups: the target is first · (number of setups) + second.
+    SetupPair,
+    /// The same in either order.
+    SetupCopy,
     /// The rig as a whole.
     Rig,
+}
+
+/// What a rig declares and effects change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RigKey {
+    /// `gain` of a sensor.
+    SensorGain,
+    /// `angle_deg` of a sensor.
+    SensorAngle,
+    /// `quadratic_per_um` and `cubic_per_um2` of a sensor.
+    SensorCharacteristic,
+    /// `part_deg` of a setup.
+    PartAngle,
+    /// `sensors_deg` of a setup.
+    SensorsAngle,
 }
 
 /// A parameter with its unit and usual size.
@@ -94,10 +154,13 @@ pub fn parameter(name: &str, unit: &str, tolerance: f64) -> Parameter {
     Parameter { name: name.into(), unit: unit.into(), tolerance }
 }
 
+/// ∂(angle in rad)/∂(angle in degrees).
+const RAD_PER_DEG: f64 = std::f64::consts::PI / 180.0;
+
 /// Orders of uneven speed and of axial motion that are looked for.
 const LOW_ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
 
-/// Asynchronous lines that are looked for.
+/// Lines of the turns' spectrum that are looked for.
 pub(crate) const MOST_LINES: usize = 3;
 
 /// An effect for the registry.
@@ -117,37 +180,53 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         Arc::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: true }),
         Arc::new(sensor_nonlinearity::SensorNonlinearity),
         Arc::new(reversal_angle::ReversalAngle),
+        Arc::new(sensors_angle::SensorsAngle),
         Arc::new(setup_motion_change::SetupMotionChange),
         Arc::new(thermal_drift::ThermalDrift),
         Arc::new(filter_attenuation::FilterAttenuation),
         Arc::new(even_order_motion::EvenOrderMotion),
         Arc::new(second_order_geometry::SecondOrderGeometry),
     ];
-    all.extend(
-        (0..MOST_LINES)
-            .map(|number| -> Arc<dyn SpindleEffect> { Arc::new(asynchronous_line::AsynchronousLine { number }) }),
-    );
+    for number in 0..MOST_LINES {
+        all.push(Arc::new(asynchronous_line::AsynchronousLine { number }));
+        all.push(Arc::new(sensor_line::SensorLine { number }));
+    }
+    all.extend(Mistake::ALL.map(|mistake| -> Arc<dyn SpindleEffect> { Arc::new(mistake) }));
     for order in LOW_ORDERS {
-        all.push(Arc::new(speed_ripple::SpeedRipple { order }));
+        all.push(Arc::new(speed_ripple::SpeedRipple { order, in_one_setup: false }));
+        all.push(Arc::new(speed_ripple::SpeedRipple { order, in_one_setup: true }));
         all.push(Arc::new(axial_motion::AxialMotion { order }));
     }
     all
 }
 
+/// What ends a list of orders, where this one is the last.
+fn last_order(order: usize) -> Option<String> {
+    (order == *LOW_ORDERS.end()).then(|| format!("order {order} is the highest one looked for"))
+}
+
 /// Amplitude, phase and order of cosine·cos(nΦ) + sine·sin(nΦ) = amplitude·cos(nΦ − phase), from the estimates of cosine
-/// and sine.
+/// and sine. The phase is in degrees.
 fn as_amplitude(order: usize, estimated: &[Estimated]) -> Vec<Estimated> {
     let [cosine, sine] = estimated else { return estimated.to_vec() };
     let amplitude = cosine.value.hypot(sine.value);
     let share = |part: f64| if amplitude > 0.0 { part / amplitude } else { 1.0 };
     let [along, across] = [share(cosine.value), share(sine.value)];
-    let std = (along * cosine.std).hypot(across * sine.std);
-    let turned = (across * cosine.std).hypot(along * sine.std) / amplitude.max(f64::MIN_POSITIVE);
-    let exact =
-        |name: &str, value: f64, unit: &str, std: f64| Estimated { name: name.into(), value, std, unit: unit.into() };
+    let combined = |of_cosine: f64, of_sine: f64| {
+        let [cosine, sine] = [cosine.std?, sine.std?];
+        Some((of_cosine * cosine).hypot(of_sine * sine))
+    };
+    let std = combined(along, across);
+    let turned = combined(across, along).map(|std| std / amplitude.max(f64::MIN_POSITIVE));
+    let exact = |name: &str, value: f64, unit: &str, std: Option<f64>| Estimated {
+        name: name.into(),
+        value,
+        std,
+        unit: unit.into(),
+    };
     vec![
         exact("amplitude", amplitude, &cosine.unit, std),
-        exact("order", order as f64, "1/rev", 0.0),
-        exact("phase", sine.value.atan2(cosine.value), "rad", turned),
+        exact("order", order as f64, "1/rev", std.map(|_| 0.0)),
+        exact("phase", sine.value.atan2(cosine.value).to_degrees(), "deg", turned.map(f64::to_degrees)),
     ]
 }

@@ -55,7 +55,10 @@ impl<'a> Predicted<'a> {
             along_z: vec![Complex64::ZERO; readings.len()],
         };
         let position = |wanted: Quantity| layout.unknowns.iter().position(|known| *known == wanted);
-        let [x, y, tilt_x, tilt_y] = [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY].map(position);
+        let motions: Vec<(usize, [f64; 4])> = (layout.unknowns.iter().enumerate())
+            .filter(|(_, quantity)| !quantity.is_form())
+            .map(|(unknown, quantity)| (unknown, quantity.cartesian()))
+            .collect();
         let first = layout.first_order_unknowns();
         let eccentricity = |setup: usize, section: usize| {
             let wanted = FirstOrder::Eccentricity { setup, section };
@@ -73,6 +76,12 @@ impl<'a> Predicted<'a> {
             .collect();
         for order in 1..readings.len() / count {
             let of = |unknown: Option<usize>| unknown.map_or(Complex64::ZERO, |unknown| estimate.told(order, unknown));
+            let mut motion = [Complex64::ZERO; 4];
+            for (unknown, shares) in &motions {
+                let value = estimate.told(order, *unknown);
+                motion.iter_mut().zip(shares).for_each(|(sum, share)| *sum += value * *share);
+            }
+            let [x, y, tilt_x, tilt_y] = motion;
             let form = |setup: usize, section: usize| {
                 if order == 1 { eccentricity(setup, section) } else { of(position(Quantity::Form(section))) }
             };
@@ -82,10 +91,10 @@ impl<'a> Predicted<'a> {
                 let phase = layout.part_phase(reading, order);
                 predicted.part[at] = form(reading.setup, reading.section) * phase;
                 let moves = layout.motion_sign(reading.setup, order) * reading.motion_ratio;
-                let (shift_x, shift_y) = (of(x) + of(tilt_y) * lever, of(y) - of(tilt_x) * lever);
+                let (shift_x, shift_y) = (x + tilt_y * *lever, y - tilt_x * *lever);
                 predicted.along[at] = (shift_x * cosine + shift_y * sine) * moves;
                 predicted.across[at] = (shift_y * cosine - shift_x * sine) * moves;
-                predicted.tilt[at] = (of(tilt_y) * cosine - of(tilt_x) * sine) * moves;
+                predicted.tilt[at] = (tilt_y * *cosine - tilt_x * *sine) * moves;
                 if let Some((other, distance_mm)) = neighbour {
                     let change = form(reading.setup, *other) - form(reading.setup, reading.section);
                     predicted.along_z[at] = change * phase / distance_mm;
@@ -137,6 +146,31 @@ impl<'a> Predicted<'a> {
             }
         }
         partial
+    }
+
+    /// Some readings of `source` (orders from 1) times cos(nΦ) and times sin(nΦ), as harmonics: with Re(a e^{−inΦ}) in front of Re(c e^{−ikΦ}),
+    /// ½·a·c has the order k + n, and ½·a*·c the order k − n.
+    #[must_use]
+    pub fn modulated(
+        &self,
+        source: &[Complex64],
+        order: usize,
+        on: impl Fn(&crate::layout::Reading) -> bool,
+    ) -> [Vec<Complex64>; 2] {
+        let count = self.layout.readings.len();
+        let orders = source.len() / count;
+        let mut products = [self.nothing(), self.nothing()];
+        for (index, _) in self.layout.readings.iter().enumerate().filter(|(_, reading)| on(reading)) {
+            let at = |wanted: usize| if wanted < orders { source[wanted * count + index] } else { Complex64::ZERO };
+            for wanted in 1..orders {
+                // e^{+ikΦ} folds to the conjugate at order k.
+                let below = if wanted >= order { at(wanted - order) } else { at(order - wanted).conj() };
+                let above = at(wanted + order);
+                products[0][wanted * count + index] = 0.5 * (below + above);
+                products[1][wanted * count + index] = 0.5 * Complex64::I * (below - above);
+            }
+        }
+        products
     }
 
     /// A partial from the curve of some readings over the spindle's angle: `map` gets angle and value of `source`.

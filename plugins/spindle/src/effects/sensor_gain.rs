@@ -2,7 +2,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
+use super::{About, ActsOn, Alterations, Predicted, RigKey, SpindleEffect, parameter};
 
 /// A sensor's relative gain.
 pub struct SensorGain;
@@ -24,5 +24,9 @@ impl SpindleEffect for SensorGain {
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let gain = 1.0 + predicted.alterations.sensors[target].gain;
         vec![predicted.each(|reading| reading.sensor == target, |_, at| predicted.readings[at] / gain)]
+    }
+
+    fn rig_key(&self) -> Option<RigKey> {
+        Some(RigKey::SensorGain)
     }
 }

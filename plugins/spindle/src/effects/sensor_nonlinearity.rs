@@ -2,7 +2,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
+use super::{About, ActsOn, Alterations, Predicted, RigKey, SpindleEffect, parameter};
 
 /// A sensor's characteristic.
 pub struct SensorNonlinearity;
@@ -33,5 +33,9 @@ impl SpindleEffect for SensorNonlinearity {
             predicted.curves(&predicted.readings, on, |_, u| u * u / slope(u)),
             predicted.curves(&predicted.readings, on, |_, u| u * u * u / slope(u)),
         ]
+    }
+
+    fn rig_key(&self) -> Option<RigKey> {
+        Some(RigKey::SensorCharacteristic)
     }
 }

@@ -1,5 +1,6 @@
-//! `thermal-drift`: a reading creeps by rate·τ·(1 − e^{−t/τ}) in each capture. Over the averaged turn it rises by a mean
-//! creep s, a saw-tooth: ∂/∂s = Φ/2π − ½ (`creep`). Rate and τ follow from the levels of the turns (`diagnose/drift.rs`).
+//! `thermal-drift`: a reading creeps along a straight line or by rate·τ·(1 − e^{−t/τ}), in each capture alike or by different
+//! amounts. Over the averaged turn it rises by a mean creep s, a saw-tooth: ∂/∂s = Φ/2π − ½ (`creep`). Course, amounts and
+//! τ follow from the levels of the turns (`diagnose/drift.rs`).
 
 use runout_core::Complex64;
 
@@ -24,8 +25,12 @@ impl SpindleEffect for ThermalDrift {
     }
 
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
-        let gain = 1.0 + predicted.alterations.sensors[target].gain;
-        let value = |order, at| creep(order, predicted.turn_angles_of(at)) / gain;
+        let sensor = &predicted.alterations.sensors[target];
+        let readings = &predicted.layout.readings;
+        let value = |order, at: usize| {
+            let share = sensor.creep_share(readings[at % readings.len()].setup);
+            share * creep(order, predicted.turn_angles_of(at)) / (1.0 + sensor.gain)
+        };
         vec![predicted.each(|reading| reading.sensor == target, value)]
     }
 

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     diagnose::SpindleModel,
-    effects::{self, SpindleEffect},
+    effects::{self, ActsOn, SpindleEffect},
     layout::Layout,
     selection::Selection,
 };
@@ -23,7 +23,7 @@ use crate::{
 const TRIED_DEG: [f64; 9] = [90.0, 180.0, 270.0, 45.0, 135.0, 225.0, 60.0, 120.0, 100.0];
 
 /// Left out: single turns show them in any rig, and an average says little of them.
-const SHOWN_BY_TURNS: [&str; 2] = ["thermal-drift", "asynchronous-line"];
+const SHOWN_BY_TURNS: [&str; 3] = ["thermal-drift", "asynchronous-line", "sensor-line"];
 
 /// An addition, and what the rig would tell with it that it does not without.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +61,11 @@ pub fn foresee(
     mut kinds: Vec<Arc<dyn SpindleEffect>>,
 ) -> Result<Foresight> {
     let station = nominal::station(selection);
-    kinds.retain(|kind| !SHOWN_BY_TURNS.contains(&kind.about().id));
+    kinds.retain(|kind| {
+        let about = kind.about();
+        // Each mistake is there or not, and a ripple of one setup shows as a common one does.
+        !SHOWN_BY_TURNS.contains(&about.id) && kind.mistake().is_none() && about.acts_on != ActsOn::Setup
+    });
     let model = SpindleModel::new(selection.clone(), layout.clone(), second_order, kinds, &[station])?;
     Ok(Foresight { assuming: nominal::words(), ..foresight::foresee(&model)? })
 }

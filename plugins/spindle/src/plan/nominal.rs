@@ -74,10 +74,10 @@ pub fn station(selection: &Selection) -> Station {
                 let own = along * cosine + across * sine;
                 (common * (1.0 - OWN_SHARE).sqrt() + own * OWN_SHARE.sqrt()) * FORM_UM
             }
-            Quantity::X => motion[0] * MOTION_UM,
+            Quantity::X | Quantity::Along(_) => motion[0] * MOTION_UM,
             Quantity::Y => motion[1] * MOTION_UM,
             Quantity::TiltX => motion[2] * TILT_URAD,
-            Quantity::TiltY => motion[3] * TILT_URAD,
+            Quantity::TiltY | Quantity::TiltAlong(_) => motion[3] * TILT_URAD,
         };
         for (index, reading) in layout.readings.iter().enumerate() {
             let seen =
@@ -115,11 +115,11 @@ fn profile(selection: &Selection, layout: &Layout, setup: usize) -> Profile {
         mean: vec![Complex64::ZERO; (MAX_ORDER + 1) * sensors],
         scatter: Some(covariance.clone()),
         covariance: Some(covariance),
-        split: None,
         spread: None,
         turns: TurnCount { recorded: TURNS, used: TURNS, ..TurnCount::default() },
         speed_rpm: None,
         responses: Vec::new(),
         warnings: Vec::new(),
+        ..Profile::default()
     }
 }

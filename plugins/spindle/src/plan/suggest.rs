@@ -5,7 +5,7 @@ use std::{
     ops::RangeInclusive,
 };
 
-use runout_core::rig::{Rig, Sensor, Setup};
+use runout_core::rig::{Calibration, Rig, Sensor, Setup};
 
 use super::{
     gain::{Criterion, FormGain, Score},
@@ -126,7 +126,8 @@ impl Addition {
                 }
                 let z_mm = rig.section_z_mm(section);
                 let id = "added".into();
-                rig.sensors.push(Sensor { id, angle_rad: angle_deg.to_radians(), z_mm, section, sign: 1.0 });
+                let (angle_rad, calibration) = (angle_deg.to_radians(), Calibration::NONE);
+                rig.sensors.push(Sensor { id, angle_rad, z_mm, section, sign: 1.0, calibration });
             }
         }
         Some(rig)

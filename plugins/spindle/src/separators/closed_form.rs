@@ -40,8 +40,10 @@ pub trait ClosedForm: Send + Sync {
     /// Unknowns = operator · readings at an order from 2, `[unknown][reading]`; `None` where the formula has a pole.
     fn operator(&self, layout: &Layout, order: usize) -> Option<Vec<Complex64>>;
 
-    /// What the user should know before any data.
-    fn notes(&self) -> Vec<String>;
+    /// What the user should know before any data, besides what the layout tells.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// A method that a rig fits or not.
@@ -218,27 +220,29 @@ pub(super) struct SectionMotion {
 pub(super) fn add_motion(operator: &mut [Complex64], layout: &Layout, along: [f64; 2], sections: &[SectionMotion]) {
     let count = layout.readings.len();
     let [cosine, sine] = along;
-    let mut add = |quantity: Quantity, share: f64, row: &[Complex64]| {
-        let Some(unknown) = layout.unknowns.iter().position(|known| *known == quantity) else { return };
-        let target = &mut operator[unknown * count..(unknown + 1) * count];
-        target.iter_mut().zip(row).for_each(|(entry, reading)| *entry += reading * share);
+    // A motion m along the direction is m·(cos, sin) in (x, y), and what of that is along an unknown's own direction; a tilt e
+    // towards it is e·(−sin, cos) in the tilts about (x, y).
+    let share = |quantity: &Quantity| -> f64 {
+        quantity.cartesian().into_iter().zip([cosine, sine, -sine, cosine]).map(|(own, part)| own * part).sum()
+    };
+    let mut add = |of: fn(Quantity) -> bool, factor: f64, row: &[Complex64]| {
+        for (unknown, quantity) in layout.unknowns.iter().enumerate().filter(|(_, quantity)| of(**quantity)) {
+            let target = &mut operator[unknown * count..(unknown + 1) * count];
+            let share = factor * share(quantity);
+            target.iter_mut().zip(row).for_each(|(entry, reading)| *entry += reading * share);
+        }
     };
     match sections {
         [near, far] => {
             let distance_mm = far.lever_mm - near.lever_mm;
             for (section, shift_mm, sign) in [(near, far.lever_mm, -1.0), (far, -near.lever_mm, 1.0)] {
-                let shift = shift_mm / distance_mm;
-                let tilt = sign / (distance_mm * UM_PER_MM_URAD);
-                add(Quantity::X, shift * cosine, &section.row);
-                add(Quantity::Y, shift * sine, &section.row);
-                add(Quantity::TiltY, tilt * cosine, &section.row);
-                add(Quantity::TiltX, -tilt * sine, &section.row);
+                add(Quantity::is_shift, shift_mm / distance_mm, &section.row);
+                add(Quantity::is_tilt, sign / (distance_mm * UM_PER_MM_URAD), &section.row);
             }
         }
         sections => {
             for section in sections {
-                add(Quantity::X, cosine, &section.row);
-                add(Quantity::Y, sine, &section.row);
+                add(Quantity::is_shift, 1.0, &section.row);
             }
         }
     }

@@ -62,8 +62,4 @@ impl ClosedForm for DonaldsonReversal {
             Some([form, vec![Complex64::from(0.5), Complex64::from(-0.5)]])
         })
     }
-
-    fn notes(&self) -> Vec<String> {
-        vec![self.sensors.note()]
-    }
 }

@@ -5,6 +5,7 @@ pub mod closed_form;
 pub mod donaldson_reversal;
 pub mod four_sensor_reversal;
 pub mod harmonic_least_squares;
+pub(crate) mod leak;
 pub mod multi_step;
 mod one_direction;
 mod operators;
@@ -14,9 +15,9 @@ mod readings;
 mod second_order;
 mod side_by_side;
 mod solution;
-mod swapped_setups;
 pub mod three_point;
 mod weights;
+pub(crate) mod wiring;
 
 pub(crate) use algebra::{Blocks, apply, leftover};
 pub(crate) use operators::Operators;

@@ -58,8 +58,4 @@ impl ClosedForm for MultiStep {
             Some([form, motion])
         })
     }
-
-    fn notes(&self) -> Vec<String> {
-        vec![self.sensors.note()]
-    }
 }

@@ -8,8 +8,6 @@ use crate::layout::Layout;
 /// One sensor in each of one or two sections, looking along the same direction.
 #[derive(Debug, Clone)]
 pub struct OneDirection {
-    /// θ of the first, in rad.
-    angle_rad: f64,
     /// The sensor of each section.
     sensors: Vec<usize>,
     setups: usize,
@@ -56,7 +54,7 @@ impl OneDirection {
             [] | [_] => {}
             _ => return Err(format!("needs one sensor in each of one or two sections; {} are given", sensors.len())),
         }
-        Ok(Self { angle_rad: first.angle_rad, sensors, setups: rig.setups.len() })
+        Ok(Self { sensors, setups: rig.setups.len() })
     }
 
     /// The operator from what each section's readings, one a setup, say of form and of motion along the sensor:
@@ -87,17 +85,5 @@ impl OneDirection {
         let (sine, cosine) = layout.readings.first()?.angle_rad.sin_cos();
         add_motion(&mut operator, layout, [cosine, sine], &sections);
         Some(operator)
-    }
-
-    /// Said of motion that is seen along one direction only.
-    pub fn note(&self) -> String {
-        let along = self.angle_rad.to_degrees().rem_euclid(180.0);
-        let on_axis = (along % 90.0).min(90.0 - along % 90.0) < 1e-6;
-        let motion = format!("one direction of sensors: motion is told along {along:.1}° only");
-        if on_axis {
-            motion
-        } else {
-            format!("{motion}, which is neither x nor y; turn the rig's 0° there to have it as x")
-        }
     }
 }

@@ -179,6 +179,7 @@ mod tests {
                 z_mm: 0.0,
                 section: "s".into(),
                 sign: 1,
+                ..SensorConfig::default()
             };
             let setup = |(index, part_deg): (usize, &f64)| SetupConfig {
                 id: format!("{index}"),

@@ -91,8 +91,8 @@ impl<'a> SecondOrder<'a> {
                 self.table.push(Vec::new());
                 continue;
             };
-            let forms =
-                (0..=max_order).map(|order| if order < 2 { Complex64::ZERO } else { estimate.told(order, unknown) });
+            let forms = (0..=max_order)
+                .map(|order| if order < 2 { Complex64::ZERO } else { estimate.likely_form(order, unknown) });
             // The unknown of a clockwise part is the conjugate: see `Layout`.
             let forms = forms.map(|form| if layout.direction < 0.0 { form.conj() } else { form });
             self.table.push(self.fine.synthesise(forms).to_vec());
@@ -101,11 +101,12 @@ impl<'a> SecondOrder<'a> {
 
     /// x, y, tilt about x and y at the sensors' mean z over the spindle's angle, as one setup sees them.
     fn motion(&mut self, estimate: &Estimate, setup: usize, max_order: usize) -> [Vec<f64>; 4] {
-        [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY].map(|quantity| {
-            let Some(unknown) = self.layout.unknowns.iter().position(|known| *known == quantity) else {
-                return vec![0.0; self.turn.length()];
-            };
-            let layout = self.layout;
+        let layout = self.layout;
+        let mut motion = [const { Vec::new() }; 4];
+        for curve in &mut motion {
+            curve.resize(self.turn.length(), 0.0);
+        }
+        for (unknown, quantity) in layout.unknowns.iter().enumerate().filter(|(_, quantity)| !quantity.is_form()) {
             let harmonics = (0..=max_order).map(|order| {
                 if order == 0 {
                     Complex64::ZERO
@@ -113,8 +114,12 @@ impl<'a> SecondOrder<'a> {
                     estimate.told(order, unknown).conj() * layout.motion_sign(setup, order)
                 }
             });
-            self.turn.synthesise(harmonics).to_vec()
-        })
+            let curve = self.turn.synthesise(harmonics);
+            for (target, share) in motion.iter_mut().zip(quantity.cartesian()).filter(|(_, share)| *share != 0.0) {
+                target.iter_mut().zip(curve).for_each(|(sum, value)| *sum += share * value);
+            }
+        }
+        motion
     }
 }
 

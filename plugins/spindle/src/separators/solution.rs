@@ -9,11 +9,12 @@ use runout_core::{
 
 use super::{
     algebra::apply,
+    leak,
     operators::{Operators, OrderOperator},
     propagation::Propagation,
     readings::Readings,
     second_order::SecondOrder,
-    swapped_setups, weights,
+    weights, wiring,
 };
 use crate::{
     layout::{FirstOrder, Layout},
@@ -22,7 +23,9 @@ use crate::{
 
 /// Three passes settle the second order; more are allowed for large eccentricities.
 const MAX_PASSES: usize = 8;
-/// What lost orders may carry into others is said in these standard uncertainties.
+/// Orders to each side that say how large form and motion may be at a lost one.
+const BESIDE: usize = 3;
+/// What the unseen motion may carry into other orders is said in these standard uncertainties.
 const CARRIED: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e5];
 /// Passes end when the readings move less than this, rms.
 const SETTLED_UM: f64 = 1e-9;
@@ -36,6 +39,8 @@ pub struct Estimate {
     /// `[order][unknown]` from order 0; order 1 holds the motion that turns against the spindle.
     values: Vec<Complex64>,
     told: Vec<bool>,
+    /// What form may be at lost orders, likewise; empty where none is lost.
+    likely: Vec<Complex64>,
 }
 
 impl Estimate {
@@ -44,6 +49,13 @@ impl Estimate {
     pub fn told(&self, order: usize, unknown: usize) -> Complex64 {
         let index = order * self.width + unknown;
         if self.told[index] { self.values[index] } else { Complex64::ZERO }
+    }
+
+    /// A form at an order; where it is lost, what it may be: for what exact geometry carries into other orders, and for no result.
+    #[must_use]
+    pub fn likely_form(&self, order: usize, unknown: usize) -> Complex64 {
+        let index = order * self.width + unknown;
+        if self.told[index] { self.values[index] } else { self.likely.get(index).copied().unwrap_or_default() }
     }
 }
 
@@ -62,13 +74,17 @@ impl Solver<'_> {
     pub fn separate(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Separation> {
         let mut readings = Readings::gather(self.selection, self.layout, station)?;
         weights::smooth(&mut readings);
+        if self.second_order {
+            leak::widen(self.layout, self.selection.rig.part_radius_mm, &mut readings);
+        }
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
-        let mut warnings = Vec::new();
+        let mut warnings = wiring::copies(&self.selection.rig, &readings);
         let propagation = Propagation::of(&readings, &operators);
         let residual = residual(&operators, &readings, &linear, propagation.as_ref());
-        if residual.chi2_per_dof > swapped_setups::SUSPICIOUS_CHI2 {
-            warnings.extend(swapped_setups::suspect(&self.selection.rig, self.layout, &operators, &readings));
+        if residual.chi2_per_dof > wiring::SUSPICIOUS_CHI2 {
+            let weights = weights::whitening(&readings);
+            warnings.extend(wiring::warning(self.selection, self.layout, &readings, weights.as_deref()));
         }
         let mut separation = self.report(station, &operators, &estimate, propagation.as_ref(), residual);
         separation.warnings = warnings;
@@ -84,26 +100,20 @@ impl Solver<'_> {
         let eccentricity_um = readings.order(1).iter().map(|reading| reading.norm()).fold(0.0, f64::max);
         let share = eccentricity_um / (1e3 * self.selection.rig.part_radius_mm);
         let sees = |wanted| self.layout.unknowns.contains(&wanted);
-        let sideways_unseen = !(sees(Quantity::X) && sees(Quantity::Y));
+        // What lost orders carry is in the readings' uncertainty.
+        if sees(Quantity::X) && sees(Quantity::Y) {
+            return None;
+        }
         let mut worst: f64 = 0.0;
         for unknown in self.layout.forms() {
             let at = |order: usize| order * width + unknown;
             let told = |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
             for order in 2..=readings.max_order {
-                let beside = [order - 1, order + 1];
-                // A lost order may be as large as those beside it.
-                let amplitude_um = if !told(&order) {
-                    beside
-                        .iter()
-                        .filter(|near| told(near))
-                        .map(|near| separation.estimate[at(*near)].norm())
-                        .fold(0.0, f64::max)
-                } else if sideways_unseen {
-                    separation.estimate[at(order)].norm()
-                } else {
+                if !told(&order) {
                     continue;
-                };
-                for near in beside.iter().filter(|near| told(near)) {
+                }
+                let amplitude_um = separation.estimate[at(order)].norm();
+                for near in [order - 1, order + 1].iter().filter(|near| told(near)) {
                     let ratio = 0.5 * order as f64 * share * amplitude_um / separation.variance[at(*near)].sqrt();
                     worst = worst.max(ratio);
                 }
@@ -111,10 +121,9 @@ impl Solver<'_> {
         }
         // The estimate is good to a size, and stations that are alike are to say the same.
         let times = CARRIED.into_iter().rfind(|times| worst >= *times)?;
-        let unknown = if sideways_unseen { "the surface goes sideways unseen" } else { "orders of form are lost" };
         Some(format!(
-            "{unknown}, and an eccentricity of {eccentricity_um:.0} µm carries that into other orders of form: some may be off by \
-             {times} times their stated uncertainty or more, and motion with them; centre the part better"
+            "the surface goes sideways unseen, and an eccentricity of {eccentricity_um:.0} µm carries that into other orders \
+             of form: some may be off by {times} times their stated uncertainty or more, and motion with them; centre the part better"
         ))
     }
 
@@ -196,7 +205,51 @@ impl Solver<'_> {
                 values[order * width..(order + 1) * width].copy_from_slice(&solution);
             }
         }
-        Estimate { width, first, values, told }
+        let likely = self.likely_forms(&values, &told, readings, max_order);
+        Estimate { width, first, values, told, likely }
+    }
+
+    /// Form at lost orders: what the section's readings have in common, less the share that motion has at the orders beside it.
+    fn likely_forms(
+        &self,
+        values: &[Complex64],
+        told: &[bool],
+        readings: &[Complex64],
+        max_order: usize,
+    ) -> Vec<Complex64> {
+        let (layout, count) = (self.layout, self.layout.readings.len());
+        let width = layout.unknowns.len();
+        let is_lost = |order: usize, form: usize| !told[order * width + form];
+        let lost: Vec<(usize, usize)> =
+            (2..=max_order).flat_map(|order| layout.forms().map(move |form| (order, form))).collect();
+        let lost: Vec<(usize, usize)> = lost.into_iter().filter(|(order, form)| is_lost(*order, *form)).collect();
+        if lost.is_empty() {
+            return Vec::new();
+        }
+        let shift = |unknown: &usize| {
+            let quantity = layout.unknowns[*unknown];
+            !quantity.is_form() && !matches!(quantity, Quantity::TiltX | Quantity::TiltY)
+        };
+        let shifts: Vec<usize> = (0..width).filter(shift).collect();
+        let mut likely = vec![Complex64::ZERO; values.len()];
+        for (order, form) in lost {
+            let beside = order.saturating_sub(BESIDE).max(2)..=(order + BESIDE).min(max_order);
+            let (mut of_form, mut of_motion) = (0.0, 0.0);
+            for near in beside.filter(|near| !is_lost(*near, form)) {
+                of_form += values[near * width + form].norm_sqr();
+                let moved: f64 = shifts.iter().map(|shift| values[near * width + shift].norm_sqr()).sum();
+                of_motion += moved / shifts.len().max(1) as f64;
+            }
+            let seen = layout.readings.iter().zip(&readings[order * count..(order + 1) * count]);
+            let seen = seen.filter(|(reading, _)| layout.unknowns[form] == Quantity::Form(reading.section));
+            let (sum, number) = seen.fold((Complex64::ZERO, 0.0), |(sum, number), (reading, value)| {
+                (sum + layout.part_phase(reading, order).conj() * value, number + 1.0)
+            });
+            // Two sensors at right angles see motions that are independent of each other.
+            let share = if of_form > 0.0 { of_form / (of_form + 0.5 * of_motion) } else { 0.0 };
+            likely[order * width + form] = sum * (share / f64::max(number, 1.0));
+        }
+        likely
     }
 
     /// Order 1 as the other orders' unknowns: form 0, motion its counter-rotating part.
@@ -213,6 +266,9 @@ impl Solver<'_> {
             Quantity::Y => -quarter * shift,
             Quantity::TiltX => quarter * tilt,
             Quantity::TiltY => tilt,
+            // cos φ·X + sin φ·Y of what turns against the spindle, and cos φ·E_y − sin φ·E_x.
+            Quantity::Along(azimuth) => shift * Complex64::cis(-self.layout.direction * azimuth.radians()),
+            Quantity::TiltAlong(azimuth) => tilt * Complex64::cis(-self.layout.direction * azimuth.radians()),
         };
         self.layout.unknowns.iter().map(value).collect()
     }
@@ -268,7 +324,7 @@ impl Solver<'_> {
         let rig = &self.selection.rig;
         let sections = (rig.sections.iter().enumerate())
             .map(|(index, id)| SectionAt::whole(id.clone(), rig.section_z_mm(index) + station.z_mm));
-        let tells_tilt = layout.unknowns.iter().any(|unknown| matches!(unknown, Quantity::TiltX | Quantity::TiltY));
+        let tells_tilt = layout.unknowns.iter().any(|unknown| unknown.is_tilt());
         Separation {
             sections: sections.collect(),
             unknowns: layout.unknowns.clone(),
@@ -276,6 +332,7 @@ impl Solver<'_> {
             variance,
             observable,
             motion_covariance,
+            equivalents: Vec::new(),
             motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
             warnings: Vec::new(),
@@ -312,6 +369,7 @@ pub fn residual(
 ) -> Residual {
     let count = readings.count;
     let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
+    let mut orders: Option<[usize; 2]> = None;
     // Weighted as the fit is; set against what the covariance lets expect of it.
     let (mut weighted, mut weighted_expected) = (0.0, 0.0);
     for (index, (OrderOperator { operator, rank }, system)) in
@@ -321,6 +379,7 @@ pub fn residual(
             continue;
         }
         dof += count - rank;
+        orders = Some([orders.map_or(index + 1, |[lowest, _]| lowest), index + 1]);
         let recorded = &linear[(index + 1) * count..(index + 2) * count];
         let fitted = apply(&system.matrix, &apply(operator, recorded));
         let residual: Vec<Complex64> =
@@ -334,7 +393,7 @@ pub fn residual(
         }
     }
     if dof == 0 {
-        return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0 };
+        return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0, orders };
     }
     // A coefficient of size c is a wave of mean square c²/2.
     let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
@@ -348,6 +407,7 @@ pub fn residual(
         expected_rms_um: if propagation.is_some() { rms(expected) } else { f64::NAN },
         chi2_per_dof,
         dof: 2 * dof,
+        orders,
     }
 }
 

@@ -17,22 +17,46 @@ pub(super) struct Chain {
     pub quadratic_per_um: f64,
     pub cubic_per_um2: f64,
     pub drifts: Vec<Drift>,
+    pub pick_ups: Vec<PickUp>,
     pub noise_um: f64,
     pub filters: Vec<LowPass>,
     pub sign: f64,
     pub converter: Converter,
 }
 
-/// rate · τ · (1 − e^{−t/τ}).
-#[derive(Debug, Clone, Copy)]
+/// rate · τ · (1 − e^{−t/τ}), or rate · t.
+#[derive(Debug, Clone)]
 pub(super) struct Drift {
     pub rate_um_per_rev: f64,
-    pub time_constant_turns: f64,
+    pub time_constant_turns: Option<f64>,
+    /// Whether it drifts in each of the setups.
+    pub setups: Vec<bool>,
+}
+
+/// A line that a channel picks up.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PickUp {
+    pub runs: Runs,
+    pub amplitude_um: f64,
+    /// The effect's place in the list: channels of one effect have the same phase.
+    pub item: usize,
+}
+
+/// What a line keeps to.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Runs {
+    /// Time: periods per sample.
+    PerSample(f64),
+    /// The spindle: periods per turn.
+    PerTurn(f64),
 }
 
 impl Drift {
     fn at(&self, turns: f64) -> f64 {
-        -self.rate_um_per_rev * self.time_constant_turns * (-turns / self.time_constant_turns).exp_m1()
+        match self.time_constant_turns {
+            Some(tau) => -self.rate_um_per_rev * tau * (-turns / tau).exp_m1(),
+            None => self.rate_um_per_rev * turns,
+        }
     }
 }
 
@@ -43,6 +67,7 @@ impl Chain {
             quadratic_per_um: 0.0,
             cubic_per_um2: 0.0,
             drifts: Vec::new(),
+            pick_ups: Vec::new(),
             noise_um,
             filters: Vec::new(),
             sign,
@@ -61,22 +86,35 @@ impl Chain {
 pub(super) struct Channel<'a> {
     chain: &'a Chain,
     random: ChaCha8Rng,
+    setup: usize,
+    /// Phase of each line picked up, in periods.
+    phases: Vec<f64>,
     filters: Vec<LowPass>,
     started: bool,
 }
 
 impl<'a> Channel<'a> {
-    pub fn new(chain: &'a Chain, random: ChaCha8Rng) -> Self {
-        Self { chain, random, filters: chain.filters.clone(), started: false }
+    /// In a setup; `phase` gives that of the line of an effect, in periods.
+    pub fn new(chain: &'a Chain, random: ChaCha8Rng, setup: usize, phase: impl Fn(usize) -> f64) -> Self {
+        let phases = chain.pick_ups.iter().map(|pick_up| phase(pick_up.item)).collect();
+        Self { chain, random, setup, phases, filters: chain.filters.clone(), started: false }
     }
 
-    /// The recorded reading of a displacement `turns` nominal turns after the capture began, both in µm.
-    pub fn record(&mut self, displacement_um: f64, turns: f64) -> f64 {
+    /// The recorded reading of a displacement `turns` nominal turns after the capture began, both in µm, at a sample and with the
+    /// spindle at its angle in turns, whole ones and the rest.
+    pub fn record(&mut self, displacement_um: f64, turns: f64, sample: u64, angle: (f64, f64)) -> f64 {
         let chain = self.chain;
         let curved = displacement_um * (chain.quadratic_per_um + displacement_um * chain.cubic_per_um2);
         let mut value = chain.gain * (displacement_um + displacement_um * curved);
-        for drift in &chain.drifts {
+        for drift in chain.drifts.iter().filter(|drift| drift.setups.get(self.setup).is_some_and(|drifts| *drifts)) {
             value += drift.at(turns);
+        }
+        for (pick_up, phase) in chain.pick_ups.iter().zip(&self.phases) {
+            let periods = match pick_up.runs {
+                Runs::PerSample(each) => (each * sample as f64).fract(),
+                Runs::PerTurn(order) => (order * angle.0).fract() + order * angle.1,
+            };
+            value += pick_up.amplitude_um * (std::f64::consts::TAU * (periods + phase)).cos();
         }
         if chain.noise_um > 0.0 {
             value += chain.noise_um * self.random.sample::<f64, _>(StandardNormal);
@@ -240,9 +278,11 @@ mod tests {
 
     #[test]
     fn drift_starts_at_its_rate_and_settles() {
-        let drift = Drift { rate_um_per_rev: 0.6, time_constant_turns: 25.0 };
+        let drift = Drift { rate_um_per_rev: 0.6, time_constant_turns: Some(25.0), setups: vec![true] };
         assert!((drift.at(1e-6) / 1e-6 - 0.6).abs() < 1e-7);
         assert!((drift.at(1e4) - 15.0).abs() < 1e-12);
+        let straight = Drift { time_constant_turns: None, ..drift.clone() };
+        assert!((straight.at(60.0) - 36.0).abs() < 1e-12);
         assert!((drift.at(25.0) - 15.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
     }
 

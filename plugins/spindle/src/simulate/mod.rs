@@ -46,9 +46,10 @@ pub use config::{
     TiltHarmonic,
 };
 pub use effects::{
-    AsynchronousLine, AxialMotion, Backlash, Dent, Effect, EvenOrderMotion, FilterAttenuation, PartEccentricity,
-    ReversalAngle, SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity,
-    SetupMotionChange, SlippedProbe, SpeedRipple, Step, ThermalDrift,
+    AsynchronousLine, AxialMotion, Backlash, Dent, Effect, EvenOrderMotion, FilterAttenuation, PartAngleSign,
+    PartEccentricity, ReversalAngle, RotationReversed, SecondOrderGeometry, SensorAngle, SensorAxialPosition,
+    SensorGain, SensorLine, SensorNonlinearity, SensorSign, SensorsAngle, SensorsIdentical, SensorsSwapped,
+    SetupMotionChange, SetupRepeated, SetupsSwapped, SlippedProbe, SpeedRipple, Step, ThermalDrift,
 };
 pub use recording::SpindleRecording;
 

@@ -18,6 +18,7 @@ pub(super) enum Purpose {
     Line,
     Noise,
     Wobble,
+    PickUp,
 }
 
 /// Where a stream is used; what does not matter stays 0.

@@ -13,7 +13,7 @@ use super::{
     config::{Geometry, Phase},
     geometry::{self, Sight},
     motion::Displacement,
-    random::{Place, Purpose, stream},
+    random::{Place, Purpose, phase, stream},
     series::{self, LANES, Phasor, Series},
     spin::Spin,
     strangers::{Acting, Slip},
@@ -124,7 +124,10 @@ impl<'a> SimulatedStream<'a> {
                 harmonics: world.form.at(z_mm),
                 moved: Vec::new(),
                 strangers: Acting::all(&sensor.strangers, setup),
-                channel: Channel::new(&sensor.chain, random),
+                channel: Channel::new(&sensor.chain, random, setup, |item| {
+                    let mut random = stream(world.seed, Purpose::PickUp, Place { setup, station, item });
+                    phase(&mut random).arg() / std::f64::consts::TAU
+                }),
             }
         });
         let limits: Option<Vec<[f64; 2]>> = world.sensors.iter().map(|sensor| sensor.chain.limits_um()).collect();
@@ -267,7 +270,8 @@ impl SampleStream for SimulatedStream<'_> {
                 let seen = sensor.look(world, &instants, count);
                 for (lane, (row, displacement_um)) in rows.chunks_mut(channels).zip(seen).enumerate() {
                     let turns = (start + lane as u64) as f64 / world.samples_per_rev as f64;
-                    row[index] = sensor.channel.record(displacement_um, turns);
+                    let sample = start + lane as u64;
+                    row[index] = sensor.channel.record(displacement_um, turns, sample, instants.turns[lane]);
                 }
             }
         }

@@ -25,6 +25,8 @@ pub(super) struct Course {
     run_down: f64,
     wobble: f64,
     ripples: Vec<Ripple>,
+    /// Those of single setups, by their index.
+    in_setups: Vec<(usize, Ripple)>,
 }
 
 /// amplitude · (sin(2π·order·b + phase) − sin phase) turns at path b turns.
@@ -68,6 +70,7 @@ impl Course {
             run_down: within("run_down_turns", config.run_down_turns, 0)? * samples_per_rev,
             wobble: config.speed_wobble_percent / 100.0,
             ripples: Vec::new(),
+            in_setups: Vec::new(),
         };
         // Every term at its largest at once still leaves the spindle turning forwards.
         if course.wobble * (2.0 * WOBBLES as f64).sqrt() >= 0.9 {
@@ -76,9 +79,15 @@ impl Course {
         Ok(course)
     }
 
-    pub fn add_ripple(&mut self, ripple: Ripple) -> Result<(), Fault> {
-        self.ripples.push(ripple);
-        let steepest: f64 = self.ripples.iter().map(|ripple| TAU * (ripple.order * ripple.amplitude_turns).abs()).sum();
+    /// In some setups, or in all.
+    pub fn add_ripple(&mut self, ripple: Ripple, setups: Option<Vec<usize>>) -> Result<(), Fault> {
+        match setups {
+            None => self.ripples.push(ripple),
+            Some(setups) => self.in_setups.extend(setups.into_iter().map(|setup| (setup, ripple))),
+        }
+        // All at once, whichever setups they are in.
+        let all = self.ripples.iter().chain(self.in_setups.iter().map(|(_, ripple)| ripple));
+        let steepest: f64 = all.map(|ripple| TAU * (ripple.order * ripple.amplitude_turns).abs()).sum();
         if steepest + self.wobble * (2.0 * WOBBLES as f64).sqrt() >= 0.95 {
             return Err(Fault::at("amplitude_deg", "with this ripple the spindle would turn backwards"));
         }
@@ -98,6 +107,8 @@ impl Course {
     /// One capture's course: wandering of the speed as chance has it.
     pub fn spin(&self, seed: u64, setup: usize, station: usize) -> Spin {
         let mut course = self.clone();
+        let in_setup = self.in_setups.iter().filter(|(place, _)| *place == setup);
+        course.ripples.extend(in_setup.map(|(_, ripple)| *ripple));
         if self.wobble > 0.0 {
             let mut random = stream(seed, Purpose::Wobble, Place { setup, station, item: 0 });
             for periods in 1..=WOBBLES {
@@ -213,8 +224,8 @@ mod tests {
     #[test]
     fn marks_are_whole_turns_at_any_speed() {
         let mut course = course(3, 2, 0.4);
-        course.add_ripple(Ripple { order: 2.0, amplitude_turns: 0.002, phase_rad: 0.4 }).unwrap();
-        course.add_ripple(Ripple { order: 0.37, amplitude_turns: 0.01, phase_rad: 2.0 }).unwrap();
+        course.add_ripple(Ripple { order: 2.0, amplitude_turns: 0.002, phase_rad: 0.4 }, None).unwrap();
+        course.add_ripple(Ripple { order: 0.37, amplitude_turns: 0.01, phase_rad: 2.0 }, None).unwrap();
         let spin = course.spin(5, 1, 3);
         let marks = spin.marks();
         assert_eq!(marks.len(), 26);

@@ -4,7 +4,7 @@ use runout_core::{
     Complex64,
     measurement::StationKey,
     pipeline::error::Fault,
-    rig::{Rig, Sensor},
+    rig::{Calibration, Rig, Sensor},
 };
 
 use super::{
@@ -47,7 +47,7 @@ pub(super) struct World {
 }
 
 /// A sensor as it really is.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct TrueSensor {
     pub angle_rad: f64,
     pub z_mm: f64,
@@ -57,7 +57,7 @@ pub(super) struct TrueSensor {
 }
 
 /// A setup as it really is.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct TrueSetup {
     pub part_rad: f64,
     pub sensors_rad: f64,
@@ -85,6 +85,12 @@ impl World {
         let rig = config.rig.clone().check().map_err(|fault| fault.under("rig"))?;
         if rig.sensors.len() > MOST_PARTS || rig.setups.len() > MOST_PARTS {
             return Err(Fault::at("rig", format!("more than {MOST_PARTS} sensors or setups cannot be simulated")));
+        }
+        if let Some(index) = rig.sensors.iter().position(|sensor| sensor.calibration != Calibration::NONE) {
+            let fault = Fault::here("a simulated sensor gives displacements in µm").under_item("sensors", index);
+            let help = "leave `unit`, `um_per_volt`, `gain`, `quadratic_per_um` and `cubic_per_um2` out; an effect gives a \
+                        sensor a gain or a characteristic";
+            return Err(fault.under("rig").help(help));
         }
         let in_recording = |fault: Fault| fault.under("recording");
         let recording = &config.recording;

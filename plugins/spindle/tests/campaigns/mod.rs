@@ -22,6 +22,7 @@ pub fn campaign(seed: u64, effects: &str) -> SpindleConfig {
         z_mm,
         section: section.into(),
         sign: 1,
+        ..SensorConfig::default()
     };
     let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
     let rig = RigConfig {

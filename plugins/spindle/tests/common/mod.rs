@@ -21,6 +21,7 @@ pub fn rig(sensors: &[(f64, f64, &str)], setups: &[(f64, f64)]) -> Rig {
         z_mm: *z_mm,
         section: (*section).into(),
         sign: 1,
+        ..SensorConfig::default()
     });
     let setups = setups.iter().enumerate().map(|(index, (part_deg, sensors_deg))| SetupConfig {
         id: format!("k{index}"),
@@ -115,12 +116,12 @@ pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
         mean,
         covariance: None,
         scatter: None,
-        split: None,
         spread: None,
         turns: TurnCount { recorded: 1, used: 1, ..TurnCount::default() },
         speed_rpm: None,
         responses: Vec::new(),
         warnings: Vec::new(),
+        ..Profile::default()
     }
 }
 

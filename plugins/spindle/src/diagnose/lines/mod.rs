@@ -1,26 +1,32 @@
-//! Lines in the turns' spectrum: motion at orders that are not whole, alike in all setups.
+//! Lines in the turns' spectrum: at orders that are not whole, alike in all setups.
 //!
 //! A harmonic of one turn sees a line at order ν as a phasor that turns by ν from turn to turn: its spectrum over the turns
 //! has a peak there. A line is one that stands far out of all others, since asynchronous motion may be many tones. Its
 //! amplitude in each channel is then fitted to all low harmonics of the turns to be fitted, and its leak is taken out of the
-//! averages.
+//! averages. It is a motion where all channels fit one displacement and tilt (`source.rs`), and else electrical pick-up. A line of the
+//! machine keeps its order; one of the mains keeps its frequency, also where captures differ in speed.
 
+mod said;
+mod source;
 mod spectrum;
+mod turns;
 
-use std::f64::consts::{PI, TAU};
+use std::{f64::consts::PI, ops::Range};
 
-use runout_core::{
-    Complex64,
-    model::diagnosis::{Diagnosis, Estimated},
-    profile::Turns,
-    stage::Station,
-};
+use runout_core::{Complex64, stage::Station};
 
-use super::data::Shared;
+use super::drift::Part;
 use crate::{layout::Layout, selection::Selection};
+pub use said::say;
+use source::Source;
+use turns::{Amplitudes, Capture, Fixed};
 
 /// Fewest turns of a capture.
 const FEWEST: usize = 16;
+/// Captures differ in speed where a line of a fixed frequency is this part of a period apart over the record.
+const APART: f64 = 0.25;
+/// A line that only one of the captures was searched for must be in all of them with at least this share of its amplitude.
+const IN_ALL: f64 = 0.5;
 
 /// A line, and what it does to the averages.
 #[derive(Debug, Clone)]
@@ -31,25 +37,82 @@ pub struct Line {
     amplitude_std: f64,
     direction_rad: f64,
     direction_std: f64,
-    /// χ² of the turns fitted that it explains, beyond what its parameters would of noise.
-    pub evidence: f64,
-    /// χ² of the turns that are held out, without it and with it.
-    pub held_out: [f64; 2],
+    /// Turns a second, where known, and turns fitted in each capture.
+    turns_hz: Option<f64>,
+    turns: f64,
+    source: Source,
+    /// Of each sensor.
+    sensors: Vec<OfSensor>,
+    /// χ² of the turns fitted that its parameters explain of noise.
+    expected: f64,
     /// In the mean over the turns fitted, held out and all, `[order][reading]` from order 0.
-    pub leak: [Vec<Complex64>; 3],
+    leak: [Vec<Complex64>; 3],
 }
 
-/// The turns of each setup in the layout's order of channels.
-struct Capture<'a> {
-    turns: &'a Turns,
-    channels: Vec<usize>,
-    fitted: usize,
+/// A line in one sensor, all setups together.
+#[derive(Debug, Clone, Default)]
+struct OfSensor {
+    amplitude_um: f64,
+    amplitude_std: f64,
+    /// χ² of the turns fitted that it explains.
+    explained: f64,
+    /// χ² of the turns that are held out, without it and with it.
+    held_out: [f64; 2],
 }
 
-impl Capture<'_> {
-    /// A turn's angle at its start, in turns.
-    fn start(&self, turn: usize) -> f64 {
-        self.turns.numbers[turn] as f64
+impl Line {
+    /// The first of the sensors that it is of, or the axis, and χ² of the turns fitted that it explains there, beyond what its
+    /// parameters would of noise.
+    pub fn row(&self) -> (Option<usize>, f64) {
+        let expected = self.expected / self.sensors.len().max(1) as f64;
+        let beyond = self.of().map(|sensor| self.sensors[sensor].explained - expected).sum::<f64>();
+        (self.target(), beyond.max(0.0))
+    }
+
+    /// χ² of the turns that are held out, without it and with it.
+    pub fn held_out(&self) -> [f64; 2] {
+        [0, 1].map(|with| self.of().map(|sensor| self.sensors[sensor].held_out[with]).sum())
+    }
+
+    /// The first of the sensors that it is of; nothing where it is of the axis.
+    fn target(&self) -> Option<usize> {
+        match &self.source {
+            Source::Motion { .. } => None,
+            Source::Sensors { channels, .. } => channels.first().copied(),
+        }
+    }
+
+    /// The sensors that have it.
+    fn of(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.sensors.len()).filter(|sensor| match &self.source {
+            Source::Motion { .. } => true,
+            Source::Sensors { channels, .. } => channels.contains(sensor),
+        })
+    }
+
+    /// Its leak into the mean over some turns.
+    pub fn leak(&self, part: Part) -> &[Complex64] {
+        &self.leak[part as usize]
+    }
+
+    /// Takes a leak out of the readings of the sensors that have the line.
+    pub fn take_out(&self, leak: &[Complex64], layout: &Layout, mean: &mut [Complex64]) {
+        let count = layout.readings.len();
+        for (index, reading) in layout.readings.iter().enumerate() {
+            if self.of().any(|sensor| sensor == reading.sensor) {
+                let values = mean.iter_mut().skip(index).step_by(count);
+                values.zip(leak.iter().skip(index).step_by(count)).for_each(|(mean, leak)| *mean -= leak);
+            }
+        }
+    }
+
+    /// Root mean square amplitude in some sensors, in µm, and its standard uncertainty.
+    fn of_sensors(&self, sensors: &[usize]) -> [f64; 2] {
+        let count = sensors.len().max(1) as f64;
+        let each = || sensors.iter().filter_map(|sensor| self.sensors.get(*sensor));
+        let amplitude_um = (each().map(|one| one.amplitude_um.powi(2)).sum::<f64>() / count).sqrt();
+        let std = each().map(|one| one.amplitude_um * one.amplitude_std).map(|product| product * product).sum::<f64>();
+        [amplitude_um, std.sqrt() / (count * amplitude_um)]
     }
 }
 
@@ -60,108 +123,214 @@ pub fn lines(selection: &Selection, layout: &Layout, station: &Station, orders: 
         let split = profile.split.as_ref()?;
         let channel = |sensor: &usize| profile.sensors.iter().position(|found| found == sensor);
         let channels = selection.sensors.iter().map(channel).collect::<Option<_>>()?;
-        Some(Capture { turns: &split.turns, channels, fitted: split.fit.turns.len() })
+        let lengths = split.turns.spans.iter().map(|[start, end]| end - start);
+        let turn_samples = lengths.sum::<f64>() / split.turns.spans.len().max(1) as f64;
+        Some(Capture { turns: &split.turns, channels, fitted: split.fit.turns.len(), turn_samples })
     };
     let captures: Option<Vec<Capture>> = selection.setups.iter().map(capture).collect();
     let Some(captures) = captures.filter(|captures| captures.iter().all(|one| one.fitted >= FEWEST)) else {
         return Vec::new();
     };
-    let found = spectrum::peaks(&captures).into_iter().map(|order| likeliest(&captures, order));
-    found.filter_map(|order| fitted(&captures, layout, order, orders)).collect()
+    let rates: Option<Vec<f64>> = station.profiles.iter().map(|profile| profile.sample_rate_hz).collect();
+    // Of captures at several rates, samples tell no time.
+    let rate_hz = rates.and_then(|rates| {
+        rates.first().copied().filter(|first| rates.iter().all(|rate| rate.total_cmp(first).is_eq()))
+    });
+    let turn_samples = captures.iter().map(|one| one.turn_samples).sum::<f64>() / captures.len() as f64;
+    let signs = selection.rig.sensors.iter().map(|sensor| sensor.sign).collect();
+    let station =
+        Searched { captures, layout, signs, orders, turn_samples, turns_hz: rate_hz.map(|hz| hz / turn_samples) };
+    station.lines()
 }
 
-/// Of all lines that a turn shows at the same phase, n ± f for the same f, the one that explains most: their turns differ by
-/// how they go within a turn only.
-fn likeliest(captures: &[Capture], order: f64) -> f64 {
-    let fraction = (order - order.round()).abs();
-    let low = captures.iter().map(|one| one.turns.orders).min().unwrap_or(0);
-    let alike = (0..low).flat_map(|order| [order as f64 - fraction, order as f64 + fraction]);
-    let alike = alike.filter(|order| *order > spectrum::SLOWEST);
-    alike.max_by(|a, b| amplitudes(captures, *a).1.total_cmp(&amplitudes(captures, *b).1)).unwrap_or(order)
+/// What is searched for lines.
+struct Searched<'a> {
+    captures: Vec<Capture<'a>>,
+    layout: &'a Layout,
+    signs: Vec<f64>,
+    /// Highest order of the averages.
+    orders: usize,
+    /// Mean length of a turn over all captures.
+    turn_samples: f64,
+    turns_hz: Option<f64>,
 }
 
-/// Harmonics of one turn of e^{iνθ}'s real and imaginary part: cₙ for a = 1 and a = i of Re(a e^{iνθ}), the turn beginning
-/// after `start` turns.
-fn of_turn(line: f64, start: f64, order: usize) -> [Complex64; 2] {
-    let whole = |x: f64| {
-        // ∫₀^{2π} e^{ixφ} dφ / 2π
-        if x.abs() < 1e-9 { Complex64::ONE } else { (Complex64::cis(TAU * x) - 1.0) / Complex64::new(0.0, TAU * x) }
-    };
-    let phase = Complex64::cis(TAU * (line * start).fract());
-    let scale = if order == 0 { 0.5 } else { 1.0 };
-    let forward = phase * whole(line + order as f64) * scale;
-    let backward = phase.conj() * whole(order as f64 - line) * scale;
-    [forward + backward, Complex64::I * (forward - backward)]
-}
-
-/// Amplitudes `[setup][channel]` that fit the turns of a range best, and the sum of squares that they explain.
-fn amplitudes(captures: &[Capture], line: f64) -> (Vec<Vec<Complex64>>, f64) {
-    let mut explained = 0.0;
-    let of_capture = |capture: &Capture| {
-        let (turns, low) = (capture.fitted, capture.turns.orders);
-        let mut columns = vec![[Complex64::ZERO; 2]; turns * low];
-        for order in 0..low {
-            let mut mean = [Complex64::ZERO; 2];
-            for turn in 0..turns {
-                let values = of_turn(line, capture.start(turn), order);
-                mean.iter_mut().zip(values).for_each(|(mean, value)| *mean += value / turns as f64);
-                columns[turn * low + order] = values;
-            }
-            for turn in 0..turns {
-                columns[turn * low + order].iter_mut().zip(mean).for_each(|(value, mean)| *value -= mean);
-            }
+impl Searched<'_> {
+    fn lines(&self) -> Vec<Line> {
+        let found = spectrum::peaks(&self.captures);
+        let kept = found.into_iter().map(|order| self.likeliest(order, Fixed::Order));
+        let mut lines: Vec<Line> = kept.filter_map(|order| self.fitted(order)).collect();
+        if lines.is_empty() {
+            lines.extend(self.of_one_frequency());
         }
-        let dot = |a: Complex64, b: Complex64| a.re * b.re + a.im * b.im;
-        let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
-        for [a, b] in &columns {
-            aa += dot(*a, *a);
-            ab += dot(*a, *b);
-            bb += dot(*b, *b);
+        lines
+    }
+
+    /// Lines that captures of different speeds have at different orders: searched for in the first capture.
+    fn of_one_frequency(&self) -> Vec<Line> {
+        let [first, rest @ ..] = &self.captures[..] else { return Vec::new() };
+        let turns = first.fitted as f64;
+        let differ = |line: f64| {
+            rest.iter().any(|one| (one.turn_samples / first.turn_samples - 1.0).abs() * line * turns > APART)
+        };
+        let fixed = Fixed::Time { turn_samples: self.turn_samples };
+        let peaks = spectrum::peaks(&self.captures[..1]).into_iter().filter(|order| differ(order.max(1.0)));
+        let lines = peaks.filter_map(|order| {
+            let order = self.likeliest(order * self.turn_samples / first.turn_samples, fixed);
+            let order =
+                maximum(order - 1.0 / turns, order + 1.0 / turns, 1e-3 / turns, |order| self.explained(order, fixed));
+            let size = |amplitudes: &Vec<Complex64>| amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
+            let sizes: Vec<f64> = Amplitudes::new(&self.captures, order, fixed).found.iter().map(size).collect();
+            let in_all = sizes.iter().all(|size| *size > IN_ALL * sizes[0]);
+            in_all.then(|| self.fitted_at(order, fixed))?
+        });
+        lines.collect()
+    }
+
+    fn explained(&self, order: f64, fixed: Fixed) -> f64 {
+        Amplitudes::new(&self.captures, order, fixed).all_explained()
+    }
+
+    /// Of all lines that a turn shows at the same phase, n ± f for the same f, the one that explains most: their turns differ by
+    /// how they go within a turn only.
+    fn likeliest(&self, order: f64, fixed: Fixed) -> f64 {
+        if fixed != Fixed::Order {
+            return order;
         }
-        let determinant = (aa * bb - ab * ab).max(f64::MIN_POSITIVE);
-        let each = capture.channels.iter().map(|channel| {
-            let (mut a, mut b) = (0.0, 0.0);
-            for turn in 0..turns {
-                for order in 0..low {
-                    let value = capture.turns.at(turn, order, *channel);
-                    let [of_a, of_b] = columns[turn * low + order];
-                    a += dot(of_a, value);
-                    b += dot(of_b, value);
+        let fraction = (order - order.round()).abs();
+        let low = self.captures.iter().map(|one| one.turns.orders).min().unwrap_or(0);
+        let alike = (0..low).flat_map(|order| [order as f64 - fraction, order as f64 + fraction]);
+        let alike = alike.filter(|order| *order > spectrum::SLOWEST);
+        alike.max_by(|a, b| self.explained(*a, fixed).total_cmp(&self.explained(*b, fixed))).unwrap_or(order)
+    }
+
+    /// A line near an order, which keeps its order or its frequency: whichever explains more.
+    fn fitted(&self, near: f64) -> Option<Line> {
+        let turns = self.captures.iter().map(|one| one.fitted).min()? as f64;
+        let best = |fixed| {
+            let order =
+                maximum(near - 1.0 / turns, near + 1.0 / turns, 1e-3 / turns, |order| self.explained(order, fixed));
+            (self.explained(order, fixed), order, fixed)
+        };
+        let time = Fixed::Time { turn_samples: self.turn_samples };
+        let apart = |one: &Capture| one.apart(near, time) > APART;
+        let kept = best(Fixed::Order);
+        let (_, order, fixed) = if self.captures.iter().any(apart) {
+            let timed = best(time);
+            if timed.0 > kept.0 { timed } else { kept }
+        } else {
+            kept
+        };
+        self.fitted_at(order, fixed)
+    }
+
+    fn fitted_at(&self, order: f64, fixed: Fixed) -> Option<Line> {
+        let captures = &self.captures;
+        let turns = captures.iter().map(|one| one.fitted).min()? as f64;
+        let amplitudes = Amplitudes::new(captures, order, fixed);
+        let [amplitude_um, direction_rad] = along(&amplitudes.found, self.layout).unwrap_or([f64::NAN; 2]);
+        // Noise is what lines beside it would have.
+        let beside = [-6.5, -4.5, 4.5, 6.5].map(|bins| Amplitudes::new(captures, order + bins / turns, fixed).found);
+        let moved: Vec<f64> = beside.iter().filter_map(|found| Some(along(found, self.layout)?[0])).collect();
+        let noise_along = (moved.iter().map(|value| value * value).sum::<f64>() / moved.len().max(1) as f64).sqrt();
+        let setups = captures.len() as f64;
+        let channels = captures.first()?.channels.len();
+        let mean_square = |all: &[Vec<Vec<Complex64>>], channel: usize| {
+            let each = all.iter().flatten().map(|setup| setup[channel].norm_sqr());
+            each.sum::<f64>() / (all.len() as f64 * setups)
+        };
+        let noise: Vec<f64> = (0..channels).map(|channel| mean_square(&beside, channel)).collect();
+        let power: Vec<f64> =
+            (0..channels).map(|channel| mean_square(std::slice::from_ref(&amplitudes.found), channel)).collect();
+        let source = source::source(&amplitudes.found, &noise, self.layout, &self.signs);
+        // Half of a complex amplitude's noise is along it; setups are independent.
+        let along_it = |noise: f64| noise / (2.0 * setups).sqrt();
+        let mut sensors = self.weighed(order, fixed, &amplitudes)?;
+        for ((sensor, power), noise) in sensors.iter_mut().zip(&power).zip(&noise) {
+            (sensor.amplitude_um, sensor.amplitude_std) = (power.sqrt(), along_it(noise.sqrt()));
+        }
+        let signal = power.iter().sum::<f64>() / noise.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let order_std = 3.0_f64.sqrt() / (signal.sqrt() * turns * PI * 2.0 * setups.sqrt());
+        let amplitude_std = along_it(noise_along);
+        Some(Line {
+            order,
+            order_std,
+            amplitude_um,
+            amplitude_std,
+            direction_rad,
+            direction_std: amplitude_std / amplitude_um,
+            turns_hz: self.turns_hz,
+            turns,
+            source,
+            sensors,
+            expected: (2 * captures.len() * channels + 1) as f64,
+            leak: [Part::Fitted, Part::HeldOut, Part::All].map(|part| self.leak(order, fixed, &amplitudes, part)),
+        })
+    }
+
+    /// What the fitted turns say for a line in each sensor, and χ² of those held out without and with it.
+    fn weighed(&self, line: f64, fixed: Fixed, amplitudes: &Amplitudes) -> Option<Vec<OfSensor>> {
+        let channels = self.captures.first()?.channels.len();
+        let mut sensors = vec![OfSensor::default(); channels];
+        let (mut about_mean, mut entries) = (0.0, 0);
+        for (setup, capture) in self.captures.iter().enumerate() {
+            let shape = capture.shape(line, fixed, capture.turns.orders);
+            let count = capture.fitted as f64;
+            for (index, (channel, sensor)) in capture.channels.iter().zip(&mut sensors).enumerate() {
+                let amplitude = amplitudes.found[setup][index];
+                sensor.explained += amplitudes.explained[setup][index];
+                for order in 0..capture.turns.orders {
+                    let of = |turn: usize| {
+                        let [a, b] = shape.at(capture.phase(turn, line, fixed), order);
+                        (capture.turns.at(turn, order, *channel), a * amplitude.re + b * amplitude.im)
+                    };
+                    let (mean, leak) = (0..capture.fitted)
+                        .map(of)
+                        .fold((Complex64::ZERO, Complex64::ZERO), |(mean, leak), (value, line)| {
+                            (mean + value / count, leak + line / count)
+                        });
+                    about_mean += (0..capture.fitted).map(|turn| (of(turn).0 - mean).norm_sqr()).sum::<f64>();
+                    entries += 2 * (capture.fitted - 1);
+                    for (value, line) in (capture.fitted..capture.turns.count()).map(of) {
+                        sensor.held_out[0] += (value - mean).norm_sqr();
+                        sensor.held_out[1] += (value - mean - (line - leak)).norm_sqr();
+                    }
                 }
             }
-            let found = Complex64::new(a * bb - b * ab, b * aa - a * ab) / determinant;
-            explained += a * found.re + b * found.im;
-            found
-        });
-        each.collect()
-    };
-    let all = captures.iter().map(of_capture).collect();
-    (all, explained)
-}
+        }
+        let square = (about_mean - amplitudes.all_explained()).max(0.0) / entries.max(1) as f64;
+        for sensor in &mut sensors {
+            sensor.explained /= square;
+            sensor.held_out = sensor.held_out.map(|sum| sum / square);
+        }
+        (square > 0.0).then_some(sensors)
+    }
 
-fn fitted(captures: &[Capture], layout: &Layout, near: f64, orders: usize) -> Option<Line> {
-    let turns = captures.iter().map(|one| one.fitted).min()? as f64;
-    let order = maximum(near - 1.0 / turns, near + 1.0 / turns, 1e-3 / turns, |order| amplitudes(captures, order).1);
-    let (found, explained) = amplitudes(captures, order);
-    let [amplitude_um, direction_rad] = along(&found, layout)?;
-    // Noise is what a line beside it would have.
-    let beside: Vec<f64> = [-6.5, -4.5, 4.5, 6.5]
-        .iter()
-        .filter_map(|bins| Some(along(&amplitudes(captures, order + bins / turns).0, layout)?[0]))
-        .collect();
-    let noise = (beside.iter().map(|value| value * value).sum::<f64>() / beside.len().max(1) as f64).sqrt();
-    let setups = captures.len() as f64;
-    // Half of a complex amplitude's noise is along it; setups are independent.
-    let amplitude_std = noise / (2.0 * setups).sqrt();
-    let order_std = 3.0_f64.sqrt() * noise / (amplitude_um * turns * PI * 2.0 * setups.sqrt());
-    let (evidence, held_out) = weighed(captures, order, &found, explained)?;
-    let leak = [
-        leak(captures, order, &found, orders, |one| 0..one.fitted),
-        leak(captures, order, &found, orders, |one| one.fitted..one.turns.count()),
-        leak(captures, order, &found, orders, |one| 0..one.turns.count()),
-    ];
-    let direction_std = amplitude_std / amplitude_um;
-    Some(Line { order, order_std, amplitude_um, amplitude_std, direction_rad, direction_std, evidence, held_out, leak })
+    /// A line's mean over some turns, `[order][reading]`.
+    fn leak(&self, line: f64, fixed: Fixed, amplitudes: &Amplitudes, part: Part) -> Vec<Complex64> {
+        let count: usize = self.captures.iter().map(|one| one.channels.len()).sum();
+        let mut leak = vec![Complex64::ZERO; (self.orders + 1) * count];
+        let mut place = 0;
+        for (capture, amplitudes) in self.captures.iter().zip(&amplitudes.found) {
+            let turns: Range<usize> = match part {
+                Part::Fitted => 0..capture.fitted,
+                Part::HeldOut => capture.fitted..capture.turns.count(),
+                Part::All => 0..capture.turns.count(),
+            };
+            let shape = capture.shape(line, fixed, self.orders + 1);
+            let phases: Complex64 = turns.clone().map(|turn| capture.phase(turn, line, fixed)).sum();
+            let phase = phases / turns.len().max(1) as f64;
+            for order in 0..=self.orders {
+                // The mean phase is no phase, but turns add up one by one.
+                let mean = shape.at(phase, order);
+                for (channel, amplitude) in amplitudes.iter().enumerate() {
+                    leak[order * count + place + channel] = mean[0] * amplitude.re + mean[1] * amplitude.im;
+                }
+            }
+            place += amplitudes.len();
+        }
+        leak
+    }
 }
 
 /// Where a function with one maximum between two places has it, by golden section.
@@ -183,7 +352,8 @@ fn maximum(mut low: f64, mut high: f64, tolerance: f64, value: impl Fn(f64) -> f
     0.5 * (low + high)
 }
 
-/// Amplitude and direction of the straight line nearest to the motion, over all setups.
+/// Amplitude and direction of the straight line nearest to the motion, over all setups. Where all sensors look one way, it is the
+/// motion along them.
 fn along(found: &[Vec<Complex64>], layout: &Layout) -> Option<[f64; 2]> {
     // Σ over setups of Re v vᴴ, v the phasors of x and y.
     let mut squares = [0.0; 3];
@@ -197,10 +367,15 @@ fn along(found: &[Vec<Complex64>], layout: &Layout) -> Option<[f64; 2]> {
             (c, s) = (c + amplitude * cosine, s + amplitude * sine);
         }
         let determinant = cc * ss - cs * cs;
-        if determinant < 1e-6 {
+        if cc + ss <= 0.0 {
             return None;
         }
-        let (x, y) = ((c * ss - s * cs) / determinant, (s * cc - c * cs) / determinant);
+        let (x, y) = if determinant > 1e-6 {
+            ((c * ss - s * cs) / determinant, (s * cc - c * cs) / determinant)
+        } else {
+            // What is along the sensors, cos θ·c + sin θ·s, of their common direction.
+            (c / (cc + ss), s / (cc + ss))
+        };
         squares[0] += x.norm_sqr();
         squares[1] += (x * y.conj()).re;
         squares[2] += y.norm_sqr();
@@ -209,83 +384,4 @@ fn along(found: &[Vec<Complex64>], layout: &Layout) -> Option<[f64; 2]> {
     let half = 0.5 * (xx - yy);
     let largest = 0.5 * (xx + yy) + half.hypot(xy);
     Some([largest.sqrt(), (0.5 * xy.atan2(half)).rem_euclid(PI)])
-}
-
-/// What the fitted turns say for a line, and χ² of those held out without and with it.
-fn weighed(captures: &[Capture], line: f64, found: &[Vec<Complex64>], explained: f64) -> Option<(f64, [f64; 2])> {
-    let (mut about_mean, mut entries) = (0.0, 0);
-    let mut held = [0.0; 2];
-    for (capture, amplitudes) in captures.iter().zip(found) {
-        for (channel, amplitude) in capture.channels.iter().zip(amplitudes) {
-            for order in 0..capture.turns.orders {
-                let of = |turn: usize| {
-                    let [a, b] = of_turn(line, capture.start(turn), order);
-                    (capture.turns.at(turn, order, *channel), a * amplitude.re + b * amplitude.im)
-                };
-                let count = capture.fitted as f64;
-                let (mean, leak) = (0..capture.fitted)
-                    .map(of)
-                    .fold((Complex64::ZERO, Complex64::ZERO), |(mean, leak), (value, line)| {
-                        (mean + value / count, leak + line / count)
-                    });
-                about_mean += (0..capture.fitted).map(|turn| (of(turn).0 - mean).norm_sqr()).sum::<f64>();
-                entries += 2 * (capture.fitted - 1);
-                for (value, line) in (capture.fitted..capture.turns.count()).map(of) {
-                    held[0] += (value - mean).norm_sqr();
-                    held[1] += (value - mean - (line - leak)).norm_sqr();
-                }
-            }
-        }
-    }
-    let square = (about_mean - explained).max(0.0) / entries.max(1) as f64;
-    let parameters = (2 * found.iter().map(Vec::len).sum::<usize>() + 1) as f64;
-    (square > 0.0).then(|| ((explained / square - parameters).max(0.0), held.map(|sum| sum / square)))
-}
-
-/// A line's mean over some turns, `[order][reading]`.
-fn leak(
-    captures: &[Capture],
-    line: f64,
-    found: &[Vec<Complex64>],
-    orders: usize,
-    part: impl Fn(&Capture) -> std::ops::Range<usize>,
-) -> Vec<Complex64> {
-    let count: usize = captures.iter().map(|one| one.channels.len()).sum();
-    let mut leak = vec![Complex64::ZERO; (orders + 1) * count];
-    let mut place = 0;
-    for (capture, amplitudes) in captures.iter().zip(found) {
-        let turns = part(capture);
-        for order in 0..=orders {
-            let mut mean = [Complex64::ZERO; 2];
-            for turn in turns.clone() {
-                let values = of_turn(line, capture.start(turn), order);
-                mean.iter_mut().zip(values).for_each(|(mean, value)| *mean += value / turns.len() as f64);
-            }
-            for (channel, amplitude) in amplitudes.iter().enumerate() {
-                leak[order * count + place + channel] = mean[0] * amplitude.re + mean[1] * amplitude.im;
-            }
-        }
-        place += amplitudes.len();
-    }
-    leak
-}
-
-/// Says a line that was found by its order, amplitude and direction.
-pub fn say(diagnosis: &mut Diagnosis, shared: &Shared, applied: &[usize]) {
-    let Some(station) = shared.data.first() else { return };
-    let added = diagnosis.added.iter_mut().filter(|added| added.effect == "asynchronous-line");
-    for (added, number) in added.zip(applied) {
-        let Some(line) = station.seen.lines.get(*number) else { continue };
-        let said = |name: &str, value: f64, std: f64, unit: &str| Estimated {
-            name: name.into(),
-            value,
-            std,
-            unit: unit.into(),
-        };
-        added.parameters = vec![
-            said("order", line.order, line.order_std, "1/rev"),
-            said("amplitude", line.amplitude_um, line.amplitude_std, "um"),
-            said("direction", line.direction_rad, line.direction_std, "rad"),
-        ];
-    }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{Complex64, numerics::fourier::Fourier};
 
-use super::Capture;
+use super::turns::Capture;
 use crate::effects::MOST_LINES;
 
 /// A line's power is this many times that of the largest peak which is none.

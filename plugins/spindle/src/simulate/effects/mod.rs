@@ -2,6 +2,7 @@
 //!
 //! Strangers are effects that no model knows.
 
+mod mistakes;
 mod sensors;
 mod setups;
 mod spindle;
@@ -11,8 +12,13 @@ use runout_core::pipeline::error::{Fault, known_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use sensors::{FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorNonlinearity, ThermalDrift};
-pub use setups::{PartEccentricity, ReversalAngle, SetupMotionChange};
+pub use mistakes::{
+    PartAngleSign, RotationReversed, SensorSign, SensorsIdentical, SensorsSwapped, SetupRepeated, SetupsSwapped,
+};
+pub use sensors::{
+    FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, ThermalDrift,
+};
+pub use setups::{PartEccentricity, ReversalAngle, SensorsAngle, SetupMotionChange};
 pub use spindle::{AsynchronousLine, AxialMotion, EvenOrderMotion, SecondOrderGeometry, SpeedRipple};
 pub use strangers::{Backlash, Dent, SlippedProbe, Step};
 
@@ -32,6 +38,8 @@ pub enum Effect {
     SensorNonlinearity(SensorNonlinearity),
     /// The part was clamped at another angle.
     ReversalAngle(ReversalAngle),
+    /// All sensors stood at another angle in a setup.
+    SensorsAngle(SensorsAngle),
     /// The part was clamped further off, at a known place.
     PartEccentricity(PartEccentricity),
     /// Says that readings follow the exact geometry, which they do unless `geometry = "linear"`.
@@ -40,7 +48,9 @@ pub enum Effect {
     SetupMotionChange(SetupMotionChange),
     /// Random synchronous motion of even orders in addition.
     EvenOrderMotion(EvenOrderMotion),
-    /// The reading creeps from the start of each capture, ever slower.
+    /// A line in channels that is no motion: electrical pick-up.
+    SensorLine(SensorLine),
+    /// The reading creeps from the start of each capture, along a straight line or ever slower.
     ThermalDrift(ThermalDrift),
     /// Motion to and fro at an order that is not whole.
     AsynchronousLine(AsynchronousLine),
@@ -50,6 +60,20 @@ pub enum Effect {
     AxialMotion(AxialMotion),
     /// A low-pass in one channel.
     FilterAttenuation(FilterAttenuation),
+    /// A mistake in the rig: readings have the opposite sign.
+    SensorSign(SensorSign),
+    /// A mistake in the rig: two channels are swapped.
+    SensorsSwapped(SensorsSwapped),
+    /// A mistake in the recording: a channel holds the signal of another.
+    SensorsIdentical(SensorsIdentical),
+    /// A mistake in the rig: two setups are swapped.
+    SetupsSwapped(SetupsSwapped),
+    /// A mistake in the recording: a setup was recorded as another.
+    SetupRepeated(SetupRepeated),
+    /// A mistake in the rig: the part turns the other way.
+    RotationReversed(RotationReversed),
+    /// A mistake in the rig: the part's angles count the other way.
+    PartAngleSign(PartAngleSign),
     /// A stranger, which the closed loop does not know: a local dent that not every sensor sees, or not in every setup.
     Dent(Dent),
     /// A stranger: play in one channel.
@@ -88,10 +112,19 @@ impl Effect {
             Self::SensorAxialPosition(effect) => effect,
             Self::SensorNonlinearity(effect) => effect,
             Self::ReversalAngle(effect) => effect,
+            Self::SensorsAngle(effect) => effect,
+            Self::SensorSign(effect) => effect,
+            Self::SensorsSwapped(effect) => effect,
+            Self::SensorsIdentical(effect) => effect,
+            Self::SetupsSwapped(effect) => effect,
+            Self::SetupRepeated(effect) => effect,
+            Self::RotationReversed(effect) => effect,
+            Self::PartAngleSign(effect) => effect,
             Self::PartEccentricity(effect) => effect,
             Self::SecondOrderGeometry(effect) => effect,
             Self::SetupMotionChange(effect) => effect,
             Self::EvenOrderMotion(effect) => effect,
+            Self::SensorLine(effect) => effect,
             Self::ThermalDrift(effect) => effect,
             Self::AsynchronousLine(effect) => effect,
             Self::SpeedRipple(effect) => effect,

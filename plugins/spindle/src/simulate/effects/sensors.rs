@@ -4,9 +4,9 @@ use runout_core::pipeline::error::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, places, sensor_ids};
+use super::{Acts, places, sensor_ids, setup_ids};
 use crate::simulate::{
-    chain::{Drift, LowPass},
+    chain::{Drift, LowPass, PickUp, Runs},
     check,
     world::{TrueSensor, World},
 };
@@ -115,7 +115,7 @@ impl Acts for SensorNonlinearity {
     }
 }
 
-/// rate · τ · (1 − e^{−t/τ}), t in turns at the nominal speed since the capture began.
+/// rate · τ · (1 − e^{−t/τ}), or rate · t without τ; t in turns at the nominal speed since the capture began.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ThermalDrift {
@@ -123,8 +123,12 @@ pub struct ThermalDrift {
     pub targets: Vec<String>,
     /// At the start, in µm per turn.
     pub rate_um_per_rev: f64,
-    /// τ, in turns.
-    pub time_constant_turns: f64,
+    /// τ, in turns; without it the drift is a straight line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_constant_turns: Option<f64>,
+    /// Ids of the setups in which it drifts; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub setups: Vec<String>,
     /// Whether the separation will be told.
     #[serde(default)]
     pub declared: bool,
@@ -137,9 +141,70 @@ impl Acts for ThermalDrift {
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("rate_um_per_rev", self.rate_um_per_rev)?;
-        check::positive("time_constant_turns", self.time_constant_turns)?;
-        let drift = Drift { rate_um_per_rev: self.rate_um_per_rev, time_constant_turns: self.time_constant_turns };
-        on_sensors(world, &self.targets, |sensor| sensor.chain.drifts.push(drift))
+        if let Some(turns) = self.time_constant_turns {
+            check::positive("time_constant_turns", turns)?;
+        }
+        let drift = Drift {
+            rate_um_per_rev: self.rate_um_per_rev,
+            time_constant_turns: self.time_constant_turns,
+            setups: in_setups(world, &self.setups)?,
+        };
+        on_sensors(world, &self.targets, |sensor| sensor.chain.drifts.push(drift.clone()))
+    }
+}
+
+/// Which of the rig's setups are named; all where none is.
+fn in_setups(world: &World, named: &[String]) -> Result<Vec<bool>, Fault> {
+    let known = setup_ids(world);
+    if named.is_empty() {
+        return Ok(vec![true; known.len()]);
+    }
+    let chosen = places("setups", named, &known, "setup")?;
+    Ok((0..known.len()).map(|setup| chosen.contains(&setup)).collect())
+}
+
+/// amplitude · cos(2π·f·t + phase) in channels, the phase random in each capture and the same for all of them.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorLine {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// In Hz, as the mains; or `order`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frequency_hz: Option<f64>,
+    /// Periods per turn of the spindle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<f64>,
+    /// In µm.
+    pub amplitude_um: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorLine {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault> {
+        check::finite("amplitude_um", self.amplitude_um)?;
+        let runs = match (self.frequency_hz, self.order) {
+            (Some(hertz), None) => {
+                check::positive("frequency_hz", hertz)?;
+                Runs::PerSample(hertz / world.sample_rate_hz)
+            }
+            (None, Some(order)) => {
+                check::positive("order", order)?;
+                Runs::PerTurn(order)
+            }
+            _ => {
+                return Err(Fault::at("frequency_hz", "a line has either a frequency or an order")
+                    .help("give `frequency_hz` or `order`"));
+            }
+        };
+        let pick_up = PickUp { runs, amplitude_um: self.amplitude_um, item: index };
+        on_sensors(world, &self.targets, |sensor| sensor.chain.pick_ups.push(pick_up))
     }
 }
 

@@ -37,6 +37,30 @@ impl Acts for ReversalAngle {
     }
 }
 
+/// True angle of all sensors = stated angle + this.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorsAngle {
+    /// Ids of setups.
+    pub targets: Vec<String>,
+    /// In degrees.
+    pub angle_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorsAngle {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("angle_deg", self.angle_deg)?;
+        on_setups(world, &self.targets, |setup| setup.sensors_rad += self.angle_deg.to_radians())
+    }
+}
+
 /// Synchronous motion × ratio.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

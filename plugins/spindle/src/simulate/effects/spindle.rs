@@ -4,7 +4,7 @@ use runout_core::pipeline::error::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Acts;
+use super::{Acts, places, setup_ids};
 use crate::simulate::{
     check,
     config::{Geometry, LineConfig, MotionHarmonic},
@@ -115,6 +115,9 @@ pub struct SpeedRipple {
     /// In degrees.
     #[serde(default)]
     pub phase_deg: f64,
+    /// Ids of the setups in which the spindle runs so; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<String>,
     /// Whether the separation will be told.
     #[serde(default)]
     pub declared: bool,
@@ -129,11 +132,17 @@ impl Acts for SpeedRipple {
         check::positive("order", self.order)?;
         check::finite("amplitude_deg", self.amplitude_deg)?;
         check::finite("phase_deg", self.phase_deg)?;
-        world.course.add_ripple(Ripple {
+        let setups = if self.targets.is_empty() {
+            None
+        } else {
+            Some(places("targets", &self.targets, &setup_ids(world), "setup")?)
+        };
+        let ripple = Ripple {
             order: self.order,
             amplitude_turns: self.amplitude_deg / 360.0,
             phase_rad: self.phase_deg.to_radians(),
-        })
+        };
+        world.course.add_ripple(ripple, setups)
     }
 }
 

@@ -22,7 +22,8 @@ fn everything() -> SpindleConfig {
         Effect::ThermalDrift(ThermalDrift {
             targets: targets.clone(),
             rate_um_per_rev: 0.6,
-            time_constant_turns: 25.0,
+            time_constant_turns: Some(25.0),
+            setups: Vec::new(),
             declared: true,
         }),
         Effect::FilterAttenuation(FilterAttenuation { targets, cutoff_hz: 300.0, order: 3, declared: false }),

@@ -216,13 +216,60 @@ fn even_order_motion() {
 
 #[test]
 fn thermal_drift() {
-    let effect =
-        ThermalDrift { targets: ids(&["S3"]), rate_um_per_rev: 0.6, time_constant_turns: 25.0, declared: false };
+    let effect = ThermalDrift {
+        targets: ids(&["S3"]),
+        rate_um_per_rev: 0.6,
+        time_constant_turns: Some(25.0),
+        ..ThermalDrift::default()
+    };
     check(
         Effect::ThermalDrift(effect),
         |channel, _| channel == 2,
         |channel, setup, phi| reading(channel, setup, phi) + 15.0 * (1.0 - (-phi / TAU / 25.0).exp()),
     );
+}
+
+#[test]
+fn a_straight_drift_of_one_setup() {
+    let effect = ThermalDrift {
+        targets: ids(&["S1"]),
+        rate_um_per_rev: -0.4,
+        setups: ids(&["turned"]),
+        ..ThermalDrift::default()
+    };
+    check(
+        Effect::ThermalDrift(effect),
+        |channel, setup| channel == 0 && setup == TURNED,
+        |channel, setup, phi| reading(channel, setup, phi) - 0.4 * phi / TAU,
+    );
+}
+
+#[test]
+fn sensor_line() {
+    let scene = scene();
+    let rate_hz = scene.recording.speed_rpm / 60.0 * TURN as f64;
+    let by_time = SensorLine { frequency_hz: Some(60.0), order: None, ..SensorLine::default() };
+    let by_angle = SensorLine { frequency_hz: None, order: Some(7.3), ..SensorLine::default() };
+    for (line, omega) in [(by_time, TAU * 60.0 / rate_hz), (by_angle, TAU * 7.3 / TURN as f64)] {
+        let effect = SensorLine { targets: ids(&["S2", "S3"]), amplitude_um: 0.3, ..line };
+        let with = SpindleConfig { effect: vec![Effect::SensorLine(effect)], ..scene.clone() };
+        for setup in [INITIAL, TURNED] {
+            let (before, after) = (readings(&scene, 0, setup), readings(&with, 0, setup));
+            let added: Vec<Vec<f64>> =
+                after.iter().zip(&before).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+            assert!(added[0].iter().chain(&added[3]).all(|value| value.abs() <= 0.0));
+            // Both channels have it at the same phase.
+            assert!(added[1].iter().zip(&added[2]).all(|(a, b)| (a - b).abs() < 1e-13));
+            // One sinusoid: s(k+1) + s(k−1) = 2 cos(ω) s(k), and its amplitude.
+            assert!(added[1].windows(3).all(|s| (s[0] + s[2] - 2.0 * omega.cos() * s[1]).abs() < 1e-12));
+            let (s, next) = (added[1][40], added[1][41]);
+            let amplitude = s.hypot((next - s * omega.cos()) / omega.sin());
+            assert!((amplitude - 0.3).abs() < 1e-9, "{amplitude}");
+        }
+    }
+    let both =
+        SensorLine { targets: ids(&["S2"]), frequency_hz: Some(50.0), order: Some(6.0), ..SensorLine::default() };
+    assert!(simulator(&SpindleConfig { effect: vec![Effect::SensorLine(both)], ..scene }).is_err());
 }
 
 #[test]
@@ -249,7 +296,13 @@ fn asynchronous_line() {
 #[test]
 fn speed_ripple() {
     let scene = scene();
-    let effect = SpeedRipple { order: 2.0, amplitude_deg: 0.004_f64.to_degrees(), phase_deg: 30.0, declared: false };
+    let effect = SpeedRipple {
+        order: 2.0,
+        amplitude_deg: 0.004_f64.to_degrees(),
+        phase_deg: 30.0,
+        targets: vec![],
+        declared: false,
+    };
     let with = SpindleConfig { effect: vec![Effect::SpeedRipple(effect)], ..scene };
     let phase = 30.0_f64.to_radians();
     for setup in [INITIAL, TURNED] {

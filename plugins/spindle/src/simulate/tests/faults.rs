@@ -49,7 +49,7 @@ fn the_place_of_a_mistake_is_told() {
         ("[asynchronous]\nlines = [{ order = 3, amplitude_um = 1 }]", "whole", "[motion]", 7),
         ("[eccentricity]\noffset_um = 4000", "radius of 30000", "tenth", 2),
         ("[[effect]]\nplugin = \"sensor-gian\"", "sensor-gian", "`sensor-gain`", 7),
-        ("[[effect]]\nplugin = \"sensor-gain\"\ntargets = [\"S1\"]\ngain = 1", "gain", "", 6),
+        ("[[effect]]\nplugin = \"sensor-gain\"\ntargets = [\"S1\"]\ngain = 1", "gain", "", 9),
         ("[[effect]]\nplugin = \"sensor-gain\"\ntargets = [\"S3\"]\nrelative_gain = 1", "no sensor `S3`", "`S1`", 8),
         ("[[effect]]\nplugin = \"dent\"\ndepth_um = 1\npart_angle_deg = 0\nwidth_deg = 2", "is form", "`setups`", 7),
         (

@@ -18,7 +18,7 @@ use super::*;
 const TURN: usize = 128;
 
 fn sensor(id: &str, angle_deg: f64, z_mm: f64, section: &str) -> SensorConfig {
-    SensorConfig { id: id.into(), angle_deg, z_mm, section: section.into(), sign: 1 }
+    SensorConfig { id: id.into(), angle_deg, z_mm, section: section.into(), ..SensorConfig::default() }
 }
 
 fn setup(id: &str, part_deg: f64, sensors_deg: f64) -> SetupConfig {

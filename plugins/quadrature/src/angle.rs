@@ -1,0 +1,176 @@
+//! The angle corrected by what is decided, and its uncertainty by what is not.
+
+use std::f64::consts::PI;
+
+use runout_core::{
+    Complex64, Result,
+    model::{Fit, linear_terms::LinearFit},
+    points::Points,
+    table::{Table, TableColumn},
+};
+
+use crate::{
+    components::Component,
+    model::{Samples, TABLE},
+    signal::Signal,
+};
+
+/// The sum P of two unknown components of one order is known, their difference Q is not. Where both are of one unknown size,
+/// the chance of |Q| > k·|P| is 1/(1 + k²): two standard deviations hold 95 % where E|Q|² is this many times |P|².
+const DIFFERENCE_OVER_SUM: f64 = 19.0 / 4.0;
+
+/// What is done to the angle.
+pub struct Correction {
+    signal: Signal,
+    /// Variance of the angle by the components, in rad².
+    variance: f64,
+    /// Of one reading, in rad.
+    noise_rad: f64,
+    /// Orders that two components may have, and the amplitude of the angle error that either would have, in rad.
+    undecided: Vec<(Component, f64)>,
+}
+
+/// A component that was found: what the radius has of it, and the variance of that.
+struct Found {
+    component: Component,
+    waves: [f64; 2],
+    variance: [f64; 2],
+}
+
+impl Correction {
+    /// By a final fit.
+    ///
+    /// # Errors
+    /// When the samples do not determine what was found.
+    pub fn of(samples: &Samples, max_order: usize, fit: &LinearFit) -> Result<Self> {
+        let radius = fit.declared().first().copied().unwrap_or(f64::NAN);
+        let found = fit.effects().filter_map(|(effect, values, variance)| {
+            let component = Component::of(&effect.id, max_order)?;
+            let parameters = <[f64; 2]>::try_from(values).ok()?;
+            let slopes = component.slopes(radius, parameters);
+            let known = |index: usize| variance.get(index).copied().filter(|entry| entry.is_finite()).unwrap_or(0.0);
+            Some(Found {
+                component,
+                waves: component.waves(radius, parameters),
+                variance: [0, 1].map(|wave| (0..2).map(|index| known(index) * slopes[index][wave].powi(2)).sum()),
+            })
+        });
+        let found: Vec<Found> = found.collect();
+        let noise_rad = fit.remainder().rms / radius;
+        let mut correction =
+            Self { signal: Signal { radius, components: Vec::new() }, variance: 0.0, noise_rad, undecided: Vec::new() };
+        if samples.true_rad.is_some() {
+            for Found { component, waves, variance } in &found {
+                correction.signal.components.push((*component, component.of_radius(*waves)));
+                correction.variance += 0.5 * variance.iter().sum::<f64>() / radius.powi(2);
+            }
+            return Ok(correction);
+        }
+        let open = |component: Component| fit.considers(&component.id());
+        let (mut known, mut decided, mut beside) = (Vec::new(), Vec::new(), Vec::new());
+        for order in 1..=max_order {
+            let of_order = || found.iter().filter(|found| found.component.order() == order);
+            let [backward, forward] = Component::of_order(order);
+            let declared = of_order().filter(|found| fit.knows(&found.component.id()));
+            known.extend(declared.map(|found| (found.component, found.component.of_radius(found.waves))));
+            let free = || of_order().filter(|found| !fit.knows(&found.component.id()));
+            if open(backward) && open(forward) {
+                let sum: Complex64 = free().map(|found| Complex64::new(found.waves[0], found.waves[1])).sum();
+                beside.extend(free().next().map(|found| found.component));
+                let usual = 2.0 * (backward.usual().powi(2) + forward.usual().powi(2));
+                let difference = usual.max(DIFFERENCE_OVER_SUM * (sum / radius).norm_sqr());
+                correction.variance += 0.5 * difference;
+                if sum.norm() > 0.0 {
+                    correction.undecided.push((backward, sum.norm() / radius));
+                }
+            } else {
+                decided.extend(free().map(|found| found.component));
+                let variance: f64 = free().flat_map(|found| found.variance).sum();
+                correction.variance += 0.5 * variance / radius.powi(2);
+            }
+        }
+        if !(decided.is_empty() && known.is_empty()) {
+            correction.signal = Signal::fit(&samples.phase_rad, &samples.radius, &known, &decided, &beside)?;
+        }
+        Ok(correction)
+    }
+
+    /// Standard uncertainty of a corrected angle, in rad.
+    fn std_rad(&self) -> f64 {
+        (self.variance + self.noise_rad.powi(2)).sqrt()
+    }
+
+    /// What the user should know.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks: Vec<String> = self
+            .undecided
+            .iter()
+            .map(|(backward, amplitude)| {
+                format!(
+                    "order {} of the radius is {} or {}: one adds an error of {:.4}° to the angle, the other takes as much \
+                     away, and the radius does not decide; the angle is not corrected for it",
+                    backward.order(),
+                    backward.id(),
+                    backward.partner().id(),
+                    amplitude.to_degrees()
+                )
+            })
+            .collect();
+        if self.undecided.is_empty() && self.signal.components.is_empty() {
+            remarks.push("nothing that was found is decided: the angle is not corrected".into());
+        }
+        remarks.push(format!(
+            "standard uncertainty of one corrected angle: {:.4}°, of which {:.4}° is the noise of the reading and {:.4}° is \
+             what the fit does not decide",
+            self.std_rad().to_degrees(),
+            self.noise_rad.to_degrees(),
+            self.variance.sqrt().to_degrees()
+        ));
+        remarks
+    }
+
+    /// One row a sample, in the order of the file.
+    pub fn table(&self, points: &Points, samples: &Samples) -> Table {
+        let corrected = samples.phase_rad.iter().zip(&samples.radius).map(|(phase, radius)| {
+            let angle = self.signal.angle_rad(*phase, *radius);
+            // The same turn as the phase has.
+            let ahead = (angle - phase + PI).rem_euclid(2.0 * PI) - PI;
+            (phase + ahead).to_degrees()
+        });
+        let corrected: Vec<f64> = corrected.collect();
+        let phase: Vec<f64> = samples.phase_rad.iter().map(|phase| phase.to_degrees()).collect();
+        let count = phase.len();
+        let column = |name: &str, unit: &str, about: &str, values: Vec<f64>| TableColumn {
+            name: name.into(),
+            unit: unit.into(),
+            about: about.into(),
+            values,
+        };
+        let first = match points.column("time_s") {
+            Ok(time) => column("time_s", "s", "time of the reading", time.to_vec()),
+            Err(_) => column(
+                "index",
+                "",
+                "row of the reading in the file, from 0",
+                (0..count).map(|row| row as f64).collect(),
+            ),
+        };
+        Table {
+            name: TABLE.into(),
+            about: "Angle of a quadrature signal within its period. corrected_deg is phase_deg without the errors that the \
+                diagnosis decided; std_deg includes what it did not decide and the noise of the reading."
+                .into(),
+            columns: vec![
+                first,
+                column("phase_deg", "deg", "angle of the pair (cosine, sine) as read", phase),
+                column("corrected_deg", "deg", "angle of the pair without the errors that were decided", corrected),
+                column(
+                    "std_deg",
+                    "deg",
+                    "standard uncertainty of corrected_deg, but for a constant",
+                    vec![self.std_rad().to_degrees(); count],
+                ),
+            ],
+        }
+    }
+}

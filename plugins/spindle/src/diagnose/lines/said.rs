@@ -1,0 +1,132 @@
+//! What is said of lines: order, frequency, size, and whether it is the mains.
+
+use runout_core::{
+    model::diagnosis::{Diagnosis, Estimated},
+    stage::Station,
+};
+
+use super::{Line, source::Source};
+use crate::diagnose::data::Shared;
+
+/// Frequencies of mains, in Hz.
+const MAINS_HZ: [f64; 2] = [50.0, 60.0];
+/// Multiples of them that are named.
+const MULTIPLES: std::ops::RangeInclusive<u32> = 1..=10;
+/// How far a grid's frequency is from its nominal value, as a share.
+const GRID: f64 = 0.002;
+
+/// A multiple of the mains' frequency within a tolerance, in Hz.
+pub(super) fn mains(frequency_hz: f64, tolerance_hz: f64) -> Option<f64> {
+    let known = MAINS_HZ.iter().flat_map(|hertz| MULTIPLES.map(move |multiple| hertz * f64::from(multiple)));
+    let near = known.filter(|hertz| (hertz - frequency_hz).abs() <= tolerance_hz + GRID * hertz);
+    near.min_by(|a, b| (a - frequency_hz).abs().total_cmp(&(b - frequency_hz).abs()))
+}
+
+/// Says each line that was found by its order, frequency and amplitude, and what it may be.
+pub fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
+    let sensors = &shared.selection.rig.sensors;
+    let id = |sensor: &usize| sensors.get(*sensor).map_or_else(String::new, |sensor| sensor.id.clone());
+    let mut said: Vec<Option<usize>> = Vec::new();
+    let mut remarks = Vec::new();
+    for added in &mut diagnosis.added {
+        if !matches!(added.effect.as_str(), "asynchronous-line" | "sensor-line") {
+            continue;
+        }
+        let sensor = added.targets.first().and_then(|id| sensors.iter().position(|sensor| sensor.id == *id));
+        // Several of one target come in the order of their size.
+        let before = said.iter().filter(|known| **known == sensor).count();
+        said.push(sensor);
+        let is = |line: &&Line| line.row().0 == sensor;
+        let known = shared.data.iter().find_map(|station| station.seen.lines.iter().filter(is).nth(before));
+        let Some(line) = known else { continue };
+        added.parameters = line.parameters();
+        if let Source::Sensors { channels, motion } = &line.source {
+            added.targets = channels.iter().map(id).collect();
+            if *motion {
+                added.confounded_with.push("asynchronous-line".into());
+                let by = "a sensor at another angle, which a motion along this one would show in too";
+                added.told_apart_by = Some(by.into());
+            }
+        }
+        remarks.extend(remark(line, &added.targets));
+    }
+    diagnosis.warnings.extend(remarks);
+    diagnosis.warnings.extend(whole_order(diagnosis, stations));
+}
+
+impl Line {
+    fn parameters(&self) -> Vec<Estimated> {
+        let said = |name: &str, value: f64, std: f64, unit: &str| Estimated {
+            name: name.into(),
+            value,
+            std: std.is_finite().then_some(std),
+            unit: unit.into(),
+        };
+        let mut parameters = vec![said("order", self.order, self.order_std, "1/rev")];
+        if let Some(turns_hz) = self.turns_hz {
+            parameters.push(said("frequency", self.order * turns_hz, self.order_std * turns_hz, "Hz"));
+        }
+        match &self.source {
+            Source::Sensors { channels, .. } => {
+                let [amplitude_um, std] = self.of_sensors(channels);
+                parameters.push(said("amplitude", amplitude_um, std, "um"));
+            }
+            Source::Motion { .. } => {
+                parameters.push(said("amplitude", self.amplitude_um, self.amplitude_std, "um"));
+                parameters.push(said(
+                    "direction",
+                    self.direction_rad.to_degrees(),
+                    self.direction_std.to_degrees(),
+                    "deg",
+                ));
+            }
+        }
+        parameters
+    }
+}
+
+/// Whether a line is the mains, and whether all channels may have picked it up.
+fn remark(line: &Line, targets: &[String]) -> Option<String> {
+    let hertz = line.turns_hz.map(|turns_hz| line.order * turns_hz);
+    let mains = line.turns_hz.and_then(|turns_hz| {
+        // What the record resolves: a quarter of a period over all of its turns.
+        let resolution = 0.25 / line.turns.max(1.0);
+        mains(line.order * turns_hz, (3.0 * line.order_std).max(resolution) * turns_hz)
+    });
+    let frequency = hertz.map_or_else(|| format!("order {:.3}", line.order), |hertz| format!("{hertz:.2} Hz"));
+    let is_mains = mains.map(|mains| format!("is mains ({mains:.0} Hz)"));
+    match (&line.source, is_mains) {
+        (Source::Sensors { channels, .. }, mains) => {
+            let several = if channels.len() > 1 {
+                "; no displacement and tilt fits the channels that have it: electrical pick-up common to them is possible"
+            } else {
+                ""
+            };
+            let what = mains.unwrap_or_else(|| "is no motion of the axis".into());
+            Some(format!("the line at {frequency} in {} {what}{several}", targets.join(", ")))
+        }
+        (Source::Motion { common: true }, mains) => Some(format!(
+            "the line at {frequency}{} has the same amplitude and phase in all channels: electrical pick-up common to all channels is possible instead of a motion",
+            mains.map_or_else(String::new, |mains| format!(" {mains} and"))
+        )),
+        (Source::Motion { .. }, Some(mains)) => Some(format!(
+            "the line at {frequency} {mains}, and all sensors fit one displacement and tilt: a motion that the mains drives, or pick-up in several channels"
+        )),
+        (Source::Motion { .. }, None) => None,
+    }
+}
+
+/// What is left at an order that is the mains at the spindle's speed, within a part of a period over the record.
+fn whole_order(diagnosis: &Diagnosis, stations: &[Station]) -> Option<String> {
+    let profile = stations.first()?.profiles.first()?;
+    let turns_hz = profile.speed_rpm? / 60.0;
+    let resolution_hz = turns_hz / profile.turns.used.max(1) as f64;
+    let narrow = diagnosis.unexplained.iter().filter(|left| left.orders[1] - left.orders[0] <= 1);
+    let mut orders = narrow.flat_map(|left| left.orders);
+    let found = orders.find_map(|order| Some((order, mains(order as f64 * turns_hz, resolution_hz)?)));
+    found.map(|(order, mains)| {
+        format!(
+            "order {order} is mains ({mains:.0} Hz) at this speed: pick-up at a whole order cannot be told from what repeats every turn; measure at another speed"
+        )
+    })
+}

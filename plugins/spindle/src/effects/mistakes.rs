@@ -1,0 +1,185 @@
+//! Mistakes in the rig file: the recording is sound, and channels, setups or signs are not where the file says. Each is there or
+//! not, so that it has no parameters, and all are tried before any other effect.
+
+use runout_core::{Complex64, rig::Rig};
+
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
+
+/// A mistake that people make.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mistake {
+    /// A reading has the opposite sign.
+    SensorSign,
+    /// Two channels hold each other's signals.
+    SensorsSwapped,
+    /// The second of two channels holds the signal of the first.
+    SensorsIdentical,
+    /// Two setups hold each other's recordings.
+    SetupsSwapped,
+    /// The second of two setups was recorded as the first: part and sensors were not moved between them.
+    SetupRepeated,
+    /// The part turns the other way.
+    RotationReversed,
+    /// The part's angles count the other way.
+    PartAngleSign,
+}
+
+impl Mistake {
+    /// All of them, the more frequent ones first.
+    pub const ALL: [Self; 7] = [
+        Self::SensorSign,
+        Self::SetupsSwapped,
+        Self::SensorsSwapped,
+        Self::PartAngleSign,
+        Self::RotationReversed,
+        Self::SetupRepeated,
+        Self::SensorsIdentical,
+    ];
+
+    /// Its id.
+    #[must_use]
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::SensorSign => "sensor-sign",
+            Self::SensorsSwapped => "sensors-swapped",
+            Self::SensorsIdentical => "sensors-identical",
+            Self::SetupsSwapped => "setups-swapped",
+            Self::SetupRepeated => "setup-repeated",
+            Self::RotationReversed => "rotation-reversed",
+            Self::PartAngleSign => "part-angle-sign",
+        }
+    }
+
+    /// Where it acts.
+    #[must_use]
+    pub fn acts_on(self) -> ActsOn {
+        match self {
+            Self::SensorSign => ActsOn::Sensor,
+            Self::SensorsSwapped => ActsOn::SensorPair,
+            Self::SensorsIdentical => ActsOn::SensorCopy,
+            Self::SetupsSwapped => ActsOn::SetupPair,
+            Self::SetupRepeated => ActsOn::SetupCopy,
+            Self::RotationReversed | Self::PartAngleSign => ActsOn::Rig,
+        }
+    }
+
+    /// Corrects it.
+    pub fn correct(self, target: usize, alterations: &mut Alterations) {
+        let sensors = pair_of(target, alterations.sensors.len());
+        let setups = pair_of(target, alterations.setups.len());
+        match self {
+            Self::SensorSign => alterations.sensors[target].sign *= -1.0,
+            Self::SensorsSwapped => {
+                let [first, second] = sensors;
+                alterations.places.swap(first, second);
+                // Each probe keeps its polarity, and the file gave it to the other channel.
+                let opposite = alterations.declared_signs[first] * alterations.declared_signs[second];
+                alterations.sensors[first].sign *= opposite;
+                alterations.sensors[second].sign *= opposite;
+            }
+            Self::SensorsIdentical => {
+                let [first, second] = sensors;
+                alterations.places[second] = alterations.places[first];
+                alterations.sensors[second].sign *=
+                    alterations.declared_signs[first] * alterations.declared_signs[second];
+            }
+            Self::SetupsSwapped => alterations.clampings.swap(setups[0], setups[1]),
+            Self::SetupRepeated => alterations.clampings[setups[1]] = alterations.clampings[setups[0]],
+            Self::RotationReversed => alterations.rotation_reversed ^= true,
+            Self::PartAngleSign => alterations.part_angles_reversed ^= true,
+        }
+    }
+
+    /// Lines of TOML, keys and values of the rig file, that correct it where it is the file that is wrong; `sensors` and `setups` are the places in
+    /// the file of those in use.
+    #[must_use]
+    pub fn change(self, target: usize, rig: &Rig, sensors: &[usize], setups: &[usize]) -> Vec<String> {
+        let exchanged = |list: &str, [first, second]: [usize; 2], places: &[usize], ids: [&str; 2]| {
+            let line = |place: usize, id: &str| format!("{list}.{}.id = \"{id}\"", places[place]);
+            vec![line(first, ids[1]), line(second, ids[0])]
+        };
+        match self {
+            Self::SensorSign => vec![format!("sensors.{}.sign = {}", sensors[target], -rig.sensors[target].sign)],
+            Self::SensorsSwapped => {
+                let pair = pair_of(target, rig.sensors.len());
+                exchanged("sensors", pair, sensors, pair.map(|sensor| rig.sensors[sensor].id.as_str()))
+            }
+            Self::SetupsSwapped => {
+                let pair = pair_of(target, rig.setups.len());
+                exchanged("setups", pair, setups, pair.map(|setup| rig.setups[setup].id.as_str()))
+            }
+            Self::SensorsIdentical | Self::SetupRepeated => Vec::new(),
+            Self::RotationReversed => {
+                vec![format!("rotation = \"{}\"", if rig.rotation.direction() > 0.0 { "cw" } else { "ccw" })]
+            }
+            Self::PartAngleSign => {
+                let turned = rig.setups.iter().zip(setups).filter(|(setup, _)| setup.part_rad != 0.0);
+                let keys = turned.map(|(setup, place)| {
+                    // Degrees were converted to radians: nine decimals give them back.
+                    let degrees = (-setup.part_rad.to_degrees() * 1e9).round() / 1e9;
+                    format!("setups.{place}.part_deg = {degrees:?}")
+                });
+                keys.collect()
+            }
+        }
+    }
+
+    /// What to do where the recording is wrong and not the rig file.
+    #[must_use]
+    pub fn advice(self, target: usize, rig: &Rig) -> Option<String> {
+        match self {
+            Self::SensorsIdentical => {
+                let [first, second] = pair_of(target, rig.sensors.len()).map(|sensor| &rig.sensors[sensor].id);
+                Some(format!("channel `{second}` holds the signal of `{first}`: record it again, or leave it out"))
+            }
+            Self::SetupRepeated => {
+                let [first, second] = pair_of(target, rig.setups.len()).map(|setup| &rig.setups[setup].id);
+                Some(format!("setup `{second}` was recorded as `{first}`: record it again, or leave it out"))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The two that the target of a pair stands for: first · count + second.
+#[must_use]
+pub fn pair_of(target: usize, count: usize) -> [usize; 2] {
+    [target / count, target % count]
+}
+
+/// Targets of a pair among `count`, the first before the second.
+pub fn pairs(count: usize) -> impl Iterator<Item = usize> {
+    (0..count).flat_map(move |first| (first + 1..count).map(move |second| first * count + second))
+}
+
+/// Targets of a pair among `count`, in either order.
+pub fn ordered_pairs(count: usize) -> impl Iterator<Item = usize> {
+    (0..count * count).filter(move |pair| pair / count != pair % count)
+}
+
+impl SpindleEffect for Mistake {
+    fn about(&self) -> About {
+        let does = match self {
+            Self::SensorSign => "a mistake in the rig: a reading has the opposite sign",
+            Self::SensorsSwapped => "a mistake in the rig: two channels are swapped",
+            Self::SensorsIdentical => "a mistake in the recording: two channels hold the same signal",
+            Self::SetupsSwapped => "a mistake in the rig: two setups are swapped",
+            Self::SetupRepeated => "a mistake in the recording: a setup was recorded twice",
+            Self::RotationReversed => "a mistake in the rig: the part turns the other way",
+            Self::PartAngleSign => "a mistake in the rig: the part's angles count the other way",
+        };
+        About { id: self.id(), does, acts_on: self.acts_on(), parameters: Vec::new() }
+    }
+
+    fn alter(&self, target: usize, _values: &[f64], alterations: &mut Alterations) {
+        self.correct(target, alterations);
+    }
+
+    fn partials(&self, _target: usize, _predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        Vec::new()
+    }
+
+    fn mistake(&self) -> Option<Mistake> {
+        Some(*self)
+    }
+}

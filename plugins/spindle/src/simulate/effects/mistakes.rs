@@ -1,0 +1,174 @@
+//! Mistakes in the rig: what is recorded is sound, and the rig as it is stated is not what was there.
+
+use runout_core::{pipeline::error::Fault, rig::Rotation};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Acts, places, sensor_ids, sensors::on_sensors, setup_ids};
+use crate::simulate::world::World;
+
+/// Readings have the opposite sign.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSign {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorSign {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        on_sensors(world, &self.targets, |sensor| sensor.chain.gain *= -1.0)
+    }
+}
+
+/// Two channels hold each other's signals.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorsSwapped {
+    /// Ids of two sensors.
+    pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorsSwapped {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let [first, second] = pair(&self.targets, &sensor_ids(world), "sensor")?;
+        world.sensors.swap(first, second);
+        Ok(())
+    }
+}
+
+/// The second of two channels holds the signal of the first, each with its own noise.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorsIdentical {
+    /// Ids of two sensors.
+    pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SensorsIdentical {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let [first, second] = pair(&self.targets, &sensor_ids(world), "sensor")?;
+        world.sensors[second] = world.sensors[first].clone();
+        Ok(())
+    }
+}
+
+/// Two setups hold each other's recordings.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SetupsSwapped {
+    /// Ids of two setups.
+    pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SetupsSwapped {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let [first, second] = pair(&self.targets, &setup_ids(world), "setup")?;
+        world.setups.swap(first, second);
+        Ok(())
+    }
+}
+
+/// The second of two setups was recorded with part and sensors as in the first.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SetupRepeated {
+    /// Ids of two setups.
+    pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for SetupRepeated {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let [first, second] = pair(&self.targets, &setup_ids(world), "setup")?;
+        world.setups[second] = world.setups[first].clone();
+        Ok(())
+    }
+}
+
+/// The part turns the other way.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RotationReversed {
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for RotationReversed {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        world.rig.rotation = match world.rig.rotation {
+            Rotation::Ccw => Rotation::Cw,
+            Rotation::Cw => Rotation::Ccw,
+        };
+        Ok(())
+    }
+}
+
+/// The part's angles count the other way.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartAngleSign {
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for PartAngleSign {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        for setup in &mut world.setups {
+            setup.part_rad = -setup.part_rad;
+        }
+        Ok(())
+    }
+}
+
+/// Indices of two different ids among the known ones.
+fn pair(ids: &[String; 2], known: &[&str], noun: &str) -> Result<[usize; 2], Fault> {
+    match places("targets", ids, known, noun)?[..] {
+        [first, second] if first != second => Ok([first, second]),
+        _ => Err(Fault::at("targets", format!("expected two different {noun}s"))),
+    }
+}

@@ -1,0 +1,284 @@
+//! Mistakes in the rig file, on simulated campaigns: the simulator records what was there, and the rig says something else.
+
+use runout_core::{
+    model::{
+        closed_loop::Settings,
+        diagnosis::{Added, Verdict},
+    },
+    rig::{RigConfig, SensorConfig},
+    stage::{Station, StationDiagnosis, StationSeparator},
+};
+use runout_spindle::{
+    diagnose::diagnose,
+    effects,
+    layout::Layout,
+    selection::Selection,
+    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    simulate::SpindleConfig,
+};
+
+use super::{
+    CLEAN_UM,
+    campaigns::{averaged, campaign},
+    diagnosed,
+};
+
+/// Three sensors in each of two sections: every mistake in one channel shows by itself.
+fn six_sensors() -> Vec<SensorConfig> {
+    let places = [(100.0, "a"), (130.0, "b")]
+        .into_iter()
+        .flat_map(|(z_mm, section)| [0.0, 99.844, 202.5].map(|angle_deg| (angle_deg, z_mm, section)));
+    let sensor = |(number, (angle_deg, z_mm, section)): (usize, (f64, f64, &str))| SensorConfig {
+        id: format!("S{number}"),
+        angle_deg,
+        z_mm,
+        section: section.into(),
+        sign: 1,
+        ..SensorConfig::default()
+    };
+    (1..).zip(places).map(sensor).collect()
+}
+
+/// A campaign with six sensors.
+fn six(seed: u64, effects: &str) -> SpindleConfig {
+    let mut config = campaign(seed, effects);
+    config.rig.sensors = six_sensors();
+    config
+}
+
+fn looked_into(rig: &RigConfig, station: &Station) -> StationDiagnosis {
+    let rig = rig.clone().check().unwrap();
+    let layout = Layout::new(&rig, false);
+    diagnose(Selection::whole(&rig), layout, true, effects::all(), std::slice::from_ref(station), &Settings::default())
+        .unwrap()
+}
+
+/// What `run` warns of.
+fn warned(rig: &RigConfig, station: &Station) -> Vec<String> {
+    let rig = rig.clone().check().unwrap();
+    HarmonicLeastSquares::new(&rig, true, Weighting::TurnCovariance).separate(station).unwrap().warnings
+}
+
+fn name(added: &Added) -> String {
+    std::iter::once(&added.effect).chain(&added.targets).cloned().collect::<Vec<_>>().join(" ")
+}
+
+/// The mistakes, and nothing else, are named; each by itself or in its set.
+fn names(config: &SpindleConfig, mistakes: &[&str], changes: &[&str]) -> (StationDiagnosis, [f64; 2]) {
+    let (found, [before, after]) = diagnosed(config);
+    let diagnosis = &found.diagnosis;
+    let chi2 = [&diagnosis.before, &diagnosis.after].map(|level| level.chi2_per_dof.unwrap());
+    let added: Vec<String> = diagnosis.added.iter().map(name).collect();
+    let sets: Vec<&Vec<String>> = diagnosis.added.iter().map(|added| &added.confounded_with).collect();
+    println!(
+        "simulated, {mistakes:?}: {added:?} or {sets:?}, χ² {:.1} → {:.2}, form error {before:.4} → {after:.4} µm",
+        chi2[0], chi2[1]
+    );
+    assert_eq!(diagnosis.verdict, Verdict::Explained, "{mistakes:?}: {added:?}");
+    assert_eq!(added.len(), mistakes.len(), "{added:?}");
+    for mistake in mistakes {
+        let holds = |added: &Added| name(added) == *mistake || added.confounded_with.iter().any(|one| one == mistake);
+        assert!(diagnosis.added.iter().any(holds), "{mistake}: {added:?} or {sets:?}");
+    }
+    let said: Vec<&str> = diagnosis.added.iter().filter_map(|added| added.change.as_deref()).collect();
+    for change in changes {
+        assert!(said.contains(change), "{change}: {said:?}");
+    }
+    (found, [before, after])
+}
+
+#[test]
+fn six_sensors_name_every_mistake() {
+    for (effect, mistake, change) in [
+        (r#"{"plugin":"sensor-sign","targets":["S2"]}"#, "sensor-sign S2", "sensors.1.sign = -1"),
+        (
+            r#"{"plugin":"sensors-swapped","targets":["S1","S3"]}"#,
+            "sensors-swapped S1 S3",
+            "sensors.0.id = \"S3\"\nsensors.2.id = \"S1\"",
+        ),
+        (
+            r#"{"plugin":"sensors-swapped","targets":["S2","S6"]}"#,
+            "sensors-swapped S2 S6",
+            "sensors.1.id = \"S6\"\nsensors.5.id = \"S2\"",
+        ),
+        (
+            r#"{"plugin":"setups-swapped","targets":["b","c"]}"#,
+            "setups-swapped b c",
+            "setups.1.id = \"c\"\nsetups.2.id = \"b\"",
+        ),
+        (r#"{"plugin":"rotation-reversed"}"#, "rotation-reversed", r#"rotation = "cw""#),
+        (
+            r#"{"plugin":"part-angle-sign"}"#,
+            "part-angle-sign",
+            "setups.1.part_deg = -99.844\nsetups.2.part_deg = -202.5",
+        ),
+    ] {
+        for seed in 1..=2 {
+            let config = six(seed, &format!("[{effect}]"));
+            let (found, [_, after]) = names(&config, &[mistake], &[change]);
+            assert!(found.diagnosis.added[0].confounded_with.is_empty(), "{:?}", found.diagnosis.added);
+            assert!(after < CLEAN_UM, "{after}");
+            let rig = config.rig.clone().check().unwrap();
+            let warnings = warned(&config.rig, &averaged(&config, &rig).0);
+            let says = |warning: &String| {
+                warning.contains(&format!("`{mistake}`")) && warning.contains(&change.replace('\n', "; "))
+            };
+            assert!(warnings.iter().any(says), "{warnings:?}");
+        }
+    }
+}
+
+/// A sign is named beside an effect of usual kind, and two mistakes at once.
+#[test]
+fn mistakes_are_named_together_and_beside_effects() {
+    let two = r#"[{"plugin":"sensor-sign","targets":["S1"]},{"plugin":"sensor-sign","targets":["S5"]}]"#;
+    names(&six(3, two), &["sensor-sign S1", "sensor-sign S5"], &[]);
+    let mixed = r#"[{"plugin":"sensor-sign","targets":["S4"]},{"plugin":"setups-swapped","targets":["a","b"]}]"#;
+    names(&six(4, mixed), &["sensor-sign S4", "setups-swapped a b"], &[]);
+    let beside = r#"[{"plugin":"sensors-swapped","targets":["S1","S2"]},
+        {"plugin":"reversal-angle","targets":["b"],"angle_deg":0.34}]"#;
+    let (found, [_, after]) = names(&six(5, beside), &["sensors-swapped S1 S2", "reversal-angle b"], &[]);
+    assert!(after < CLEAN_UM, "{after}: {:?}", found.diagnosis.added);
+}
+
+/// Three setups one place on: two swaps, and one change of the file.
+#[test]
+fn setups_in_a_cycle_are_named() {
+    let cycle = r#"[{"plugin":"setups-swapped","targets":["a","b"]},{"plugin":"setups-swapped","targets":["b","c"]}]"#;
+    let config = six(6, cycle);
+    let (found, [_, after]) = diagnosed(&config);
+    let added: Vec<&str> = found.diagnosis.added.iter().map(|added| added.effect.as_str()).collect();
+    let changes: Vec<&str> = found.diagnosis.added.iter().filter_map(|added| added.change.as_deref()).collect();
+    println!("simulated, a cycle of setups: {added:?} {changes:?}, form error {after:.4} µm");
+    assert_eq!(added, ["setups-swapped", "setups-swapped"]);
+    assert!(after < CLEAN_UM, "{after}");
+    // What the file must say, tried on the same recording.
+    let rig = config.rig.clone().check().unwrap();
+    let (mut station, _) = averaged(&config, &rig);
+    let [change] = changes[..] else { panic!("{changes:?}") };
+    let mut corrected = config.rig.clone();
+    for key in change.lines() {
+        let (place, id) = key.strip_prefix("setups.").unwrap().split_once(".id = ").unwrap();
+        corrected.setups[place.parse::<usize>().unwrap()].id = id.trim_matches('"').into();
+    }
+    for profile in &mut station.profiles {
+        let id = &config.rig.setups[profile.setup].id;
+        profile.setup = corrected.setups.iter().position(|setup| setup.id == *id).unwrap();
+    }
+    assert_eq!(looked_into(&corrected, &station).diagnosis.verdict, Verdict::AtNoiseFloor);
+}
+
+/// Two sensors in a section do not tell whose sign is wrong: the form and its negative explain as much, but for the exact
+/// geometry. The uncertainty of form holds both.
+#[test]
+fn what_a_layout_does_not_tell_is_in_the_uncertainty() {
+    for offset_um in [0.5, 8.0, 40.0] {
+        let mut config = campaign(1, r#"[{"plugin":"sensor-sign","targets":["S1"]}]"#);
+        config.eccentricity.offset_um = offset_um;
+        let (found, [_, after]) = names(&config, &["sensor-sign S1"], &[]);
+        let stated = (0..2).map(|section| found.after[0].angle_std(section)).fold(0.0, f64::max);
+        println!("simulated, {offset_um} µm off centre: error {after:.4}, stated {stated:.4}");
+        assert!(after < 3.0 * stated, "{after} {stated}");
+        if found.diagnosis.added[0].confounded_with.is_empty() {
+            assert!(after < CLEAN_UM, "{after}");
+        }
+    }
+}
+
+/// What leaves no trace is said, with what it would do: the signs of a section change its form to the negative, 1 µm away from 0.5 µm
+/// rms. A large eccentricity shows them by the exact geometry.
+#[test]
+fn mistakes_without_a_trace_are_said() {
+    let unseen = |config: &SpindleConfig| {
+        let (found, _) = diagnosed(config);
+        assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor, "{:?}", found.diagnosis.added);
+        let blind = found.diagnosis.blind_to.into_iter();
+        let mistakes = ["sensor-sign", "sensors-swapped", "setups-swapped", "rotation-reversed", "part-angle-sign"];
+        blind.filter(|blind| mistakes.contains(&blind.effect.as_str())).collect::<Vec<_>>()
+    };
+    let mut config = campaign(1, "[]");
+    config.form.rms_um = 0.5;
+    (config.motion.x_rms_um, config.motion.y_rms_um, config.motion.tilt_rms_urad) = (0.2, 0.2, 0.3);
+    config.eccentricity.offset_um = 0.2;
+    let said = unseen(&config);
+    println!("simulated, 0.2 µm off centre: {said:?}");
+    let targets: Vec<&[String]> = said.iter().map(|blind| &blind.targets[..]).collect();
+    assert_eq!(targets, [["S1", "S2"], ["S3", "S4"]]);
+    for blind in &said {
+        assert_eq!((blind.effect.as_str(), blind.bias_per_unit.on.as_str()), ("sensor-sign", "form"));
+        assert!((0.6..1.3).contains(&blind.bias_per_unit.value), "{blind:?}");
+    }
+    config.eccentricity.offset_um = 100.0;
+    assert_eq!(unseen(&config), []);
+    // Part and sensors reversed: which setup was which changes the sign of motion.
+    config.eccentricity.offset_um = 0.2;
+    config.rig.setups.truncate(2);
+    (config.rig.setups[1].part_deg, config.rig.setups[1].sensors_deg) = (180.0, 180.0);
+    let said = unseen(&config);
+    println!("simulated, part and sensors reversed: {said:?}");
+    assert!(
+        said.iter().any(|blind| blind.effect == "setups-swapped" && blind.bias_per_unit.on == "motion"),
+        "{said:?}"
+    );
+}
+
+/// Part and sensors were not moved between two setups, or two channels carry one signal.
+#[test]
+fn what_was_recorded_twice_is_named() {
+    let repeated = r#"[{"plugin":"setup-repeated","targets":["b","c"]}]"#;
+    names(&six(1, repeated), &["setup-repeated b c"], &[]);
+    let identical = r#"[{"plugin":"sensors-identical","targets":["S1","S2"]}]"#;
+    names(&six(2, identical), &["sensors-identical S1 S2"], &[]);
+}
+
+/// The same file stored under two names: noise is the same too.
+#[test]
+fn a_recording_stored_twice_is_said_by_run() {
+    let config = six(1, "[]");
+    let rig = config.rig.clone().check().unwrap();
+    let (mut station, _) = averaged(&config, &rig);
+    assert_eq!(warned(&config.rig, &station), Vec::<String>::new());
+    station.profiles[2] = station.profiles[1].clone();
+    station.profiles[2].setup = 2;
+    let warnings = warned(&config.rig, &station);
+    assert!(
+        warnings.iter().any(|warning| warning.contains("setups `b` and `c` hold the same recording")),
+        "{warnings:?}"
+    );
+    let found = looked_into(&config.rig, &station).diagnosis;
+    assert!(found.warnings.iter().any(|warning| warning.contains("hold the same recording")), "{:?}", found.warnings);
+    assert_eq!(found.added.iter().map(name).collect::<Vec<_>>(), ["setup-repeated b c"]);
+}
+
+/// All sensors turned by 0.5° in a setup.
+#[test]
+fn sensors_turned_wrongly_in_a_setup_are_named() {
+    let effect = r#"[{"plugin":"sensors-angle","targets":["b"],"angle_deg":0.5}]"#;
+    for seed in 1..=2 {
+        let (found, [_, after]) = names(&six(seed, effect), &["sensors-angle b"], &[]);
+        let angle = &found.diagnosis.added[0].parameters[0];
+        assert!((angle.value - 0.5).abs() < 5.0 * angle.std.unwrap(), "{angle:?}");
+        assert!(after < CLEAN_UM, "{after}");
+    }
+}
+
+/// Large effects and strangers are no mistakes in the rig file.
+#[test]
+fn nothing_else_is_taken_for_a_mistake() {
+    for effect in [
+        r#"[{"plugin":"sensor-gain","targets":["S1"],"relative_gain":0.3}]"#,
+        r#"[{"plugin":"sensor-angle","targets":["S3"],"angle_deg":5}]"#,
+        r#"[{"plugin":"reversal-angle","targets":["b"],"angle_deg":3}]"#,
+        r#"[{"plugin":"setup-motion-change","targets":["c"],"ratio":0.4}]"#,
+        r#"[{"plugin":"step","targets":["S3"],"setups":["b"],"step_um":5.0,"from_deg":100.0,"to_deg":160.0}]"#,
+        r#"[{"plugin":"dent","targets":["S2"],"depth_um":30.0,"part_angle_deg":80.0,"width_deg":5.0}]"#,
+    ] {
+        for config in [campaign(6, effect), six(7, effect)] {
+            let (found, _) = diagnosed(&config);
+            let mistakes = ["sensor-sign", "sensors-swapped", "setups-swapped", "rotation-reversed", "part-angle-sign"];
+            let copies = ["setup-repeated", "sensors-identical"];
+            let named = |added: &Added| mistakes.iter().chain(&copies).any(|mistake| *mistake == added.effect);
+            assert!(!found.diagnosis.added.iter().any(named), "{effect}: {:?}", found.diagnosis.added);
+        }
+    }
+}
