@@ -127,6 +127,11 @@ pub struct AxialReversal(pub(crate) AxialReversalConfig);
 /// Positions closer than this share of the coarsest spacing are worth a word.
 const FINER: f64 = 0.75;
 
+/// A position or length as warnings say it: to 0.1 µm, without zeros at the end.
+fn said(mm: f64) -> f64 {
+    (mm * 1e4).round() / 1e4
+}
+
 /// Traces of both setups, one after the other.
 pub(crate) struct Traces {
     pub all: Vec<AxialTrace>,
@@ -222,7 +227,9 @@ impl AxialReversal {
             let [first, last] = range;
             let left_out = beyond.join(", ");
             warnings.push(format!(
-                "all traces share z = {first:.4} to {last:.4} mm; points beyond it left out: {left_out}"
+                "all traces share z = {} to {} mm; points beyond it left out: {left_out}",
+                said(first),
+                said(last)
             ));
         }
         let own = |trace: &&AxialTrace| z_mm.iter().all(|at| trace.z_mm.binary_search_by(|z| z.total_cmp(at)).is_ok());
@@ -230,14 +237,17 @@ impl AxialReversal {
             let step = second - first;
             let finer = if step < FINER * coarsest_mm(all) { ", closer than the traces' own" } else { "" };
             let rest = range[1] - end;
-            let rest = if rest > 1e-6 * step { format!("; the last {rest:.4} mm hold none") } else { String::new() };
-            warnings.push(format!("readings are interpolated (cubic) on positions {step:.4} mm apart{finer}{rest}"));
+            let rest =
+                if rest > 1e-6 * step { format!("; the last {} mm hold none", said(rest)) } else { String::new() };
+            warnings
+                .push(format!("readings are interpolated (cubic) on positions {} mm apart{finer}{rest}", said(step)));
         }
         let mean_step = (range[1] - range[0]) / (z_mm.len().max(2) - 1) as f64;
         for trace in all {
             let gaps = trace.gaps(range, mean_step);
             warnings.extend(gaps.into_iter().map(|[from, to]| {
-                format!("trace {} has no points from {from:.4} to {to:.4} mm: it is left out there", trace.id)
+                let (from, to) = (said(from), said(to));
+                format!("trace {} has no points from {from} to {to} mm: it is left out there", trace.id)
             }));
         }
         let flagged = all.iter().filter(|trace| trace.flagged > 0);
