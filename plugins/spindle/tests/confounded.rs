@@ -24,8 +24,8 @@ use runout_spindle::{diagnose::diagnose, effects, layout::Layout, selection::Sel
 /// Orders that are compared: the simulated form's and motion's.
 const BAND: std::ops::RangeInclusive<usize> = 2..=60;
 
-/// RONt of the truth and of the estimate are on different angles: crests between them are missed.
-const BETWEEN_ANGLES_UM: f64 = 0.03;
+/// Angles of the truth's RONt: as many as the estimate's, or more, so that neither misses crests.
+const FINE_ANGLES: usize = 4096;
 
 /// A diagnosis beside the truth.
 struct Judged {
@@ -103,8 +103,7 @@ impl Judged {
         let motion = (0..4).map(|index| compared(after, &[self.motion(index)]).ratio()).fold(0.0, f64::max);
         let moved = self.found.diagnosis.moved.iter().filter(|moved| moved.value == "RONt");
         let ront = moved.zip(&self.truth.form_um).map(|(moved, curve)| {
-            let error = (moved.after - ront_lsci_um(curve)).abs() - BETWEEN_ANGLES_UM;
-            error.max(0.0) / moved.std.unwrap()
+            (moved.after - ront_lsci_um(&fine(curve))).abs() / moved.std.unwrap()
         });
         [form, motion, ront.fold(0.0, f64::max)]
     }
@@ -113,6 +112,14 @@ impl Judged {
         let holds = |added: &&Added| named(added) == name || added.confounded_with.iter().any(|one| one == name);
         self.found.diagnosis.added.iter().find(holds)
     }
+}
+
+/// A curve on more angles.
+fn fine(curve: &[f64]) -> Vec<f64> {
+    let mut fourier = Fourier::new(curve.len());
+    let mut harmonics = vec![Complex64::ZERO; fourier.max_order() + 1];
+    fourier.analyse(curve.iter().copied(), &mut harmonics);
+    Fourier::new(FINE_ANGLES).synthesise(harmonics).to_vec()
 }
 
 /// "effect target".

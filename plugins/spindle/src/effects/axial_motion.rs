@@ -5,6 +5,10 @@ use runout_core::{Complex64, model::diagnosis::Estimated};
 
 use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_amplitude, last_order, parameter};
 
+/// Largest amplitude in µm. Spindles move by micrometres along their axes. Where the form has next to no slope along z, a far
+/// larger motion can reproduce what other effects leave: over millimetres the slope between sections says nothing of it.
+const LARGEST_UM: f64 = 1000.0;
+
 /// Axial error motion of one order.
 pub struct AxialMotion {
     /// Per turn.
@@ -25,6 +29,10 @@ impl SpindleEffect for AxialMotion {
         let products = predicted.modulated(&predicted.along_z, self.order, |_| true);
         // µm of motion along z are 1e-3 mm.
         products.into_iter().map(|product| product.into_iter().map(|value| -1e-3 * value).collect()).collect()
+    }
+
+    fn is_possible(&self, values: &[f64]) -> bool {
+        values.iter().map(|value| value * value).sum::<f64>().sqrt() <= LARGEST_UM
     }
 
     fn last_of_list(&self) -> Option<String> {
