@@ -45,6 +45,8 @@ pub struct Profile {
     pub sample_rate_hz: Option<f64>,
     /// Filters that the signal went through.
     pub responses: Vec<Response>,
+    /// By how much interruptions of the part's surface are bridged beyond what the rig declares, at each end, in rad.
+    pub bridged_beyond_rad: f64,
     /// What the user should know of this capture.
     pub warnings: Vec<String>,
 }

@@ -11,7 +11,7 @@ use runout_spindle::{
 use crate::campaign;
 
 /// Offsets of the clamped part's axis, in µm.
-pub const ECCENTRICITIES_UM: [f64; 3] = [0.0, 8.0, 150.0];
+pub const ECCENTRICITIES_UM: [f64; 6] = [0.0, 8.0, 150.0, 250.0, 400.0, 1000.0];
 /// Form error that every campaign must stay below, in µm rms over orders 2 to 60.
 pub const LIMIT_UM: f64 = 0.009;
 

@@ -128,7 +128,8 @@ pub(super) fn complete(
     let (values, motion_values) = (Vec::new(), Vec::new());
     let Evaluation { evaluate, radius_mm, rig } = evaluation;
     if let Some(rig) = rig {
-        separation.sections.iter_mut().for_each(|section| section.gaps = rig.gaps_of(&section.id));
+        let beyond_rad = profiles.iter().map(|profile| profile.bridged_beyond_rad).fold(0.0, f64::max);
+        separation.sections.iter_mut().for_each(|section| section.gaps = rig.gaps_of(&section.id).widened(beyond_rad));
     }
     let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
     let sections = 0..result.separation.sections.len();

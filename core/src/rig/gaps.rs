@@ -2,6 +2,9 @@
 
 use std::f64::consts::TAU;
 
+/// A stretch is shorter than a circle by more than rounding.
+const ROUNDING_RAD: f64 = 1e-9;
+
 /// Stretches of a circle that are left out: a keyway, a cross hole.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gaps {
@@ -13,6 +16,23 @@ impl Gaps {
     /// Leaves out one stretch more, of a length below 2π.
     pub fn add(&mut self, from_rad: f64, length_rad: f64) {
         self.stretches.push([from_rad.rem_euclid(TAU), length_rad]);
+    }
+
+    /// First angle, 0 to below 2π, and length of each stretch, both in rad.
+    pub fn stretches(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        self.stretches.iter().copied()
+    }
+
+    /// The same, each stretch longer by so much at both ends, and shorter than a circle.
+    #[must_use]
+    pub fn widened(&self, by_rad: f64) -> Self {
+        let mut wider = Self::default();
+        for [from, length] in self.stretches() {
+            let room = (0.5 * (TAU - length) - ROUNDING_RAD).max(0.0);
+            let by_rad = by_rad.clamp(0.0, room);
+            wider.add(from - by_rad, length + 2.0 * by_rad);
+        }
+        wider
     }
 
     /// Whether nothing is left out.
@@ -94,6 +114,16 @@ mod tests {
         }
         assert!(gaps.hold_all(355_f64.to_radians(), 0.2) && !gaps.hold_all(355_f64.to_radians(), 0.3));
         assert!((gaps.coverage(3600) - 340.0 / 360.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn widened_stretches_hold_what_is_beside_them() {
+        let gaps = keyway().widened(1_f64.to_radians());
+        for (angle_deg, inside) in [(348.9, false), (349.1, true), (10.9, true), (11.1, false)] {
+            assert_eq!(gaps.hold(f64::to_radians(angle_deg)), inside, "{angle_deg}°");
+        }
+        assert!(keyway().widened(9.0).longest_rad() < TAU);
+        assert_eq!(keyway().widened(0.0), keyway());
     }
 
     #[test]

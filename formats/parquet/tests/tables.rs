@@ -263,6 +263,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         band_upr: [2, 50],
         lost_orders: vec![LOST],
         weakened_above_upr: None,
+        absent_above_upr: None,
         filter: "Gaussian 50 UPR".into(),
         reference: "MZCI".into(),
         coverage: 0.75,

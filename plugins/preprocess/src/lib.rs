@@ -2,6 +2,7 @@
 
 mod butterworth;
 mod cascade;
+mod interruptions;
 mod low_pass;
 mod synchronous_average;
 mod trim;

@@ -12,6 +12,7 @@ use runout_core::{
         error::Fault,
         registry::{Context, StageConfig},
     },
+    rig::Rig,
     stage::{Conditioner, Preprocessor, preprocessor::sample_rate_hz},
 };
 use schemars::JsonSchema;
@@ -20,6 +21,7 @@ use serde::Deserialize;
 use crate::{
     butterworth::{sections, settling_samples, two_pass_half_power_hz},
     cascade::{Cascade, Direction},
+    interruptions,
 };
 
 /// What the backward pass leaves of what lies beyond the samples it begins at: below rounding, with room for the
@@ -57,14 +59,15 @@ impl StageConfig for LowPassConfig {
     const NAME: &'static str = "low-pass";
     const ABOUT: &'static str = "zero-phase Butterworth low-pass, forward and backward";
 
-    fn check(self, _context: &Context) -> std::result::Result<Preprocessor, Fault> {
+    fn check(self, context: &Context) -> std::result::Result<Preprocessor, Fault> {
         if !(self.cutoff_hz > 0.0 && self.cutoff_hz.is_finite()) {
             return Err(Fault::at("cutoff_hz", format!("expected a frequency above 0 Hz, found {}", self.cutoff_hz)));
         }
         if !(1..=HIGHEST_ORDER).contains(&self.order) {
             return Err(Fault::at("order", format!("expected 1 to {HIGHEST_ORDER}, found {}", self.order)));
         }
-        Ok(Preprocessor::Conditioner(Box::new(LowPass { cutoff_hz: self.cutoff_hz, order: self.order })))
+        let rig = interruptions::interrupted(context.rig);
+        Ok(Preprocessor::Conditioner(Box::new(LowPass { cutoff_hz: self.cutoff_hz, order: self.order, rig })))
     }
 }
 
@@ -73,6 +76,8 @@ impl StageConfig for LowPassConfig {
 pub struct LowPass {
     cutoff_hz: f64,
     order: usize,
+    /// Where the part's surface is interrupted somewhere: readings there are bridged before the filter.
+    rig: Option<Rig>,
 }
 
 impl Conditioner for LowPass {
@@ -103,7 +108,7 @@ impl Conditioner for LowPass {
         let lookahead = settling_samples(&sections, FORGOTTEN);
         let channels = capture.channels();
         Ok(Box::new(LowPassStream {
-            input,
+            input: interruptions::bridged(input, self.rig.as_ref()),
             capture,
             pad: 3 * (self.order + 1),
             lookahead,

@@ -4,8 +4,8 @@
 //! ([`kernel`]), fine enough that nothing the recording can hold folds onto a kept order. Sums over the turns, for their
 //! mean and its covariance across channels ([`slow`]), are accumulated in one pass ([`mean`]) and then transformed. Of the
 //! harmonics, those that `samples_per_rev` equal angles can hold are kept: leaving out the rest is the anti-alias filter.
-//! Some turns are transformed by themselves, for their scatter ([`scatter`]). Where the part's surface is interrupted, each
-//! turn is bridged before ([`bridge`]).
+//! Some turns are transformed by themselves, for their scatter ([`scatter`]). Where the part's surface is interrupted, readings
+//! are bridged before anything is interpolated between them ([`interruptions`]), and each turn once more ([`bridge`]).
 
 mod bridge;
 mod encoder;
@@ -39,7 +39,7 @@ use kernel::{Kernel, PASS_BAND};
 use resample::Resampling;
 use turns::Turn;
 
-use crate::low_pass::significant;
+use crate::{interruptions, low_pass::significant};
 
 /// Averages whole turns, one harmonic at a time, with the covariance across channels.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -95,7 +95,7 @@ impl StageConfig for SynchronousAverageConfig {
         if let Some(sigma) = self.outlier_sigma {
             expect(sigma > 1.0 && sigma.is_finite(), "outlier_sigma", "a factor above 1", &sigma)?;
         }
-        let rig = context.rig.filter(|rig| rig.gaps.iter().any(|gaps| !gaps.is_empty())).cloned();
+        let rig = interruptions::interrupted(context.rig);
         Ok(Preprocessor::Averager(Box::new(SynchronousAverage { config: self, kernel: Kernel::new(), rig })))
     }
 }
@@ -204,7 +204,8 @@ impl Averager for SynchronousAverage {
         fourier::max_order(self.config.samples_per_rev)
     }
 
-    fn average_wanting(&self, mut input: Box<dyn SampleStream + '_>, wanted: Wanted) -> Result<Profile> {
+    fn average_wanting(&self, input: Box<dyn SampleStream + '_>, wanted: Wanted) -> Result<Profile> {
+        let mut input = interruptions::bridged(input, self.rig.as_ref());
         let mut capture = input.capture().clone();
         Self::are_turns(&capture)?;
         let first_turn = capture.first_turn();
@@ -269,6 +270,7 @@ impl Averager for SynchronousAverage {
             speed_rpm,
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,
+            bridged_beyond_rad: outcome.bridged_beyond_rad,
             warnings,
         })
     }

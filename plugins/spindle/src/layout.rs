@@ -1,6 +1,9 @@
 //! The layout of a rig: which combination of form and motion each sensor reads in each setup, one order at a time.
 
-use std::{f64::consts::FRAC_PI_2, sync::Arc};
+use std::{
+    f64::consts::{FRAC_PI_2, TAU},
+    sync::Arc,
+};
 
 pub use runout_core::separation::UM_PER_MM_URAD;
 use runout_core::{
@@ -229,6 +232,19 @@ impl Layout {
         let turns = (reading.part_angle_rad / std::f64::consts::TAU).rem_euclid(1.0);
         let angle = (turns * order as f64).rem_euclid(1.0) * std::f64::consts::TAU;
         Complex64::new(exact_cos(angle), self.direction * exact_cos(angle - FRAC_PI_2))
+    }
+
+    /// The part angle that a sensor's line points at, at one of so many equal angles of the spindle, in rad.
+    #[must_use]
+    pub fn part_angle_rad(&self, reading: &Reading, step: usize, samples: usize) -> f64 {
+        reading.part_angle_rad - self.direction * TAU * step as f64 / samples as f64
+    }
+
+    /// A form's coefficient of e^{+inα} from the unknown, or the unknown from it: where the part turns clockwise, one is the
+    /// conjugate of the other.
+    #[must_use]
+    pub fn of_part(&self, form: Complex64) -> Complex64 {
+        if self.direction < 0.0 { form.conj() } else { form }
     }
 
     /// Aₙ, `[reading][unknown]`.

@@ -54,8 +54,11 @@ pub fn add_areal(
         Label::new(symbol, unit, format!("ISO 25178-2:2021, {clause}"), "LSCY removed, mean")
     };
     let lost: BTreeSet<usize> = sections.iter().flat_map(Section::lost_orders).collect();
+    let highest = max_order(surface.angles);
+    let orders = sections.iter().map(|section| section.orders.len().saturating_sub(1));
     let held = Held {
-        highest: max_order(surface.angles),
+        highest,
+        all_to: orders.fold(highest, usize::min),
         lost: lost.into_iter().collect(),
         half_power_upr: sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min),
     };

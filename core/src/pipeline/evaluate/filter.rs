@@ -2,11 +2,14 @@
 
 use crate::{
     Complex64,
-    numerics::filter::{Band, upr},
+    numerics::filter::{Band, transmission, upr},
 };
 
 /// Orders of which a filter passes less do not matter.
 const MATTERS: f64 = 0.01;
+/// A filter reaches above the highest order where it passes this much of the next one or more: how high the orders above
+/// are, nothing says, and they are many. 2^−(f/f_c)² is below it from 3.157 f_c on.
+const REACHES: f64 = 1e-3;
 
 /// A Gaussian filter (ISO 16610-21) by order.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,9 +50,16 @@ impl Filter {
         [low.min(high), high]
     }
 
-    /// Whether half of an order above this one would pass it. What lets everything pass asks for nothing.
-    pub fn asks_for_more_than(&self, order: f64) -> bool {
-        self.band.below_upr.is_some_and(|cutoff| cutoff > order)
+    /// Whether a hundredth or more passes of an order of which something before has taken half of the power, 29 % of the
+    /// amplitude. What lets everything pass asks for nothing.
+    pub fn asks_for_more_than(&self, half_power_upr: f64) -> bool {
+        self.band.below_upr.is_some_and(|cutoff| transmission(half_power_upr, cutoff) >= MATTERS)
+    }
+
+    /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there are.
+    pub fn reaches_above(&self, order: usize) -> bool {
+        let passed = |cutoff| transmission((order + 1) as f64, cutoff);
+        self.band.below_upr.is_some_and(|cutoff| passed(cutoff) >= REACHES)
     }
 
     /// The highest order that it passes, of those up to `highest`.
@@ -90,6 +100,9 @@ mod tests {
         assert_eq!((filter.band_upr(255), filter.band_upr(40)), ([2, 50], [2, 40]));
         // 2^-(129/50)² is 0.0099.
         assert_eq!(filter.lost(&[4, 128, 129]), [4, 128]);
+        // 2^-(158/50)² is 0.00099, and of order 157 more than a thousandth passes.
+        assert!(filter.reaches_above(156) && !filter.reaches_above(157) && !filter.reaches_above(255));
+        assert!(Filter::low_pass(Some(500.0)).reaches_above(1577) && !Filter::low_pass(None).reaches_above(2));
     }
 
     #[test]

@@ -66,6 +66,9 @@ pub struct LimitValue {
     pub reference: String,
     /// Its filter.
     pub filter: String,
+    /// Undulations per revolution that it is of, both ends included: what is said of a value without filter is said of these.
+    #[serde(default)]
+    pub band_upr: [usize; 2],
     /// The number.
     pub value: f64,
     /// Where the truth lies with 95 % probability; null where that is not known.
@@ -185,6 +188,7 @@ impl Limit {
             section: placed.section.map(str::to_owned),
             reference: value.reference.clone(),
             filter: value.filter.clone(),
+            band_upr: value.band_upr,
             value: value.value,
             interval_95,
             within: value.value >= low && value.value <= high,
@@ -199,6 +203,11 @@ fn missing(value: &Value) -> Option<String> {
     if let [first, others @ ..] = &value.lost_orders[..] {
         let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
         return Some(format!("order {first}{more} of its band cannot be told"));
+    }
+    if let Some(order) = value.absent_above_upr {
+        return Some(format!(
+            "its filter passes more than a thousandth above order {order}, the highest that there is"
+        ));
     }
     let above = value.weakened_above_upr?;
     Some(format!("of its band, a low-pass has weakened what is above {above:.1} undulations"))

@@ -73,6 +73,8 @@ const POINTS_A_WAVE: usize = 16;
 struct Held {
     /// Highest order.
     highest: usize,
+    /// Highest order that every part of it has.
+    all_to: usize,
     /// Orders that the layout cannot tell.
     lost: Vec<usize>,
     /// Order of which filters before the average pass half.
@@ -101,6 +103,7 @@ fn labelled(
 ) -> Vec<Value> {
     let lost_orders = filter.lost(&held.lost);
     let weakened_above_upr = held.half_power_upr.filter(|half| filter.asks_for_more_than(*half));
+    let absent_above_upr = Some(held.all_to).filter(|order| filter.reaches_above(*order));
     let known = labels.into_iter().zip(found).filter(|(_, (value, _))| value.is_finite());
     known
         .map(|(label, (value, uncertainty))| Value {
@@ -111,6 +114,7 @@ fn labelled(
             band_upr: filter.band_upr(held.highest_passed()),
             lost_orders: lost_orders.clone(),
             weakened_above_upr,
+            absent_above_upr,
             filter: filter.name.clone(),
             reference: label.reference,
             coverage,

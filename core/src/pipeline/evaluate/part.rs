@@ -105,11 +105,12 @@ impl Wall {
     fn of(sections: &[&surface::Section], count: usize, radius_mm: f64, placed: bool) -> Self {
         let (lowest, fitting) = (if placed { 0 } else { 2 }, max_order(count) + 1);
         let mut lost = BTreeSet::new();
-        let mut highest = 0;
+        let (mut highest, mut all_to) = (0, usize::MAX);
         let rings = sections.iter().map(|section| {
             let orders = || section.orders.iter().take(fitting).enumerate();
             lost.extend(section.lost_orders().filter(|order| *order < fitting));
-            highest = highest.max(orders().count().saturating_sub(1));
+            let own = orders().count().saturating_sub(1);
+            (highest, all_to) = (highest.max(own), all_to.min(own));
             let known = || orders().map(|(order, known)| known.filter(|_| order >= lowest));
             Ring {
                 z_mm: section.z_mm,
@@ -120,9 +121,9 @@ impl Wall {
                 seed: seed(&[&section.station, &section.id]),
             }
         });
-        let rings = rings.collect();
+        let rings: Vec<Ring> = rings.collect();
         let half_power_upr = sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min);
-        let held = Held { highest, lost: lost.into_iter().collect(), half_power_upr };
+        let held = Held { highest, all_to: all_to.min(highest), lost: lost.into_iter().collect(), half_power_upr };
         Self { angles: Angles::equal(count), count, radius_mm, placed, rings, held }
     }
 

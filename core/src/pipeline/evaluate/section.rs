@@ -76,6 +76,7 @@ impl Form {
         let at = separation.sections.get(section)?.clone();
         let held = Held {
             highest: separation.max_order(),
+            all_to: separation.max_order(),
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
             half_power_upr: result.half_power_upr(),
         };

@@ -301,6 +301,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
         band_upr: [2, 50],
         lost_orders: Vec::new(),
         weakened_above_upr: None,
+        absent_above_upr: None,
         filter: "none".into(),
         reference: reference.into(),
         coverage: 1.0,
@@ -366,7 +367,7 @@ fn nothing_is_proven_of_a_value_that_lacks_orders() {
     let evaluate = evaluate("references = ['LSCI']").unwrap();
     let limit: Limit = toml::from_str("symbol = 'RONt'\nunit = 'um'\nupper = 9.0").unwrap();
     let decided = |lost: &[usize], half_power_hz: Option<f64>| {
-        let mut result = station(0.0, &[lobes(3, 2.0)], 60, 1e-6, lost);
+        let mut result = station(0.0, &[lobes(3, 2.0)], 160, 1e-6, lost);
         result.profiles = half_power_hz.into_iter().map(weakened).collect();
         let values = section_values(&result, 0, &evaluate, RADIUS_MM);
         let placed = values.iter().map(|value| PlacedValue { station: None, section: None, z_mm: None, value });
@@ -376,9 +377,71 @@ fn nothing_is_proven_of_a_value_that_lacks_orders() {
     let of = |none, filtered| vec![("none".to_owned(), none), ("Gaussian 50 UPR".to_owned(), filtered)];
     assert_eq!(decided(&[], None), of(Decision::Conforms, Decision::Conforms));
     assert_eq!(decided(&[20], None), of(Decision::Undecided, Decision::Undecided));
-    // At 600 rpm 400 Hz are order 40: less than the Gaussian asks for. What is unfiltered says which band it has.
+    // At 600 rpm 400 Hz are order 40, and 800 Hz order 80, of which the Gaussian passes 17 %; of order 150 it passes 0.2 %. What
+    // is unfiltered says which band it has.
     assert_eq!(decided(&[], Some(400.0)), of(Decision::Conforms, Decision::Undecided));
-    assert_eq!(decided(&[], Some(800.0)), of(Decision::Conforms, Decision::Conforms));
+    assert_eq!(decided(&[], Some(800.0)), of(Decision::Conforms, Decision::Undecided));
+    assert_eq!(decided(&[], Some(1500.0)), of(Decision::Conforms, Decision::Conforms));
+}
+
+/// A form with a wave of order 300 and 3.6 µm in a band to 500 UPR, recorded with orders to 255: nothing of that band is proven.
+#[test]
+fn nothing_is_proven_of_a_filter_that_reaches_above_the_orders() {
+    let of = |limit: &str, text: &str, waves: &[(usize, Complex64)], highest: usize| {
+        let limit: Limit = toml::from_str(limit).unwrap();
+        let values = section_values(&station(0.0, waves, highest, 1e-8, &[]), 0, &evaluate(text).unwrap(), RADIUS_MM);
+        let placed = values.iter().map(|value| PlacedValue { station: None, section: None, z_mm: None, value });
+        let (found, _) = decide(std::slice::from_ref(&limit), &placed.collect::<Vec<_>>());
+        let one = found[0].values.first().unwrap().clone();
+        (one.decision, one.band_upr, one.missing)
+    };
+    let ront = |cutoff: u32, waves: &[(usize, Complex64)], highest: usize| {
+        let limit = format!("symbol = 'RONt'\nunit = 'um'\nupper = 1.5\nfilter = 'Gaussian {cutoff} UPR'");
+        of(&limit, &format!("references = ['LSCI']\nfilter_upr = [{cutoff}]"), waves, highest)
+    };
+    let lobe = [lobes(3, 0.22), lobes(300, 2.3)];
+    let (decision, band, missing) = ront(500, &lobe[..1], 255);
+    assert_eq!((decision, band), (Decision::Undecided, [2, 255]));
+    assert!(missing.unwrap().contains("above order 255"));
+    assert_eq!(ront(500, &lobe, 2047), (Decision::DoesNotConform, [2, 500], None));
+    // 255 orders hold all of 50 UPR; 127 of them let 1.1 % of the next one go, and 157 less than 0.1 %.
+    assert_eq!(ront(50, &lobe[..1], 255), (Decision::Conforms, [2, 50], None));
+    assert_eq!(ront(50, &lobe[..1], 127).0, Decision::Undecided);
+    assert_eq!(ront(50, &lobe[..1], 157).0, Decision::Conforms);
+    // Unfiltered it is a value of the orders that there are.
+    let unfiltered = "symbol = 'RONt'\nunit = 'um'\nupper = 1.5\nfilter = 'none'";
+    assert_eq!(of(unfiltered, "references = ['LSCI']", &lobe[..1], 255), (Decision::Conforms, [2, 255], None));
+    // λs of 0.8 mm on 188 mm are 236 undulations; of 2.5 mm 75.
+    for (lambda_s, decision) in [(0.8, Decision::Undecided), (2.5, Decision::Conforms)] {
+        let text = format!("values = ['texture']\nlambda_c_mm = 8\nlambda_s_mm = {lambda_s}");
+        let rz = "symbol = 'Rz'\nunit = 'um'\nupper = 1.5";
+        assert_eq!(of(rz, &text, &[lobes(60, 0.2)], 255).0, decision, "{lambda_s}");
+    }
+}
+
+/// What one section does not have is in no value of the wall, and a surface has no more orders than its angles hold.
+#[test]
+fn a_wall_and_a_surface_say_what_their_filter_asks_for_and_they_do_not_have() {
+    let wall = |highest: [usize; 2]| {
+        let rings = [station(0.0, &[lobes(3, 1.0)], highest[0], 1e-6, &[]), station(5.0, &[], highest[1], 1e-6, &[])];
+        let found = part(&rings, false, "references = ['LSCI']");
+        find(&found.values, "CYLt", "LSCY of centred sections", "Gaussian 50 UPR").absent_above_upr
+    };
+    assert_eq!([wall([170, 170]), wall([170, 60])], [None, Some(60)]);
+    let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 64, step_mm: None });
+    for z in 0..3 {
+        builder.add(&station(5.0 * f64::from(z), &[lobes(3, 1.0)], 100, 1e-6, &[]));
+    }
+    let (surface, uncertain) = builder.build(RADIUS_MM).unwrap();
+    for (lambda_s, absent) in [(8.0, Some(31)), (40.0, None)] {
+        let mut part = PartSummary::default();
+        let text = format!("values = ['areal']\nlambda_c_mm = 90\nlambda_s_mm = {lambda_s}");
+        add_areal(&mut part, &surface, &uncertain, 2, &evaluate(&text).unwrap()).unwrap();
+        assert!(
+            !part.values.is_empty() && part.values.iter().all(|value| value.absent_above_upr == absent),
+            "{lambda_s}"
+        );
+    }
 }
 
 /// The average behind a low-pass.

@@ -19,9 +19,10 @@ pub(super) struct Bridges {
 }
 
 impl Bridges {
-    /// Without a rig, no surface is interrupted. `length` equal angles make a turn.
-    pub fn new(rig: Option<&Rig>, capture: &Capture, length: usize) -> Self {
-        let bridge = |sensor: &usize| Bridge::new(rig?.gaps_seen(capture.setup, *sensor), length);
+    /// Without a rig, no surface is interrupted. `length` equal angles make a turn; interruptions are wider by so much at
+    /// each end.
+    pub fn new(rig: Option<&Rig>, capture: &Capture, length: usize, beyond_rad: f64) -> Self {
+        let bridge = |sensor: &usize| Bridge::new(rig?.gaps_seen(capture.setup, *sensor).widened(beyond_rad), length);
         Self { length, channels: capture.sensors.iter().map(bridge).collect() }
     }
 
@@ -32,6 +33,11 @@ impl Bridges {
                 bridge.cross(values);
             }
         }
+    }
+
+    /// Whether anything is bridged.
+    pub fn any(&self) -> bool {
+        self.channels.iter().any(Option::is_some)
     }
 
     /// What bridging does not know, where anything is bridged.

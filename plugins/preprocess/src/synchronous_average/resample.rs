@@ -1,6 +1,6 @@
 //! From samples to the harmonics of each turn, block by block.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, f64::consts::TAU};
 
 use runout_core::{
     Complex64,
@@ -24,6 +24,7 @@ use super::{
     turns::{ROUNDING, Turn},
     window::{CONTINUED, Window},
 };
+use crate::interruptions::GUARD;
 
 /// What the samples of a capture gave.
 pub(super) struct Outcome {
@@ -41,6 +42,8 @@ pub(super) struct Outcome {
     pub rejected: Vec<RejectedTurn>,
     /// What is not known where readings are bridged.
     pub bridged: Option<String>,
+    /// By how much interruptions are wider at each end than the rig declares.
+    pub bridged_beyond_rad: f64,
     /// All positions lay on samples: nothing was interpolated.
     pub exact: bool,
 }
@@ -59,6 +62,8 @@ pub(super) struct Resampling<'a> {
     counted: Vec<f64>,
     /// Where channels look into an interruption of the surface.
     bridges: Bridges,
+    /// By how much these are wider at each end than the rig declares.
+    beyond_rad: f64,
     analysis: Analysis,
     /// One turn's harmonics, `[channel][order]`.
     harmonics: Vec<Complex64>,
@@ -76,7 +81,10 @@ impl<'a> Resampling<'a> {
     pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>, wanted: Wanted) -> Self {
         let config = &average.config;
         let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
-        let angles = angles(&turns, config.samples_per_rev, capture.encoder);
+        let (angles, on_samples) = angles(&turns, config.samples_per_rev, capture.encoder);
+        // The samples that are bridged with the interruption, and what is interpolated between one of them and the next.
+        let beyond = GUARD + usize::from(!on_samples);
+        let beyond_rad = capture.median_turn_samples().map_or(0.0, |turn| TAU * beyond as f64 / turn);
         let (size, planned) = (Size { channels, angles, orders }, turns.len());
         let motion = wanted.projection.and_then(|wanted| Motion::new(wanted, &capture.sensors, angles));
         Self {
@@ -88,7 +96,8 @@ impl<'a> Resampling<'a> {
             positions: Vec::with_capacity(angles),
             angles,
             counted: (0..angles).map(|angle| angle as f64).collect(),
-            bridges: Bridges::new(average.rig.as_ref(), capture, angles),
+            bridges: Bridges::new(average.rig.as_ref(), capture, angles, beyond_rad),
+            beyond_rad,
             analysis: Analysis::new(angles, orders),
             harmonics: vec![Complex64::ZERO; orders * channels],
             means: Means::new(size, planned, wanted.hold_out, motion.as_ref().map(Motion::spread)),
@@ -154,6 +163,7 @@ impl<'a> Resampling<'a> {
             spread: self.means.spread(),
             used_samples: self.used_samples,
             rejected: self.rejected,
+            bridged_beyond_rad: if self.bridges.any() { self.beyond_rad } else { 0.0 },
             bridged: self.bridges.warning(),
             exact: self.exact,
         }
@@ -250,18 +260,18 @@ fn behind(turn: &Turn) -> usize {
     (turn.end.ceil() as usize).saturating_add(CONTINUED + REACH + 1).max(2 * CONTINUED + 1)
 }
 
-/// Equal angles on which turns are interpolated.
+/// Equal angles on which turns are interpolated, and whether they are the samples themselves.
 ///
 /// Where every turn is the same whole number of samples and begins at a sample, the samples themselves. Otherwise about as
 /// many as a turn has samples: neighbouring angles then lie alike between the samples around them, which interpolation is
 /// quick for. And enough that the highest order that a turn's samples can hold, half of them, folds to above the highest
 /// order that is kept.
-fn angles(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> usize {
+fn angles(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> (usize, bool) {
     let longest = turns.iter().map(Turn::samples).fold(0.0, f64::max);
     if let Some(length) = on_sample(longest).filter(|length| *length > 0) {
         let whole = |turn: &Turn| on_sample(turn.start).is_some() && on_sample(turn.samples()) == Some(length);
         if turns.iter().all(whole) {
-            return length;
+            return (length, true);
         }
     }
     // Within a turn the encoder tells of faster and slower stretches: where it is slow, samples lie closer.
@@ -269,7 +279,8 @@ fn angles(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> usize {
     let needed = (0.5 * densest) as usize + max_order(samples_per_rev).min(orders_held(densest)) + 1;
     let fewest = needed.max(longest as usize).next_multiple_of(2);
     // Within a thousandth for the sake of a transform's good length.
-    (fewest..=fewest + fewest / 1000).step_by(2).find(|length| is_smooth(*length)).unwrap_or(fewest)
+    let smooth = (fewest..=fewest + fewest / 1000).step_by(2).find(|length| is_smooth(*length));
+    (smooth.unwrap_or(fewest), false)
 }
 
 /// Whether 2, 3 and 5 are its only prime factors, which transforms are quick for.

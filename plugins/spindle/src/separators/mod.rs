@@ -5,6 +5,7 @@ pub mod closed_form;
 pub mod donaldson_reversal;
 pub mod four_sensor_reversal;
 pub mod harmonic_least_squares;
+mod joint;
 pub(crate) mod leak;
 pub mod multi_step;
 mod one_direction;

@@ -15,7 +15,7 @@ use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
 pub(crate) const OVERSAMPLING: usize = 4;
 /// Points of the Lagrange interpolation: at fourfold oversampling, orders up to a quarter of the samples a turn are
 /// interpolated to 1e-6 of their amplitude.
-const POINTS: usize = 8;
+pub(super) const POINTS: usize = 8;
 /// The shift asin(t/ρ) changes by less than 1e-9 of itself after two rounds: ρ varies by 1e-3 at most.
 const ROUNDS: usize = 2;
 
@@ -26,6 +26,8 @@ pub struct SecondOrder<'a> {
     turn: Fourier,
     fine: Fourier,
     table: Vec<Vec<f64>>,
+    /// Part angles where lines meet the profile, rad, `[reading][angle]`.
+    met_rad: Vec<f64>,
 }
 
 impl<'a> SecondOrder<'a> {
@@ -36,7 +38,13 @@ impl<'a> SecondOrder<'a> {
             turn: Fourier::new(samples_per_rev),
             fine: Fourier::new(samples_per_rev * OVERSAMPLING),
             table: Vec::new(),
+            met_rad: Vec::new(),
         }
+    }
+
+    /// Part angles where lines meet the profile at the last estimate, in rad, `[reading][angle]`.
+    pub fn met_rad(&self) -> &[f64] {
+        &self.met_rad
     }
 
     /// Writes the excess over the linear readings, coefficients of e^{−inΦ}, to `excess` (`[order][reading]`).
@@ -49,6 +57,7 @@ impl<'a> SecondOrder<'a> {
         let mut motions = Vec::new();
         let mut harmonics = vec![Complex64::ZERO; max_order + 1];
         let mut curve = vec![0.0; samples];
+        self.met_rad.clear();
         for (index, reading) in layout.readings.iter().enumerate() {
             if motions.get(reading.setup).is_none() {
                 motions.push(self.motion(estimate, reading.setup, max_order));
@@ -59,17 +68,18 @@ impl<'a> SecondOrder<'a> {
             let lever = reading.lever_mm * UM_PER_MM_URAD;
             let table = &self.table[reading.section];
             for (step, value) in curve.iter_mut().enumerate() {
-                let turned = layout.direction * TAU * step as f64 / samples as f64;
-                let part_angle = reading.part_angle_rad - turned;
+                let part_angle = layout.part_angle_rad(reading, step, samples);
                 // The eccentricity Re C e^{iα} is along the sensor's line; a quarter turn on, it is across.
                 let ahead = eccentricity * Complex64::from_polar(1.0, part_angle);
                 let across_motion = cosine * (y[step] - lever * tilt_x[step]) - sine * (x[step] + lever * tilt_y[step]);
                 let across = reading.motion_ratio * across_motion - ahead.im;
                 let here = interpolate(table, part_angle);
-                let mut there = here;
+                let (mut there, mut met) = (here, part_angle);
                 for _ in 0..ROUNDS {
-                    there = interpolate(table, part_angle - (across / (self.radius_um + there)).asin());
+                    met = part_angle - (across / (self.radius_um + there)).asin();
+                    there = interpolate(table, met);
                 }
+                self.met_rad.push(met);
                 let radius = self.radius_um + there;
                 let sagitta = across * across / (radius + (radius * radius - across * across).sqrt());
                 *value = there - here - sagitta;
@@ -93,9 +103,7 @@ impl<'a> SecondOrder<'a> {
             };
             let forms = (0..=max_order)
                 .map(|order| if order < 2 { Complex64::ZERO } else { estimate.likely_form(order, unknown) });
-            // The unknown of a clockwise part is the conjugate: see `Layout`.
-            let forms = forms.map(|form| if layout.direction < 0.0 { form.conj() } else { form });
-            self.table.push(self.fine.synthesise(forms).to_vec());
+            self.table.push(self.fine.synthesise(forms.map(|form| layout.of_part(form))).to_vec());
         }
     }
 
@@ -135,21 +143,25 @@ impl Estimate {
 
 /// Lagrange interpolation in a periodic table.
 pub(crate) fn interpolate(table: &[f64], angle_rad: f64) -> f64 {
-    let position = (angle_rad / TAU).rem_euclid(1.0) * table.len() as f64;
+    let (first, weights) = weights_at(table.len(), angle_rad);
+    weights.iter().enumerate().map(|(point, weight)| weight * table[(first + point) % table.len()]).sum()
+}
+
+/// The first of the points of a periodic table that an angle lies between, which may be beyond its end, and the weights of
+/// all of them.
+pub(super) fn weights_at(length: usize, angle_rad: f64) -> (usize, [f64; POINTS]) {
+    let position = (angle_rad / TAU).rem_euclid(1.0) * length as f64;
     let base = position.floor();
     let offset = position - base;
-    let first = base as usize + table.len() - (POINTS / 2 - 1);
-    let mut sum = 0.0;
-    for (point, weight) in LAGRANGE_WEIGHTS.iter().enumerate() {
-        let mut product = *weight;
+    let mut weights = LAGRANGE_WEIGHTS;
+    for (point, weight) in weights.iter_mut().enumerate() {
         for other in 0..POINTS {
             if other != point {
-                product *= offset + (POINTS / 2 - 1) as f64 - other as f64;
+                *weight *= offset + (POINTS / 2 - 1) as f64 - other as f64;
             }
         }
-        sum += product * table[(first + point) % table.len()];
     }
-    sum
+    (base as usize + length - (POINTS / 2 - 1), weights)
 }
 
 /// 1/Π(i − j) of eight equally spaced points.

@@ -1,7 +1,7 @@
 //! From operators to a separation: solve, add second-order geometry, propagate covariance, look at the residual.
 
 use runout_core::{
-    Complex64, Result,
+    Complex64, Error, Result,
     profile::Profile,
     separation::{Quantity, Residual, SectionAt, Sensitivity, Separation},
     stage::Station,
@@ -9,6 +9,7 @@ use runout_core::{
 
 use super::{
     algebra::apply,
+    joint::Joint,
     leak,
     operators::{Operators, OrderOperator},
     propagation::Propagation,
@@ -29,6 +30,15 @@ const BESIDE: usize = 3;
 const CARRIED: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e5];
 /// Passes end when the readings move less than this, rms.
 const SETTLED_UM: f64 = 1e-9;
+/// Orders one by one are given up when they still move more than this after all passes.
+const APART_UM: f64 = 1e-6;
+/// The highest order times eccentricity over radius, n·e/R, from which on orders may be solved together: half of it is the share
+/// of form that goes to either side.
+const COUPLED: f64 = 0.2;
+/// Passes of all orders together, at most.
+const JOINT_PASSES: usize = 10;
+/// No result is given of a solution that still moves more than this, rms.
+const UNSETTLED_UM: f64 = 5e-4;
 
 /// The unknowns at all orders, motion at the sensors' mean z.
 #[derive(Debug, Clone)]
@@ -41,6 +51,8 @@ pub struct Estimate {
     told: Vec<bool>,
     /// What form may be at lost orders, likewise; empty where none is lost.
     likely: Vec<Complex64>,
+    /// How far the last pass has moved the readings, rms.
+    pub moved_um: f64,
 }
 
 impl Estimate {
@@ -79,6 +91,9 @@ impl Solver<'_> {
         }
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
+        if self.couples(&readings) && !(estimate.moved_um <= UNSETTLED_UM) {
+            return Err(self.unsettled(station, &readings, &estimate));
+        }
         let mut warnings = wiring::copies(&self.selection.rig, &readings);
         let propagation = Propagation::of(&readings, &operators);
         let residual = residual(&operators, &readings, &linear, propagation.as_ref());
@@ -93,11 +108,23 @@ impl Solver<'_> {
         Ok(separation)
     }
 
+    /// Where exact geometry does not settle.
+    fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
+        let eccentricity_um = eccentricity_um(readings);
+        let problem = format!(
+            "an eccentricity of {eccentricity_um:.0} µm on a radius of {} mm couples the orders so strongly that no solution settles: the              last pass still moves the readings by {:.2e} µm rms",
+            self.selection.rig.part_radius_mm, estimate.moved_um
+        );
+        let help =
+            "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the order";
+        Error::new("separate", format!("station {}", station.name), problem).help(help)
+    }
+
     /// What a large eccentricity carries into orders that are told, of what is not: a surface that goes sideways by e turns
     /// under the sensor by e/R, and order n is then seen by n·e/R of its amplitude one order lower and higher.
     fn carried(&self, readings: &Readings, separation: &Separation) -> Option<String> {
         let width = separation.unknowns.len();
-        let eccentricity_um = readings.order(1).iter().map(|reading| reading.norm()).fold(0.0, f64::max);
+        let eccentricity_um = eccentricity_um(readings);
         let share = eccentricity_um / (1e3 * self.selection.rig.part_radius_mm);
         let sees = |wanted| self.layout.unknowns.contains(&wanted);
         // What lost orders carry is in the readings' uncertainty.
@@ -141,13 +168,15 @@ impl Solver<'_> {
             .second_order
             .then(|| SecondOrder::new(self.layout, self.selection.rig.part_radius_mm, readings.samples_per_rev));
         let mut excess = vec![Complex64::ZERO; readings.mean.len()];
+        let rms = |squares: f64| (0.5 * squares / readings.count as f64).sqrt();
+        let coupled = self.couples(readings);
         for _ in 0..MAX_PASSES {
             match &mut geometry {
                 Some(geometry) => geometry.excess(&estimate, &mut excess),
                 None => excess.fill(Complex64::ZERO),
             }
             beyond(&estimate, &mut excess);
-            let mut moved = 0.0;
+            let (mut moved, before) = (0.0, estimate.moved_um);
             for ((linear, reading), excess) in linear.iter_mut().zip(&readings.mean).zip(&excess) {
                 let corrected = reading - excess;
                 moved += (corrected - *linear).norm_sqr();
@@ -157,7 +186,60 @@ impl Solver<'_> {
                 break;
             }
             estimate = self.estimate(operators, &linear, readings.max_order);
-            if (0.5 * moved / readings.count as f64).sqrt() < SETTLED_UM {
+            estimate.moved_um = rms(moved);
+            let grows = coupled && before > 0.0 && estimate.moved_um > before;
+            if estimate.moved_um < SETTLED_UM || (grows && estimate.moved_um > APART_UM) {
+                break;
+            }
+        }
+        match geometry {
+            Some(geometry) if coupled && !(estimate.moved_um <= APART_UM) => {
+                self.together(readings, operators, geometry, beyond)
+            }
+            _ => (estimate, linear),
+        }
+    }
+
+    /// Whether the eccentricity takes the highest order to the orders beside it by so much that they do not settle one by one.
+    fn couples(&self, readings: &Readings) -> bool {
+        let share = eccentricity_um(readings) / (1e3 * self.selection.rig.part_radius_mm);
+        self.second_order && share * readings.max_order as f64 > COUPLED
+    }
+
+    /// The same, of all orders together.
+    fn together(
+        &self,
+        readings: &Readings,
+        operators: &Operators,
+        mut geometry: SecondOrder,
+        mut beyond: impl FnMut(&Estimate, &mut [Complex64]),
+    ) -> (Estimate, Vec<Complex64>) {
+        let count = readings.count;
+        // Readings of which each order's own solution is the estimate.
+        let mut own = readings.mean.clone();
+        let mut linear = own.clone();
+        let mut estimate = self.estimate(operators, &own, readings.max_order);
+        let mut excess = vec![Complex64::ZERO; own.len()];
+        for _ in 0..JOINT_PASSES {
+            geometry.excess(&estimate, &mut excess);
+            let mut joint = Joint::new(self.layout, operators, readings.samples_per_rev, geometry.met_rad());
+            beyond(&estimate, &mut excess);
+            linear.iter_mut().zip(&readings.mean).zip(&excess).for_each(|((linear, reading), excess)| {
+                *linear = reading - excess;
+            });
+            let mut left = linear.clone();
+            left[..count].fill(Complex64::ZERO);
+            for (index, (order, system)) in operators.orders.iter().zip(&operators.systems).enumerate() {
+                let row = (index + 1) * count..(index + 2) * count;
+                let fitted = apply(&system.matrix, &apply(&order.operator, &own[row.clone()]));
+                left[row].iter_mut().zip(fitted).for_each(|(left, fitted)| *left -= fitted);
+            }
+            let change = joint.solve(&left);
+            own.iter_mut().zip(&change).for_each(|(own, change)| *own += change);
+            estimate = self.estimate(operators, &own, readings.max_order);
+            let moved = change.iter().map(Complex64::norm_sqr).sum::<f64>();
+            estimate.moved_um = (0.5 * moved / count as f64).sqrt();
+            if estimate.moved_um < APART_UM {
                 break;
             }
         }
@@ -206,7 +288,7 @@ impl Solver<'_> {
             }
         }
         let likely = self.likely_forms(&values, &told, readings, max_order);
-        Estimate { width, first, values, told, likely }
+        Estimate { width, first, values, told, likely, moved_um: 0.0 }
     }
 
     /// Form at lost orders: what the section's readings have in common, less the share that motion has at the orders beside it.
@@ -358,6 +440,11 @@ impl Solver<'_> {
         let width = self.layout.unknowns.len();
         (0..width).flat_map(|unknown| columns.iter().map(move |column| column[unknown])).collect()
     }
+}
+
+/// The largest reading of order 1: the largest eccentricity, but for motion.
+fn eccentricity_um(readings: &Readings) -> f64 {
+    readings.order(1).iter().map(|reading| reading.norm()).fold(0.0, f64::max)
 }
 
 /// What the solution leaves of linear readings, `[order][reading]`, and what noise lets expect of that.
