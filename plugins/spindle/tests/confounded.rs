@@ -102,9 +102,9 @@ impl Judged {
         let form = self.forms().into_iter().map(|form| compared(after, &[form]).ratio()).fold(0.0, f64::max);
         let motion = (0..4).map(|index| compared(after, &[self.motion(index)]).ratio()).fold(0.0, f64::max);
         let moved = self.found.diagnosis.moved.iter().filter(|moved| moved.value == "RONt");
-        let ront = moved.zip(&self.truth.form_um).map(|(moved, curve)| {
-            (moved.after - ront_lsci_um(&fine(curve))).abs() / moved.std.unwrap()
-        });
+        let ront = moved
+            .zip(&self.truth.form_um)
+            .map(|(moved, curve)| (moved.after - ront_lsci_um(&fine(curve))).abs() / moved.std.unwrap());
         [form, motion, ront.fold(0.0, f64::max)]
     }
 
