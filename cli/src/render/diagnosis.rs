@@ -32,7 +32,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     };
     page.line(headline);
     for set in undecided(&diagnosis.added) {
-        page.line(format_args!("Not decided: {set}. The ± of form and motion include each of them"));
+        page.line(format_args!("Not decided: {set}. The stated ± include each of them"));
     }
     // A residual without degrees of freedom is 0 whatever the data are.
     if diagnosis.after.degrees_of_freedom > 0 && !diagnosis.nothing_separated {

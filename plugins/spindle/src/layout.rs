@@ -229,8 +229,8 @@ impl Layout {
     #[must_use]
     pub fn part_phase(&self, reading: &Reading, order: usize) -> Complex64 {
         // The angle is reduced before it is multiplied by a large order.
-        let turns = (reading.part_angle_rad / std::f64::consts::TAU).rem_euclid(1.0);
-        let angle = (turns * order as f64).rem_euclid(1.0) * std::f64::consts::TAU;
+        let turns = fraction(reading.part_angle_rad / TAU);
+        let angle = fraction(turns * order as f64) * TAU;
         Complex64::new(exact_cos(angle), self.direction * exact_cos(angle - FRAC_PI_2))
     }
 
@@ -480,4 +480,9 @@ impl ToReference {
 fn exact_cos(angle_rad: f64) -> f64 {
     let cosine = angle_rad.cos();
     if cosine.abs() < 1e-15 { 0.0 } else { cosine }
+}
+
+/// What of a number of turns is beyond whole ones.
+fn fraction(turns: f64) -> f64 {
+    turns - turns.floor()
 }
