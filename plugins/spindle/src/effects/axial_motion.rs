@@ -6,8 +6,8 @@ use runout_core::{Complex64, model::diagnosis::Estimated};
 use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_amplitude, last_order, parameter};
 
 /// Largest amplitude in µm. Spindles move by micrometres along their axes. Where the form has next to no slope along z, a far
-/// larger motion can reproduce what other effects leave: over millimetres the slope between sections says nothing of it.
-const LARGEST_UM: f64 = 1000.0;
+/// larger motion can reproduce what other effects leave.
+const LARGEST_UM: f64 = 200.0;
 
 /// Axial error motion of one order.
 pub struct AxialMotion {
