@@ -11,3 +11,4 @@ pub mod plot;
 pub mod scaling;
 pub mod straightness;
 pub mod surface;
+pub mod values;

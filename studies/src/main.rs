@@ -11,11 +11,13 @@ use runout_studies::{
     coverage, eccentricity,
     minimum_zone_cylinder::{self, Wall},
     monte_carlo, scaling, straightness, surface as unrolled,
+    values::{self, Spectrum},
 };
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
+       runout-studies value-coverage [CAMPAIGNS]   the same of every value of the standards, two rigs and two spectra
        runout-studies blind [CAMPAIGNS [SEED [FILE [LAYOUT]]]]   what the closed loop says of campaigns that it knows
                                              nothing of; LAYOUT is four, six or reversed
        runout-studies blind-campaign INDEX [SEED [LAYOUT]]   one of them in full
@@ -36,6 +38,10 @@ fn main() -> ExitCode {
         }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
+        ["value-coverage"] => value_coverage(300),
+        ["value-coverage", campaigns] if campaigns.parse::<u64>().is_ok() => {
+            value_coverage(campaigns.parse().unwrap_or_default())
+        }
         ["blind", ref rest @ ..] if rest.len() <= 4 && sizes(rest, [240, 1]).is_some() => {
             let [campaigns, seed] = sizes(rest, [240, 1]).unwrap_or_default();
             layout(rest.get(3)).and_then(|only| blind(campaigns, seed, rest.get(2).copied(), only))
@@ -94,6 +100,17 @@ fn coverage(campaigns: u64) -> Result<()> {
     for setting in coverage::Setting::ALL {
         println!("{campaigns} campaigns, simulated: {}\n", setting.name());
         println!("{}", coverage::table(&coverage::rows(&setting.campaigns(0, campaigns))?));
+    }
+    Ok(())
+}
+
+fn value_coverage(campaigns: u64) -> Result<()> {
+    let folder = tempfile::tempdir().map_err(|error| Error::new("make", "a folder for recordings", error))?;
+    for rig in values::RIGS {
+        for spectrum in Spectrum::ALL {
+            println!("{campaigns} campaigns, simulated: {}; {}\n", rig.name(), spectrum.name());
+            println!("{}", values::table(&values::rows(rig, spectrum, campaigns, folder.path())?));
+        }
     }
     Ok(())
 }

@@ -207,14 +207,20 @@ impl Layout {
     /// What one reading sees of a unit of an unknown, at an order.
     #[must_use]
     pub fn coefficient(&self, reading: &Reading, quantity: Quantity, order: usize) -> Complex64 {
+        match quantity {
+            Quantity::Form(section) if section == reading.section => self.part_phase(reading, order),
+            Quantity::Form(_) => Complex64::ZERO,
+            motion => self.motion_sign(reading.setup, order) * Complex64::from(Self::seen(reading, motion)),
+        }
+    }
+
+    /// What one reading sees of a unit of motion, 0 of form.
+    fn seen(reading: &Reading, quantity: Quantity) -> f64 {
         // Both sines come from the same function, so that sensors at right angles are exactly so.
         let (cosine, sine) = (|| exact_cos(reading.angle_rad), || exact_cos(reading.angle_rad - FRAC_PI_2));
         let lever = reading.lever_mm * UM_PER_MM_URAD;
         let motion = match quantity {
-            Quantity::Form(section) if section == reading.section => {
-                return self.part_phase(reading, order);
-            }
-            Quantity::Form(_) => return Complex64::ZERO,
+            Quantity::Form(_) => return 0.0,
             Quantity::X => cosine(),
             Quantity::Y => sine(),
             Quantity::TiltX => -lever * sine(),
@@ -222,7 +228,7 @@ impl Layout {
             Quantity::Along(azimuth) => exact_cos(reading.angle_rad - azimuth.radians()),
             Quantity::TiltAlong(azimuth) => lever * exact_cos(reading.angle_rad - azimuth.radians()),
         };
-        Complex64::from(self.motion_sign(reading.setup, order) * reading.motion_ratio * motion)
+        reading.motion_ratio * motion
     }
 
     /// e^{±in(θ'−β)}, + where the part turns counter-clockwise.
@@ -250,8 +256,27 @@ impl Layout {
     /// Aₙ, `[reading][unknown]`.
     #[must_use]
     pub fn matrix(&self, order: usize) -> Vec<Complex64> {
-        let row = |reading| self.unknowns.iter().map(move |unknown| self.coefficient(reading, *unknown, order));
+        self.matrix_with(&self.motions(), order)
+    }
+
+    /// What the readings see of motion, which is the same at every order but for its sign, `[reading][unknown]`.
+    pub(crate) fn motions(&self) -> Vec<f64> {
+        let row = |reading| self.unknowns.iter().map(move |unknown| Self::seen(reading, *unknown));
         self.readings.iter().flat_map(row).collect()
+    }
+
+    /// Aₙ, `[reading][unknown]`, from [`motions`](Self::motions).
+    pub(crate) fn matrix_with(&self, motions: &[f64], order: usize) -> Vec<Complex64> {
+        let rows = self.readings.iter().zip(motions.chunks(self.unknowns.len().max(1)));
+        let row = |(reading, motions): (&Reading, &[f64])| -> Vec<Complex64> {
+            let sign = self.motion_sign(reading.setup, order);
+            let entry = |(unknown, motion): (&Quantity, &f64)| match unknown {
+                Quantity::Form(_) => self.coefficient(reading, *unknown, order),
+                _ => Complex64::from(sign * motion),
+            };
+            self.unknowns.iter().zip(motions).map(entry).collect()
+        };
+        rows.flat_map(row).collect()
     }
 
     /// The unknowns at order 1.
@@ -349,6 +374,11 @@ impl Layout {
     #[must_use]
     pub fn observable(&self, order: usize) -> Vec<bool> {
         self.told(&self.factor(order), order)
+    }
+
+    /// [`observable`](Self::observable) with an order's matrix.
+    pub(crate) fn observable_with(&self, matrix: &[Complex64], order: usize) -> Vec<bool> {
+        self.told(&self.factor_matrix(self.unknowns.len(), matrix), order)
     }
 
     fn told(&self, qr: &PivotedQr, order: usize) -> Vec<bool> {

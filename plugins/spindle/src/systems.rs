@@ -33,13 +33,16 @@ impl Clone for Systems {
 impl Systems {
     /// The equations of the orders from 1 to `max_order`.
     pub(crate) fn up_to(&self, layout: &Layout, max_order: usize) -> Vec<Arc<System>> {
+        let motions = layout.motions();
         let work_out = |order: usize| {
+            let matrix = layout.matrix_with(&motions, order);
+            let observable = layout.observable_with(&matrix, order);
             let (columns, matrix) = if order == 1 {
                 (layout.first_order_unknowns().len(), layout.first_order_matrix())
             } else {
-                (layout.unknowns.len(), layout.matrix(order))
+                (layout.unknowns.len(), matrix)
             };
-            Arc::new(System { columns, matrix, observable: layout.observable(order) })
+            Arc::new(System { columns, matrix, observable })
         };
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         while known.len() < max_order.min(KEPT) {

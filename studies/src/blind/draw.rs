@@ -65,7 +65,8 @@ impl Layout {
         }
     }
 
-    fn config(self) -> RigConfig {
+    /// As a rig.
+    pub(crate) fn config(self) -> RigConfig {
         match self {
             Self::Four => campaign::four_sensors(&[(0.0, 0.0), (99.844, 0.0), (202.5, 0.0)]),
             Self::Reversed => campaign::four_sensors(&[(0.0, 0.0), (180.0, 180.0)]),

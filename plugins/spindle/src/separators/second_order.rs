@@ -167,10 +167,12 @@ fn weighted(table: &[f64], first: usize, weights: &[f64; POINTS]) -> f64 {
 /// The first of the points of a periodic table that an angle lies between, which may be beyond its end, and the weights of
 /// all of them.
 pub(super) fn weights_at(length: usize, angle_rad: f64) -> (usize, [f64; POINTS]) {
+    // Casts truncate; without SSE4.1 `floor` is a call, and this is the innermost loop.
     let turns = angle_rad / TAU;
-    let position = (turns - turns.floor()) * length as f64;
-    let base = position.floor();
-    let from_first = position - base + (POINTS / 2 - 1) as f64;
+    let beyond_whole = turns - (turns as i64) as f64;
+    let position = (if beyond_whole < 0.0 { beyond_whole + 1.0 } else { beyond_whole }) * length as f64;
+    let base = position as usize;
+    let from_first = position - base as f64 + (POINTS / 2 - 1) as f64;
     // Each weight has the product of the distances to all points before and after its own.
     let mut weights = LAGRANGE_WEIGHTS;
     let mut before = 1.0;
@@ -183,7 +185,7 @@ pub(super) fn weights_at(length: usize, angle_rad: f64) -> (usize, [f64; POINTS]
         *weight *= after;
         after *= from_first - point as f64;
     }
-    (base as usize + length - (POINTS / 2 - 1), weights)
+    (base + length - (POINTS / 2 - 1), weights)
 }
 
 /// asin(x). Below 0.02 the series up to x⁷ leaves out less than 1e-16 of x.
