@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use runout_core::evaluate::{
-    areal::{HeightMap, Settings, areal},
+    areal::{HeightMap, MaterialRatio, Settings, areal},
     texture,
 };
 use serde::Deserialize;
@@ -47,8 +47,10 @@ fn areal_values_are_those_of_surfalize_where_it_defines_them_alike() {
             // The lag where the autocorrelation passes 0.2: it takes the nearest of 1000 points on rays to whole
             // points, runout the crossing of the grid's lines.
             ("Sal" | "Str", _) => (golden.areal[symbol], 0.02),
-            // Forward differences there, over seven points here: see below.
-            ("Sdq", _) => continue,
+            // Its Sxp takes the ratios that its Sdc has here.
+            ("Sxp", _) => (golden.as_many_classes_as_points["Sdc"], 1e-9),
+            // It has none of the first; forward differences there, over seven points here: see below.
+            ("Sda" | "Sha" | "Sdv" | "Shv" | "Sdq", _) => continue,
             // Areas under the curve end there at the nearest point, here on it.
             ("Spk" | "Svk" | "Vmp" | "Vmc" | "Vvc" | "Vvv", Some(theirs)) => (*theirs, 5e-3),
             (_, Some(theirs)) => (*theirs, 1e-9),
@@ -59,6 +61,20 @@ fn areal_values_are_those_of_surfalize_where_it_defines_them_alike() {
         };
         println!("{symbol:6} {:14.8} {theirs:14.8} {:10.2e}", one.value, one.value / theirs - 1.0);
         assert_near(symbol, one.value, theirs, share);
+    }
+}
+
+/// surfalize 0.19.2, `AbbottFirestoneCurve(surface, nbins=8640).mr(c)` and `.mc(p)` of the same map, whose heights it does not
+/// refer to their mean.
+#[test]
+fn the_material_ratio_curve_is_that_of_surfalize() {
+    let curve = MaterialRatio::of(&Golden::read().map());
+    for (height_um, percent) in [(-0.3, 96.304_962_5), (-0.1, 77.951_041_5), (0.2, 26.012_357_3), (0.35, 8.899_756_9)] {
+        // Its curve begins half a class further.
+        assert_near("Smr(c)", curve.smr_percent(height_um), percent, 2e-4);
+    }
+    for (percent, height_um) in [(2.5, 0.502_431_75), (10.0, 0.335_753), (50.0, 0.064_64), (80.0, -0.114_912)] {
+        assert_near("Smc(p)", curve.smc_um(percent), height_um, 1e-5);
     }
 }
 
@@ -95,8 +111,8 @@ fn profile_values_are_those_of_surfalize() {
     assert_eq!(found.sections, 5);
     for one in found.parameters() {
         match one.symbol {
-            // It has no Rsm, and takes Rdq by forward differences.
-            "Rsm" => (),
+            // It takes Rdq by forward differences, and has no others.
+            symbol if symbol != "Rdq" && !golden.profile.contains_key(symbol) => (),
             // Where a whole section lies above the mean line, it adds the lowest point's distance; runout takes it off, so
             // that Rz = Rp + Rv.
             "Rv" => {

@@ -2,6 +2,7 @@
 
 pub mod areal;
 pub mod cylindricity;
+pub mod drawn;
 pub mod error_motion;
 mod near;
 pub mod parameter;
@@ -10,6 +11,7 @@ pub mod reference;
 pub mod roundness;
 pub mod straightness;
 pub mod texture;
+pub mod twist;
 pub mod uncertainty;
 
 use schemars::JsonSchema;
@@ -46,4 +48,7 @@ pub struct Value {
     pub coverage: f64,
     /// From the covariance of the separation; null where none is known.
     pub uncertainty: Option<uncertainty::Uncertainty>,
+    /// Why no uncertainty is stated, where the errors are known and intervals by them do not hold; null otherwise.
+    #[serde(default)]
+    pub no_uncertainty: Option<String>,
 }

@@ -101,16 +101,26 @@ impl Errors {
         self.largest_um
     }
 
+    /// Harmonics of the next errors, independent of all before, by order from 0.
+    fn harmonics(&mut self) -> Vec<Complex64> {
+        let mut part = |amplitude: f64| -> f64 {
+            let normal: f64 = StandardNormal.sample(&mut self.random);
+            amplitude * normal
+        };
+        self.amplitudes.iter().map(|amplitude| Complex64::new(part(*amplitude), part(*amplitude))).collect()
+    }
+
+    /// Fills `errors_um` with the next errors on the equal angles that `fourier` has, independent of all before.
+    pub fn fresh(&mut self, fourier: &mut Fourier, errors_um: &mut [f64]) {
+        let harmonics = self.harmonics();
+        errors_um.iter_mut().zip(fourier.synthesise(harmonics)).for_each(|(target, error)| *target = *error);
+    }
+
     /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
     pub fn draw(&mut self, fourier: &mut Fourier, form_um: &[f64], drawn: &mut Vec<f64>) {
         let length = fourier.length();
         if self.turn == 0 {
-            let mut part = |amplitude: f64| -> f64 {
-                let normal: f64 = StandardNormal.sample(&mut self.random);
-                amplitude * normal
-            };
-            let harmonics: Vec<Complex64> =
-                self.amplitudes.iter().map(|amplitude| Complex64::new(part(*amplitude), part(*amplitude))).collect();
+            let harmonics = self.harmonics();
             self.drawn_um.clear();
             self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
             self.largest_um = self.drawn_um.iter().fold(0.0, |largest, error| error.abs().max(largest));

@@ -77,6 +77,14 @@ impl<'a> HeightMap<'a> {
         HeightMap { heights_um: heights_um.into(), ..*self }
     }
 
+    /// The map without so many rows at each end; with all of them where fewer than two would be left.
+    #[must_use]
+    pub fn without_ends(&self, rows: usize) -> HeightMap<'static> {
+        let rows = if self.rows() >= 2 * rows + 2 { rows } else { 0 };
+        let kept = &self.heights_um[rows * self.columns..self.heights_um.len() - rows * self.columns];
+        HeightMap { heights_um: kept.to_vec().into(), ..*self }
+    }
+
     /// Heights in µm, `[row][column]`.
     #[must_use]
     pub fn heights_um(&self) -> &[f64] {

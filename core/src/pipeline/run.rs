@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use super::{
     config::{Pipeline, Route, summary_path},
-    evaluate::{Evaluate, Group, add_areal, decide, part_summary, steepest_um_per_deg},
+    evaluate::{Evaluate, Group, add_areal, add_generatrices, decide, part_summary, steepest_um_per_deg},
     line::{Line, separate},
     outdated,
     overlap::write_behind,
@@ -169,8 +169,9 @@ impl Gathering {
         let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(info)).collect();
         let tested = matches!(&pipeline.route, Route::Points { separator } if separator.needs_surface());
         let evaluate = pipeline.evaluate.clone();
-        let needed = exporters.iter().any(|exporter| exporter.needs_surface()) || evaluate.has(Group::Areal);
-        let surface = match (needed, tested) {
+        let needed =
+            exporters.iter().any(|exporter| exporter.needs_surface()) || (evaluate.needs_surface() && !evaluate.all);
+        let surface = match (needed, tested || evaluate.all) {
             (true, _) => SurfaceUse::Needed,
             (false, true) => SurfaceUse::WhereThere,
             (false, false) => SurfaceUse::Unused,
@@ -205,7 +206,7 @@ impl Gathering {
     pub(super) fn build_surface(&mut self, radius_mm: f64) -> Result<Option<Surface>> {
         let Some(builder) = self.sections.take() else { return Ok(None) };
         let evaluate = &self.evaluate;
-        if evaluate.has(Group::Cylindricity) || evaluate.has(Group::Areal) {
+        if evaluate.has(Group::Cylindricity) || evaluate.needs_surface() {
             self.summary.part = part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
         }
         match self.surface {
@@ -214,10 +215,10 @@ impl Gathering {
             SurfaceUse::WhereThere | SurfaceUse::Needed => {}
         }
         let (surface, uncertain) = builder.build(radius_mm)?;
-        if evaluate.has(Group::Areal) {
+        if evaluate.needs_surface() {
             let part = self.summary.part.get_or_insert_with(PartSummary::default);
-            let lowest = if self.placed { 0 } else { 2 };
-            add_areal(part, &surface, &uncertain, lowest, evaluate)?;
+            add_generatrices(part, &uncertain, radius_mm, self.placed, evaluate);
+            add_areal(part, &surface, &uncertain, if self.placed { 0 } else { 2 }, evaluate)?;
         }
         self.summary.surface = Some(SurfaceSummary {
             angles: surface.angles,

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     Complex64, Error, Result,
-    evaluate::uncertainty::Errors,
+    evaluate::{drawn::remove_noise, uncertainty::Errors},
     numerics::fourier::{Fourier, max_order},
     pipeline::run::StationResult,
     rig::Gaps,
@@ -162,23 +162,62 @@ impl Uncertain {
         &self.sections
     }
 
-    /// Draws: each fills a surface's deviations. Orders below `lowest` are taken as exact. `None` where a ring's errors are
-    /// not known.
-    pub(crate) fn draws(&self, lowest: usize, seed: u64) -> Option<impl FnMut(&mut Surface) + '_> {
+    /// Measured rings: places in mm, ascending.
+    pub(crate) fn z_mm(&self) -> &[f64] {
+        &self.rings.z_mm
+    }
+
+    /// Harmonics of each measured ring by order from 0, with the power that their errors add taken out where `without_noise`;
+    /// errors of orders below `lowest` are taken as none.
+    pub(crate) fn harmonics(&self, lowest: usize, without_noise: bool) -> Vec<Vec<Complex64>> {
+        let angles = self.rings.angles;
+        let mut fourier = Fourier::new(angles);
+        let rings = self.rings.deviation_um.chunks(angles).map(|ring| {
+            let mut harmonics = vec![Complex64::ZERO; max_order(angles) + 1];
+            fourier.analyse(ring.iter().copied(), &mut harmonics);
+            harmonics
+        });
+        let mut harmonics: Vec<Vec<Complex64>> = rings.collect();
+        if without_noise {
+            remove_noise(&mut harmonics, &self.variance, lowest);
+        }
+        harmonics
+    }
+
+    /// The measured rings one after the other, without the power that their errors add.
+    pub(crate) fn without_noise(&self, lowest: usize) -> Vec<f64> {
+        let mut fourier = Fourier::new(self.rings.angles);
+        let rings = self.harmonics(lowest, true);
+        rings.into_iter().flat_map(|harmonics| fourier.synthesise(harmonics).to_vec()).collect()
+    }
+
+    /// Standard deviation of each measured ring's errors at any one angle, in µm; NaN where nothing is known.
+    pub(crate) fn std_um(&self, lowest: usize) -> Vec<f64> {
+        let std = |variance: &Vec<f64>| Errors::new(variance, lowest, 0).map_or(f64::NAN, |errors| errors.std_um());
+        self.variance.iter().map(std).collect()
+    }
+
+    /// Errors of all measured rings, one after the other, independent from call to call. Orders below `lowest` are taken as
+    /// exact. `None` where a ring's errors are not known.
+    pub(crate) fn errors(&self, lowest: usize, seed: u64) -> Option<impl FnMut(&mut [f64]) + '_> {
         let each = self.variance.iter().zip(0..);
         let errors: Option<Vec<Errors>> =
             each.map(|(variance, ring)| Errors::new(variance, lowest, seed.wrapping_add(ring))).collect();
         let mut errors = errors?;
         let angles = self.rings.angles;
-        let (mut fourier, mut ring) = (Fourier::new(angles), Vec::new());
-        Some(move |surface: &mut Surface| {
-            let mut drawn = Rings { angles, z_mm: self.rings.z_mm.clone(), deviation_um: Vec::new() };
-            for (errors, form_um) in errors.iter_mut().zip(self.rings.deviation_um.chunks(angles)) {
-                errors.draw(&mut fourier, form_um, &mut ring);
-                drawn.deviation_um.extend_from_slice(&ring);
+        let mut fourier = Fourier::new(angles);
+        Some(move |rings_um: &mut [f64]| {
+            for (errors, ring) in errors.iter_mut().zip(rings_um.chunks_mut(angles)) {
+                errors.fresh(&mut fourier, ring);
             }
-            surface.deviation_um = drawn.laid(self.step_mm).deviation_um;
         })
+    }
+
+    /// A surface's deviations from those of its measured rings.
+    pub(crate) fn laid(&self, rings_um: &[f64]) -> Vec<f64> {
+        let Rings { angles, z_mm, .. } = &self.rings;
+        let rings = Rings { angles: *angles, z_mm: z_mm.clone(), deviation_um: rings_um.to_vec() };
+        rings.laid(self.step_mm).deviation_um
     }
 }
 

@@ -50,6 +50,11 @@ pub fn schema() -> Schema {
         uncertain("low_95", "lower end of the 95 % interval"),
         uncertain("high_95", "upper end of the 95 % interval"),
         column("draws", DataType::UInt32, true, "", "draws of the Monte Carlo; null without uncertainty"),
+        text(
+            "no_uncertainty",
+            true,
+            "why no uncertainty is stated; null where one is, or where the errors are not known",
+        ),
     ])
 }
 
@@ -89,6 +94,7 @@ pub fn rows(summary: &Summary) -> Vec<ArrayRef> {
                 .map(|row| row.value.uncertainty.as_ref().map(|uncertainty| whole(uncertainty.draws)))
                 .collect::<UInt32Array>(),
         ),
+        Arc::new(rows.iter().map(|row| row.value.no_uncertainty.as_deref()).collect::<StringArray>()),
     ]
 }
 

@@ -27,6 +27,14 @@ pub struct Features {
     pub s5v: f64,
     /// S5p + S5v, in µm.
     pub s10z: f64,
+    /// Mean area of the dales, in mm²: of a dale, all that runs down to its pit.
+    pub sda_mm2: f64,
+    /// Mean area of the hills, in mm².
+    pub sha_mm2: f64,
+    /// Mean volume of the dales, in mm³: of a dale, what it holds up to the lowest saddle on its border.
+    pub sdv_mm3: f64,
+    /// Mean volume of the hills, in mm³: of a hill, what is above the highest saddle on its border.
+    pub shv_mm3: f64,
 }
 
 impl Features {
@@ -39,6 +47,12 @@ impl Features {
             depths.sort_unstable_by(|a, b| b.total_cmp(a));
             mean(depths.into_iter().take(FIVE))
         });
+        let cell_mm2 = centred.dx_mm() * centred.dy_mm();
+        let [sda_mm2, sha_mm2] =
+            [&dales, &hills].map(|found| mean(found.iter().map(|one| one.points as f64 * cell_mm2)));
+        // µm·mm² to mm³.
+        let [sdv_mm3, shv_mm3] =
+            [&dales, &hills].map(|found| mean(found.iter().map(|one| 1e-3 * cell_mm2 * one.below_saddle)));
         let [svc_per_mm, spc_per_mm] = [(&dales, -1.0), (&hills, 1.0)]
             .map(|(found, sign)| sign * mean(found.iter().filter_map(|one| one.curvature)));
         Self {
@@ -51,8 +65,29 @@ impl Features {
             s5p,
             s5v,
             s10z: s5p + s5v,
+            sda_mm2,
+            sha_mm2,
+            sdv_mm3,
+            shv_mm3,
         }
     }
+
+    /// Where nothing was looked for.
+    pub(super) const NONE: Self = Self {
+        hills: 0,
+        dales: 0,
+        spd_per_mm2: f64::NAN,
+        svd_per_mm2: f64::NAN,
+        spc_per_mm: f64::NAN,
+        svc_per_mm: f64::NAN,
+        s5p: f64::NAN,
+        s5v: f64::NAN,
+        s10z: f64::NAN,
+        sda_mm2: f64::NAN,
+        sha_mm2: f64::NAN,
+        sdv_mm3: f64::NAN,
+        shv_mm3: f64::NAN,
+    };
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -65,6 +100,10 @@ struct Extreme {
     depth: f64,
     /// Bluntness of the pit, positive; `None` beside an edge.
     curvature: Option<f64>,
+    /// Points of the dale.
+    points: usize,
+    /// Sum of the depths of its points below the lowest saddle on its border.
+    below_saddle: f64,
 }
 
 /// Heights with a frame of one point, so that every point has eight neighbours: at the open sides, and in gaps, a wall;
@@ -201,18 +240,36 @@ impl<'a> Relief<'a> {
         let depths: Vec<f64> = pits.iter().map(|pit| self.heights[*pit]).collect();
         // Parts that are connected below the water; and what of them is one dale. A root is the label of the lowest pit.
         let (mut parts, mut dales) = (Sets::new(pits.len()), Sets::new(pits.len()));
-        for (height, a, b) in saddles {
-            let (a, b) = (a as usize, b as usize);
+        for (height, a, b) in &saddles {
+            let (a, b) = (*a as usize, *b as usize);
             let Some((_, shallow)) = parts.join(a, b, &depths) else { continue };
-            if height - depths[shallow] < pruning
+            if *height - depths[shallow] < pruning
                 && let Some((deep, shallow)) = dales.join(a, b, &depths)
             {
                 edge[deep] |= edge[shallow];
             }
         }
-        (1..pits.len())
-            .filter(|label| dales.root(*label) == *label && !edge[*label])
-            .map(|label| Extreme { depth: depths[label], curvature: self.curvature(pits[label]) })
+        let roots: Vec<usize> = (0..pits.len()).map(|label| dales.root(label)).collect();
+        let mut lowest = vec![f64::INFINITY; pits.len()];
+        for (height, a, b) in saddles {
+            let [a, b] = [a, b].map(|label| roots[label as usize]);
+            if a != b {
+                (lowest[a], lowest[b]) = (lowest[a].min(height), lowest[b].min(height));
+            }
+        }
+        let mut held = vec![(0_usize, 0.0); pits.len()];
+        for point in self.rows().flatten().filter(|point| labels[*point] != 0) {
+            let root = roots[labels[point] as usize];
+            let depth = lowest[root] - self.heights[point];
+            held[root].0 += 1;
+            held[root].1 += depth.max(0.0);
+        }
+        let significant = (1..pits.len()).filter(|label| roots[*label] == *label && !edge[*label]);
+        significant
+            .map(|label| {
+                let (points, below_saddle) = held[label];
+                Extreme { depth: depths[label], curvature: self.curvature(pits[label]), points, below_saddle }
+            })
             .collect()
     }
 

@@ -30,6 +30,44 @@ pub fn without_cylinder(map: &HeightMap) -> Result<HeightMap<'static>> {
     }))
 }
 
+/// A closed map without the least-squares line along the axis: mean radius and taper. It is what a plane is of a wall, which
+/// cannot slope around.
+///
+/// # Errors
+/// Of a map that is not closed.
+pub fn without_taper(map: &HeightMap) -> Result<HeightMap<'static>> {
+    if !map.closed() {
+        let problem = "only a map that goes all the way round has one";
+        return Err(Error::new("remove", "the taper", problem).help("remove a polynomial of degree 1 instead"));
+    }
+    Ok(without(map, 2, |row, _, terms| terms.copy_from_slice(&[1.0, middled(row, map.rows())])))
+}
+
+/// A closed map without the least-squares body whose radius and centre are polynomials of a degree along the axis: 1, cos θ
+/// and sin θ times powers of z. Degree 1 is a cone with a tilted axis, degree 2 a barrel with a bent one.
+///
+/// # Errors
+/// Above degree 8, and of a map that is not closed.
+pub fn without_turned_body(map: &HeightMap, degree: usize) -> Result<HeightMap<'static>> {
+    let failure = |problem: String| Err(Error::new("remove", "the form", problem));
+    if degree > HIGHEST_DEGREE {
+        return failure(format!("its degree is {degree}; {HIGHEST_DEGREE} is the highest"));
+    }
+    if !map.closed() {
+        return failure("only a map that goes all the way round is a turned body".into());
+    }
+    let angles: Vec<(f64, f64)> = (0..map.columns())
+        .map(|column| (std::f64::consts::TAU * column as f64 / map.columns() as f64).sin_cos())
+        .collect();
+    let along: Vec<[f64; HIGHEST_DEGREE + 1]> = (0..map.rows()).map(|row| legendre(middled(row, map.rows()))).collect();
+    Ok(without(map, 3 * (degree + 1), |row, column, terms| {
+        let (sine, cosine) = angles[column];
+        for (terms, power) in terms.as_chunks_mut::<3>().0.iter_mut().zip(&along[row]) {
+            *terms = [1.0, cosine, sine].map(|term| term * power);
+        }
+    }))
+}
+
 /// A map without the least-squares polynomial in x and y of a total degree (0 the mean, 1 a plane).
 ///
 /// # Errors

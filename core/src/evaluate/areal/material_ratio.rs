@@ -4,6 +4,8 @@ use super::HeightMap;
 
 /// Width of the core's secant, as a share of the material ratio (ISO 25178-2, annex B).
 const SECANT: f64 = 0.4;
+/// Material ratios of Sxp (ISO 25178-3).
+const EXTREME_PERCENT: [f64; 2] = [2.5, 50.0];
 
 /// The material ratio curve: all measured heights from the highest down, at equal steps of the material ratio from 0 to
 /// 100 %, with straight lines in between. No classes are formed.
@@ -16,8 +18,10 @@ pub struct MaterialRatio {
 /// Values of the material ratio curve. Heights in µm, volumes in µm³/µm² (which is ml/m²).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Functional {
-    /// Difference of the heights at two material ratios; Sxp at 2.5 % and 50 %.
+    /// Difference of the heights at two material ratios.
     pub sdc: f64,
+    /// Peak extreme height: the same at 2.5 % and 50 %.
+    pub sxp: f64,
     /// Core height.
     pub sk: f64,
     /// Reduced peak height.
@@ -46,11 +50,45 @@ pub struct Functional {
     pub vvv: f64,
 }
 
+impl Functional {
+    /// Where no curve was made.
+    pub(super) const NONE: Self = Self {
+        sdc: f64::NAN,
+        sxp: f64::NAN,
+        sk: f64::NAN,
+        spk: f64::NAN,
+        svk: f64::NAN,
+        spkx: f64::NAN,
+        svkx: f64::NAN,
+        smrk1_percent: f64::NAN,
+        smrk2_percent: f64::NAN,
+        sak1: f64::NAN,
+        sak2: f64::NAN,
+        vmp: f64::NAN,
+        vmc: f64::NAN,
+        vvc: f64::NAN,
+        vvv: f64::NAN,
+    };
+}
+
 impl MaterialRatio {
     /// Of the points measured, with heights as they are in the map.
     #[must_use]
     pub fn of(map: &HeightMap) -> Self {
-        let mut heights: Vec<f64> = map.heights_um().iter().copied().filter(|height| height.is_finite()).collect();
+        Self::of_heights(map.heights_um().iter().copied().filter(|height| height.is_finite()))
+    }
+
+    /// Of the points measured, with heights above their mean.
+    #[must_use]
+    pub fn about_mean(map: &HeightMap) -> Self {
+        let centred = super::height::centred(map.heights_um());
+        Self::of_heights(centred.into_iter().filter(|height| height.is_finite()))
+    }
+
+    /// Of heights in µm in any order, all of which are finite.
+    #[must_use]
+    pub fn of_heights(heights_um: impl Iterator<Item = f64>) -> Self {
+        let mut heights: Vec<f64> = heights_um.collect();
         heights.sort_unstable_by(|a, b| b.total_cmp(a));
         Self { heights }
     }
@@ -153,6 +191,7 @@ impl MaterialRatio {
         let [p, q] = volume_percent;
         Functional {
             sdc: self.smc_um(difference_percent[0]) - self.smc_um(difference_percent[1]),
+            sxp: self.smc_um(EXTREME_PERCENT[0]) - self.smc_um(EXTREME_PERCENT[1]),
             sk: upper - lower,
             spk: reduced(hills, smrk1),
             svk: reduced(dales, 100.0 - smrk2),

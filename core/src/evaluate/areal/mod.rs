@@ -12,7 +12,7 @@ mod material_ratio;
 mod spatial;
 
 pub use features::Features;
-pub use form::{without_cylinder, without_polynomial};
+pub use form::{without_cylinder, without_polynomial, without_taper, without_turned_body};
 pub use height::Height;
 pub use hybrid::Hybrid;
 pub(super) use hybrid::derivative;
@@ -29,7 +29,7 @@ pub struct Settings {
     pub decay: f64,
     /// Wolf pruning of hills and dales, in % of Sz; ISO 25178-3: 5.
     pub pruning_percent: f64,
-    /// Material ratios p and q of Sdc and Sxp, in %; ISO 25178-3 for Sxp: 2.5 and 50.
+    /// Material ratios p and q of Sdc, in %.
     pub difference_percent: [f64; 2],
     /// Material ratios of the volumes Vmp, Vmc, Vvc, Vvv, in %; ISO 25178-3: 10 and 80.
     pub volume_percent: [f64; 2],
@@ -42,7 +42,7 @@ impl Default for Settings {
 }
 
 /// Symbol, unit and clause of every value, in the order of [`Areal::parameters`].
-pub const PARAMETERS: [(&str, &str, &str); 34] = [
+pub const PARAMETERS: [(&str, &str, &str); 39] = [
     ("Sq", "µm", "4.2.2"),
     ("Ssk", "", "4.2.3"),
     ("Sku", "", "4.2.4"),
@@ -57,6 +57,7 @@ pub const PARAMETERS: [(&str, &str, &str); 34] = [
     ("Sdq", "", "4.4.2"),
     ("Sdr", "%", "4.4.3"),
     ("Sdc", "µm", "4.5.3"),
+    ("Sxp", "µm", "peak extreme height"),
     ("Sk", "µm", "4.5.4"),
     ("Spk", "µm", "4.5.4"),
     ("Svk", "µm", "4.5.4"),
@@ -77,6 +78,10 @@ pub const PARAMETERS: [(&str, &str, &str); 34] = [
     ("S5p", "µm", "5.8.6"),
     ("S5v", "µm", "5.8.7"),
     ("S10z", "µm", "5.8.8"),
+    ("Sda", "mm²", "5.8"),
+    ("Sha", "mm²", "5.8"),
+    ("Sdv", "mm³", "5.8"),
+    ("Shv", "mm³", "5.8"),
 ];
 
 /// All values of one surface.
@@ -103,17 +108,31 @@ pub struct Areal {
 #[must_use]
 pub fn areal(map: &HeightMap, settings: &Settings) -> Areal {
     let centred = map.with(height::centred(map.heights_um()));
-    let height = Height::of(&centred);
+    let found = of_centred(&centred, settings);
     let curve = MaterialRatio::of(&centred);
+    Areal {
+        functional: curve.functional(settings.difference_percent, settings.volume_percent),
+        features: Features::of(&centred, settings.pruning_percent / 100.0 * found.height.sz),
+        ..found
+    }
+}
+
+/// Heights, lengths and slopes alone, in a part of the time: what the material ratio curve, hills and dales give is NaN.
+#[must_use]
+pub fn without_curve_and_features(map: &HeightMap, settings: &Settings) -> Areal {
+    of_centred(&map.with(height::centred(map.heights_um())), settings)
+}
+
+fn of_centred(centred: &HeightMap, settings: &Settings) -> Areal {
     let missing = centred.missing();
     Areal {
         points: centred.heights_um().len() - missing,
         missing,
-        height,
-        spatial: Spatial::of(&centred, settings.decay),
-        hybrid: Hybrid::of(&centred),
-        functional: curve.functional(settings.difference_percent, settings.volume_percent),
-        features: Features::of(&centred, settings.pruning_percent / 100.0 * height.sz),
+        height: Height::of(centred),
+        spatial: Spatial::of(centred, settings.decay),
+        hybrid: Hybrid::of(centred),
+        functional: Functional::NONE,
+        features: Features::NONE,
     }
 }
 
@@ -137,6 +156,7 @@ impl Areal {
             hybrid.sdq,
             hybrid.sdr_percent,
             functional.sdc,
+            functional.sxp,
             functional.sk,
             functional.spk,
             functional.svk,
@@ -157,6 +177,10 @@ impl Areal {
             features.s5p,
             features.s5v,
             features.s10z,
+            features.sda_mm2,
+            features.sha_mm2,
+            features.sdv_mm3,
+            features.shv_mm3,
         ];
         let named = PARAMETERS.iter().zip(values);
         named.map(|((symbol, unit, clause), value)| Parameter::new(symbol, unit, clause, value)).collect()

@@ -68,6 +68,7 @@ fn heights_as_frequent_as_each_other_are_all_core() {
         (found.smrk1_percent, 0.0),
         (found.smrk2_percent, 100.0),
         (found.sdc, 0.475),
+        (found.sxp, 0.475),
         (found.vmp, 0.005),
         (found.vmc, 0.315),
         (found.vvv, 0.02),
@@ -102,6 +103,13 @@ fn hills_and_dales_of_an_egg_box_are_counted() {
     let bend = 0.25e-3 * (PI * PI + (TAU / 2.5).powi(2));
     near(plain.features.spc_per_mm, bend, 0.01 * bend);
     near(plain.features.svc_per_mm, -bend, 0.01 * bend);
+    // A dale reaches from crest to crest: a cell of 2 mm by 2.5 mm. Below the saddles, at height 0, lies half of its mean
+    // |½ (cos u + cos v)| = 4/π².
+    near(plain.features.sda_mm2, 5.0, 0.03 * 5.0);
+    near(plain.features.sha_mm2, 5.0, 0.03 * 5.0);
+    let held = 1e-3 * 5.0 * 2.0 / (PI * PI);
+    near(plain.features.sdv_mm3, held, 0.01 * held);
+    near(plain.features.shv_mm3, held, 0.01 * held);
     let rippled = areal(&box_of(0.02), &Settings::default());
     assert_eq!((rippled.features.hills, rippled.features.dales), (30, 20));
     let finer = areal(&box_of(0.02), &Settings { pruning_percent: 0.1, ..Settings::default() });

@@ -12,29 +12,43 @@ struct Side {
     height: f64,
 }
 
-/// Mean spacing of the profile elements in mm, of both directions; NaN where there is none. `lowest` are the heights in
-/// µm that hills and dales need to count, `narrowest` the width in mm.
-pub(super) fn spacing(profile: &Profile, lowest: [f64; 2], narrowest: f64) -> f64 {
+/// Means over the profile elements; NaN where there is none.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mean {
+    /// Width, in mm.
+    pub(super) spacing_mm: f64,
+    /// Height of the hill and depth of the dale together, in µm.
+    pub(super) height_um: f64,
+}
+
+/// Means over the profile elements of both directions. `lowest` are the heights in µm that hills and dales need to count,
+/// `narrowest` the width in mm.
+pub(super) fn mean(profile: &Profile, lowest: [f64; 2], narrowest: f64) -> Mean {
     let counts = |side: &Side| side.width >= narrowest && side.height >= lowest[usize::from(!side.above)];
-    let forward = runs(profile, false);
-    let backward = runs(profile, true);
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for runs in [forward, backward] {
-        for run in runs {
-            let starts = starts(&run, profile.turn_mm.is_some(), counts);
-            // Every other start is one element further: hill and dale, and dale and hill.
-            let turn = profile.turn_mm.filter(|_| run.whole);
-            let count_of = starts.len();
-            let elements = if turn.is_some() && count_of >= 2 { count_of } else { count_of.saturating_sub(2) };
-            for element in 0..elements {
-                let end = element + 2;
-                let around = if end >= count_of { turn.unwrap_or(0.0) } else { 0.0 };
-                sum += starts[end % count_of] + around - starts[element];
-                count += 1;
-            }
+    let (mut width, mut height, mut count) = (0.0, 0.0, 0_usize);
+    for run in [runs(profile, false), runs(profile, true)].iter().flatten() {
+        let halves = halves(run, profile.turn_mm.is_some(), counts);
+        // Every other half is one element further: hill and dale, and dale and hill.
+        let turn = profile.turn_mm.filter(|_| run.whole);
+        let count_of = halves.len();
+        let elements = if turn.is_some() && count_of >= 2 { count_of } else { count_of.saturating_sub(2) };
+        for element in 0..elements {
+            let end = element + 2;
+            let around = if end >= count_of { turn.unwrap_or(0.0) } else { 0.0 };
+            width += halves[end % count_of].start + around - halves[element].start;
+            height += halves[element].height + halves[(element + 1) % count_of].height;
+            count += 1;
         }
     }
-    sum / count as f64
+    Mean { spacing_mm: width / count as f64, height_um: height / count as f64 }
+}
+
+/// Half of an element: significant sides of one kind, and what of the other kind between them does not count.
+struct Half {
+    /// Where it begins, in mm.
+    start: f64,
+    /// Largest distance from the mean line.
+    height: f64,
 }
 
 /// Sides of a stretch of measured points, in the order of going.
@@ -44,19 +58,29 @@ struct Run {
     whole: bool,
 }
 
-/// Where each significant side begins that follows one of the other kind; ascending in the direction of going.
-fn starts(run: &Run, closed: bool, counts: impl Fn(&Side) -> bool) -> Vec<f64> {
+/// The halves of elements that have a beginning; ascending in the direction of going.
+fn halves(run: &Run, closed: bool, counts: impl Fn(&Side) -> bool) -> Vec<Half> {
     let significant: Vec<&Side> = run.sides.iter().filter(|side| counts(side)).collect();
-    let Some(last) = significant.last().filter(|_| closed && run.whole) else {
-        // The first side of an open run has no beginning.
-        return significant
-            .windows(2)
-            .filter(|pair| pair[0].above != pair[1].above)
-            .map(|pair| pair[1].start)
-            .collect();
+    let Some(last) = significant.last() else { return Vec::new() };
+    let changes = |place: usize| {
+        let before = if place > 0 { significant[place - 1] } else { last };
+        before.above != significant[place].above
     };
-    let before = std::iter::once(last).chain(&significant);
-    before.zip(&significant).filter(|(before, side)| before.above != side.above).map(|(_, side)| side.start).collect()
+    // The first half of an open run has no beginning; that of a closed one may be the rest of its last.
+    let whole = closed && run.whole;
+    let Some(first) = (usize::from(!whole)..significant.len()).find(|place| changes(*place)) else { return Vec::new() };
+    let wrapped = if whole { 0..first } else { 0..0 };
+    let mut halves: Vec<Half> = Vec::new();
+    for place in (first..significant.len()).chain(wrapped) {
+        let side = significant[place];
+        match halves.last_mut() {
+            Some(half) if place != first && (place < first || !changes(place)) => {
+                half.height = half.height.max(side.height);
+            }
+            _ => halves.push(Half { start: side.start, height: side.height }),
+        }
+    }
+    halves
 }
 
 /// The profile's stretches without gaps, as sides of the mean line, forwards or backwards.

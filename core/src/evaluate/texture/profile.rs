@@ -1,7 +1,7 @@
 //! Values of a filtered profile.
 
 use super::{Settings, Texture, elements};
-use crate::evaluate::areal::derivative;
+use crate::evaluate::areal::{MaterialRatio, derivative};
 
 /// Hills and dales below this share of Rp and Rv are none (ISO 21920-2).
 const LOWEST: f64 = 0.1;
@@ -24,28 +24,17 @@ pub(super) struct Profile<'a> {
 
 impl<'a> Profile<'a> {
     pub(super) fn new(positions_mm: &'a [f64], mut heights_um: Vec<f64>, turn_mm: Option<f64>) -> Self {
-        let gaps: Vec<f64> = positions_mm.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let even = gaps.iter().all(|gap| (gap - gaps[0]).abs() <= EVEN * gaps[0]);
-        let cells = if even || turn_mm.is_some() {
-            vec![1.0; positions_mm.len()]
-        } else {
-            let (first, last) = (gaps.first(), gaps.last());
-            let left = first.into_iter().chain(&gaps);
-            left.zip(gaps.iter().chain(last)).map(|(left, right)| 0.5 * (left + right)).collect()
+        let (cells, even) = match turn_mm {
+            // Closed profiles are on equal angles.
+            Some(_) => (vec![1.0; heights_um.len()], true),
+            None => cells(positions_mm),
         };
-        let mut profile = Self { positions_mm, heights_um: Vec::new(), turn_mm, cells, even };
-        std::mem::swap(&mut profile.heights_um, &mut heights_um);
-        let mean = profile.mean(|height| height);
-        profile.heights_um.iter_mut().for_each(|height| *height -= mean);
-        profile
-    }
-
-    /// Mean along the profile of a power of its heights, over the points there are.
-    fn mean(&self, of: impl Fn(f64) -> f64) -> f64 {
-        let known = self.heights_um.iter().zip(&self.cells).filter(|(height, _)| height.is_finite());
-        let (sum, length) =
-            known.fold((0.0, 0.0), |(sum, length), (height, cell)| (sum + cell * of(*height), length + cell));
-        sum / length
+        let ([mean], length) = sums(&heights_um, &cells, |height| [height]);
+        let mean = mean / length;
+        for height in &mut heights_um {
+            *height -= mean;
+        }
+        Self { positions_mm, heights_um, turn_mm, cells, even }
     }
 
     /// First position and length.
@@ -57,43 +46,92 @@ impl<'a> Profile<'a> {
         }
     }
 
+    /// All values.
     pub(super) fn texture(&self, settings: &Settings) -> Texture {
+        let heights = self.heights(settings);
+        let lowest = [LOWEST * heights.rp, LOWEST * heights.rv];
+        let elements = elements::mean(self, lowest, NARROWEST * heights.section_mm);
+        let curve = MaterialRatio::of_heights(self.heights_um.iter().copied().filter(|height| height.is_finite()));
+        // The volumes of a surface are not asked for: any material ratios will do.
+        let found = curve.functional(settings.difference_percent, settings.difference_percent);
+        Texture {
+            rsm_mm: elements.spacing_mm,
+            rc: elements.height_um,
+            rk: found.sk,
+            rpk: found.spk,
+            rvk: found.svk,
+            rmrk1_percent: found.smrk1_percent,
+            rmrk2_percent: found.smrk2_percent,
+            rdc: found.sdc,
+            ..heights
+        }
+    }
+
+    /// The values that need neither elements nor the material ratio curve; the others are NaN.
+    pub(super) fn heights(&self, settings: &Settings) -> Texture {
         let (start, length) = self.extent();
         let wanted = settings.section_mm.or(settings.lambda_c_mm).unwrap_or(length / 5.0);
         // A length that is whole sections but for rounding has them all.
         let sections = ((length / wanted * (1.0 + EVEN)) as usize).clamp(1, self.heights_um.len().max(1));
         let section_mm = length / sections as f64;
-        let mut extremes = vec![(f64::INFINITY, f64::NEG_INFINITY); sections];
-        let known = || self.positions_mm.iter().zip(&self.heights_um).filter(|(_, height)| height.is_finite());
-        for (position, height) in known() {
-            let section = ((position - start) / section_mm * (1.0 + 1e-12)) as usize;
-            let (low, high) = &mut extremes[section.min(sections - 1)];
-            (*low, *high) = (low.min(*height), high.max(*height));
+        let scale = (1.0 + 1e-12) / section_mm;
+        let mut extremes = Vec::with_capacity(sections);
+        let mut rest = (self.positions_mm, &self.heights_um[..]);
+        for section in 0..sections {
+            let last = section + 1 == sections;
+            let inside = |position: &f64| last || ((position - start) * scale) as usize <= section;
+            let (positions, heights) = rest;
+            let count = positions.partition_point(inside).min(heights.len());
+            let ends = heights[..count].iter().filter(|height| height.is_finite());
+            extremes.push(ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
+                (if *height < low { *height } else { low }, if *height > high { *height } else { high })
+            }));
+            rest = (&positions[count..], &heights[count..]);
         }
+        let points = self.heights_um.iter().filter(|height| height.is_finite()).count();
         // A section in which nothing was measured has no say.
         extremes.retain(|(low, _)| low.is_finite());
         let over_sections = |of: fn(&(f64, f64)) -> f64| extremes.iter().map(of).sum::<f64>() / extremes.len() as f64;
         let (rp, rv) = (over_sections(|(_, high)| *high), over_sections(|(low, _)| -low));
-        let (low, high) = known()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, height)| (low.min(*height), high.max(*height)));
-        let variance = self.mean(|height| height * height);
-        let points = known().count();
+        let rz1max = extremes.iter().map(|(low, high)| high - low).fold(f64::NAN, f64::max);
+        let (low, high) = extremes
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), section| (low.min(section.0), high.max(section.1)));
+        let [ra, variance, third, fourth] = self.moments();
         Texture {
-            ra: self.mean(f64::abs),
+            ra,
             rq: variance.sqrt(),
             rp,
             rv,
             rz: rp + rv,
+            rz1max,
             rt: if points == 0 { f64::NAN } else { high - low },
-            rsk: self.mean(|height| height.powi(3)) / variance.powf(1.5),
-            rku: self.mean(|height| height.powi(4)) / (variance * variance),
-            rsm_mm: elements::spacing(self, [LOWEST * rp, LOWEST * rv], NARROWEST * section_mm),
+            rsk: third / (variance * variance.sqrt()),
+            rku: fourth / (variance * variance),
             rdq: self.gradient(),
             points,
             missing: self.heights_um.len() - points,
             sections,
             section_mm,
+            rsm_mm: f64::NAN,
+            rc: f64::NAN,
+            rk: f64::NAN,
+            rpk: f64::NAN,
+            rvk: f64::NAN,
+            rmrk1_percent: f64::NAN,
+            rmrk2_percent: f64::NAN,
+            rdc: f64::NAN,
+            cropped_mm: 0.0,
         }
+    }
+
+    /// Means of |z|, z², z³ and z⁴.
+    fn moments(&self) -> [f64; 4] {
+        let (sums, length) = sums(&self.heights_um, &self.cells, |height| {
+            let square = height * height;
+            [height.abs(), square, square * height, square * square]
+        });
+        sums.map(|sum| sum / length)
     }
 
     /// Root mean square of the slope, over the points with three measured neighbours on each side.
@@ -103,14 +141,50 @@ impl<'a> Profile<'a> {
             return f64::NAN;
         }
         let spacing_um = 1e3 * (self.positions_mm[1] - self.positions_mm[0]);
-        let points = if self.turn_mm.is_some() { 0..count } else { 3..count - 3 };
-        let squares = points.filter_map(|point| {
-            let at =
-                |step: isize| self.heights_um[(point.cast_signed() + step).rem_euclid(count.cast_signed()) as usize];
-            let square = (derivative(at) / spacing_um).powi(2);
-            square.is_finite().then_some(square)
-        });
-        let (sum, number) = squares.fold((0.0, 0_usize), |(sum, number), square| (sum + square, number + 1));
-        (sum / number as f64).sqrt()
+        let (mut sum, mut number) = (0.0, 0_usize);
+        let mut add = |difference: f64| {
+            let square = difference * difference;
+            if square.is_finite() {
+                sum += square;
+                number += 1;
+            }
+        };
+        for window in self.heights_um.windows(7) {
+            add(derivative(|step| window[(step + 3) as usize]));
+        }
+        if self.turn_mm.is_some() {
+            for point in (0..3).chain(count - 3..count) {
+                let beside = |step: isize| (point.cast_signed() + step).rem_euclid(count.cast_signed()) as usize;
+                add(derivative(|step| self.heights_um[beside(step)]));
+            }
+        }
+        (sum / number as f64).sqrt() / spacing_um
     }
+}
+
+/// Length that each point of an open profile stands for, and whether all stand for the same.
+fn cells(positions_mm: &[f64]) -> (Vec<f64>, bool) {
+    let gaps: Vec<f64> = positions_mm.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if gaps.iter().all(|gap| (gap - gaps[0]).abs() <= EVEN * gaps[0]) {
+        return (vec![1.0; positions_mm.len()], true);
+    }
+    let left = gaps.first().into_iter().chain(&gaps);
+    (left.zip(gaps.iter().chain(gaps.last())).map(|(left, right)| 0.5 * (left + right)).collect(), false)
+}
+
+/// Sums of terms of the heights that there are, each times its cell, and of the cells: over lanes that do not wait for each
+/// other, because Monte Carlo asks for this many thousand times.
+fn sums<const N: usize>(heights: &[f64], cells: &[f64], terms: impl Fn(f64) -> [f64; N]) -> ([f64; N], f64) {
+    const LANES: usize = 8;
+    let (mut sums, mut length) = ([[0.0; LANES]; N], [0.0; LANES]);
+    for (heights, cells) in heights.chunks(LANES).zip(cells.chunks(LANES)) {
+        for (lane, (height, cell)) in heights.iter().zip(cells).enumerate() {
+            let (height, cell) = if height.is_finite() { (*height, *cell) } else { (0.0, 0.0) };
+            for (sum, term) in sums.iter_mut().zip(terms(height)) {
+                sum[lane] += cell * term;
+            }
+            length[lane] += cell;
+        }
+    }
+    (sums.map(|lanes| lanes.iter().sum()), length.iter().sum())
 }

@@ -101,3 +101,59 @@ fn missing_points_are_left_out_and_counted() {
     assert!(nothing.ra.is_nan() && nothing.rz.is_nan() && nothing.rt.is_nan() && nothing.rsm_mm.is_nan());
     assert!(along(&[], &[], &settings).rq.is_nan() && along(&[1.0], &[2.0], &settings).rsm_mm.is_nan());
 }
+
+/// Heights at equal steps from 0 to 1 µm, up and down: the whole curve is core, a hundredth of it for each percent.
+#[test]
+fn the_material_ratio_curve_of_a_triangle_is_a_line() {
+    let triangle = |point: usize| 1.0 - (point % 200).abs_diff(100) as f64 / 100.0;
+    let profile: Vec<f64> = (0..20_000).map(triangle).collect();
+    let found = around(&profile, 100.0 / TAU, &Settings::default());
+    // 200 points a wave: the ends of the curve are steps of 0.01 µm.
+    for (found, expected) in [(found.rk, 1.0), (found.rpk, 0.0), (found.rvk, 0.0), (found.rdc, 0.6), (found.rc, 1.0)] {
+        assert!((found - expected).abs() < 0.02, "{found} instead of {expected}");
+    }
+    assert!(found.rmrk1_percent < 1.0 && found.rmrk2_percent > 99.0, "{found:?}");
+    assert!((found.rsm_mm - 1.0).abs() < 1e-9 && (found.values()[12] - 10.0).abs() < 1e-8);
+    assert!((material_ratio_percent(&profile, 0.25) - 25.0).abs() < 1.0);
+    assert!(material_ratio_percent(&[f64::NAN], 0.0).is_nan());
+}
+
+/// Elements of 1 mm, every fourth one twice as high: Rc = (3 · 2 + 4)/4 µm; the highest section holds such a one.
+#[test]
+fn elements_have_their_mean_height_and_sections_their_highest() {
+    let wave = |z: f64| (TAU * z).sin() * if (z / 4.0).fract() < 0.25 { 2.0 } else { 1.0 };
+    let positions: Vec<f64> = (0..=40_000).map(|point| f64::from(point) * 1e-3).collect();
+    let profile: Vec<f64> = positions.iter().map(|z| wave(*z)).collect();
+    let settings = Settings { section_mm: Some(2.0), ..Settings::default() };
+    let found = along(&positions, &profile, &settings);
+    // The first and last elements are not complete in one direction each.
+    assert!((found.rc - 2.5).abs() < 0.05, "{}", found.rc);
+    assert!((found.rz1max - 4.0).abs() < 1e-3 && (found.rz - 3.0).abs() < 0.01, "{} {}", found.rz1max, found.rz);
+}
+
+/// Half a cut-off from the ends, a profile's roughness is that of the same place in a line ten times as long, to 1 % of the
+/// waviness; at the ends it is not.
+#[test]
+fn ends_where_the_filter_is_incomplete_are_left_out() {
+    let settings = Settings { lambda_c_mm: Some(0.8), ..Settings::default() };
+    let positions: Vec<f64> = (0..8000).map(|point| f64::from(point) * 0.005).collect();
+    let wave = |z: &f64| 2.0 * (TAU * z / 2.3).sin() + (TAU * z / 0.7 + 0.3).sin() + 0.2 * (TAU * z / 0.1).sin();
+    let profile: Vec<f64> = positions.iter().map(wave).collect();
+    let low_pass = |from: usize, to: usize| {
+        let filtered = |z: &[f64], profile: &[f64]| Smoother::open(z, 0.8, Degree::One).low_pass(profile, None);
+        filtered(&positions[from..to], &profile[from..to])
+    };
+    let (long, short) = (low_pass(0, 8000), low_pass(3000, 3800));
+    let error = |from: usize, to: usize| {
+        let pairs = short[from..to].iter().zip(&long[3000 + from..3000 + to]);
+        pairs.map(|(short, long)| (short - long).abs()).fold(0.0, f64::max)
+    };
+    // 160 points are one cut-off.
+    let (at_the_end, inside) = (error(0, 80), error(80, 720));
+    println!("waviness of 3 µm, λc 0.8 mm: {at_the_end:.3} µm within λc/2 of an end, {inside:.4} µm further in");
+    assert!(at_the_end > 0.1 && inside < 0.03, "{at_the_end} and {inside}");
+    let found = along(&positions[3000..3800], &profile[3000..3800], &settings);
+    assert!((found.cropped_mm - 0.4).abs() < 1e-12 && found.points == 640, "{found:?}");
+    // Too short a line keeps its ends.
+    assert!(along(&positions[..300], &profile[..300], &settings).cropped_mm.abs() < 1e-12);
+}

@@ -1,10 +1,12 @@
 //! Gaussian filters (ISO 16610): closed profiles by their harmonics, open and gapped ones by local regression, maps.
 
 mod areal;
+mod areal_robust;
 mod regression;
 mod robust;
 
 pub use areal::areal_gaussian;
+pub use areal_robust::robust_areal_gaussian;
 pub use regression::{Degree, Smoother};
 pub use robust::{Robust, robust_gaussian};
 

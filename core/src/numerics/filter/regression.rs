@@ -19,14 +19,14 @@ impl Degree {
     ///
     /// With a = π (width·λc/λ)², e^−a passes of a sine at degrees 0 and 1 and (1 + a) e^−a at degree 2. Half of the
     /// amplitude: a = ln 2 and a = 1.678 346 990 (ISO 16610-31 rounds its root to 0.7309).
-    fn width(self) -> f64 {
+    pub(super) fn width(self) -> f64 {
         let half = if self == Self::Two { 1.678_346_990_016_661 } else { std::f64::consts::LN_2 };
         (half / PI).sqrt()
     }
 }
 
 /// Half-width of the Gaussian in its own widths: beyond, it is below 6·10⁻¹⁰ of its middle.
-const REACH: f64 = 2.6;
+pub(super) const REACH: f64 = 2.6;
 
 /// Spacings that differ by less than this share are one.
 const EVEN: f64 = 1e-6;
@@ -153,7 +153,7 @@ impl Smoother {
     }
 }
 
-fn gaussian(widths: f64) -> f64 {
+pub(super) fn gaussian(widths: f64) -> f64 {
     (-PI * widths * widths).exp()
 }
 

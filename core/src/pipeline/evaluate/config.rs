@@ -1,10 +1,13 @@
 //! `[evaluate]`: which of the standards' values a run gives.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{
+    Deserialize, Deserializer,
+    de::{SeqAccess, Unexpected, Visitor},
+};
 
 use super::{
-    filter::{between_name, low_pass_name},
+    filter::{between_name, low_pass_name, waviness_name},
     limit::Limit,
 };
 use crate::{
@@ -12,30 +15,209 @@ use crate::{
         areal,
         error_motion::{self, Centre},
         roundness::Reference,
-        texture,
+        texture::Kind,
+        twist,
     },
-    pipeline::error::Fault,
+    pipeline::error::{Fault, Place},
 };
 
 /// `[evaluate]`: which of the standards' values a run gives, and how.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EvaluateConfig {
-    /// Groups of values; without it `roundness`, `texture`, `cylindricity` and `error-motion`.
-    pub values: Option<Vec<Group>>,
+    /// Groups of values, or "all"; without it `roundness`, `texture`, `cylindricity` and `error-motion`. Of "all", what a run
+    /// cannot give (areal values and twist of a single section) is left out.
+    #[schemars(with = "Option<GroupsSchema>")]
+    pub values: Option<Groups>,
     /// Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY). Without it LSCI and
     /// MZCI.
     pub references: Option<Vec<Reference>>,
     /// Cut-offs of the Gaussian low-pass (ISO 16610-21) for roundness and cylindricity, in undulations per revolution, as
     /// 15, 50, 150, 500, 1500. Unfiltered values are always there besides. Without it 50, where the orders reach it.
     pub filter_upr: Option<Vec<f64>>,
-    /// λc, the longest wavelength of texture and areal values, in mm; it makes Rq, Rp, Rv, Rz, Rt, Rsk, Rku, Rsm and Rdq
-    /// besides the unfiltered Ra.
+    /// λc, the longest wavelength of texture and areal values, in mm; it makes the values of the roughness profile besides the
+    /// unfiltered Ra.
     pub lambda_c_mm: Option<f64>,
     /// λs, the shortest, in mm.
     pub lambda_s_mm: Option<f64>,
     /// Centres of polar plots that error motion values are about; without it LSC.
     pub centres: Option<Vec<CentreConfig>>,
+    /// What texture values are of, besides λs and λc.
+    #[serde(default)]
+    pub texture: TextureConfig,
+    /// How areal and twist values are made of the surface, besides λs and λc.
+    #[serde(default)]
+    pub areal: ArealConfig,
+}
+
+/// `[evaluate.texture]`: which profiles have texture values, and what the standard leaves to the one who evaluates.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TextureConfig {
+    /// Profiles: R (roughness, λs to λc), P (primary, from λs on), W (waviness, λc to λf). Without it R. R and W need λc.
+    pub profiles: Option<Vec<Kind>>,
+    /// λf, the longest wavelength of W, in mm; without it W has all that is longer than λc.
+    pub lambda_f_mm: Option<f64>,
+    /// Heights above the mean line, in µm, at which the material ratio Rmr(c), Pmr(c), Wmr(c) is given.
+    pub heights_um: Option<Vec<f64>>,
+    /// Material ratios p and q of Rdc, Pdc, Wdc, in %; without it 20 and 80.
+    pub rdc_percent: Option<[f64; 2]>,
+    /// Angles of the part, in degrees, at which the profiles are taken along the axis too, from section to section.
+    pub generatrices_deg: Option<Vec<f64>>,
+}
+
+/// `[evaluate.areal]`: form removal, filter and material ratios of areal values.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArealConfig {
+    /// F-operator: what is taken off before the filters; without it `cylinder`.
+    pub form: Option<FormRemoval>,
+    /// Degree of `polynomial` along the axis, 0 to 8; without it 2.
+    pub degree: Option<usize>,
+    /// The filter of λs and λc; without it `gaussian`.
+    pub filter: Option<ArealFilter>,
+    /// Heights above the mean, in µm, at which the material ratio Smr(c) is given.
+    pub heights_um: Option<Vec<f64>>,
+    /// Material ratios, in %, at which the height Smc(p) above the mean is given.
+    pub ratios_percent: Option<Vec<f64>>,
+}
+
+/// What the F-operator takes off a wall, by least squares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FormRemoval {
+    /// Nothing but the mean.
+    None,
+    /// A line along the axis, the same all around: radius and taper.
+    Plane,
+    /// A cylinder: radius, place and tilt of its axis.
+    Cylinder,
+    /// A cone: a cylinder and its taper.
+    Cone,
+    /// A body whose radius and centre are polynomials along the axis.
+    Polynomial,
+}
+
+/// The filter of areal values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ArealFilter {
+    /// ISO 16610-61.
+    #[default]
+    Gaussian,
+    /// ISO 16610-71: scratches and grooves do not pull it. It states no uncertainty.
+    RobustGaussian,
+}
+
+impl ArealConfig {
+    fn check(self) -> Result<Areal, Fault> {
+        let usual = Areal::default();
+        let degree = self.degree.unwrap_or(usual.degree);
+        if degree > HIGHEST_DEGREE {
+            return Err(Fault::at("degree", format!("expected a degree from 0 to {HIGHEST_DEGREE}, found {degree}")));
+        }
+        if self.degree.is_some() && self.form != Some(FormRemoval::Polynomial) {
+            return Err(Fault::at("degree", "only a polynomial has a degree").help("set `form = \"polynomial\"`"));
+        }
+        let (heights_um, ratios_percent) =
+            (self.heights_um.unwrap_or_default(), self.ratios_percent.unwrap_or_default());
+        if let Some((index, height)) = heights_um.iter().enumerate().find(|(_, height)| !height.is_finite()) {
+            let fault = Fault::here(format!("expected a finite height in µm, found {height}"));
+            return Err(fault.under_item("heights_um", index));
+        }
+        if let Some((index, ratio)) =
+            ratios_percent.iter().enumerate().find(|(_, ratio)| !(0.0..=100.0).contains(*ratio))
+        {
+            let fault = Fault::here(format!("expected a material ratio from 0 to 100 %, found {ratio}"));
+            return Err(fault.under_item("ratios_percent", index));
+        }
+        let (form, filter) = (self.form.unwrap_or(usual.form), self.filter.unwrap_or_default());
+        Ok(Areal { form, degree, filter, heights_um, ratios_percent })
+    }
+}
+
+/// Highest degree of a polynomial form.
+const HIGHEST_DEGREE: usize = 8;
+
+/// How areal values are made of the surface, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Areal {
+    pub form: FormRemoval,
+    pub degree: usize,
+    pub filter: ArealFilter,
+    pub heights_um: Vec<f64>,
+    pub ratios_percent: Vec<f64>,
+}
+
+impl Default for Areal {
+    fn default() -> Self {
+        let (heights_um, ratios_percent) = (Vec::new(), Vec::new());
+        Self { form: FormRemoval::Cylinder, degree: 2, filter: ArealFilter::Gaussian, heights_um, ratios_percent }
+    }
+}
+
+impl TextureConfig {
+    fn check(self, lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>) -> Result<Texture, Fault> {
+        let usual = Texture::default();
+        let profiles = once_each(self.profiles.unwrap_or_else(|| usual.profiles.clone()));
+        if profiles.is_empty() {
+            return Err(Fault::at("profiles", "expected at least one of R, P, W"));
+        }
+        if lambda_c_mm.is_none() && profiles.contains(&Kind::W) {
+            return Err(Fault::at("profiles", "a waviness profile needs λc").help("add `lambda_c_mm` to [evaluate]"));
+        }
+        if lambda_s_mm.is_some() && lambda_c_mm.is_none() && !profiles.contains(&Kind::P) {
+            let help = "add `lambda_c_mm`, or P to `profiles` in [evaluate.texture]";
+            return Err(Fault::here("λs alone makes no roughness profile").help(help));
+        }
+        if let Some(longest) = self.lambda_f_mm {
+            let shortest = lambda_c_mm.unwrap_or(0.0);
+            if !(longest.is_finite() && longest > shortest) {
+                let message = format!("λf must be longer than λc = {shortest} mm, found {longest}");
+                return Err(Fault::at("lambda_f_mm", message));
+            }
+        }
+        let heights_um = self.heights_um.unwrap_or_default();
+        if let Some((index, height)) = heights_um.iter().enumerate().find(|(_, height)| !height.is_finite()) {
+            let fault = Fault::here(format!("expected a finite height in µm, found {height}"));
+            return Err(fault.under_item("heights_um", index));
+        }
+        let generatrices_deg = once_each(self.generatrices_deg.unwrap_or_default());
+        if let Some((index, angle)) = generatrices_deg.iter().enumerate().find(|(_, angle)| !angle.is_finite()) {
+            let fault = Fault::here(format!("expected an angle in degrees, found {angle}"));
+            return Err(fault.under_item("generatrices_deg", index));
+        }
+        let difference_percent = self.rdc_percent.unwrap_or(usual.difference_percent);
+        let [upper, lower] = difference_percent;
+        if !(upper >= 0.0 && upper < lower && lower <= 100.0) {
+            let message = format!("expected two material ratios from 0 to 100 %, ascending, found {upper} and {lower}");
+            return Err(Fault::at("rdc_percent", message));
+        }
+        Ok(Texture { profiles, lambda_f_mm: self.lambda_f_mm, heights_um, difference_percent, generatrices_deg })
+    }
+}
+
+/// What texture values are of, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Texture {
+    pub profiles: Vec<Kind>,
+    pub lambda_f_mm: Option<f64>,
+    pub heights_um: Vec<f64>,
+    pub difference_percent: [f64; 2],
+    pub generatrices_deg: Vec<f64>,
+}
+
+impl Default for Texture {
+    fn default() -> Self {
+        let (heights_um, generatrices_deg) = (Vec::new(), Vec::new());
+        Self {
+            profiles: vec![Kind::R],
+            lambda_f_mm: None,
+            heights_um,
+            difference_percent: [20.0, 80.0],
+            generatrices_deg,
+        }
+    }
 }
 
 /// A centre of a polar plot (ISO 230-7) as it stands in a file.
@@ -72,25 +254,90 @@ impl From<CentreConfig> for Centre {
 pub enum Group {
     /// RONt about each reference; RONp, RONv, RONq and the steepest slope dr/dθ about LSCI; of each section.
     Roundness,
-    /// Ra of each section's unfiltered profile; with λc the values of ISO 21920-2.
+    /// Ra of each section's unfiltered profile; with λc the values of ISO 21920-2, of the profiles in [evaluate.texture].
     Texture,
     /// CYLt about each reference, CYLp, CYLv, CYLq about LSCY, of all sections together.
     Cylindricity,
-    /// ISO 25178-2 on the surface without its least-squares cylinder.
+    /// ISO 25178-2 on the surface without its form, which is a cylinder unless [evaluate.areal] says otherwise.
     Areal,
+    /// Twist of a turned or ground shaft (MBN 31007-07): the strongest helix on the surface.
+    Twist,
     /// ISO 230-7, of each station.
     ErrorMotion,
+}
+
+impl Group {
+    /// All of them.
+    const ALL: [Self; 6] =
+        [Self::Roundness, Self::Texture, Self::Cylindricity, Self::Areal, Self::Twist, Self::ErrorMotion];
+}
+
+/// Groups of values as they stand in a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Groups {
+    /// "all".
+    All,
+    /// A list.
+    Listed(Vec<Group>),
+}
+
+/// [`Groups`] for the schema.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "only its schema is made")]
+enum GroupsSchema {
+    Word(All),
+    Listed(Vec<Group>),
+}
+
+#[derive(JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[allow(dead_code, reason = "only its schema is made")]
+enum All {
+    All,
+}
+
+impl<'de> Deserialize<'de> for Groups {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Words;
+
+        impl<'de> Visitor<'de> for Words {
+            type Value = Groups;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+                formatter.write_str("\"all\" or a list of groups")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Groups, E> {
+                if word == "all" { Ok(Groups::All) } else { Err(E::invalid_value(Unexpected::Str(word), &self)) }
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Groups, A::Error> {
+                let mut groups = Vec::new();
+                while let Some(group) = items.next_element()? {
+                    groups.push(group);
+                }
+                Ok(Groups::Listed(groups))
+            }
+        }
+
+        deserializer.deserialize_any(Words)
+    }
 }
 
 /// What to evaluate, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluate {
     groups: Vec<Group>,
+    /// Whether all groups were asked for, and none by its name.
+    pub(in crate::pipeline) all: bool,
     pub(super) references: Vec<Reference>,
     filter_upr: Option<Vec<f64>>,
     pub(super) lambda_c_mm: Option<f64>,
     pub(super) lambda_s_mm: Option<f64>,
     pub(in crate::pipeline) centres: Vec<Centre>,
+    pub(super) texture: Texture,
+    pub(super) areal: Areal,
     limits: Vec<Limit>,
 }
 
@@ -98,11 +345,14 @@ impl Default for Evaluate {
     fn default() -> Self {
         Self {
             groups: vec![Group::Roundness, Group::Texture, Group::Cylindricity, Group::ErrorMotion],
+            all: false,
             references: vec![Reference::LeastSquares, Reference::MinimumZone],
             filter_upr: None,
             lambda_c_mm: None,
             lambda_s_mm: None,
             centres: vec![error_motion::CENTRE],
+            texture: Texture::default(),
+            areal: Areal::default(),
             limits: Vec::new(),
         }
     }
@@ -136,9 +386,6 @@ impl EvaluateConfig {
                 let message = format!("λs must be shorter than λc = {longest} mm, found {shortest}");
                 return Err(Fault::at("lambda_s_mm", message));
             }
-            (Some(_), None) => {
-                return Err(Fault::at("lambda_s_mm", "λs alone makes no texture").help("add `lambda_c_mm`"));
-            }
             _ => {}
         }
         if matches!(&self.references, Some(references) if references.is_empty()) {
@@ -147,9 +394,19 @@ impl EvaluateConfig {
         if matches!(&self.centres, Some(centres) if centres.is_empty()) {
             return Err(Fault::at("centres", "expected at least one of PC, LSC, MZC, MIC, MCC"));
         }
+        let texture = self.texture.check(self.lambda_s_mm, self.lambda_c_mm).map_err(|fault| match fault.place {
+            // What is wrong of all keys together is that of λs.
+            Place::Path(ref path) if path.is_empty() => fault.under("lambda_s_mm"),
+            _ => fault.under("texture"),
+        })?;
         let usual = Evaluate::default();
         Ok(Evaluate {
-            groups: self.values.unwrap_or(usual.groups),
+            all: self.values == Some(Groups::All),
+            groups: match self.values {
+                Some(Groups::All) => Group::ALL.to_vec(),
+                Some(Groups::Listed(groups)) => groups,
+                None => usual.groups,
+            },
             references: once_each(self.references.unwrap_or(usual.references)),
             filter_upr: self.filter_upr.map(once_each),
             lambda_c_mm: self.lambda_c_mm,
@@ -157,6 +414,8 @@ impl EvaluateConfig {
             centres: self
                 .centres
                 .map_or(usual.centres, |centres| once_each(centres.into_iter().map(Centre::from).collect())),
+            texture,
+            areal: self.areal.check().map_err(|fault| fault.under("areal"))?,
             limits: Vec::new(),
         })
     }
@@ -213,6 +472,13 @@ impl Evaluate {
         self.groups.contains(&group)
     }
 
+    /// Whether values are asked for that need the surface between the sections, or its rings.
+    #[must_use]
+    pub fn needs_surface(&self) -> bool {
+        let generatrices = self.has(Group::Texture) && !self.texture.generatrices_deg.is_empty();
+        generatrices || self.has(Group::Areal) || self.has(Group::Twist)
+    }
+
     /// Cut-offs for orders up to `highest`; `None` is no filter.
     pub(super) fn cutoffs_upr(&self, highest: usize) -> Vec<Option<f64>> {
         let usual: &[f64] = if highest as f64 >= USUAL_UPR { &[USUAL_UPR] } else { &[] };
@@ -224,7 +490,9 @@ impl Evaluate {
     pub(super) fn filter_names(&self) -> Vec<String> {
         let cutoffs = self.filter_upr.as_deref().unwrap_or(&[USUAL_UPR]);
         let round = std::iter::once(None).chain(cutoffs.iter().copied().map(Some)).map(low_pass_name);
-        once_each(round.chain([between_name(self.lambda_s_mm, self.lambda_c_mm)]).collect())
+        let waviness = self.lambda_c_mm.map(|c| waviness_name(c, self.texture.lambda_f_mm));
+        let between = [between_name(self.lambda_s_mm, self.lambda_c_mm), between_name(self.lambda_s_mm, None)];
+        once_each(round.chain(between).chain(waviness).collect())
     }
 
     /// Symbols and units of the values that may come.
@@ -236,8 +504,11 @@ impl Evaluate {
         }
         if self.has(Group::Texture) {
             symbols.push(("Ra", "µm"));
-            if self.lambda_c_mm.is_some() {
-                symbols.extend(texture::PARAMETERS[1..].iter().map(|(symbol, unit, _)| (*symbol, *unit)));
+            for kind in &self.texture.profiles {
+                if *kind == Kind::P || self.lambda_c_mm.is_some() {
+                    symbols.extend(kind.parameters().iter().map(|(symbol, unit, _)| (*symbol, *unit)));
+                    symbols.push((kind.material_ratio_symbol(), "%"));
+                }
             }
         }
         if self.has(Group::Cylindricity) {
@@ -246,6 +517,10 @@ impl Evaluate {
         }
         if self.has(Group::Areal) {
             symbols.extend(areal::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
+            symbols.extend([("Smr(c)", "%"), ("Smc(p)", "µm")]);
+        }
+        if self.has(Group::Twist) {
+            symbols.extend(twist::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
         }
         if self.has(Group::ErrorMotion) {
             symbols.extend(error_motion::SYMBOLS);

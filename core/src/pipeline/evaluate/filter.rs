@@ -24,11 +24,23 @@ impl Filter {
         Self { name: low_pass_name(cutoff_upr), band: Band { above_upr: None, below_upr: cutoff_upr } }
     }
 
+    /// The same filter by this name for values that no order of a turn is taken from or left out of: along the axis.
+    pub fn along_axis(&self) -> Self {
+        Self { name: self.name.clone(), band: Band::default() }
+    }
+
     /// What lies between λs and λc along the circumference of a radius.
     pub fn between(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>, radius_mm: f64) -> Self {
         let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
         let band = Band { above_upr: lambda_c_mm.map(upr), below_upr: lambda_s_mm.map(upr) };
         Self { name: between_name(lambda_s_mm, lambda_c_mm), band }
+    }
+
+    /// What lies between λc and λf, the waviness; without λf, all that is longer than λc.
+    pub fn waviness(lambda_c_mm: f64, lambda_f_mm: Option<f64>, radius_mm: f64) -> Self {
+        let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
+        let band = Band { above_upr: lambda_f_mm.map(upr), below_upr: Some(upr(lambda_c_mm)) };
+        Self { name: waviness_name(lambda_c_mm, lambda_f_mm), band }
     }
 
     /// Harmonics behind the filter.
@@ -80,7 +92,15 @@ pub(super) fn low_pass_name(cutoff_upr: Option<f64>) -> String {
 
 /// "none", "Gaussian λs 0.0025 mm, λc 0.8 mm".
 pub(super) fn between_name(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>) -> String {
-    let named = [("λs", lambda_s_mm), ("λc", lambda_c_mm)];
+    gaussian_name([("λs", lambda_s_mm), ("λc", lambda_c_mm)])
+}
+
+/// "Gaussian λc 0.8 mm, λf 8 mm".
+pub(super) fn waviness_name(lambda_c_mm: f64, lambda_f_mm: Option<f64>) -> String {
+    gaussian_name([("λc", Some(lambda_c_mm)), ("λf", lambda_f_mm)])
+}
+
+fn gaussian_name(named: [(&str, Option<f64>); 2]) -> String {
     let named = named.iter().filter_map(|(name, wavelength)| Some(format!("{name} {} mm", (*wavelength)?)));
     let names: Vec<String> = named.collect();
     if names.is_empty() { "none".into() } else { format!("Gaussian {}", names.join(", ")) }

@@ -77,7 +77,7 @@ pub struct LimitValue {
     pub within: bool,
     /// What that proves.
     pub decision: Decision,
-    /// What of its band is not in the value, so that nothing is proven; null where all of it is.
+    /// Why nothing is proven: what of its band is not in the value, or why no uncertainty is stated; null otherwise.
     #[serde(default)]
     pub missing: Option<String>,
 }
@@ -193,7 +193,7 @@ impl Limit {
             interval_95,
             within: value.value >= low && value.value <= high,
             decision,
-            missing,
+            missing: missing.or_else(|| value.no_uncertainty.clone()),
         }
     }
 }

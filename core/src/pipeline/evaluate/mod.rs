@@ -3,12 +3,15 @@
 mod areal;
 mod config;
 mod filter;
+mod generatrix;
 mod limit;
 mod part;
 mod section;
+mod texture;
 
 pub(super) use areal::add_areal;
-pub use config::{Evaluate, EvaluateConfig, Group};
+pub use config::{ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FormRemoval, Group, Groups, TextureConfig};
+pub(super) use generatrix::add_generatrices;
 pub(super) use limit::decide;
 pub use limit::{Decision, Limit, LimitSummary, LimitValue};
 pub use part::PartSummary;
@@ -93,6 +96,15 @@ fn ascii_unit(unit: &str) -> String {
     unit.replace('µ', "u").replace('°', "deg")
 }
 
+/// A number, and what is known of its error.
+#[derive(Debug, Clone)]
+struct Found {
+    value: f64,
+    uncertainty: Option<Uncertainty>,
+    /// Why there is none, where the errors are known.
+    no_uncertainty: Option<String>,
+}
+
 /// Numbers under their labels; what is no number is left out: the profile or the wall does not have that value.
 fn labelled(
     labels: Vec<Label>,
@@ -101,12 +113,24 @@ fn labelled(
     held: &Held,
     coverage: f64,
 ) -> Vec<Value> {
+    let found = found.into_iter().map(|(value, uncertainty)| Found { value, uncertainty, no_uncertainty: None });
+    labelled_with_reasons(labels, found.collect(), filter, held, coverage)
+}
+
+/// The same of numbers that say why they have no uncertainty.
+fn labelled_with_reasons(
+    labels: Vec<Label>,
+    found: Vec<Found>,
+    filter: &Filter,
+    held: &Held,
+    coverage: f64,
+) -> Vec<Value> {
     let lost_orders = filter.lost(&held.lost);
     let weakened_above_upr = held.half_power_upr.filter(|half| filter.asks_for_more_than(*half));
     let absent_above_upr = Some(held.all_to).filter(|order| filter.reaches_above(*order));
-    let known = labels.into_iter().zip(found).filter(|(_, (value, _))| value.is_finite());
+    let known = labels.into_iter().zip(found).filter(|(_, found)| found.value.is_finite());
     known
-        .map(|(label, (value, uncertainty))| Value {
+        .map(|(label, Found { value, uncertainty, no_uncertainty })| Value {
             symbol: label.symbol.into(),
             unit: ascii_unit(label.unit),
             value,
@@ -115,6 +139,7 @@ fn labelled(
             lost_orders: lost_orders.clone(),
             weakened_above_upr,
             absent_above_upr,
+            no_uncertainty,
             filter: filter.name.clone(),
             reference: label.reference,
             coverage,
@@ -123,5 +148,7 @@ fn labelled(
         .collect()
 }
 
+#[cfg(test)]
+mod coverage_tests;
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,4 @@
-//! Values of one section: roundness and texture around the part.
+//! Values of one section: roundness around the part.
 
 use super::{Evaluate, Filter, Group, Held, Label, POINTS_A_WAVE, labelled};
 use crate::{
@@ -6,7 +6,6 @@ use crate::{
     evaluate::{
         Value,
         roundness::{Angles, Disturbed, Points, Reference, Values},
-        texture::{self, Settings},
         uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
     },
     numerics::fourier::Fourier,
@@ -52,16 +51,16 @@ pub(in crate::pipeline) fn steepest_um_per_deg(profile_um: &[f64]) -> f64 {
 }
 
 /// One section's form without level and centring, which are no form deviation also where the method knows them.
-struct Form {
-    harmonics: Vec<Complex64>,
+pub(super) struct Form {
+    pub(super) harmonics: Vec<Complex64>,
     /// Those of the solutions between which the data do not decide, and this is the mean of.
     equivalents: Vec<Vec<Complex64>>,
     /// Of noise.
-    variance: Vec<f64>,
-    held: Held,
-    angles: usize,
-    radius_mm: f64,
-    at: SectionAt,
+    pub(super) variance: Vec<f64>,
+    pub(super) held: Held,
+    pub(super) angles: usize,
+    pub(super) radius_mm: f64,
+    pub(super) at: SectionAt,
     seed: u64,
 }
 
@@ -103,13 +102,12 @@ impl Form {
         let mut values = Vec::new();
         for cutoff in evaluate.cutoffs_upr(self.held.highest) {
             let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
-            let papers_ra = cutoff.is_none() && evaluate.has(Group::Texture);
-            values.extend(self.round(&Filter::low_pass(cutoff), references, papers_ra));
+            values.extend(self.round(&Filter::low_pass(cutoff), references));
+            if cutoff.is_none() && evaluate.has(Group::Texture) {
+                values.extend(self.papers_ra());
+            }
         }
-        if let (true, Some(lambda_c)) = (evaluate.has(Group::Texture), evaluate.lambda_c_mm) {
-            let filter = Filter::between(evaluate.lambda_s_mm, Some(lambda_c), self.radius_mm);
-            values.extend(self.texture(&filter, lambda_c));
-        }
+        values.extend(self.texture(evaluate));
         values
     }
 
@@ -137,13 +135,13 @@ impl Form {
         })
     }
 
-    fn profile(&self, filter: &Filter, fourier: &mut Fourier) -> Vec<f64> {
+    pub(super) fn profile(&self, filter: &Filter, fourier: &mut Fourier) -> Vec<f64> {
         let mut form_um = fourier.synthesise(filter.harmonics(&self.harmonics)).to_vec();
         self.at.gaps.blank(&mut form_um);
         form_um
     }
 
-    fn errors(&self, filter: &Filter) -> Option<Errors> {
+    pub(super) fn errors(&self, filter: &Filter) -> Option<Errors> {
         Errors::new(&filter.variance(&self.variance), 2, self.seed)
     }
 
@@ -151,7 +149,7 @@ impl Form {
         labelled(labels, found, filter, &self.held, self.at.coverage(self.angles))
     }
 
-    fn round(&self, filter: &Filter, references: &[Reference], papers_ra: bool) -> Vec<Value> {
+    fn round(&self, filter: &Filter, references: &[Reference]) -> Vec<Value> {
         let mut labels = Vec::new();
         for reference in references {
             let ron = |symbol, meaning: &str| {
@@ -165,10 +163,6 @@ impl Form {
                 labels.push(Label::new("dr/dtheta", "µm/°", steepest, reference.symbol()));
             }
         }
-        if papers_ra {
-            let source = "Qiao, Xu, Zhao 2024: unfiltered circumferential profile";
-            labels.push(Label::new("Ra", "µm", source, "mean line"));
-        }
         if labels.is_empty() {
             return Vec::new();
         }
@@ -177,9 +171,6 @@ impl Form {
             let mut circles = Circles::new(self, filter, &at, references, draws > 0);
             self.evaluate(filter, angles, draws, |profile_um, largest_um, found| {
                 circles.values(profile_um, largest_um, found);
-                if papers_ra {
-                    found.push(texture::ra_um(profile_um));
-                }
             })
         };
         let waves = filter.highest(self.held.highest);
@@ -191,18 +182,6 @@ impl Form {
         let found = found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
         let found = found.collect();
         self.labelled(labels, found, filter)
-    }
-
-    fn texture(&self, filter: &Filter, lambda_c_mm: f64) -> Vec<Value> {
-        let label = |(symbol, unit, clause): &(&'static str, &'static str, &str)| {
-            Label::new(symbol, unit, format!("ISO 21920-2:2021, {clause}"), "mean line")
-        };
-        let settings = Settings { section_mm: Some(lambda_c_mm), ..Settings::default() };
-        let found = self.evaluate(filter, self.angles, DRAWS, |profile_um, _, found| {
-            let texture = texture::around(profile_um, self.radius_mm, &settings);
-            found.extend(texture.parameters().iter().map(|parameter| parameter.value));
-        });
-        self.labelled(texture::PARAMETERS.iter().map(label).collect(), found, filter)
     }
 }
 

@@ -21,12 +21,18 @@ use crate::{
     surface::{SurfaceBuilder, SurfaceConfig},
 };
 
-const RADIUS_MM: f64 = 30.0;
+pub(super) const RADIUS_MM: f64 = 30.0;
 /// Form²/R of 6 µm on 30 mm: what centring and circles that are no limaçons leave.
 const EXACT_UM: f64 = 1.2e-3;
 
 /// A section at z with these waves (order, coefficient), orders to `highest`, each of one variance.
-fn station(z_mm: f64, waves: &[(usize, Complex64)], highest: usize, variance: f64, lost: &[usize]) -> StationResult {
+pub(super) fn station(
+    z_mm: f64,
+    waves: &[(usize, Complex64)],
+    highest: usize,
+    variance: f64,
+    lost: &[usize],
+) -> StationResult {
     let mut estimate = vec![Complex64::ZERO; highest + 1];
     for (order, value) in waves {
         estimate[*order] = *value;
@@ -55,15 +61,15 @@ fn station(z_mm: f64, waves: &[(usize, Complex64)], highest: usize, variance: f6
     }
 }
 
-fn lobes(order: usize, amplitude_um: f64) -> (usize, Complex64) {
+pub(super) fn lobes(order: usize, amplitude_um: f64) -> (usize, Complex64) {
     (order, Complex64::from(amplitude_um))
 }
 
-fn evaluate(text: &str) -> Result<Evaluate, Fault> {
+pub(super) fn evaluate(text: &str) -> Result<Evaluate, Fault> {
     toml::from_str::<EvaluateConfig>(text).unwrap().check()
 }
 
-fn find<'a>(values: &'a [Value], symbol: &str, reference: &str, filter: &str) -> &'a Value {
+pub(super) fn find<'a>(values: &'a [Value], symbol: &str, reference: &str, filter: &str) -> &'a Value {
     let wanted = |value: &&Value| value.symbol == symbol && value.reference == reference && value.filter == filter;
     values.iter().find(wanted).unwrap_or_else(|| panic!("no {symbol} {reference} {filter} in {values:?}"))
 }
@@ -171,49 +177,15 @@ fn intervals_hold_the_truth() {
     assert!((178..=199).contains(&inside), "{inside} of {TRIALS}");
 }
 
-/// How many of so many 95 % intervals of each areal value hold the truth; rings, each on so many angles, of which each has its
-/// own size and place.
-fn areal_intervals(rings: usize, angles: usize, trials: usize) -> Vec<(String, usize)> {
-    let evaluate = evaluate("values = ['areal']").unwrap();
-    let of = |rings: &[Vec<(usize, Complex64)>], variance| {
-        let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles, step_mm: None });
-        for (ring, waves) in rings.iter().enumerate() {
-            builder.add(&station(5.0 * ring as f64, waves, 20, variance, &[]));
-        }
-        let (surface, uncertain) = builder.build(RADIUS_MM).unwrap();
-        let mut part = PartSummary::default();
-        add_areal(&mut part, &surface, &uncertain, 2, &evaluate).unwrap();
-        part.values
-    };
-    let truth = |ring: usize| {
-        let grown = Complex64::from_polar(1.0 + ring as f64 / rings as f64, 0.6 * ring as f64);
-        [lobes(4, 0.4), lobes(7, 0.5), lobes(11, 0.3)].map(|(order, value)| (order, value * grown))
-    };
-    let exact = of(&(0..rings).map(|ring| truth(ring).to_vec()).collect::<Vec<_>>(), f64::NAN);
-    assert!(exact.iter().all(|value| value.uncertainty.is_none()));
-    let (variance, mut random) = (1e-4, ChaCha8Rng::seed_from_u64(12));
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-    let share = (0.5_f64 * variance).sqrt();
-    let mut inside = vec![0; exact.len()];
-    for _ in 0..trials {
-        let mut disturbed = |ring| {
-            let mut waves: Vec<(usize, Complex64)> =
-                (2..=20).map(|order| (order, Complex64::new(share * normal(), share * normal()))).collect();
-            for (order, value) in truth(ring) {
-                waves[order - 2].1 += value;
-            }
-            waves
-        };
-        let found = of(&(0..rings).map(&mut disturbed).collect::<Vec<_>>(), variance);
-        for (inside, exact) in inside.iter_mut().zip(&exact) {
-            let found = found.iter().find(|value| value.symbol == exact.symbol);
-            let known = found.and_then(|value| value.uncertainty.as_ref());
-            *inside += usize::from(
-                known.is_some_and(|known| known.interval_95[0] <= exact.value && exact.value <= known.interval_95[1]),
-            );
-        }
-    }
-    exact.into_iter().zip(inside).map(|(value, inside)| (value.symbol, inside)).collect()
+#[test]
+fn all_groups_are_asked_for_by_one_word() {
+    let all = evaluate("values = 'all'").unwrap();
+    let groups =
+        [Group::Roundness, Group::Texture, Group::Cylindricity, Group::Areal, Group::Twist, Group::ErrorMotion];
+    assert!(groups.iter().all(|group| all.has(*group)));
+    let unknown = |text: &str| toml::from_str::<EvaluateConfig>(text).unwrap_err().to_string();
+    assert!(unknown("values = 'some'").contains("\"all\" or a list"), "{}", unknown("values = 'some'"));
+    assert!(unknown("values = ['area']").contains("areal"), "{}", unknown("values = ['area']"));
 }
 
 /// Also where no other value of the part was asked for.
@@ -226,26 +198,7 @@ fn lost_orders_are_said_of_areal_values() {
     let mut part = PartSummary::default();
     add_areal(&mut part, &surface, &uncertain, 2, &evaluate("values = ['areal']").unwrap()).unwrap();
     assert!(!part.values.is_empty() && part.values.iter().all(|value| value.lost_orders == [7, 9]));
-    assert_eq!(part.remarks.len(), 1);
-}
-
-#[test]
-fn areal_intervals_hold_the_truth() {
-    let found = areal_intervals(8, 128, 60);
-    for symbol in ["Sq", "Sa", "Sdq", "Sal"] {
-        let (_, inside) = found.iter().find(|(known, _)| known == symbol).unwrap();
-        // 95 % of 60 are 57 ± 1.7; four of those below it.
-        assert!(*inside >= 50, "{symbol}: {inside} of 60");
-    }
-}
-
-#[test]
-#[ignore = "prints the table of docs/uncertainty.md, which takes minutes"]
-fn areal_intervals_of_a_larger_surface() {
-    let found = areal_intervals(30, 360, 200);
-    for (symbol, inside) in found {
-        println!("| {symbol} | {:.1} % |", inside as f64 / 2.0);
-    }
+    assert!(part.remarks.is_empty());
 }
 
 fn part(stations: &[StationResult], placed: bool, text: &str) -> PartSummary {
@@ -302,6 +255,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
         lost_orders: Vec::new(),
         weakened_above_upr: None,
         absent_above_upr: None,
+        no_uncertainty: None,
         filter: "none".into(),
         reference: reference.into(),
         coverage: 1.0,
@@ -483,6 +437,13 @@ fn what_cannot_be_evaluated_is_refused_at_its_place() {
         ("lambda_s_mm = 0.0025", vec![key("lambda_s_mm")], "alone"),
         ("lambda_c_mm = 0.8\nlambda_s_mm = 2.5", vec![key("lambda_s_mm")], "shorter than λc"),
         ("references = []", vec![key("references")], "at least one"),
+        ("texture = { profiles = ['W'] }", vec![key("texture"), key("profiles")], "needs λc"),
+        (
+            "lambda_c_mm = 0.8\ntexture = { lambda_f_mm = 0.5 }",
+            vec![key("texture"), key("lambda_f_mm")],
+            "longer than λc",
+        ),
+        ("texture = { rdc_percent = [80, 20] }", vec![key("texture"), key("rdc_percent")], "ascending"),
     ] {
         let fault = evaluate(text).unwrap_err();
         assert!(fault.message.contains(words), "{fault}");
