@@ -22,7 +22,7 @@ mod points;
 mod search;
 
 use super::near::Course;
-pub use super::reference::Reference;
+pub use super::reference::{Reference, Undetermined};
 pub use disturbed::Disturbed;
 pub use points::{Angles, Points};
 
