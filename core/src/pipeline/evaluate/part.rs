@@ -12,7 +12,7 @@ use crate::{
         Value,
         cylindricity::{Disturbed, Generatrices, MedianLine, Points, Reference, Section, Values},
         roundness::Angles,
-        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
+        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed, without_noise},
     },
     numerics::fourier::{Fourier, max_order},
     rig::Gaps,
@@ -63,6 +63,7 @@ pub fn part_summary(
     let wall = Wall::of(&there, angles.min(MOST_ANGLES), radius_mm, placed);
     let mut part = PartSummary { sections: there.len(), z_mm, angles: wall.count, ..PartSummary::default() };
     if evaluate.has(Group::Cylindricity) {
+        part.remarks.extend(wall.missing_cylinders(&evaluate.references));
         for cutoff in evaluate.cutoffs_upr(wall.held.highest) {
             part.values.extend(wall.cylindricity(&Filter::low_pass(cutoff), &evaluate.references));
         }
@@ -90,6 +91,15 @@ struct Wall {
     placed: bool,
     rings: Vec<Ring>,
     held: Held,
+}
+
+/// What errors are drawn about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum About {
+    /// The form found.
+    Form,
+    /// The form found, less the noise that it holds.
+    WithoutNoise,
 }
 
 struct Ring {
@@ -145,7 +155,8 @@ impl Wall {
         let usual_um =
             self.errors(filter).map(|errors| LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max));
         let mut disturbed: Vec<Option<Disturbed>> = Vec::new();
-        self.evaluate(filter, labels, draws.clamp(FEWEST_DRAWS, DRAWS), |sections, largest_um, found| {
+        let draws = draws.clamp(FEWEST_DRAWS, DRAWS);
+        self.evaluate(filter, labels, draws, About::WithoutNoise, |sections, largest_um, found| {
             let points = largest_um.is_none().then(|| Points::of_sections(self.radius_mm, sections));
             for (index, reference) in references.iter().enumerate() {
                 let about = if let (None, Some(points)) = (largest_um, &points) {
@@ -172,6 +183,29 @@ impl Wall {
         })
     }
 
+    /// Why the wall does not have the reference cylinders that are asked for, each with its reason.
+    fn missing_cylinders(&self, references: &[Reference]) -> Vec<String> {
+        if self.rings.iter().all(|ring| ring.gaps.is_empty()) {
+            return Vec::new();
+        }
+        let mut fourier = Fourier::new(self.count);
+        let forms = self.rings.iter().map(|ring| {
+            let mut form_um = fourier.synthesise(ring.harmonics.iter().copied()).to_vec();
+            ring.gaps.blank(&mut form_um);
+            form_um
+        });
+        let forms: Vec<Vec<f64>> = forms.collect();
+        let sections = self.rings.iter().zip(&forms);
+        let sections: Vec<Section> =
+            sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles: &self.angles, form_um }).collect();
+        let points = Points::of_sections(self.radius_mm, &sections);
+        let missing = references.iter().filter_map(|reference| {
+            let reason = points.determine(*reference).err()?;
+            Some(format!("no CYLt about {}: {reason}", reference.cylinder_symbol()))
+        });
+        missing.collect()
+    }
+
     /// What needs the sections' centres and mean radii.
     fn lines(&self) -> Vec<Value> {
         let coaxiality = "ISO 1101:2017, coaxiality: the largest of a section's LSCI centre with the axis";
@@ -181,7 +215,7 @@ impl Wall {
             Label::new("STRt", "µm", "ISO 12780-1:2011, of the median line, a diameter", "LSLI of the median line"),
             Label::new("coaxiality", "µm", coaxiality, "LSCY"),
         ];
-        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, |sections, _, found| {
+        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, About::Form, |sections, _, found| {
             let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
             let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
             let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
@@ -213,16 +247,24 @@ impl Wall {
         filter: &Filter,
         labels: Vec<Label>,
         draws: usize,
+        about: About,
         mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<Value> {
-        let drawn = self.on_angles(&self.angles, filter, draws, &mut values);
+        let drawn = self.on_angles(&self.angles, filter, draws, about, &mut values);
         let room = POINTS_FOUND / (self.rings.len() * self.count).max(1);
-        let times = (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.count).min(room);
-        if times < 2 {
+        let times = (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.count).min(room).max(1);
+        if times < 2 && about == About::Form {
             return labelled(labels, drawn, filter, &self.held, self.coverage());
         }
-        let found = self.on_angles(&Angles::equal(times * self.count), filter, 0, &mut values).into_iter().zip(drawn);
-        let found = found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
+        let angles = Angles::equal(times * self.count);
+        let found = self.on_angles(&angles, filter, 0, About::Form, &mut values).into_iter().zip(drawn);
+        let found = found.map(|((value, _), (drawn, known))| {
+            let known = known.map(|known| match about {
+                About::Form => known.moved(value - drawn),
+                About::WithoutNoise => known.of_value_with_noise(drawn, value),
+            });
+            (value, known)
+        });
         labelled(labels, found.collect(), filter, &self.held, self.coverage())
     }
 
@@ -232,11 +274,16 @@ impl Wall {
         angles: &Angles,
         filter: &Filter,
         draws: usize,
+        about: About,
         mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<(f64, Option<Uncertainty>)> {
         let mut fourier = Fourier::new(angles.len());
         let forms = self.rings.iter().map(|ring| {
-            let mut form_um = fourier.synthesise(filter.harmonics(&ring.harmonics)).to_vec();
+            let harmonics = match about {
+                About::Form => filter.harmonics(&ring.harmonics),
+                About::WithoutNoise => filter.harmonics(&without_noise(&ring.harmonics, &ring.variance)),
+            };
+            let mut form_um = fourier.synthesise(harmonics).to_vec();
             ring.gaps.blank(&mut form_um);
             form_um
         });

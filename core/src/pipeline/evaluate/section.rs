@@ -5,7 +5,7 @@ use crate::{
     Complex64,
     evaluate::{
         Value,
-        roundness::{Angles, Disturbed, Points, Reference, Values},
+        roundness::{Angles, Disturbed, Points, Reference, Values, between_angles},
         texture::{self, Settings},
         uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
     },
@@ -29,6 +29,20 @@ pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluat
         value.uncertainty = value.uncertainty.take().map(|known| known.with_equivalents(value.value, &others));
     }
     values
+}
+
+/// Why a section does not have the reference circles that are asked for, each with its reason: an interruption may leave an arc.
+pub fn missing_circles(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<String> {
+    let form = Form::of(result, section, radius_mm).filter(|form| !form.at.gaps.is_empty());
+    let Some(form) = form.filter(|_| evaluate.has(Group::Roundness)) else { return Vec::new() };
+    let profile_um = form.profile(&Filter::low_pass(None), &mut Fourier::new(form.angles));
+    let mut points = Points::default();
+    points.set_profile(&Angles::equal(form.angles), &profile_um, radius_mm);
+    let missing = evaluate.references.iter().filter_map(|reference| {
+        let reason = points.determine(*reference).err()?;
+        Some(format!("section {}: no RONt about {}: {reason}", form.at.id, reference.symbol()))
+    });
+    missing.collect()
 }
 
 /// The largest |dr/dθ| of a profile on equal angles, by central differences over three points; NaN where no point has
@@ -188,7 +202,10 @@ impl Form {
         let finer = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
         let drawn = on_angles(fewer, DRAWS);
         let found = on_angles(finer, 0).into_iter().zip(drawn);
-        let found = found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
+        let found = found.zip(&labels).map(|(((value, _), (about, known)), label)| {
+            let known = known.map(|known| known.moved(value - about));
+            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
+        });
         let found = found.collect();
         self.labelled(labels, found, filter)
     }
@@ -217,6 +234,14 @@ struct Circles<'a> {
     points: Points,
     /// Of each reference, where its errors are drawn.
     disturbed: Vec<Option<Disturbed<'a>>>,
+    /// Harmonics of the profile itself, where no errors are drawn: contacts are then sought between the angles.
+    series: Option<Vec<Complex64>>,
+}
+
+/// Whether errors change which contacts hold the circle that a value is about, and with them the value's slopes.
+fn has_kinks(label: &Label) -> bool {
+    let about = [Reference::MaximumInscribed, Reference::MinimumCircumscribed];
+    label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
 }
 
 impl<'a> Circles<'a> {
@@ -235,6 +260,7 @@ impl<'a> Circles<'a> {
             references,
             points: Points::default(),
             disturbed: disturbed.collect(),
+            series: (!drawn).then(|| filter.harmonics(&form.harmonics)),
         }
     }
 
@@ -247,7 +273,12 @@ impl<'a> Circles<'a> {
                 (Some(largest_um), Some(disturbed)) => {
                     disturbed.as_mut().and_then(|disturbed| disturbed.values(profile_um, largest_um))
                 }
-                _ => self.points.reference(*reference).map(|circle| self.points.values(&circle)),
+                _ => match &self.series {
+                    Some(series) => {
+                        between_angles(series, profile_um, self.radius_mm, *reference).ok().map(|found| found.1)
+                    }
+                    None => self.points.reference(*reference).map(|circle| self.points.values(&circle)),
+                },
             };
             let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
             found.push(of(|values| values.ront_um));
