@@ -155,6 +155,8 @@ fn a_cone_and_a_banana() {
     let cone = wall(&|z, _| 0.3 * z);
     let lines = Generatrices::of(&cone.sections(), RADIUS_MM, &lscy(&cone)).unwrap();
     assert!((lines.cyltt_um() - 3.0).abs() < 1e-9 && lines.largest_strt_um() < 1e-9, "{lines:?}");
+    // Opposite generatrices part by twice the slope.
+    assert!((lines.largest_parallelism_um() - 6.0).abs() < 1e-9, "{lines:?}");
     // A bow x = 0.04 (z − 5)² µm, from 0 to 1 and back: its least-squares line is at the mean 0.4, ends 0.6 off.
     let banana = wall(&|z, angle| 0.04 * (z - 5.0).powi(2) * angle.cos());
     let found = lscy(&banana);

@@ -5,6 +5,7 @@ pub mod cylindricity;
 pub mod error_motion;
 mod near;
 pub mod parameter;
+pub mod position;
 pub mod reading;
 pub mod reference;
 pub mod roundness;

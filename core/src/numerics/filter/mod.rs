@@ -1,10 +1,12 @@
 //! Gaussian filters (ISO 16610): closed profiles by their harmonics, open and gapped ones by local regression, maps.
 
 mod areal;
+mod kind;
 mod regression;
 mod robust;
 
 pub use areal::areal_gaussian;
+pub use kind::Kind;
 pub use regression::{Degree, Smoother};
 pub use robust::{Robust, robust_gaussian};
 

@@ -11,6 +11,7 @@ use crate::{
     evaluate::{
         Value,
         cylindricity::{Disturbed, Generatrices, MedianLine, Points, Reference, Section, Values},
+        position::{Axis, Positions},
         roundness::Angles,
         uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed, without_noise},
     },
@@ -65,12 +66,27 @@ pub fn part_summary(
     if evaluate.has(Group::Cylindricity) {
         part.remarks.extend(wall.missing_cylinders(&evaluate.references));
         for cutoff in evaluate.cutoffs_upr(wall.held.highest) {
-            part.values.extend(wall.cylindricity(&Filter::low_pass(cutoff), &evaluate.references));
+            part.values.extend(wall.cylindricity(&evaluate.low_pass(cutoff), &evaluate.references));
         }
         if placed {
             part.values.extend(wall.lines());
         } else {
             part.remarks.push(CENTRED.into());
+        }
+        let datum = &evaluate.datum;
+        let (datums, others): (Vec<usize>, Vec<usize>) =
+            (0..wall.rings.len()).partition(|ring| wall.rings[*ring].is_named(datum));
+        let unknown = |name: &&String| !wall.rings.iter().any(|ring| ring.is_named(std::slice::from_ref(*name)));
+        if datum.is_empty() {
+        } else if let Some(name) = datum.iter().find(unknown) {
+            part.remarks.push(format!("datum: there is no section `{name}`; no position about the datum is given"));
+        } else if !placed {
+            part.remarks
+                .push("datum: centres of sections are not known, and no position about the datum is given".into());
+        } else {
+            for cutoff in evaluate.cutoffs_upr(wall.held.highest) {
+                part.values.extend(wall.positions(&evaluate.low_pass(cutoff), &datum.join(", "), &datums, &others));
+            }
         }
     }
     if there.len() < sections.len() {
@@ -103,12 +119,21 @@ enum About {
 }
 
 struct Ring {
+    station: String,
+    id: String,
     z_mm: f64,
     harmonics: Vec<Complex64>,
     variance: Vec<f64>,
     gaps: Gaps,
     used: f64,
     seed: u64,
+}
+
+impl Ring {
+    /// Whether its section or its station is among these.
+    fn is_named(&self, names: &[String]) -> bool {
+        names.iter().any(|name| [&self.id, &self.station].contains(&name))
+    }
 }
 
 impl Wall {
@@ -123,6 +148,8 @@ impl Wall {
             (highest, all_to) = (highest.max(own), all_to.min(own));
             let known = || orders().map(|(order, known)| known.filter(|_| order >= lowest));
             Ring {
+                station: section.station.clone(),
+                id: section.id.clone(),
                 z_mm: section.z_mm,
                 harmonics: known().map(|known| known.map_or(Complex64::ZERO, |known| known.value)).collect(),
                 variance: known().map(|known| known.map_or(f64::NAN, |known| known.variance)).collect(),
@@ -206,14 +233,46 @@ impl Wall {
         missing.collect()
     }
 
+    /// Positions of sections about the axis through others.
+    fn positions(&self, filter: &Filter, datum: &str, datums: &[usize], others: &[usize]) -> Vec<Value> {
+        let axis = format!("axis of {datum}");
+        let name = |ring: &usize| {
+            let Ring { station, id, .. } = &self.rings[*ring];
+            format!("section {id} of {station}, {axis}")
+        };
+        let mut labels: Vec<Label> = Vec::new();
+        for ring in others {
+            let centre = "distance of the section's LSCI centre from the datum axis";
+            labels.push(Label::new("eccentricity", "µm", centre, name(ring)));
+            labels.push(Label::new("circular-run-out", "µm", "ISO 1101:2017, circular run-out, radial", name(ring)));
+        }
+        let coaxiality = "ISO 1101:2017, coaxiality: twice the largest eccentricity";
+        labels.push(Label::new("coaxiality", "µm", coaxiality, axis.clone()));
+        labels.push(Label::new("total-run-out", "µm", "ISO 1101:2017, total run-out, radial", axis));
+        let draws = (POINTS_DRAWN / (self.rings.len() * self.count).max(1)).clamp(FEWEST_DRAWS, DRAWS);
+        self.evaluate(filter, labels, draws, About::WithoutNoise, |sections, _, found| {
+            let of = |rings: &[usize]| rings.iter().filter_map(|ring| sections.get(*ring).copied()).collect::<Vec<_>>();
+            let axis = Axis::through(&of(datums), self.radius_mm);
+            let positions = axis.map(|axis| Positions::about(&of(others), self.radius_mm, &axis));
+            let each = positions.iter().flat_map(|all| all.eccentricity_um.iter().zip(&all.circular_runout_um));
+            let mut all: Vec<f64> = each.flat_map(|(eccentricity, runout)| [*eccentricity, *runout]).collect();
+            all.resize(2 * others.len(), f64::NAN);
+            found.extend(all);
+            found.push(positions.as_ref().map_or(f64::NAN, |all| all.coaxiality_um));
+            found.push(positions.as_ref().map_or(f64::NAN, |all| all.total_runout_um));
+        })
+    }
+
     /// What needs the sections' centres and mean radii.
     fn lines(&self) -> Vec<Value> {
         let coaxiality = "ISO 1101:2017, coaxiality: the largest of a section's LSCI centre with the axis";
+        let parallelism = "ISO 1101:2017, parallelism: the largest of the generatrices";
         let labels = vec![
             Label::new("CYLtt", "µm", "ISO 12180-1:2011, cylinder taper", "LSCY"),
             Label::new("STRt", "µm", "ISO 12780-1:2011, the largest of the generatrices", "LSLI of generatrices"),
             Label::new("STRt", "µm", "ISO 12780-1:2011, of the median line, a diameter", "LSLI of the median line"),
             Label::new("coaxiality", "µm", coaxiality, "LSCY"),
+            Label::new("parallelism", "µm", parallelism, "LSLI of the opposite generatrix"),
         ];
         self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, About::Form, |sections, _, found| {
             let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
@@ -224,6 +283,7 @@ impl Wall {
             found.push(median.as_ref().map_or(f64::NAN, |median| median.straightness_um));
             let coaxiality = median.iter().flat_map(|median| &median.coaxiality_um);
             found.push(coaxiality.copied().fold(f64::NAN, f64::max));
+            found.push(lines.as_ref().map_or(f64::NAN, Generatrices::largest_parallelism_um));
         })
     }
 

@@ -21,9 +21,11 @@ pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluat
     let equivalents: Vec<Vec<Value>> =
         form.equivalents.iter().map(|harmonics| form.exactly(harmonics).values(evaluate)).collect();
     for value in &mut values {
-        let same = |other: &&Value| {
-            (&other.symbol, &other.filter, &other.reference) == (&value.symbol, &value.filter, &value.reference)
+        let key = |value: &Value| {
+            let Value { symbol, filter, reference, band_upr, .. } = value;
+            (symbol.clone(), filter.clone(), reference.clone(), *band_upr)
         };
+        let same = |other: &&Value| key(other) == key(value);
         let others: Vec<f64> =
             equivalents.iter().filter_map(|all| all.iter().find(same)).map(|other| other.value).collect();
         value.uncertainty = value.uncertainty.take().map(|known| known.with_equivalents(value.value, &others));
@@ -118,11 +120,82 @@ impl Form {
         for cutoff in evaluate.cutoffs_upr(self.held.highest) {
             let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
             let papers_ra = cutoff.is_none() && evaluate.has(Group::Texture);
-            values.extend(self.round(&Filter::low_pass(cutoff), references, papers_ra));
+            values.extend(self.round(&evaluate.low_pass(cutoff), references, papers_ra));
+            if let (true, Some(window_deg)) = (evaluate.has(Group::Roundness), evaluate.slope_window_deg) {
+                values.extend(self.slope(&evaluate.low_pass(cutoff), window_deg));
+            }
+        }
+        if evaluate.has(Group::Harmonics) {
+            values.extend(self.harmonics(evaluate.harmonics_upr));
         }
         if let (true, Some(lambda_c)) = (evaluate.has(Group::Texture), evaluate.lambda_c_mm) {
             let filter = Filter::between(evaluate.lambda_s_mm, Some(lambda_c), self.radius_mm);
             values.extend(self.texture(&filter, lambda_c));
+        }
+        values
+    }
+
+    /// The largest change of the profile over a window of angles, r(α + w) − r(α): a profile of its own, with the harmonics
+    /// cₙ (e^{inw} − 1).
+    fn slope(&self, filter: &Filter, window_deg: f64) -> Vec<Value> {
+        let window_rad = window_deg.to_radians();
+        let change = |order: usize| Complex64::cis(order as f64 * window_rad) - 1.0;
+        let harmonics: Vec<Complex64> =
+            self.harmonics.iter().enumerate().map(|(order, harmonic)| harmonic * change(order)).collect();
+        let mut changes = self.exactly(&harmonics);
+        changes.variance =
+            self.variance.iter().enumerate().map(|(order, variance)| variance * change(order).norm_sqr()).collect();
+        for [from, length] in self.at.gaps.stretches() {
+            changes.at.gaps.add(from - window_rad, length);
+        }
+        let waves = filter.highest(self.held.highest);
+        let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
+        let found = changes.evaluate(filter, angles, DRAWS, |profile_um, _, found| {
+            found.push(profile_um.iter().map(|change| change.abs()).fold(f64::NAN, f64::max));
+        });
+        let source = "largest change of the profile over a window, no standard's symbol";
+        let label = Label::new("slope", "µm", source, format!("LSCI, window {window_deg}°"));
+        changes.labelled(vec![label], found, filter)
+    }
+
+    /// Amplitude and phase of each order from 2 to at most `highest`.
+    ///
+    /// Half of an order's variance is along its amplitude and half across it. An amplitude below 2.45 times its standard
+    /// uncertainty may be noise alone (the 95 % point of Rayleigh's distribution): its interval begins at 0, and its phase has none.
+    fn harmonics(&self, highest: usize) -> Vec<Value> {
+        const NOISE_ALONE: f64 = 2.447_746_830_680_816;
+        const NORMAL_95: f64 = 1.959_963_984_540_054;
+        let mut values = Vec::new();
+        let known = |order: &usize| !self.held.lost.contains(order);
+        for order in (2..=highest.min(self.held.highest)).filter(known) {
+            let (value, turns) = (self.harmonics[order], order as f64);
+            let amplitude = value.norm();
+            // The first crest of A cos(n α + φ).
+            let phase = (-value.arg().to_degrees() / turns).rem_euclid(360.0 / turns);
+            let variance = self.variance.get(order).copied().filter(|variance| variance.is_finite());
+            let std = variance.map(|variance| (0.5 * variance).sqrt());
+            let about = |value: f64, std: f64, low: f64| Uncertainty {
+                std,
+                interval_95: [low, value + NORMAL_95 * std],
+                draws: 0,
+            };
+            let of_amplitude = std.map(|std| {
+                let low = if amplitude < NOISE_ALONE * std { 0.0 } else { amplitude - NORMAL_95 * std };
+                about(amplitude, std, low)
+            });
+            let of_phase = std.filter(|std| amplitude >= NOISE_ALONE * std).map(|std| {
+                let std = (std / (amplitude * turns)).to_degrees();
+                about(phase, std, phase - NORMAL_95 * std)
+            });
+            let labels = vec![
+                Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),
+                Label::new("phase", "°", "part's angle of the order's first crest", "LSCI"),
+            ];
+            let found = vec![(amplitude, of_amplitude), (phase, of_phase)];
+            let both = self.labelled(labels, found, &Filter::low_pass(None));
+            let weakened_above_upr = self.held.half_power_upr.filter(|half| turns > *half);
+            let of_order = |value| Value { band_upr: [order; 2], lost_orders: Vec::new(), weakened_above_upr, ..value };
+            values.extend(both.into_iter().map(of_order));
         }
         values
     }
