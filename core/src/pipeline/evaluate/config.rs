@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    filter::{Filter, between_name},
+    filter::{Filter, between_name, robust_name},
     limit::Limit,
 };
 use crate::{
@@ -34,6 +34,8 @@ pub struct EvaluateConfig {
     pub filter: Option<Kind>,
     /// Cut-off of a high-pass in undulations per revolution, which makes a band of each filter of `filter_upr`; unfiltered values stay.
     pub high_pass_upr: Option<f64>,
+    /// Cut-offs of robust Gaussian low-passes (ISO 16610-31) for roundness, in undulations per revolution, besides `filter_upr`.
+    pub robust_filter_upr: Option<Vec<f64>>,
     /// Window, in degrees up to 180, over which `roundness` gives the largest change of the profile, `slope`.
     pub slope_window_deg: Option<f64>,
     /// Highest order of `harmonics`; without it 15.
@@ -104,6 +106,7 @@ pub struct Evaluate {
     filter_upr: Option<Vec<f64>>,
     filter: Kind,
     high_pass_upr: Option<f64>,
+    pub(super) robust_filter_upr: Vec<f64>,
     pub(super) slope_window_deg: Option<f64>,
     pub(super) harmonics_upr: usize,
     pub(super) datum: Vec<String>,
@@ -121,6 +124,7 @@ impl Default for Evaluate {
             filter_upr: None,
             filter: Kind::Gaussian,
             high_pass_upr: None,
+            robust_filter_upr: Vec::new(),
             slope_window_deg: None,
             harmonics_upr: 15,
             datum: Vec::new(),
@@ -141,10 +145,12 @@ impl EvaluateConfig {
     /// # Errors
     /// The first that cannot be, with its key.
     pub(in crate::pipeline) fn check(self) -> Result<Evaluate, Fault> {
-        for (index, cutoff) in self.filter_upr.iter().flatten().enumerate() {
-            if !(cutoff.is_finite() && *cutoff > 0.0) {
-                let fault = Fault::here(format!("the cut-off must be above 0 undulations a turn, found {cutoff}"));
-                return Err(fault.under_item("filter_upr", index));
+        for (key, cutoffs) in [("filter_upr", &self.filter_upr), ("robust_filter_upr", &self.robust_filter_upr)] {
+            for (index, cutoff) in cutoffs.iter().flatten().enumerate() {
+                if !(cutoff.is_finite() && *cutoff > 0.0) {
+                    let fault = Fault::here(format!("the cut-off must be above 0 undulations a turn, found {cutoff}"));
+                    return Err(fault.under_item(key, index));
+                }
             }
         }
         for (key, wavelength) in [("lambda_c_mm", self.lambda_c_mm), ("lambda_s_mm", self.lambda_s_mm)] {
@@ -196,6 +202,7 @@ impl EvaluateConfig {
             filter_upr: self.filter_upr.map(once_each),
             filter: self.filter.unwrap_or_default(),
             high_pass_upr: self.high_pass_upr,
+            robust_filter_upr: once_each(self.robust_filter_upr.unwrap_or_default()),
             slope_window_deg: self.slope_window_deg,
             harmonics_upr: self.harmonics_upr.unwrap_or(usual.harmonics_upr),
             datum: once_each(self.datum.unwrap_or_default()),
@@ -277,7 +284,8 @@ impl Evaluate {
         let cutoffs = self.filter_upr.as_deref().unwrap_or(&[USUAL_UPR]);
         let round = std::iter::once(None).chain(cutoffs.iter().copied().map(Some));
         let round = round.map(|cutoff| self.low_pass(cutoff).name);
-        once_each(round.chain([between_name(self.lambda_s_mm, self.lambda_c_mm)]).collect())
+        let robust = self.robust_filter_upr.iter().map(|cutoff| robust_name(*cutoff));
+        once_each(round.chain(robust).chain([between_name(self.lambda_s_mm, self.lambda_c_mm)]).collect())
     }
 
     /// Symbols and units of the values that may come.

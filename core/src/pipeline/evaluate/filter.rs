@@ -30,6 +30,11 @@ impl Filter {
         Self { name: round_name(kind, above_upr, below_upr), kind, band: Band { above_upr, below_upr } }
     }
 
+    /// The robust Gaussian's name and the band of the Gaussian with its cut-off, which it is not: no weight on orders.
+    pub fn robust(cutoff_upr: f64) -> Self {
+        Self { name: robust_name(cutoff_upr), ..Self::low_pass(Some(cutoff_upr)) }
+    }
+
     /// What lies between λs and λc along the circumference of a radius.
     pub fn between(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>, radius_mm: f64) -> Self {
         let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
@@ -98,6 +103,11 @@ pub(super) fn round_name(kind: Kind, above_upr: Option<f64>, below_upr: Option<f
         (Some(above), None) => format!("{} above {above} UPR", kind.name()),
         (Some(above), Some(below)) => format!("{} {above} to {below} UPR", kind.name()),
     }
+}
+
+/// "robust Gaussian 50 UPR".
+pub(super) fn robust_name(cutoff_upr: f64) -> String {
+    format!("robust Gaussian {cutoff_upr} UPR")
 }
 
 /// "none", "Gaussian λs 0.0025 mm, λc 0.8 mm".

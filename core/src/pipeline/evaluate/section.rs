@@ -9,7 +9,10 @@ use crate::{
         texture::{self, Settings},
         uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
     },
-    numerics::fourier::Fourier,
+    numerics::{
+        filter::{Degree, Smoother, robust_gaussian},
+        fourier::Fourier,
+    },
     pipeline::result::StationResult,
     separation::{Quantity, SectionAt},
 };
@@ -125,6 +128,9 @@ impl Form {
                 values.extend(self.slope(&evaluate.low_pass(cutoff), window_deg));
             }
         }
+        for cutoff in evaluate.robust_filter_upr.iter().filter(|_| evaluate.has(Group::Roundness)) {
+            values.extend(self.robust(*cutoff, &evaluate.references));
+        }
         if evaluate.has(Group::Harmonics) {
             values.extend(self.harmonics(evaluate.harmonics_upr));
         }
@@ -133,6 +139,34 @@ impl Form {
             values.extend(self.texture(&filter, lambda_c));
         }
         values
+    }
+
+    /// Roundness behind the robust Gaussian (ISO 16610-31), which is applied to each drawn profile.
+    fn robust(&self, cutoff_upr: f64, references: &[Reference]) -> Vec<Value> {
+        let filter = Filter::robust(cutoff_upr);
+        let labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
+        let smoother = Smoother::closed(self.angles, cutoff_upr, Degree::Two);
+        let (angles, mut points) = (Angles::equal(self.angles), Points::default());
+        let found = self.evaluate(&Filter::low_pass(None), self.angles, DRAWS_OF_ROBUST, |profile_um, _, found| {
+            points.set_profile(&angles, &robust_gaussian(&smoother, profile_um).low_pass, self.radius_mm);
+            for reference in references {
+                let about = points.reference(*reference).map(|circle| points.values(&circle));
+                let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+                found.push(of(|values| values.ront_um));
+                if *reference == Reference::LeastSquares {
+                    found.extend([
+                        of(|values| values.ronp_um),
+                        of(|values| values.ronv_um),
+                        of(|values| values.ronq_um),
+                    ]);
+                }
+            }
+        });
+        let found = found.into_iter().zip(&labels).map(|((value, known), label)| {
+            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
+        });
+        let found = found.collect();
+        self.labelled(labels, found, &filter)
     }
 
     /// The largest change of the profile over a window of angles, r(α + w) − r(α): a profile of its own, with the harmonics
@@ -241,13 +275,8 @@ impl Form {
     fn round(&self, filter: &Filter, references: &[Reference], papers_ra: bool) -> Vec<Value> {
         let mut labels = Vec::new();
         for reference in references {
-            let ron = |symbol, meaning: &str| {
-                Label::new(symbol, "µm", format!("ISO 12181-1:2011, {meaning} roundness deviation"), reference.symbol())
-            };
-            labels.push(ron("RONt", "peak-to-valley"));
+            labels.extend(roundness_labels(*reference));
             if *reference == Reference::LeastSquares {
-                labels.extend([ron("RONp", "peak-to-reference"), ron("RONv", "reference-to-valley")]);
-                labels.push(ron("RONq", "root mean square"));
                 let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
                 labels.push(Label::new("dr/dtheta", "µm/°", steepest, reference.symbol()));
             }
@@ -296,6 +325,9 @@ impl Form {
     }
 }
 
+/// Draws of what is filtered robustly, point by point and some times over.
+const DRAWS_OF_ROBUST: usize = 64;
+
 /// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
 const DRAWN_POINTS_A_WAVE: usize = 6;
 
@@ -309,6 +341,19 @@ struct Circles<'a> {
     disturbed: Vec<Option<Disturbed<'a>>>,
     /// Harmonics of the profile itself, where no errors are drawn: contacts are then sought between the angles.
     series: Option<Vec<Complex64>>,
+}
+
+/// RONt, and about LSCI RONp, RONv and RONq.
+fn roundness_labels(reference: Reference) -> Vec<Label> {
+    let ron = |symbol, meaning: &str| {
+        Label::new(symbol, "µm", format!("ISO 12181-1:2011, {meaning} roundness deviation"), reference.symbol())
+    };
+    let mut labels = vec![ron("RONt", "peak-to-valley")];
+    if reference == Reference::LeastSquares {
+        labels.extend([ron("RONp", "peak-to-reference"), ron("RONv", "reference-to-valley")]);
+        labels.push(ron("RONq", "root mean square"));
+    }
+    labels
 }
 
 /// Whether errors change which contacts hold the circle that a value is about, and with them the value's slopes.

@@ -478,6 +478,27 @@ fn filters_pass_their_share_at_the_cut_off() {
     assert!(evaluate("high_pass_upr = 60").is_err() && evaluate("high_pass_upr = 0").is_err());
 }
 
+/// Three lobes and a scratch of 10 µm in a dale: a Gaussian of 15 UPR follows it by half a micron, the robust one does not.
+#[test]
+fn a_scratch_does_not_pull_the_robust_filter() {
+    let width: f64 = 0.005;
+    let scratch = |order: usize| {
+        let share = (-0.5 * (order as f64 * width).powi(2)).exp();
+        Complex64::from(-10.0 * width * (2.0 / PI).sqrt() * share)
+    };
+    let mut waves: Vec<(usize, Complex64)> = (2..=340).map(|order| (order, scratch(order))).collect();
+    waves[1].1 += Complex64::from_polar(2.0, PI);
+    let text = "references = ['LSCI']\nfilter_upr = [15]\nrobust_filter_upr = [15]";
+    let values = section_values(&station(0.0, &waves, 340, 1e-9, &[]), 0, &evaluate(text).unwrap(), RADIUS_MM);
+    let [plain, robust] =
+        ["Gaussian 15 UPR", "robust Gaussian 15 UPR"].map(|filter| find(&values, "RONt", "LSCI", filter));
+    // Of three lobes (1 + a) e^−a pass, a = 1.678 (3/15)². Orders 0 and 1 of the scratch are not in the form: 0.01 µm.
+    let expected = 4.0 * 1.0671 * (-0.0671_f64).exp();
+    assert!((robust.value - expected).abs() < 0.05, "{} instead of {expected}", robust.value);
+    assert!((plain.value - expected).abs() > 0.15, "{}", plain.value);
+    assert!(robust.uncertainty.as_ref().is_some_and(|known| known.std > 0.0 && known.std < 0.01));
+}
+
 /// A section 3 µm aside of the axis of two others, with two lobes of 0.5 µm.
 #[test]
 fn sections_have_their_position_about_a_datum_axis() {
