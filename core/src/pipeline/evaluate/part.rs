@@ -73,19 +73,10 @@ pub fn part_summary(
         } else {
             part.remarks.push(CENTRED.into());
         }
-        let datum = &evaluate.datum;
-        let (datums, others): (Vec<usize>, Vec<usize>) =
-            (0..wall.rings.len()).partition(|ring| wall.rings[*ring].is_named(datum));
-        let unknown = |name: &&String| !wall.rings.iter().any(|ring| ring.is_named(std::slice::from_ref(*name)));
-        if datum.is_empty() {
-        } else if let Some(name) = datum.iter().find(unknown) {
-            part.remarks.push(format!("datum: there is no section `{name}`; no position about the datum is given"));
-        } else if !placed {
-            part.remarks
-                .push("datum: centres of sections are not known, and no position about the datum is given".into());
-        } else {
-            for cutoff in evaluate.cutoffs_upr(wall.held.highest) {
-                part.values.extend(wall.positions(&evaluate.low_pass(cutoff), &datum.join(", "), &datums, &others));
+        if !evaluate.datum.is_empty() {
+            match wall.about_datum(evaluate) {
+                Ok(values) => part.values.extend(values),
+                Err(remark) => part.remarks.push(format!("{remark}; no position about the datum is given")),
             }
         }
     }
@@ -231,6 +222,22 @@ impl Wall {
             Some(format!("no CYLt about {}: {reason}", reference.cylinder_symbol()))
         });
         missing.collect()
+    }
+
+    /// Positions about the datum of the sections that are not in it, or why there are none.
+    fn about_datum(&self, evaluate: &Evaluate) -> Result<Vec<Value>, String> {
+        let datum = &evaluate.datum;
+        let unknown = |name: &&String| !self.rings.iter().any(|ring| ring.is_named(std::slice::from_ref(*name)));
+        if let Some(name) = datum.iter().find(unknown) {
+            return Err(format!("datum: there is no section `{name}`"));
+        }
+        if !self.placed {
+            return Err("datum: the centres of sections are not known".into());
+        }
+        let (datums, others): (Vec<usize>, Vec<usize>) =
+            (0..self.rings.len()).partition(|ring| self.rings[*ring].is_named(datum));
+        let filters = evaluate.cutoffs_upr(self.held.highest).into_iter().map(|cutoff| evaluate.low_pass(cutoff));
+        Ok(filters.flat_map(|filter| self.positions(&filter, &datum.join(", "), &datums, &others)).collect())
     }
 
     /// Positions of sections about the axis through others.
