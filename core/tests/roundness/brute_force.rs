@@ -165,7 +165,7 @@ fn wide_profiles_have_the_largest_inscribed_circle() {
             let mut size = 20.0;
             while size > 1e-7 {
                 let around = (0..16).map(|step| {
-                    let (sin, cos) = (f64::from(step) * 0.392_699).sin_cos();
+                    let (sin, cos) = (f64::from(step) * std::f64::consts::FRAC_PI_8).sin_cos();
                     [place[0] + size * cos, place[1] + size * sin]
                 });
                 let next = around.map(|place| (extremes(&places, place).0, place)).max_by(|a, b| a.0.total_cmp(&b.0));

@@ -51,7 +51,7 @@ pub(super) fn search(points: &Points, start: Axis, reference: Reference) -> Resu
             return Err(Undetermined::NotBounded);
         }
         let held = held.ok_or(Undetermined::NotFound)?;
-        if search.adrift(&held) > ADRIFT || merit > at_start + tolerance {
+        if adrift(&held) > ADRIFT || merit > at_start + tolerance {
             return Err(Undetermined::NotFound);
         }
         let deviation = match reference {
@@ -74,6 +74,12 @@ pub(super) fn search(points: &Points, start: Axis, reference: Reference) -> Resu
 
 /// What holds an axis, each with its multiplier.
 type Contacts = [(Contact, f64); 6];
+
+/// The largest multiplier of a limit: how steep the merit still is.
+fn adrift(held: &Contacts) -> f64 {
+    let limits = held.iter().filter(|(contact, _)| matches!(contact, Contact::Least(_) | Contact::Most(_)));
+    limits.map(|(_, multiplier)| *multiplier).fold(0.0, f64::max)
+}
 
 struct Search<'a> {
     points: &'a Points,
@@ -132,12 +138,6 @@ impl Search<'_> {
     /// Whether the axis has left the wall.
     fn is_far(&self, axis: &Axis, start: &Axis) -> bool {
         !(0..4).all(|k| (axis[k] - start[k]).abs() < self.points.radius_um)
-    }
-
-    /// The largest multiplier of a limit: how steep the merit still is.
-    fn adrift(&self, held: &Contacts) -> f64 {
-        let limits = held.iter().filter(|(contact, _)| matches!(contact, Contact::Least(_) | Contact::Most(_)));
-        limits.map(|(_, multiplier)| *multiplier).fold(0.0, f64::max)
     }
 
     fn cost(&self) -> [f64; 6] {
