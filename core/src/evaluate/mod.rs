@@ -6,6 +6,7 @@ pub mod drawn;
 pub mod error_motion;
 mod near;
 pub mod parameter;
+pub mod position;
 pub mod reading;
 pub mod reference;
 pub mod roundness;

@@ -1,5 +1,7 @@
 //! What deviations are referred to: circles of profiles, and cylinders of walls in the same four ways.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -47,3 +49,33 @@ impl Reference {
         }
     }
 }
+
+/// Why points have no reference circle or cylinder of a kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Undetermined {
+    /// Fewer points than the circle or cylinder has unknowns.
+    TooFewPoints,
+    /// All points of a wall have the same height.
+    OneHeight,
+    /// The nominal radius is not a positive number, or deviations of a wall are as large as it.
+    Radius,
+    /// The points do not surround a centre or axis (a partial arc): the inscribed circle, or the radius of the zone, grows
+    /// without bound.
+    NotBounded,
+    /// The search did not converge.
+    NotFound,
+}
+
+impl fmt::Display for Undetermined {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::TooFewPoints => "there are fewer points than unknowns",
+            Self::OneHeight => "all points have the same height",
+            Self::Radius => "the nominal radius is not above the deviations",
+            Self::NotBounded => "the points do not surround a centre: the reference is not bounded",
+            Self::NotFound => "the search did not converge",
+        })
+    }
+}
+
+impl std::error::Error for Undetermined {}

@@ -41,6 +41,34 @@ impl Uncertainty {
         self
     }
 
+    /// The same of a value with kinks: an interval that reaches as far below the value as above it, the farther of both.
+    ///
+    /// Where an error changes which contacts hold a circle (nearly opposite contacts of MICI and MCCI), draws about the value
+    /// do not tell on which side of it the truth lies.
+    #[must_use]
+    pub fn on_both_sides(mut self, value: f64) -> Self {
+        let [low, high] = self.interval_95;
+        let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        let reach = (value - low).max(high - value);
+        self.interval_95 = [(value - reach).max(floor), value + reach];
+        self
+    }
+
+    /// The same of a value found with noise, from draws about a form of which noise is taken ([`without_noise`]) and which has the
+    /// value `about`: from below what the draws' errors make of the value found to above the draws themselves, whichever reaches
+    /// farther on each side.
+    ///
+    /// The first end is right where errors move the value alike for all forms, the second where noise adds to extremes or
+    /// decides which points hold the reference.
+    #[must_use]
+    pub fn of_value_with_noise(self, about: f64, value: f64) -> Self {
+        let [low, high] = self.interval_95;
+        let drawn = [2.0 * about - high, 2.0 * about - low];
+        let mut moved = self.moved(value - about);
+        moved.interval_95 = [moved.interval_95[0].min(drawn[0]), moved.interval_95[1].max(drawn[1])];
+        moved
+    }
+
     /// The same where the data do not decide between `value` and these: the largest distance from it is added to the standard
     /// uncertainty, and the interval reaches as far beyond each of them as beyond it.
     #[must_use]
@@ -53,6 +81,21 @@ impl Uncertainty {
         self.std = self.std.hypot(distances().map(f64::abs).fold(0.0, f64::max));
         self
     }
+}
+
+/// Harmonics less the noise that they hold, for draws about them: each times 1 − σ²/|c|², or 0 where that is below 0 (Wiener's
+/// filter by order, with the power |c|² − σ² for that of the form). Orders without a known variance stay.
+///
+/// Draws about a form that holds its noise add the same noise a second time: where noise is larger than the form, peaks
+/// of the draws scatter √2 times as far as those of the form found do.
+#[must_use]
+pub fn without_noise(harmonics: &[Complex64], variance: &[f64]) -> Vec<Complex64> {
+    let share = |harmonic: &Complex64, variance: f64| {
+        let power = harmonic.norm_sqr();
+        if variance > 0.0 && power > 0.0 { (1.0 - variance / power).max(0.0) } else { 1.0 }
+    };
+    let variance = variance.iter().copied().chain(std::iter::repeat(f64::NAN));
+    harmonics.iter().zip(variance).map(|(harmonic, variance)| harmonic * share(harmonic, variance)).collect()
 }
 
 /// Largest distance of other values from one.

@@ -77,6 +77,12 @@ impl<const D: usize> Cloud<D> {
         (0..D).fold(self.levels[point], |height, k| height - self.features[k][point] * place[k])
     }
 
+    /// f·s of one point over `place`: what its height lacks to its level.
+    #[must_use]
+    pub fn level_under(&self, point: usize, place: &[f64; D]) -> f64 {
+        (0..D).fold(0.0, |sum, k| sum + self.features[k][point] * place[k])
+    }
+
     /// Lowest and highest height over `place` in a range of points; (∞, −∞) where none is there.
     #[must_use]
     pub fn extremes(&self, range: Range<usize>, place: &[f64; D]) -> (f64, f64) {

@@ -2,7 +2,7 @@
 
 use super::{
     config::Pipeline,
-    evaluate::{Evaluate, section_values},
+    evaluate::{Evaluate, missing_circles, section_values},
 };
 use crate::{
     Complex64,
@@ -133,7 +133,10 @@ pub(super) fn complete(
     }
     let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
     let sections = 0..result.separation.sections.len();
-    result.values = sections.map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
+    result.values = sections.clone().map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
+    let missing = sections.flat_map(|section| missing_circles(&result, section, evaluate, radius_mm));
+    let missing: Vec<String> = missing.collect();
+    result.separation.warnings.extend(missing);
     result
 }
 

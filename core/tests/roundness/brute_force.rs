@@ -1,6 +1,6 @@
 //! All subsets of contacts of small profiles.
 
-use runout_core::evaluate::roundness::{Points, Reference};
+use runout_core::evaluate::roundness::{Points, Reference, Undetermined};
 
 use crate::profiles::{Profile, profile};
 
@@ -118,7 +118,7 @@ fn plots_have_the_smallest_circle_and_no_better_one_than_all_subsets() {
         {
             wrong.push(format!("{seed}: MCCI"));
         }
-        // The others may be a local optimum: never better than the best of all, and mostly the best.
+        // Never better than the best of all. MICI is the best, MZCI mostly: its local optima are more.
         let zone =
             points.reference(Reference::MinimumZone).map(|circle| points.values(&circle).ront_um - zone(&places));
         let inscribed = radius(Reference::MaximumInscribed).map(|found| inscribed(&places, tolerance) - found);
@@ -132,5 +132,75 @@ fn plots_have_the_smallest_circle_and_no_better_one_than_all_subsets() {
     }
     println!("MZCI, MICI: the best of all in {best:?} of {all:?} plots with deviations of a third of the radius");
     assert!(wrong.is_empty(), "{} wrong, such as {:?}", wrong.len(), &wrong[..wrong.len().min(20)]);
-    assert!((0..2).all(|kind| 2 * best[kind] > all[kind]), "{best:?} of {all:?}");
+    assert!(best[1] == all[1] && 10 * best[0] > 9 * all[0], "{best:?} of {all:?}");
+}
+
+/// Smooth profiles of many points with deviations of up to 30 % of the radius, against a dense search of the centre.
+#[test]
+fn wide_profiles_have_the_largest_inscribed_circle() {
+    use rand::{RngExt, SeedableRng};
+    let mut wrong = Vec::new();
+    for seed in 0..60 {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let waves: Vec<[f64; 2]> =
+            (0..5).map(|_| [random.random_range(-1.0..1.0), random.random_range(0.0..6.3)]).collect();
+        let form = |angle: f64| -> f64 {
+            waves.iter().zip(2..).map(|([a, phase], order)| a * (f64::from(order) * angle + phase).cos()).sum()
+        };
+        let angles: Vec<f64> = (0..180).map(|point| f64::from(point).to_radians() * 2.0).collect();
+        let largest = angles.iter().map(|angle| form(*angle).abs()).fold(0.0, f64::max);
+        let radius_um = 1000.0;
+        let form_um: Vec<f64> = angles.iter().map(|angle| 0.3 * radius_um * form(*angle) / largest).collect();
+        let profile = Profile { kind: "wide", angles, form_um, radius_mm: 1e-3 * radius_um };
+        let places: Vec<Place> = profile.places().into_iter().map(|(_, place)| place).collect();
+        // Least distances on a grid, then ever finer about the best ten places.
+        let mut best: Vec<(f64, Place)> = (-30..=30)
+            .flat_map(|i| (-30..=30).map(move |j| [f64::from(i) * 20.0, f64::from(j) * 20.0]))
+            .filter(|place| place[0].hypot(place[1]) < 600.0)
+            .map(|place| (extremes(&places, place).0, place))
+            .collect();
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        best.truncate(10);
+        for (low, place) in &mut best {
+            let mut size = 20.0;
+            while size > 1e-7 {
+                let around = (0..16).map(|step| {
+                    let (sin, cos) = (f64::from(step) * std::f64::consts::FRAC_PI_8).sin_cos();
+                    [place[0] + size * cos, place[1] + size * sin]
+                });
+                let next = around.map(|place| (extremes(&places, place).0, place)).max_by(|a, b| a.0.total_cmp(&b.0));
+                match next {
+                    Some((better, next)) if better > *low => (*low, *place) = (better, next),
+                    _ => size *= 0.7,
+                }
+            }
+        }
+        let searched = best.iter().map(|(low, _)| *low).fold(0.0, f64::max);
+        let found =
+            profile.points().determine(Reference::MaximumInscribed).map(|circle| radius_um + circle.deviation_um);
+        if found.is_ok_and(|found| found < searched - 1e-4) || found.is_err() {
+            wrong.push(format!("{seed}: {found:?} instead of {searched}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong, such as {:?}", wrong.len(), &wrong[..wrong.len().min(20)]);
+}
+
+#[test]
+fn partial_arcs_say_that_a_circle_is_not_bounded() {
+    for (covered, bounded) in [(100, false), (170, false), (200, true), (300, true)] {
+        let angles: Vec<f64> = (0..covered).map(|point| f64::from(point).to_radians()).collect();
+        let form_um = angles.iter().map(|angle| (9.0 * angle).cos()).collect();
+        let points = Profile { kind: "arc", angles, form_um, radius_mm: 20.0 }.points();
+        let inscribed = points.determine(Reference::MaximumInscribed);
+        assert_eq!(
+            inscribed.as_ref().err(),
+            (!bounded).then_some(&Undetermined::NotBounded),
+            "{covered}: {inscribed:?}"
+        );
+        let others = [Reference::LeastSquares, Reference::MinimumZone, Reference::MinimumCircumscribed];
+        assert!(others.iter().all(|reference| points.determine(*reference).is_ok()), "{covered}");
+    }
+    let two = Profile { kind: "two points", angles: vec![0.0, 3.0], form_um: vec![0.0; 2], radius_mm: 20.0 }.points();
+    assert_eq!(two.determine(Reference::MinimumZone), Err(Undetermined::TooFewPoints));
+    assert!(two.determine(Reference::MinimumCircumscribed).is_ok());
 }

@@ -2,7 +2,7 @@
 
 use super::{Cylinder, Points, Section};
 use crate::{
-    evaluate::{roundness, straightness::about_lsli_um},
+    evaluate::{near::Course, roundness, straightness::about_lsli_um},
     numerics::{chebyshev::Chebyshev, cloud::Cloud},
 };
 
@@ -16,6 +16,9 @@ pub struct Generatrices {
     /// Local taper in the plane of each angle and the opposite one (ISO 12180-1): half the difference of the diameters
     /// between the least-squares lines of both at the ends of the wall, without sign; NaN where a line is not known.
     pub local_taper_um: Vec<f64>,
+    /// Parallelism of each to the opposite one (ISO 1101:2017, 17.10): the distance of the two lines parallel to the
+    /// opposite generatrix' LSLI that hold it; NaN where a line is not known.
+    pub parallelism_um: Vec<f64>,
 }
 
 impl Generatrices {
@@ -50,13 +53,31 @@ impl Generatrices {
         let rises: Vec<f64> = lines.iter().map(|(z, d)| length * slope(z, d)).collect();
         let planes = count / 2 * usize::from(count % 2 == 0);
         let local_taper_um = (0..planes).map(|plane| 0.5 * (rises[plane] + rises[plane + planes]).abs()).collect();
-        Some(Self { strt_lsli_um: strt(true).collect(), strt_mzli_um: strt(false).collect(), local_taper_um })
+        let parallelism = |(index, (z, d)): (usize, &(Vec<f64>, Vec<f64>))| {
+            let rise = if planes > 0 { rises[(index + planes) % count] } else { f64::NAN };
+            // Outwards on one side is inwards on the other: parallel lines have opposite slopes.
+            let turned = Course::of(z.iter().zip(d).map(|(z, d)| d + rise / length * z));
+            turned.high - turned.low
+        };
+        let parallelism_um = lines.iter().enumerate().map(parallelism).collect();
+        Some(Self {
+            parallelism_um,
+            strt_lsli_um: strt(true).collect(),
+            strt_mzli_um: strt(false).collect(),
+            local_taper_um,
+        })
     }
 
     /// The largest straightness deviation of a generatrix about its least-squares line; NaN of none.
     #[must_use]
     pub fn largest_strt_um(&self) -> f64 {
         largest(&self.strt_lsli_um)
+    }
+
+    /// The largest parallelism deviation of opposite generatrices; NaN of none.
+    #[must_use]
+    pub fn largest_parallelism_um(&self) -> f64 {
+        largest(&self.parallelism_um)
     }
 
     /// Cylinder taper CYLtt (ISO 12180-1): the largest local taper; NaN of none.

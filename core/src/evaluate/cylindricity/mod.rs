@@ -9,7 +9,7 @@ mod points;
 mod search;
 
 use super::near::Course;
-pub use super::reference::Reference;
+pub use super::reference::{Reference, Undetermined};
 pub use disturbed::Disturbed;
 pub use lines::{Generatrices, MedianLine};
 pub use points::{Points, Section};
@@ -36,7 +36,8 @@ pub struct Cylinder {
 /// A point that holds a reference cylinder.
 ///
 /// With the derivatives g of a point's distance by the axis' four coordinates, Σ λg over the outer equals Σ λg over the
-/// inner, and either λ add up to 1 (MICY and MCCY: Σ λg = 0). That is the proof that no small move of the axis helps.
+/// inner, and either λ add up to 1 (of MCCY the inner to 10⁻³ and the outer to 1.001, of MICY the other way round). That is
+/// the proof that no small move of the axis helps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// Which point.

@@ -1,6 +1,6 @@
 //! The points of a wall, and what they are about an axis.
 
-use super::{Cylinder, Reference, Values, least_squares, search};
+use super::{Cylinder, Reference, Undetermined, Values, least_squares, search};
 use crate::evaluate::{near::Course, roundness::Angles};
 
 /// One circle of a wall.
@@ -95,21 +95,38 @@ impl Points {
         (0..self.len()).filter(|point| !self.held[*point][2].is_nan())
     }
 
-    /// The reference cylinder; `None` where it is not determined: fewer than five points, all at one height, or, but for
-    /// MCCY, points that do not surround an axis; or deviations as large as the radius, beside which they are taken to be
-    /// small.
-    ///
-    /// MZCY, MICY and MCCY are reached downhill from LSCY.
+    /// The reference cylinder as [`determine`](Self::determine) finds it, without the reason where there is none.
     #[must_use]
     pub fn reference(&self, reference: Reference) -> Option<Cylinder> {
-        let determined = self.radius_um > 0.0 && self.half_um > 0.0 && self.half_um.is_finite();
-        if !determined || self.span_um >= self.radius_um || self.there().count() < 5 {
-            return None;
+        self.determine(reference).ok()
+    }
+
+    /// The reference cylinder. MZCY, MICY and MCCY are the local optimum that is reached downhill from LSCY; none is worse
+    /// than LSCY by its own criterion.
+    ///
+    /// The largest inscribed and the smallest circumscribed cylinder often leave their axis free: contacts at one height do
+    /// not fix the tilt. The zone (CYLt) then decides, with a small weight in what is minimised: MCCY is the axis with the
+    /// least `high` + 10⁻³ (`high` − `low`), MICY that with the least 10⁻³ (`high` − `low`) − `low`, of the highest and the
+    /// lowest distance of a point. The radius is the extreme one to 10⁻³ of the zone; it is exactly that wherever
+    /// the contacts fix the axis.
+    ///
+    /// # Errors
+    /// Fewer than five points, all at one height, points that do not surround an axis (not for MCCY), or deviations as large
+    /// as the radius, beside which they are taken to be small.
+    pub fn determine(&self, reference: Reference) -> Result<Cylinder, Undetermined> {
+        if self.there().count() < 5 {
+            return Err(Undetermined::TooFewPoints);
         }
-        let (axis, deviation) = least_squares::axis(self)?;
+        if !(self.half_um > 0.0 && self.half_um.is_finite()) {
+            return Err(Undetermined::OneHeight);
+        }
+        if !(self.radius_um > 0.0 && self.span_um < self.radius_um) {
+            return Err(Undetermined::Radius);
+        }
+        let (axis, deviation) = least_squares::axis(self).ok_or(Undetermined::NotFound)?;
         match reference {
-            Reference::LeastSquares => Some(self.about(axis, deviation, vec![])),
-            _ => self.downhill(reference, axis),
+            Reference::LeastSquares => Ok(self.about(axis, deviation, vec![])),
+            _ => search::search(self, axis, reference),
         }
     }
 
@@ -119,14 +136,7 @@ impl Points {
         let up = 1e-3 * (self.middle_mm - near.z_mm);
         let at = [near.x_um + near.slope_x_urad * up, near.y_um + near.slope_y_urad * up];
         let determined = self.half_um > 0.0 && self.half_um.is_finite();
-        determined.then(|| self.downhill(reference, [at[0], at[1], lean[0], lean[1]]))?
-    }
-
-    fn downhill(&self, reference: Reference, start: Axis) -> Option<Cylinder> {
-        match reference {
-            Reference::MinimumZone => search::search::<6>(self, start, reference),
-            _ => search::search::<5>(self, start, reference),
-        }
+        determined.then(|| search::search(self, [at[0], at[1], lean[0], lean[1]], reference).ok())?
     }
 
     /// Deviation of each point from a cylinder, at right angles to its axis, outward positive; NaN where it is missing.

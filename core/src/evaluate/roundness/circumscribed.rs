@@ -80,7 +80,7 @@ impl Ball {
 }
 
 /// Where three points have one height: the centre of the circle through them.
-fn equal_heights(cloud: &Cloud<2>, [a, b, c]: [usize; 3]) -> Option<[f64; 2]> {
+pub(super) fn equal_heights(cloud: &Cloud<2>, [a, b, c]: [usize; 3]) -> Option<[f64; 2]> {
     let from_c = |point: usize| {
         let ([x, y], [x_c, y_c]) = (cloud.features(point), cloud.features(c));
         (x - x_c, y - y_c, cloud.levels()[point] - cloud.levels()[c])

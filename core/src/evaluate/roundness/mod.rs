@@ -20,11 +20,13 @@ mod disturbed;
 mod least_squares;
 mod points;
 mod search;
+mod series;
 
 use super::near::Course;
-pub use super::reference::Reference;
+pub use super::reference::{Reference, Undetermined};
 pub use disturbed::Disturbed;
 pub use points::{Angles, Points};
+pub use series::between_angles;
 
 /// A reference circle.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Circle, Reference, Values, circumscribed, least_squares, search};
+use super::{Circle, Reference, Undetermined, Values, circumscribed, least_squares, search};
 use crate::{evaluate::near::Course, numerics::cloud::Cloud};
 
 /// Directions of a profile's points, to be kept and used for many profiles.
@@ -138,22 +138,34 @@ impl Points {
         self.cloud.levels().iter().filter(|level| !level.is_nan()).count()
     }
 
-    /// The reference circle; `None` where it is not determined: fewer than three points (two for MCCI), or, but for
-    /// MCCI, points that do not surround a centre.
-    ///
-    /// MZCI and MICI are those whose centre is reached downhill (uphill) from that of the algebraic least-squares circle
-    /// (Kåsa). Where deviations are small beside the radius there is no better one; a profile that is far from a circle
-    /// (a polar plot with the base circle's size) may have several of them, as a kidney has several inscribed circles.
+    /// The reference circle as [`determine`](Self::determine) finds it, without the reason where there is none.
     #[must_use]
     pub fn reference(&self, reference: Reference) -> Option<Circle> {
+        self.determine(reference).ok()
+    }
+
+    /// The reference circle.
+    ///
+    /// MZCI and MICI are those whose centre is reached downhill (uphill) from that of the algebraic least-squares circle
+    /// (Kåsa). Where deviations are small beside the radius there is no better one. A profile that is far from a circle
+    /// (a polar plot with the base circle's size) may have several of them, as a kidney has several inscribed circles: from
+    /// deviations of 2 % of the radius on, the search also starts at the best places of a grid, and the best circle is taken.
+    ///
+    /// # Errors
+    /// Fewer than three points (two for MCCI); a nominal radius that is not a positive number; points that do not surround a
+    /// centre, of which the inscribed circle or the zone grows without bound.
+    pub fn determine(&self, reference: Reference) -> Result<Circle, Undetermined> {
         if !(self.radius_um > 0.0 && self.radius_um.is_finite()) {
-            return None;
+            return Err(Undetermined::Radius);
+        }
+        if self.there() < if reference == Reference::MinimumCircumscribed { 2 } else { 3 } {
+            return Err(Undetermined::TooFewPoints);
         }
         match reference {
-            Reference::LeastSquares => least_squares::circle(self),
+            Reference::LeastSquares => least_squares::circle(self).ok_or(Undetermined::NotFound),
             Reference::MinimumZone => search::minimum_zone(self),
             Reference::MaximumInscribed => search::maximum_inscribed(self),
-            Reference::MinimumCircumscribed => circumscribed::circle(self),
+            Reference::MinimumCircumscribed => circumscribed::circle(self).ok_or(Undetermined::NotFound),
         }
     }
 

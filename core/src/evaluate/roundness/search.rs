@@ -1,6 +1,6 @@
 //! Minimum zone and maximum inscribed circle: exchange among few points, then a look at all.
 
-use super::{Circle, Points, least_squares::guess};
+use super::{Circle, Points, Undetermined, circumscribed::equal_heights, least_squares::guess};
 use crate::numerics::{
     chebyshev::{Chebyshev, Contact},
     cloud::Cloud,
@@ -12,6 +12,13 @@ const BLOCKS: usize = 64;
 const FEW: usize = 128;
 /// Steps downhill among the chosen points, and looks at all points, before giving up.
 const MOST_STEPS: usize = 200;
+/// Deviations from this share of the radius on may have several local optima.
+const WIDE: f64 = 0.02;
+/// Places in each direction of the grid on which starts are sought, and starts at most.
+const GRID: usize = 25;
+const MOST_STARTS: usize = 24;
+/// Triples of so few points are all looked at.
+const FEW_TRIPLES: usize = 24;
 /// Inscribed circles that are compared where the profile has two nearly opposite contacts.
 const MOST_NEIGHBOURS: usize = 16;
 
@@ -108,7 +115,7 @@ impl<'a, const N: usize> Search<'a, N> {
     /// The bounds of the heights are linear in the centre: only their share in the merit bends. Each step minimises with
     /// the slopes at the present place, which for the inscribed circle can only improve (the merit lies below its
     /// tangent) and for a zone is shortened until it does; where the place stays, its contacts balance exactly.
-    fn settle(&mut self, start: [f64; 2]) -> Option<Rest> {
+    fn settle(&mut self, start: [f64; 2]) -> Result<Rest, Undetermined> {
         let (points, tolerance) = (self.points, self.points.tolerance());
         let reach = points.radius_um() + points.span_um;
         let limits = start.map(|start| (start - reach, start + reach));
@@ -121,7 +128,8 @@ impl<'a, const N: usize> Search<'a, N> {
             let mut found = None;
             for _ in 0..MOST_STEPS {
                 let slopes = self.slopes(&place, low, high);
-                let optimum = self.chebyshev.solve(&self.chosen.cloud, &slopes, &limits, tolerance)?;
+                let optimum = self.chebyshev.solve(&self.chosen.cloud, &slopes, &limits, tolerance);
+                let optimum = optimum.ok_or(Undetermined::NotFound)?;
                 let mut next = optimum.place;
                 found = Some(optimum);
                 let better = loop {
@@ -141,16 +149,76 @@ impl<'a, const N: usize> Search<'a, N> {
             // Twice the tolerance: the exchange leaves heights within one.
             let high_bound = if zone { high + 2.0 * tolerance } else { f64::INFINITY };
             let grown = self.chosen.grow(points, &place, low - 2.0 * tolerance, high_bound);
-            let contacts = self.contacts(&found?.contacts);
+            let contacts = self.contacts(&found.ok_or(Undetermined::NotFound)?.contacts);
             if !grown {
-                return contacts.map(|contacts| Rest { place, merit, low, high, contacts });
+                let contacts = contacts.ok_or(Undetermined::NotBounded)?;
+                // Downhill on the chosen points, which are not all: no end is worse than its start.
+                let better = merit <= self.merit_of_all(&start) + tolerance;
+                return if better {
+                    Ok(Rest { place, merit, low, high, contacts })
+                } else {
+                    Err(Undetermined::NotFound)
+                };
             }
             if contacts.is_none() {
                 // Far out, for want of points that hold it.
                 place = start;
             }
         }
-        None
+        Err(Undetermined::NotFound)
+    }
+
+    fn merit_of_all(&self, place: &[f64; 2]) -> f64 {
+        let (low, high) = self.points.cloud.extremes(0..self.points.len(), place);
+        self.merit(place, low, high)
+    }
+
+    /// Places from which other optima of a profile far from a circle may be reached, the best first: those of a grid about
+    /// `middle` that are better than their neighbours, and the best centres of circles through three of few points.
+    fn starts(&self, middle: [f64; 2]) -> Vec<[f64; 2]> {
+        let (points, half) = (self.points, (GRID / 2) as f64);
+        let at = |i: usize, j: usize| {
+            [(i, middle[0]), (j, middle[1])].map(|(step, middle)| middle + points.span_um * (step as f64 - half) / half)
+        };
+        let merits: Vec<f64> =
+            (0..GRID * GRID).map(|place| self.merit_of_all(&at(place % GRID, place / GRID))).collect();
+        let around = |i: usize| i.saturating_sub(1)..(i + 2).min(GRID);
+        let is_best = |i: usize, j: usize| {
+            around(j).all(|row| around(i).all(|column| merits[row * GRID + column] >= merits[j * GRID + i]))
+        };
+        let all = (0..GRID).flat_map(|j| (0..GRID).map(move |i| (i, j)));
+        let mut starts: Vec<(f64, [f64; 2])> =
+            all.filter(|(i, j)| is_best(*i, *j)).map(|(i, j)| (merits[j * GRID + i], at(i, j))).collect();
+        if points.there() <= FEW_TRIPLES {
+            let there: Vec<usize> = (0..points.len()).filter(|point| !points.cloud.levels()[*point].is_nan()).collect();
+            for (a, b, c) in (0..there.len()).flat_map(|a| (0..a).flat_map(move |b| (0..b).map(move |c| (a, b, c)))) {
+                let held = [there[a], there[b], there[c]];
+                let far = |place: &[f64; 2]| place[0].hypot(place[1]) > points.radius_um() + points.span_um;
+                if let Some(place) = equal_heights(&points.cloud, held).filter(|place| !far(place)) {
+                    starts.push((self.merit_of_all(&place), place));
+                }
+            }
+        }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.truncate(MOST_STARTS);
+        starts.into_iter().map(|(_, place)| place).collect()
+    }
+
+    /// The best of where the search comes to rest from the first guess, and of a profile far from a circle from others.
+    fn best(&mut self) -> Result<Rest, Undetermined> {
+        let start = guess(self.points);
+        let first = self.settle(start);
+        if self.points.span_um < WIDE * self.points.radius_um() {
+            return first;
+        }
+        let mut best = first;
+        for start in self.starts(start) {
+            let better = |rest: &Rest| best.as_ref().map_or(true, |best| rest.merit < best.merit);
+            if let Some(rest) = self.settle(start).ok().filter(better) {
+                best = Ok(rest);
+            }
+        }
+        best
     }
 
     fn extremes(&self, place: &[f64; 2]) -> (f64, f64) {
@@ -179,30 +247,25 @@ impl<'a, const N: usize> Search<'a, N> {
 ///
 /// Two outer and two inner contacts take turns in angle (the alternation condition): with unit vectors e from the centre,
 /// λe₁ + (1−λ)e₂ over the outer equals μe₃ + (1−μ)e₄ over the inner.
-pub(super) fn minimum_zone(points: &Points) -> Option<Circle> {
-    if points.there() < 3 {
-        return None;
-    }
-    let rest = Search::<4>::new(points, Goal::Zone).settle(guess(points))?;
+pub(super) fn minimum_zone(points: &Points) -> Result<Circle, Undetermined> {
+    let rest = Search::<4>::new(points, Goal::Zone).best()?;
     let common = points.common(&rest.place);
     let [outer, inner] = [rest.high, rest.low].map(|level| points.deviation(level + common));
-    Some(points.about(rest.place, 0.5 * (outer + inner), rest.contacts))
+    Ok(points.about(rest.place, 0.5 * (outer + inner), rest.contacts))
 }
 
 /// MICI: the centre with the largest smallest distance; three contacts, the centre within their triangle.
 ///
 /// Between two points that lie nearly opposite each other the centre may settle on either side of their chord, and the
 /// radii differ by deviation²/2R: where the centre is that near to a chord, the other side is tried too.
-pub(super) fn maximum_inscribed(points: &Points) -> Option<Circle> {
-    if points.there() < 3 {
-        return None;
-    }
+pub(super) fn maximum_inscribed(points: &Points) -> Result<Circle, Undetermined> {
     let mut search = Search::<3>::new(points, Goal::Inscribed);
-    let first = search.settle(guess(points))?;
+    let first = search.best()?;
     let (mut best, mut seen, mut open) = (first.clone(), vec![first.contacts.clone()], vec![first]);
     while let Some(rest) = open.pop() {
         for start in beyond(points, &rest) {
-            let Some(other) = search.settle(start).filter(|other| !seen.contains(&other.contacts)) else { continue };
+            let other = search.settle(start).ok().filter(|other| !seen.contains(&other.contacts));
+            let Some(other) = other else { continue };
             if other.merit < best.merit {
                 best = other.clone();
             }
@@ -213,7 +276,7 @@ pub(super) fn maximum_inscribed(points: &Points) -> Option<Circle> {
         }
     }
     let deviation = points.deviation(best.low + points.common(&best.place));
-    Some(points.about(best.place, deviation, best.contacts))
+    Ok(points.about(best.place, deviation, best.contacts))
 }
 
 /// Places on the far side of those edges of the contacts' triangle that are near.

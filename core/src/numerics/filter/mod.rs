@@ -2,11 +2,13 @@
 
 mod areal;
 mod areal_robust;
+mod kind;
 mod regression;
 mod robust;
 
 pub use areal::areal_gaussian;
 pub use areal_robust::robust_areal_gaussian;
+pub use kind::Kind;
 pub use regression::{Degree, Smoother};
 pub use robust::{Robust, robust_gaussian};
 

@@ -7,7 +7,7 @@ use serde::{
 };
 
 use super::{
-    filter::{between_name, low_pass_name, waviness_name},
+    filter::{Filter, between_name, robust_name, waviness_name},
     limit::Limit,
 };
 use crate::{
@@ -18,6 +18,7 @@ use crate::{
         texture::Kind,
         twist,
     },
+    numerics::filter::Kind as FilterKind,
     pipeline::error::{Fault, Place},
 };
 
@@ -35,6 +36,19 @@ pub struct EvaluateConfig {
     /// Cut-offs of the Gaussian low-pass (ISO 16610-21) for roundness and cylindricity, in undulations per revolution, as
     /// 15, 50, 150, 500, 1500. Unfiltered values are always there besides. Without it 50, where the orders reach it.
     pub filter_upr: Option<Vec<f64>>,
+    /// Kind of the filters of `filter_upr` and `high_pass_upr`; without it `gaussian`.
+    pub filter: Option<FilterKind>,
+    /// Cut-off of a high-pass in undulations per revolution, which makes a band of each filter of `filter_upr`; unfiltered values stay.
+    pub high_pass_upr: Option<f64>,
+    /// Cut-offs of robust Gaussian low-passes (ISO 16610-31) for roundness, in undulations per revolution, besides `filter_upr`.
+    pub robust_filter_upr: Option<Vec<f64>>,
+    /// Window, in degrees up to 180, over which `roundness` gives the largest change of the profile, `slope`.
+    pub slope_window_deg: Option<f64>,
+    /// Highest order of `harmonics`; without it 15.
+    pub harmonics_upr: Option<usize>,
+    /// Sections, or stations of sections, whose least-squares centres make the datum axis of eccentricity, coaxiality and run-out
+    /// of the other sections (with `cylindricity`, where centres are known); one section makes an axis along z.
+    pub datum: Option<Vec<String>>,
     /// λc, the longest wavelength of texture and areal values, in mm; it makes the values of the roughness profile besides the
     /// unfiltered Ra.
     pub lambda_c_mm: Option<f64>,
@@ -254,6 +268,8 @@ impl From<CentreConfig> for Centre {
 pub enum Group {
     /// RONt about each reference; RONp, RONv, RONq and the steepest slope dr/dθ about LSCI; of each section.
     Roundness,
+    /// Amplitude and phase of each order from 2 on of each section's form.
+    Harmonics,
     /// Ra of each section's unfiltered profile; with λc the values of ISO 21920-2, of the profiles in [evaluate.texture].
     Texture,
     /// CYLt about each reference, CYLp, CYLv, CYLq about LSCY, of all sections together.
@@ -268,8 +284,15 @@ pub enum Group {
 
 impl Group {
     /// All of them.
-    const ALL: [Self; 6] =
-        [Self::Roundness, Self::Texture, Self::Cylindricity, Self::Areal, Self::Twist, Self::ErrorMotion];
+    const ALL: [Self; 7] = [
+        Self::Roundness,
+        Self::Harmonics,
+        Self::Texture,
+        Self::Cylindricity,
+        Self::Areal,
+        Self::Twist,
+        Self::ErrorMotion,
+    ];
 }
 
 /// Groups of values as they stand in a file.
@@ -333,6 +356,12 @@ pub struct Evaluate {
     pub(in crate::pipeline) all: bool,
     pub(super) references: Vec<Reference>,
     filter_upr: Option<Vec<f64>>,
+    filter: FilterKind,
+    high_pass_upr: Option<f64>,
+    pub(super) robust_filter_upr: Vec<f64>,
+    pub(super) slope_window_deg: Option<f64>,
+    pub(super) harmonics_upr: usize,
+    pub(super) datum: Vec<String>,
     pub(super) lambda_c_mm: Option<f64>,
     pub(super) lambda_s_mm: Option<f64>,
     pub(in crate::pipeline) centres: Vec<Centre>,
@@ -348,6 +377,12 @@ impl Default for Evaluate {
             all: false,
             references: vec![Reference::LeastSquares, Reference::MinimumZone],
             filter_upr: None,
+            filter: FilterKind::Gaussian,
+            high_pass_upr: None,
+            robust_filter_upr: Vec::new(),
+            slope_window_deg: None,
+            harmonics_upr: 15,
+            datum: Vec::new(),
             lambda_c_mm: None,
             lambda_s_mm: None,
             centres: vec![error_motion::CENTRE],
@@ -367,10 +402,12 @@ impl EvaluateConfig {
     /// # Errors
     /// The first that cannot be, with its key.
     pub(in crate::pipeline) fn check(self) -> Result<Evaluate, Fault> {
-        for (index, cutoff) in self.filter_upr.iter().flatten().enumerate() {
-            if !(cutoff.is_finite() && *cutoff > 0.0) {
-                let fault = Fault::here(format!("the cut-off must be above 0 undulations a turn, found {cutoff}"));
-                return Err(fault.under_item("filter_upr", index));
+        for (key, cutoffs) in [("filter_upr", &self.filter_upr), ("robust_filter_upr", &self.robust_filter_upr)] {
+            for (index, cutoff) in cutoffs.iter().flatten().enumerate() {
+                if !(cutoff.is_finite() && *cutoff > 0.0) {
+                    let fault = Fault::here(format!("the cut-off must be above 0 undulations a turn, found {cutoff}"));
+                    return Err(fault.under_item(key, index));
+                }
             }
         }
         for (key, wavelength) in [("lambda_c_mm", self.lambda_c_mm), ("lambda_s_mm", self.lambda_s_mm)] {
@@ -380,6 +417,24 @@ impl EvaluateConfig {
                 }
                 _ => {}
             }
+        }
+        if let Some(cutoff) = self.high_pass_upr {
+            if !(cutoff.is_finite() && cutoff > 0.0) {
+                let message = format!("the cut-off must be above 0 undulations a turn, found {cutoff}");
+                return Err(Fault::at("high_pass_upr", message));
+            }
+            let low_passes = self.filter_upr.as_deref().unwrap_or(&[USUAL_UPR]);
+            if let Some(below) = low_passes.iter().find(|below| **below <= cutoff) {
+                let message = format!("the high-pass must be below the low-pass at {below}, found {cutoff}");
+                return Err(Fault::at("high_pass_upr", message));
+            }
+        }
+        if let Some(window) = self.slope_window_deg.filter(|window| !(*window > 0.0 && *window <= 180.0)) {
+            let message = format!("the window must be above 0° and at most 180°, found {window}");
+            return Err(Fault::at("slope_window_deg", message));
+        }
+        if matches!(&self.datum, Some(datum) if datum.is_empty()) {
+            return Err(Fault::at("datum", "expected at least one section"));
         }
         match (self.lambda_s_mm, self.lambda_c_mm) {
             (Some(shortest), Some(longest)) if shortest >= longest => {
@@ -409,6 +464,12 @@ impl EvaluateConfig {
             },
             references: once_each(self.references.unwrap_or(usual.references)),
             filter_upr: self.filter_upr.map(once_each),
+            filter: self.filter.unwrap_or_default(),
+            high_pass_upr: self.high_pass_upr,
+            robust_filter_upr: once_each(self.robust_filter_upr.unwrap_or_default()),
+            slope_window_deg: self.slope_window_deg,
+            harmonics_upr: self.harmonics_upr.unwrap_or(usual.harmonics_upr),
+            datum: once_each(self.datum.unwrap_or_default()),
             lambda_c_mm: self.lambda_c_mm,
             lambda_s_mm: self.lambda_s_mm,
             centres: self
@@ -486,13 +547,20 @@ impl Evaluate {
         std::iter::once(None).chain(cutoffs.iter().copied().map(Some)).collect()
     }
 
+    /// The filter of roundness and cylindricity with a cut-off; `None` is no filter.
+    pub(super) fn low_pass(&self, cutoff_upr: Option<f64>) -> Filter {
+        Filter::round(self.filter, cutoff_upr.and(self.high_pass_upr), cutoff_upr)
+    }
+
     /// Names of the filters that values may have.
     pub(super) fn filter_names(&self) -> Vec<String> {
         let cutoffs = self.filter_upr.as_deref().unwrap_or(&[USUAL_UPR]);
-        let round = std::iter::once(None).chain(cutoffs.iter().copied().map(Some)).map(low_pass_name);
+        let round = std::iter::once(None).chain(cutoffs.iter().copied().map(Some));
+        let round = round.map(|cutoff| self.low_pass(cutoff).name);
+        let robust = self.robust_filter_upr.iter().map(|cutoff| robust_name(*cutoff));
         let waviness = self.lambda_c_mm.map(|c| waviness_name(c, self.texture.lambda_f_mm));
         let between = [between_name(self.lambda_s_mm, self.lambda_c_mm), between_name(self.lambda_s_mm, None)];
-        once_each(round.chain(between).chain(waviness).collect())
+        once_each(round.chain(robust).chain(between).chain(waviness).collect())
     }
 
     /// Symbols and units of the values that may come.
@@ -501,6 +569,12 @@ impl Evaluate {
         if self.has(Group::Roundness) {
             symbols.extend(["RONt", "RONp", "RONv", "RONq"].map(|symbol| (symbol, "µm")));
             symbols.push(("dr/dtheta", "µm/°"));
+            if self.slope_window_deg.is_some() {
+                symbols.push(("slope", "µm"));
+            }
+        }
+        if self.has(Group::Harmonics) {
+            symbols.extend([("amplitude", "µm"), ("phase", "°")]);
         }
         if self.has(Group::Texture) {
             symbols.push(("Ra", "µm"));
@@ -512,8 +586,11 @@ impl Evaluate {
             }
         }
         if self.has(Group::Cylindricity) {
-            let names = ["CYLt", "CYLp", "CYLv", "CYLq", "CYLtt", "STRt", "coaxiality"];
+            let names = ["CYLt", "CYLp", "CYLv", "CYLq", "CYLtt", "STRt", "coaxiality", "parallelism"];
             symbols.extend(names.map(|symbol| (symbol, "µm")));
+            if !self.datum.is_empty() {
+                symbols.extend(["eccentricity", "circular-run-out", "total-run-out"].map(|symbol| (symbol, "µm")));
+            }
         }
         if self.has(Group::Areal) {
             symbols.extend(areal::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));

@@ -2,60 +2,83 @@
 
 use crate::{
     Complex64,
-    numerics::filter::{Band, transmission, upr},
+    numerics::filter::{Band, Kind, upr},
 };
 
 /// Orders of which a filter passes less do not matter.
 const MATTERS: f64 = 0.01;
 /// A filter reaches above the highest order where it passes this much of the next one or more: how high the orders above
-/// are, nothing says, and they are many. 2^−(f/f_c)² is below it from 3.157 f_c on.
+/// are, nothing says, and they are many. The Gaussian's 2^−(f/f_c)² is below it from 3.157 f_c on.
 const REACHES: f64 = 1e-3;
 
-/// A Gaussian filter (ISO 16610-21) by order.
+/// A filter of closed profiles by order.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Filter {
     pub name: String,
+    kind: Kind,
     band: Band,
 }
 
 impl Filter {
-    /// Everything passes, or what is below a cut-off.
+    /// Everything passes, or what is below a cut-off of a Gaussian.
     pub fn low_pass(cutoff_upr: Option<f64>) -> Self {
-        Self { name: low_pass_name(cutoff_upr), band: Band { above_upr: None, below_upr: cutoff_upr } }
+        Self::round(Kind::Gaussian, None, cutoff_upr)
+    }
+
+    /// What is between two cut-offs, as far as there are any.
+    pub fn round(kind: Kind, above_upr: Option<f64>, below_upr: Option<f64>) -> Self {
+        Self { name: round_name(kind, above_upr, below_upr), kind, band: Band { above_upr, below_upr } }
+    }
+
+    /// The robust Gaussian's name and the band of the Gaussian with its cut-off, which it is not: no weight on orders.
+    pub fn robust(cutoff_upr: f64) -> Self {
+        Self { name: robust_name(cutoff_upr), ..Self::low_pass(Some(cutoff_upr)) }
     }
 
     /// The same filter by this name for values that no order of a turn is taken from or left out of: along the axis.
     pub fn along_axis(&self) -> Self {
-        Self { name: self.name.clone(), band: Band::default() }
+        Self { name: self.name.clone(), kind: self.kind, band: Band::default() }
     }
 
     /// What lies between λs and λc along the circumference of a radius.
     pub fn between(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>, radius_mm: f64) -> Self {
         let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
         let band = Band { above_upr: lambda_c_mm.map(upr), below_upr: lambda_s_mm.map(upr) };
-        Self { name: between_name(lambda_s_mm, lambda_c_mm), band }
+        Self { name: between_name(lambda_s_mm, lambda_c_mm), kind: Kind::Gaussian, band }
+    }
+
+    /// Share of an order that passes, with its phase. A high-pass leaves level and centre, orders 0 and 1, which are position
+    /// and no form, where they are known.
+    fn weight(&self, order: usize) -> Complex64 {
+        let upr = order as f64;
+        let low = self.band.below_upr.map_or(Complex64::ONE, |cutoff| self.kind.low_pass(upr, cutoff));
+        let high = self.band.above_upr.filter(|_| order > 1);
+        low * high.map_or(Complex64::ONE, |cutoff| self.kind.high_pass(upr, cutoff))
+    }
+
+    /// Share of an order that its low-pass passes.
+    fn passes(&self, order: f64, cutoff: f64) -> f64 {
+        self.kind.low_pass(order, cutoff).norm()
     }
 
     /// What lies between λc and λf, the waviness; without λf, all that is longer than λc.
     pub fn waviness(lambda_c_mm: f64, lambda_f_mm: Option<f64>, radius_mm: f64) -> Self {
         let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
         let band = Band { above_upr: lambda_f_mm.map(upr), below_upr: Some(upr(lambda_c_mm)) };
-        Self { name: waviness_name(lambda_c_mm, lambda_f_mm), band }
+        Self { name: waviness_name(lambda_c_mm, lambda_f_mm), kind: Kind::Gaussian, band }
     }
 
     /// Harmonics behind the filter.
     pub fn harmonics(&self, harmonics: &[Complex64]) -> Vec<Complex64> {
-        let mut filtered = harmonics.to_vec();
-        self.band.apply(&mut filtered);
-        filtered
+        harmonics.iter().enumerate().map(|(order, harmonic)| harmonic * self.weight(order)).collect()
     }
 
     /// Variances behind the filter.
     pub fn variance(&self, variance: &[f64]) -> Vec<f64> {
-        variance.iter().enumerate().map(|(order, variance)| variance * self.band.weight(order).powi(2)).collect()
+        variance.iter().enumerate().map(|(order, variance)| variance * self.weight(order).norm_sqr()).collect()
     }
 
-    /// Orders of which half passes or more, from 2 to at most `highest`.
+    /// Orders between the cut-offs, from 2 to at most `highest`.
     pub fn band_upr(&self, highest: usize) -> [usize; 2] {
         let low = self.band.above_upr.map_or(2, |cutoff| (cutoff.ceil() as usize).max(2));
         let high = self.band.below_upr.map_or(highest, |cutoff| (cutoff.floor() as usize).min(highest));
@@ -65,29 +88,38 @@ impl Filter {
     /// Whether a hundredth or more passes of an order of which something before has taken half of the power, 29 % of the
     /// amplitude. What lets everything pass asks for nothing.
     pub fn asks_for_more_than(&self, half_power_upr: f64) -> bool {
-        self.band.below_upr.is_some_and(|cutoff| transmission(half_power_upr, cutoff) >= MATTERS)
+        self.band.below_upr.is_some_and(|cutoff| self.passes(half_power_upr, cutoff) >= MATTERS)
     }
 
     /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there are.
     pub fn reaches_above(&self, order: usize) -> bool {
-        let passed = |cutoff| transmission((order + 1) as f64, cutoff);
-        self.band.below_upr.is_some_and(|cutoff| passed(cutoff) >= REACHES)
+        self.band.below_upr.is_some_and(|cutoff| self.passes((order + 1) as f64, cutoff) >= REACHES)
     }
 
     /// The highest order that it passes, of those up to `highest`.
     pub fn highest(&self, highest: usize) -> usize {
-        (0..=highest).rev().find(|order| self.band.weight(*order) >= MATTERS).unwrap_or(0)
+        (0..=highest).rev().find(|order| self.weight(*order).norm() >= MATTERS).unwrap_or(0)
     }
 
     /// Those of the lost orders that it would pass.
     pub fn lost(&self, lost: &[usize]) -> Vec<usize> {
-        lost.iter().copied().filter(|order| self.band.weight(*order) >= MATTERS).collect()
+        lost.iter().copied().filter(|order| self.weight(*order).norm() >= MATTERS).collect()
     }
 }
 
-/// "none", "Gaussian 50 UPR".
-pub(super) fn low_pass_name(cutoff_upr: Option<f64>) -> String {
-    cutoff_upr.map_or_else(|| "none".into(), |cutoff| format!("Gaussian {cutoff} UPR"))
+/// "none", "Gaussian 50 UPR", "spline 15 to 150 UPR", "2RC above 15 UPR".
+pub(super) fn round_name(kind: Kind, above_upr: Option<f64>, below_upr: Option<f64>) -> String {
+    match (above_upr, below_upr) {
+        (None, None) => "none".into(),
+        (None, Some(below)) => format!("{} {below} UPR", kind.name()),
+        (Some(above), None) => format!("{} above {above} UPR", kind.name()),
+        (Some(above), Some(below)) => format!("{} {above} to {below} UPR", kind.name()),
+    }
+}
+
+/// "robust Gaussian 50 UPR".
+pub(super) fn robust_name(cutoff_upr: f64) -> String {
+    format!("robust Gaussian {cutoff_upr} UPR")
 }
 
 /// "none", "Gaussian λs 0.0025 mm, λc 0.8 mm".

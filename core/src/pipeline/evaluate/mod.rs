@@ -16,7 +16,7 @@ pub(super) use limit::decide;
 pub use limit::{Decision, Limit, LimitSummary, LimitValue};
 pub use part::PartSummary;
 pub(super) use part::part_summary;
-pub(super) use section::{section_values, steepest_um_per_deg};
+pub(super) use section::{missing_circles, section_values, steepest_um_per_deg};
 
 use super::summary::StationSummary;
 use crate::evaluate::{Value, uncertainty::Uncertainty};

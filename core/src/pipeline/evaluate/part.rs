@@ -11,8 +11,9 @@ use crate::{
     evaluate::{
         Value,
         cylindricity::{Disturbed, Generatrices, MedianLine, Points, Reference, Section, Values},
+        position::{Axis, Positions},
         roundness::Angles,
-        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
+        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed, without_noise},
     },
     numerics::fourier::{Fourier, max_order},
     rig::Gaps,
@@ -63,13 +64,20 @@ pub fn part_summary(
     let wall = Wall::of(&there, angles.min(MOST_ANGLES), radius_mm, placed);
     let mut part = PartSummary { sections: there.len(), z_mm, angles: wall.count, ..PartSummary::default() };
     if evaluate.has(Group::Cylindricity) {
+        part.remarks.extend(wall.missing_cylinders(&evaluate.references));
         for cutoff in evaluate.cutoffs_upr(wall.held.highest) {
-            part.values.extend(wall.cylindricity(&Filter::low_pass(cutoff), &evaluate.references));
+            part.values.extend(wall.cylindricity(&evaluate.low_pass(cutoff), &evaluate.references));
         }
         if placed {
             part.values.extend(wall.lines());
         } else {
             part.remarks.push(CENTRED.into());
+        }
+        if !evaluate.datum.is_empty() {
+            match wall.about_datum(evaluate) {
+                Ok(values) => part.values.extend(values),
+                Err(remark) => part.remarks.push(format!("{remark}; no position about the datum is given")),
+            }
         }
     }
     if there.len() < sections.len() {
@@ -92,13 +100,31 @@ struct Wall {
     held: Held,
 }
 
+/// What errors are drawn about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum About {
+    /// The form found.
+    Form,
+    /// The form found, less the noise that it holds.
+    WithoutNoise,
+}
+
 struct Ring {
+    station: String,
+    id: String,
     z_mm: f64,
     harmonics: Vec<Complex64>,
     variance: Vec<f64>,
     gaps: Gaps,
     used: f64,
     seed: u64,
+}
+
+impl Ring {
+    /// Whether its section or its station is among these.
+    fn is_named(&self, names: &[String]) -> bool {
+        names.iter().any(|name| [&self.id, &self.station].contains(&name))
+    }
 }
 
 impl Wall {
@@ -113,6 +139,8 @@ impl Wall {
             (highest, all_to) = (highest.max(own), all_to.min(own));
             let known = || orders().map(|(order, known)| known.filter(|_| order >= lowest));
             Ring {
+                station: section.station.clone(),
+                id: section.id.clone(),
                 z_mm: section.z_mm,
                 harmonics: known().map(|known| known.map_or(Complex64::ZERO, |known| known.value)).collect(),
                 variance: known().map(|known| known.map_or(f64::NAN, |known| known.variance)).collect(),
@@ -145,7 +173,8 @@ impl Wall {
         let usual_um =
             self.errors(filter).map(|errors| LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max));
         let mut disturbed: Vec<Option<Disturbed>> = Vec::new();
-        self.evaluate(filter, labels, draws.clamp(FEWEST_DRAWS, DRAWS), |sections, largest_um, found| {
+        let draws = draws.clamp(FEWEST_DRAWS, DRAWS);
+        self.evaluate(filter, labels, draws, About::WithoutNoise, |sections, largest_um, found| {
             let points = largest_um.is_none().then(|| Points::of_sections(self.radius_mm, sections));
             for (index, reference) in references.iter().enumerate() {
                 let about = if let (None, Some(points)) = (largest_um, &points) {
@@ -172,16 +201,87 @@ impl Wall {
         })
     }
 
+    /// Why the wall does not have the reference cylinders that are asked for, each with its reason.
+    fn missing_cylinders(&self, references: &[Reference]) -> Vec<String> {
+        if self.rings.iter().all(|ring| ring.gaps.is_empty()) {
+            return Vec::new();
+        }
+        let mut fourier = Fourier::new(self.count);
+        let forms = self.rings.iter().map(|ring| {
+            let mut form_um = fourier.synthesise(ring.harmonics.iter().copied()).to_vec();
+            ring.gaps.blank(&mut form_um);
+            form_um
+        });
+        let forms: Vec<Vec<f64>> = forms.collect();
+        let sections = self.rings.iter().zip(&forms);
+        let sections: Vec<Section> =
+            sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles: &self.angles, form_um }).collect();
+        let points = Points::of_sections(self.radius_mm, &sections);
+        let missing = references.iter().filter_map(|reference| {
+            let reason = points.determine(*reference).err()?;
+            Some(format!("no CYLt about {}: {reason}", reference.cylinder_symbol()))
+        });
+        missing.collect()
+    }
+
+    /// Positions about the datum of the sections that are not in it, or why there are none.
+    fn about_datum(&self, evaluate: &Evaluate) -> Result<Vec<Value>, String> {
+        let datum = &evaluate.datum;
+        let unknown = |name: &&String| !self.rings.iter().any(|ring| ring.is_named(std::slice::from_ref(*name)));
+        if let Some(name) = datum.iter().find(unknown) {
+            return Err(format!("datum: there is no section `{name}`"));
+        }
+        if !self.placed {
+            return Err("datum: the centres of sections are not known".into());
+        }
+        let (datums, others): (Vec<usize>, Vec<usize>) =
+            (0..self.rings.len()).partition(|ring| self.rings[*ring].is_named(datum));
+        let filters = evaluate.cutoffs_upr(self.held.highest).into_iter().map(|cutoff| evaluate.low_pass(cutoff));
+        Ok(filters.flat_map(|filter| self.positions(&filter, &datum.join(", "), &datums, &others)).collect())
+    }
+
+    /// Positions of sections about the axis through others.
+    fn positions(&self, filter: &Filter, datum: &str, datums: &[usize], others: &[usize]) -> Vec<Value> {
+        let axis = format!("axis of {datum}");
+        let name = |ring: &usize| {
+            let Ring { station, id, .. } = &self.rings[*ring];
+            format!("section {id} of {station}, {axis}")
+        };
+        let mut labels: Vec<Label> = Vec::new();
+        for ring in others {
+            let centre = "distance of the section's LSCI centre from the datum axis";
+            labels.push(Label::new("eccentricity", "µm", centre, name(ring)));
+            labels.push(Label::new("circular-run-out", "µm", "ISO 1101:2017, circular run-out, radial", name(ring)));
+        }
+        let coaxiality = "ISO 1101:2017, coaxiality: twice the largest eccentricity";
+        labels.push(Label::new("coaxiality", "µm", coaxiality, axis.clone()));
+        labels.push(Label::new("total-run-out", "µm", "ISO 1101:2017, total run-out, radial", axis));
+        let draws = (POINTS_DRAWN / (self.rings.len() * self.count).max(1)).clamp(FEWEST_DRAWS, DRAWS);
+        self.evaluate(filter, labels, draws, About::WithoutNoise, |sections, _, found| {
+            let of = |rings: &[usize]| rings.iter().filter_map(|ring| sections.get(*ring).copied()).collect::<Vec<_>>();
+            let axis = Axis::through(&of(datums), self.radius_mm);
+            let positions = axis.map(|axis| Positions::about(&of(others), self.radius_mm, &axis));
+            let each = positions.iter().flat_map(|all| all.eccentricity_um.iter().zip(&all.circular_runout_um));
+            let mut all: Vec<f64> = each.flat_map(|(eccentricity, runout)| [*eccentricity, *runout]).collect();
+            all.resize(2 * others.len(), f64::NAN);
+            found.extend(all);
+            found.push(positions.as_ref().map_or(f64::NAN, |all| all.coaxiality_um));
+            found.push(positions.as_ref().map_or(f64::NAN, |all| all.total_runout_um));
+        })
+    }
+
     /// What needs the sections' centres and mean radii.
     fn lines(&self) -> Vec<Value> {
         let coaxiality = "ISO 1101:2017, coaxiality: the largest of a section's LSCI centre with the axis";
+        let parallelism = "ISO 1101:2017, parallelism: the largest of the generatrices";
         let labels = vec![
             Label::new("CYLtt", "µm", "ISO 12180-1:2011, cylinder taper", "LSCY"),
             Label::new("STRt", "µm", "ISO 12780-1:2011, the largest of the generatrices", "LSLI of generatrices"),
             Label::new("STRt", "µm", "ISO 12780-1:2011, of the median line, a diameter", "LSLI of the median line"),
             Label::new("coaxiality", "µm", coaxiality, "LSCY"),
+            Label::new("parallelism", "µm", parallelism, "LSLI of the opposite generatrix"),
         ];
-        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, |sections, _, found| {
+        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, About::Form, |sections, _, found| {
             let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
             let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
             let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
@@ -190,6 +290,7 @@ impl Wall {
             found.push(median.as_ref().map_or(f64::NAN, |median| median.straightness_um));
             let coaxiality = median.iter().flat_map(|median| &median.coaxiality_um);
             found.push(coaxiality.copied().fold(f64::NAN, f64::max));
+            found.push(lines.as_ref().map_or(f64::NAN, Generatrices::largest_parallelism_um));
         })
     }
 
@@ -213,16 +314,24 @@ impl Wall {
         filter: &Filter,
         labels: Vec<Label>,
         draws: usize,
+        about: About,
         mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<Value> {
-        let drawn = self.on_angles(&self.angles, filter, draws, &mut values);
+        let drawn = self.on_angles(&self.angles, filter, draws, about, &mut values);
         let room = POINTS_FOUND / (self.rings.len() * self.count).max(1);
-        let times = (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.count).min(room);
-        if times < 2 {
+        let times = (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.count).min(room).max(1);
+        if times < 2 && about == About::Form {
             return labelled(labels, drawn, filter, &self.held, self.coverage());
         }
-        let found = self.on_angles(&Angles::equal(times * self.count), filter, 0, &mut values).into_iter().zip(drawn);
-        let found = found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
+        let angles = Angles::equal(times * self.count);
+        let found = self.on_angles(&angles, filter, 0, About::Form, &mut values).into_iter().zip(drawn);
+        let found = found.map(|((value, _), (drawn, known))| {
+            let known = known.map(|known| match about {
+                About::Form => known.moved(value - drawn),
+                About::WithoutNoise => known.of_value_with_noise(drawn, value),
+            });
+            (value, known)
+        });
         labelled(labels, found.collect(), filter, &self.held, self.coverage())
     }
 
@@ -232,11 +341,16 @@ impl Wall {
         angles: &Angles,
         filter: &Filter,
         draws: usize,
+        about: About,
         mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<(f64, Option<Uncertainty>)> {
         let mut fourier = Fourier::new(angles.len());
         let forms = self.rings.iter().map(|ring| {
-            let mut form_um = fourier.synthesise(filter.harmonics(&ring.harmonics)).to_vec();
+            let harmonics = match about {
+                About::Form => filter.harmonics(&ring.harmonics),
+                About::WithoutNoise => filter.harmonics(&without_noise(&ring.harmonics, &ring.variance)),
+            };
+            let mut form_um = fourier.synthesise(harmonics).to_vec();
             ring.gaps.blank(&mut form_um);
             form_um
         });

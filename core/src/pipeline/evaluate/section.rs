@@ -5,10 +5,13 @@ use crate::{
     Complex64,
     evaluate::{
         Value,
-        roundness::{Angles, Disturbed, Points, Reference, Values},
+        roundness::{Angles, Disturbed, Points, Reference, Values, between_angles},
         uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
     },
-    numerics::fourier::Fourier,
+    numerics::{
+        filter::{Degree, Smoother, robust_gaussian},
+        fourier::Fourier,
+    },
     pipeline::result::StationResult,
     separation::{Quantity, SectionAt},
 };
@@ -20,14 +23,30 @@ pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluat
     let equivalents: Vec<Vec<Value>> =
         form.equivalents.iter().map(|harmonics| form.exactly(harmonics).values(evaluate)).collect();
     for value in &mut values {
-        let same = |other: &&Value| {
-            (&other.symbol, &other.filter, &other.reference) == (&value.symbol, &value.filter, &value.reference)
+        let key = |value: &Value| {
+            let Value { symbol, filter, reference, band_upr, .. } = value;
+            (symbol.clone(), filter.clone(), reference.clone(), *band_upr)
         };
+        let same = |other: &&Value| key(other) == key(value);
         let others: Vec<f64> =
             equivalents.iter().filter_map(|all| all.iter().find(same)).map(|other| other.value).collect();
         value.uncertainty = value.uncertainty.take().map(|known| known.with_equivalents(value.value, &others));
     }
     values
+}
+
+/// Why a section does not have the reference circles that are asked for, each with its reason: an interruption may leave an arc.
+pub fn missing_circles(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<String> {
+    let form = Form::of(result, section, radius_mm).filter(|form| !form.at.gaps.is_empty());
+    let Some(form) = form.filter(|_| evaluate.has(Group::Roundness)) else { return Vec::new() };
+    let profile_um = form.profile(&Filter::low_pass(None), &mut Fourier::new(form.angles));
+    let mut points = Points::default();
+    points.set_profile(&Angles::equal(form.angles), &profile_um, radius_mm);
+    let missing = evaluate.references.iter().filter_map(|reference| {
+        let reason = points.determine(*reference).err()?;
+        Some(format!("section {}: no RONt about {}: {reason}", form.at.id, reference.symbol()))
+    });
+    missing.collect()
 }
 
 /// The largest |dr/dθ| of a profile on equal angles, by central differences over three points; NaN where no point has
@@ -102,12 +121,114 @@ impl Form {
         let mut values = Vec::new();
         for cutoff in evaluate.cutoffs_upr(self.held.highest) {
             let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
-            values.extend(self.round(&Filter::low_pass(cutoff), references));
+            values.extend(self.round(&evaluate.low_pass(cutoff), references));
             if cutoff.is_none() && evaluate.has(Group::Texture) {
                 values.extend(self.papers_ra());
             }
+            if let (true, Some(window_deg)) = (evaluate.has(Group::Roundness), evaluate.slope_window_deg) {
+                values.extend(self.slope(&evaluate.low_pass(cutoff), window_deg));
+            }
+        }
+        for cutoff in evaluate.robust_filter_upr.iter().filter(|_| evaluate.has(Group::Roundness)) {
+            values.extend(self.robust(*cutoff, &evaluate.references));
+        }
+        if evaluate.has(Group::Harmonics) {
+            values.extend(self.harmonics(evaluate.harmonics_upr));
         }
         values.extend(self.texture(evaluate));
+        values
+    }
+
+    /// Roundness behind the robust Gaussian (ISO 16610-31), which is applied to each drawn profile.
+    fn robust(&self, cutoff_upr: f64, references: &[Reference]) -> Vec<Value> {
+        let filter = Filter::robust(cutoff_upr);
+        let labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
+        let smoother = Smoother::closed(self.angles, cutoff_upr, Degree::Two);
+        let (angles, mut points) = (Angles::equal(self.angles), Points::default());
+        let found = self.evaluate(&Filter::low_pass(None), self.angles, DRAWS_OF_ROBUST, |profile_um, _, found| {
+            points.set_profile(&angles, &robust_gaussian(&smoother, profile_um).low_pass, self.radius_mm);
+            for reference in references {
+                let about = points.reference(*reference).map(|circle| points.values(&circle));
+                let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+                found.push(of(|values| values.ront_um));
+                if *reference == Reference::LeastSquares {
+                    found.extend([
+                        of(|values| values.ronp_um),
+                        of(|values| values.ronv_um),
+                        of(|values| values.ronq_um),
+                    ]);
+                }
+            }
+        });
+        let found = found.into_iter().zip(&labels).map(|((value, known), label)| {
+            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
+        });
+        let found = found.collect();
+        self.labelled(labels, found, &filter)
+    }
+
+    /// The largest change of the profile over a window of angles, r(α + w) − r(α): a profile of its own, with the harmonics
+    /// cₙ (e^{inw} − 1).
+    fn slope(&self, filter: &Filter, window_deg: f64) -> Vec<Value> {
+        let window_rad = window_deg.to_radians();
+        let change = |order: usize| Complex64::cis(order as f64 * window_rad) - 1.0;
+        let harmonics: Vec<Complex64> =
+            self.harmonics.iter().enumerate().map(|(order, harmonic)| harmonic * change(order)).collect();
+        let mut changes = self.exactly(&harmonics);
+        changes.variance =
+            self.variance.iter().enumerate().map(|(order, variance)| variance * change(order).norm_sqr()).collect();
+        for [from, length] in self.at.gaps.stretches() {
+            changes.at.gaps.add(from - window_rad, length);
+        }
+        let waves = filter.highest(self.held.highest);
+        let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
+        let found = changes.evaluate(filter, angles, DRAWS, |profile_um, _, found| {
+            found.push(profile_um.iter().map(|change| change.abs()).fold(f64::NAN, f64::max));
+        });
+        let source = "largest change of the profile over a window, no standard's symbol";
+        let label = Label::new("slope", "µm", source, format!("LSCI, window {window_deg}°"));
+        changes.labelled(vec![label], found, filter)
+    }
+
+    /// Amplitude and phase of each order from 2 to at most `highest`.
+    ///
+    /// Half of an order's variance is along its amplitude and half across it. An amplitude below 2.45 times its standard
+    /// uncertainty may be noise alone (the 95 % point of Rayleigh's distribution): its interval begins at 0, and its phase has none.
+    fn harmonics(&self, highest: usize) -> Vec<Value> {
+        const NOISE_ALONE: f64 = 2.447_746_830_680_816;
+        const NORMAL_95: f64 = 1.959_963_984_540_054;
+        let mut values = Vec::new();
+        let known = |order: &usize| !self.held.lost.contains(order);
+        for order in (2..=highest.min(self.held.highest)).filter(known) {
+            let (value, turns) = (self.harmonics[order], order as f64);
+            let amplitude = value.norm();
+            // The first crest of A cos(n α + φ).
+            let phase = (-value.arg().to_degrees() / turns).rem_euclid(360.0 / turns);
+            let variance = self.variance.get(order).copied().filter(|variance| variance.is_finite());
+            let std = variance.map(|variance| (0.5 * variance).sqrt());
+            let about = |value: f64, std: f64, low: f64| Uncertainty {
+                std,
+                interval_95: [low, value + NORMAL_95 * std],
+                draws: 0,
+            };
+            let of_amplitude = std.map(|std| {
+                let low = if amplitude < NOISE_ALONE * std { 0.0 } else { amplitude - NORMAL_95 * std };
+                about(amplitude, std, low)
+            });
+            let of_phase = std.filter(|std| amplitude >= NOISE_ALONE * std).map(|std| {
+                let std = (std / (amplitude * turns)).to_degrees();
+                about(phase, std, phase - NORMAL_95 * std)
+            });
+            let labels = vec![
+                Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),
+                Label::new("phase", "°", "part's angle of the order's first crest", "LSCI"),
+            ];
+            let found = vec![(amplitude, of_amplitude), (phase, of_phase)];
+            let both = self.labelled(labels, found, &Filter::low_pass(None));
+            let weakened_above_upr = self.held.half_power_upr.filter(|half| turns > *half);
+            let of_order = |value| Value { band_upr: [order; 2], lost_orders: Vec::new(), weakened_above_upr, ..value };
+            values.extend(both.into_iter().map(of_order));
+        }
         values
     }
 
@@ -152,13 +273,8 @@ impl Form {
     fn round(&self, filter: &Filter, references: &[Reference]) -> Vec<Value> {
         let mut labels = Vec::new();
         for reference in references {
-            let ron = |symbol, meaning: &str| {
-                Label::new(symbol, "µm", format!("ISO 12181-1:2011, {meaning} roundness deviation"), reference.symbol())
-            };
-            labels.push(ron("RONt", "peak-to-valley"));
+            labels.extend(roundness_labels(*reference));
             if *reference == Reference::LeastSquares {
-                labels.extend([ron("RONp", "peak-to-reference"), ron("RONv", "reference-to-valley")]);
-                labels.push(ron("RONq", "root mean square"));
                 let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
                 labels.push(Label::new("dr/dtheta", "µm/°", steepest, reference.symbol()));
             }
@@ -179,11 +295,17 @@ impl Form {
         let finer = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
         let drawn = on_angles(fewer, DRAWS);
         let found = on_angles(finer, 0).into_iter().zip(drawn);
-        let found = found.map(|((value, _), (about, known))| (value, known.map(|known| known.moved(value - about))));
+        let found = found.zip(&labels).map(|(((value, _), (about, known)), label)| {
+            let known = known.map(|known| known.moved(value - about));
+            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
+        });
         let found = found.collect();
         self.labelled(labels, found, filter)
     }
 }
+
+/// Draws of what is filtered robustly, point by point and some times over.
+const DRAWS_OF_ROBUST: usize = 64;
 
 /// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
 const DRAWN_POINTS_A_WAVE: usize = 6;
@@ -196,6 +318,27 @@ struct Circles<'a> {
     points: Points,
     /// Of each reference, where its errors are drawn.
     disturbed: Vec<Option<Disturbed<'a>>>,
+    /// Harmonics of the profile itself, where no errors are drawn: contacts are then sought between the angles.
+    series: Option<Vec<Complex64>>,
+}
+
+/// RONt, and about LSCI RONp, RONv and RONq.
+fn roundness_labels(reference: Reference) -> Vec<Label> {
+    let ron = |symbol, meaning: &str| {
+        Label::new(symbol, "µm", format!("ISO 12181-1:2011, {meaning} roundness deviation"), reference.symbol())
+    };
+    let mut labels = vec![ron("RONt", "peak-to-valley")];
+    if reference == Reference::LeastSquares {
+        labels.extend([ron("RONp", "peak-to-reference"), ron("RONv", "reference-to-valley")]);
+        labels.push(ron("RONq", "root mean square"));
+    }
+    labels
+}
+
+/// Whether errors change which contacts hold the circle that a value is about, and with them the value's slopes.
+fn has_kinks(label: &Label) -> bool {
+    let about = [Reference::MaximumInscribed, Reference::MinimumCircumscribed];
+    label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
 }
 
 impl<'a> Circles<'a> {
@@ -214,6 +357,7 @@ impl<'a> Circles<'a> {
             references,
             points: Points::default(),
             disturbed: disturbed.collect(),
+            series: (!drawn).then(|| filter.harmonics(&form.harmonics)),
         }
     }
 
@@ -226,7 +370,12 @@ impl<'a> Circles<'a> {
                 (Some(largest_um), Some(disturbed)) => {
                     disturbed.as_mut().and_then(|disturbed| disturbed.values(profile_um, largest_um))
                 }
-                _ => self.points.reference(*reference).map(|circle| self.points.values(&circle)),
+                _ => match &self.series {
+                    Some(series) => {
+                        between_angles(series, profile_um, self.radius_mm, *reference).ok().map(|found| found.1)
+                    }
+                    None => self.points.reference(*reference).map(|circle| self.points.values(&circle)),
+                },
             };
             let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
             found.push(of(|values| values.ront_um));

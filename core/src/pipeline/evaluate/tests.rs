@@ -120,6 +120,21 @@ fn an_interruption_is_in_no_value_and_each_says_so() {
     }
 }
 
+/// What is left of 200° of interruption surrounds no centre: MICI does not exist, and its reason is given.
+#[test]
+fn an_arc_says_which_circle_it_does_not_have() {
+    let mut result = station(0.0, &[lobes(9, 2.0)], 60, 1e-8, &[]);
+    let evaluate = evaluate("references = ['LSCI', 'MICI', 'MCCI']\nfilter_upr = []").unwrap();
+    assert!(missing_circles(&result, 0, &evaluate, RADIUS_MM).is_empty());
+    result.separation.sections[0].gaps.add(0.0, 200_f64.to_radians());
+    let values = section_values(&result, 0, &evaluate, RADIUS_MM);
+    let about = |reference: &str| values.iter().any(|value| value.symbol == "RONt" && value.reference == reference);
+    assert_eq!(["LSCI", "MICI", "MCCI"].map(about), [true, false, true]);
+    let missing = missing_circles(&result, 0, &evaluate, RADIUS_MM);
+    assert!(missing.len() == 1 && missing[0].contains("section a: no RONt about MICI"), "{missing:?}");
+    assert!(missing[0].contains("not bounded"), "{missing:?}");
+}
+
 #[test]
 fn half_of_a_wave_at_the_cut_off_is_left() {
     for cutoff in [15, 50, 150] {
@@ -223,6 +238,132 @@ fn centred_sections_have_their_form_and_no_taper() {
     assert!(found.remarks[0].contains("CYLtt"));
 }
 
+/// Shares of 95 % intervals of cylindricity that hold the truth, and the stated standard uncertainty over the errors' standard
+/// deviation: four sections with orders to 30 of 1/n µm, errors of `noise_um`/√n at order n.
+fn cylindricity_intervals(text: &str, noise_um: f64, trials: u64) -> Vec<(String, f64, f64)> {
+    const HIGHEST: usize = 30;
+    let variance = |order: usize| if order < 2 { 0.0 } else { noise_um * noise_um / order as f64 };
+    let of = |rings: &[Vec<(usize, Complex64)>], noisy: bool| {
+        let stations: Vec<StationResult> = (rings.iter().zip(0..))
+            .map(|(waves, ring)| {
+                let mut station = station(8.0 * f64::from(ring), waves, HIGHEST, f64::NAN, &[]);
+                if noisy {
+                    station.separation.variance = (0..=HIGHEST).map(variance).collect();
+                }
+                station
+            })
+            .collect();
+        part(&stations, false, text).values
+    };
+    let (mut inside, mut errors, mut stated): (Vec<usize>, Vec<Vec<f64>>, Vec<f64>) = Default::default();
+    let mut names = Vec::new();
+    for trial in 0..trials {
+        let mut random = ChaCha8Rng::seed_from_u64(trial);
+        let truth: Vec<Vec<(usize, Complex64)>> = (0..4)
+            .map(|_| {
+                let wave = |order: usize| {
+                    let amplitude = rand::RngExt::random_range(&mut random, 0.3..1.0) / order as f64;
+                    (order, Complex64::from_polar(amplitude, rand::RngExt::random_range(&mut random, 0.0..2.0 * PI)))
+                };
+                (2..=HIGHEST).map(wave).collect()
+            })
+            .collect();
+        let mut disturbed = |(order, value): &(usize, Complex64)| {
+            let share = (0.5 * variance(*order)).sqrt();
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            (*order, value + Complex64::new(share * normal(), share * normal()))
+        };
+        let found: Vec<Vec<(usize, Complex64)>> =
+            truth.iter().map(|ring| ring.iter().map(&mut disturbed).collect()).collect();
+        let (exact, found) = (of(&truth, false), of(&found, true));
+        names = exact.iter().map(|value| format!("{} {}", value.symbol, value.reference)).collect();
+        inside.resize(exact.len(), 0);
+        errors.resize(exact.len(), Vec::new());
+        stated.resize(exact.len(), 0.0);
+        for (index, (exact, found)) in exact.iter().zip(&found).enumerate() {
+            let known = found.uncertainty.as_ref().unwrap();
+            inside[index] += usize::from((known.interval_95[0]..=known.interval_95[1]).contains(&exact.value));
+            errors[index].push(found.value - exact.value);
+            stated[index] += known.std.powi(2);
+        }
+    }
+    let of_value = |(index, name): (usize, String)| {
+        let count = trials as f64;
+        let mean = errors[index].iter().sum::<f64>() / count;
+        let squares: f64 = errors[index].iter().map(|error| (error - mean).powi(2)).sum();
+        (name, inside[index] as f64 / count, (stated[index] / squares).sqrt())
+    };
+    names.into_iter().enumerate().map(of_value).collect()
+}
+
+#[test]
+fn intervals_of_cylindricity_hold_the_truth() {
+    for noise_um in [0.02, 0.3] {
+        for (name, inside, ratio) in cylindricity_intervals("references = ['LSCI']\nfilter_upr = []", noise_um, 60) {
+            // 95 % of 60 are 57 ± 1.7. Below 0.1 µm; above, noise is as large as the form, and only the size of ± is looked at.
+            assert!(noise_um > 0.1 || inside >= 0.85, "{name}, {noise_um} µm: {inside}");
+            // A standard deviation of 60 is known to 9 %.
+            assert!((0.7..1.4).contains(&ratio), "{name}, {noise_um} µm: stated {ratio} times the scatter");
+        }
+    }
+}
+
+#[test]
+#[ignore = "prints the table of docs/uncertainty.md, which takes minutes"]
+fn intervals_of_cylindricity_by_noise() {
+    for (references, trials) in [("'LSCI'", 300), ("'MZCI', 'MICI', 'MCCI'", 100)] {
+        for noise_um in [0.003, 0.02, 0.05, 0.1] {
+            let text = format!("references = [{references}]\nfilter_upr = []");
+            for (name, inside, ratio) in cylindricity_intervals(&text, noise_um, trials) {
+                println!("| {name} | {noise_um} | {:.1} % | {ratio:.2} |", 100.0 * inside);
+            }
+        }
+    }
+}
+
+/// 95 % intervals of RONt about MICI and MCCI with two lobes, whose contacts are nearly opposite each other.
+#[test]
+fn intervals_hold_the_truth_with_nearly_opposite_contacts() {
+    const TRIALS: u64 = 300;
+    const HIGHEST: usize = 30;
+    let text = "values = ['roundness']\nreferences = ['MICI', 'MCCI']\nfilter_upr = []";
+    let evaluate = evaluate(text).unwrap();
+    for (strength, noise_um) in [(0.1, 0.001), (0.3, 0.004), (0.1, 0.008)] {
+        let mut inside = [0; 2];
+        for trial in 0..TRIALS {
+            let mut random = ChaCha8Rng::seed_from_u64(trial);
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let truth: Vec<(usize, Complex64)> = (2..=HIGHEST)
+                .map(|order| {
+                    let size = if order == 2 { 1.0 } else { strength / order as f64 };
+                    (order, size * Complex64::new(normal(), normal()))
+                })
+                .collect();
+            let share = noise_um / SQRT_2;
+            let found: Vec<(usize, Complex64)> = truth
+                .iter()
+                .map(|(order, value)| (*order, value + share * Complex64::new(normal(), normal())))
+                .collect();
+            let of = |waves: &[(usize, Complex64)], variance| {
+                let mut result = station(0.0, waves, HIGHEST, variance, &[]);
+                result.angles = 240;
+                section_values(&result, 0, &evaluate, RADIUS_MM)
+            };
+            let (exact, found) = (of(&truth, f64::NAN), of(&found, noise_um * noise_um));
+            for (inside, (exact, found)) in inside.iter_mut().zip(exact.iter().zip(&found)) {
+                let [low, high] = found.uncertainty.as_ref().unwrap().interval_95;
+                *inside += usize::from((low..=high).contains(&exact.value));
+            }
+        }
+        println!("{strength} µm of other lobes, errors {noise_um} µm: MICI, MCCI {inside:?} of {TRIALS}");
+        // 95 % of 300 are 285 ± 3.8.
+        assert!(
+            inside.iter().all(|inside| (273..=298).contains(inside)),
+            "{strength} {noise_um}: {inside:?} of {TRIALS}"
+        );
+    }
+}
+
 #[test]
 fn placed_sections_have_taper_bend_and_coaxiality() {
     // Radii 1 µm more and less at the ends: diameters differ by 4 µm.
@@ -240,6 +381,157 @@ fn placed_sections_have_taper_bend_and_coaxiality() {
     assert!((value("coaxiality", "LSCY") - 4.0).abs() < EXACT_UM);
     assert!((value("STRt", "LSLI of the median line") - 4.0).abs() < EXACT_UM);
     assert!((value("STRt", "LSLI of generatrices") - 3.0).abs() < EXACT_UM);
+}
+
+#[test]
+fn harmonics_have_amplitude_and_the_first_crest() {
+    let waves = [(3, Complex64::from_polar(2.0, -0.6)), (5, Complex64::from_polar(0.001, 1.0))];
+    let evaluate = evaluate("values = ['harmonics']\nharmonics_upr = 6").unwrap();
+    let values = section_values(&station(0.0, &waves, 60, 2e-4, &[4]), 0, &evaluate, RADIUS_MM);
+    let orders: Vec<usize> = values.iter().map(|value| value.band_upr[0]).collect();
+    assert_eq!(orders, [2, 2, 3, 3, 5, 5, 6, 6]);
+    let (amplitude, phase) = (&values[2], &values[3]);
+    // 2·cos(3α − 0.6) has its crest at 0.2 rad.
+    assert!((amplitude.value - 2.0).abs() < 1e-12 && (phase.value - 0.2_f64.to_degrees()).abs() < 1e-9);
+    assert_eq!((&*amplitude.symbol, &*phase.symbol, &*phase.unit), ("amplitude", "phase", "deg"));
+    // σ = √(½·2e-4) = 0.01 µm along the amplitude, and as much across it: 0.01/(2·3) rad.
+    assert!((amplitude.uncertainty.as_ref().unwrap().std - 0.01).abs() < 1e-12);
+    assert!((phase.uncertainty.as_ref().unwrap().std - (0.01_f64 / 6.0).to_degrees()).abs() < 1e-12);
+    // Less than noise: from 0 on, and of no phase.
+    let lowest = values[4].uncertainty.as_ref().unwrap().interval_95[0];
+    assert!(lowest.abs() < 1e-12 && values[5].uncertainty.is_none());
+}
+
+#[test]
+fn the_slope_in_a_window_is_the_largest_change_over_it() {
+    // 2·cos 3α changes by 2·2·sin(3w/2) over w.
+    for window in [5.0_f64, 30.0, 60.0] {
+        let text = format!("references = ['LSCI']\nfilter_upr = []\nslope_window_deg = {window}");
+        let values =
+            section_values(&station(0.0, &[lobes(3, 2.0)], 60, 1e-6, &[]), 0, &evaluate(&text).unwrap(), RADIUS_MM);
+        let slope = find(&values, "slope", &format!("LSCI, window {window}°"), "none");
+        let expected = 4.0 * (1.5 * window).to_radians().sin();
+        assert!((slope.value - expected).abs() < 1e-4 * expected, "{} instead of {expected}", slope.value);
+        // Errors of so many orders, each twice half of 1e-6 µm² times 1 − cos nw, at one angle.
+        let std = slope.uncertainty.as_ref().unwrap().std;
+        let squares: f64 = (2..=60).map(|n| 1e-6 * (1.0 - (f64::from(n) * window).to_radians().cos())).sum();
+        assert!(std > 0.5 * squares.sqrt() && std < 1.5 * squares.sqrt(), "{std} {}", squares.sqrt());
+    }
+    assert!(evaluate("slope_window_deg = 0").is_err() && evaluate("slope_window_deg = 181").is_err());
+}
+
+#[test]
+fn filters_pass_their_share_at_the_cut_off() {
+    for (kind, name, share) in [
+        ("gaussian", "Gaussian 50 UPR", 0.5),
+        ("spline", "spline 50 UPR", 0.5),
+        ("2rc", "2RC 50 UPR", 0.75),
+        ("2rc-phase-correct", "2RC phase correct 50 UPR", 0.75),
+    ] {
+        let text = format!("references = ['LSCI']\nfilter = '{kind}'\nfilter_upr = [50]");
+        let waves = [lobes(50, 2.0)];
+        let values = section_values(&station(0.0, &waves, 200, f64::NAN, &[]), 0, &evaluate(&text).unwrap(), RADIUS_MM);
+        let found = find(&values, "RONt", "LSCI", name).value;
+        assert!((found - 4.0 * share).abs() < EXACT_UM, "{kind}: {found}");
+    }
+    // A band: half of both ends, nearly all between them.
+    let band = evaluate("references = ['LSCI']\nfilter_upr = [150]\nhigh_pass_upr = 15").unwrap();
+    for (order, share) in [(15, 0.5 * (-0.01_f64).exp2()), (150, 0.5), (40, 0.945)] {
+        let waves = [lobes(order, 2.0)];
+        let values = section_values(&station(0.0, &waves, 300, f64::NAN, &[]), 0, &band, RADIUS_MM);
+        let value = find(&values, "RONt", "LSCI", "Gaussian 15 to 150 UPR");
+        assert!((value.value / 4.0 - share).abs() < 4e-3, "{order}: {}", value.value);
+        assert_eq!(value.band_upr, [15, 150]);
+    }
+    assert!(evaluate("high_pass_upr = 60").is_err() && evaluate("high_pass_upr = 0").is_err());
+}
+
+/// Three lobes and a scratch of 10 µm in a dale: a Gaussian of 15 UPR follows it by half a micron, the robust one does not.
+#[test]
+fn a_scratch_does_not_pull_the_robust_filter() {
+    let width: f64 = 0.005;
+    let scratch = |order: usize| {
+        let share = (-0.5 * (order as f64 * width).powi(2)).exp();
+        Complex64::from(-10.0 * width * (2.0 / PI).sqrt() * share)
+    };
+    let mut waves: Vec<(usize, Complex64)> = (2..=340).map(|order| (order, scratch(order))).collect();
+    waves[1].1 += Complex64::from_polar(2.0, PI);
+    let text = "references = ['LSCI']\nfilter_upr = [15]\nrobust_filter_upr = [15]";
+    let values = section_values(&station(0.0, &waves, 340, 1e-9, &[]), 0, &evaluate(text).unwrap(), RADIUS_MM);
+    let [plain, robust] =
+        ["Gaussian 15 UPR", "robust Gaussian 15 UPR"].map(|filter| find(&values, "RONt", "LSCI", filter));
+    // Of three lobes (1 + a) e^−a pass, a = 1.678 (3/15)². Orders 0 and 1 of the scratch are not in the form: 0.01 µm.
+    let expected = 4.0 * 1.0671 * (-0.0671_f64).exp();
+    assert!((robust.value - expected).abs() < 0.05, "{} instead of {expected}", robust.value);
+    assert!((plain.value - expected).abs() > 0.15, "{}", plain.value);
+    assert!(robust.uncertainty.as_ref().is_some_and(|known| known.std > 0.0 && known.std < 0.01));
+}
+
+/// A section 3 µm aside of the axis of two others, with two lobes of 0.5 µm.
+#[test]
+fn sections_have_their_position_about_a_datum_axis() {
+    let text = "references = ['LSCI']\nfilter_upr = []\ndatum = ['s0', 's20']";
+    let at =
+        |z: f64, x: f64, y: f64, form: f64| station(z, &[(1, Complex64::new(x, -y)), lobes(2, form)], 10, 1e-6, &[]);
+    let rings = [at(0.0, 1.0, 0.0, 0.0), at(20.0, 3.0, 4.0, 0.0), at(10.0, 5.0, 2.0, 0.5), at(30.0, 4.0, 6.0, 0.0)];
+    let found = part(&rings, true, text);
+    let value = |symbol, reference| find(&found.values, symbol, reference, "none");
+    let eccentricity = value("eccentricity", "section a of s10, axis of s0, s20");
+    // The axis passes through (2, 2) at 10 mm. Form²/R.
+    assert!((eccentricity.value - 3.0).abs() < EXACT_UM && eccentricity.uncertainty.is_some(), "{eccentricity:?}");
+    let runout = value("circular-run-out", "section a of s10, axis of s0, s20").value;
+    // 3 cos α + ½ cos 2α is from −2.5 to 3.5.
+    let lowest =
+        (0..3600).map(|step| (f64::from(step) / 10.0).to_radians()).map(|a| 3.0 * a.cos() + 0.5 * (2.0 * a).cos());
+    let expected = 3.5 - lowest.fold(f64::INFINITY, f64::min);
+    assert!((runout - expected).abs() < EXACT_UM, "{runout} instead of {expected}");
+    assert!(value("circular-run-out", "section a of s30, axis of s0, s20").value < 2.0 * EXACT_UM);
+    assert!((value("coaxiality", "axis of s0, s20").value - 6.0).abs() < 2.0 * EXACT_UM);
+    assert!((value("total-run-out", "axis of s0, s20").value - expected).abs() < EXACT_UM);
+    assert!(value("parallelism", "LSLI of the opposite generatrix").value > 1.0);
+    // What is not there is said.
+    let unknown = part(&rings, true, "datum = ['s0', 'B']");
+    assert!(unknown.remarks.iter().any(|remark| remark.contains("no section `B`")), "{:?}", unknown.remarks);
+    let centred = part(&rings, false, text);
+    assert!(centred.remarks.iter().any(|remark| remark.contains("centres")), "{:?}", centred.remarks);
+    assert!(evaluate("datum = []").is_err());
+}
+
+#[test]
+fn intervals_of_positions_hold_the_truth() {
+    const TRIALS: u64 = 60;
+    let text = "references = ['LSCI']\nfilter_upr = []\ndatum = ['s0', 's20']";
+    let variance = 4e-4;
+    let mut inside: Vec<(String, usize)> = Vec::new();
+    for trial in 0..TRIALS {
+        let mut random = ChaCha8Rng::seed_from_u64(trial);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let of = |rings: &[Vec<(usize, Complex64)>], variance| {
+            let stations: Vec<StationResult> = (rings.iter().zip([0.0, 20.0, 10.0, 30.0]))
+                .map(|(waves, z)| station(z, waves, 12, variance, &[]))
+                .collect();
+            let values = part(&stations, true, text).values;
+            values.into_iter().filter(|value| value.reference.contains("axis of")).collect::<Vec<Value>>()
+        };
+        let truth: Vec<Vec<(usize, Complex64)>> = (0..4)
+            .map(|_| (1..=12).map(|order| (order, Complex64::new(normal(), normal()) / order as f64)).collect())
+            .collect();
+        let share = (0.5_f64 * variance).sqrt();
+        let mut disturb =
+            |(order, value): &(usize, Complex64)| (*order, value + share * Complex64::new(normal(), normal()));
+        let found: Vec<Vec<(usize, Complex64)>> =
+            truth.iter().map(|ring| ring.iter().map(&mut disturb).collect()).collect();
+        let (exact, found) = (of(&truth, f64::NAN), of(&found, variance));
+        inside.resize(exact.len(), (String::new(), 0));
+        for ((name, inside), (exact, found)) in inside.iter_mut().zip(exact.iter().zip(&found)) {
+            let [low, high] = found.uncertainty.as_ref().unwrap().interval_95;
+            *name = format!("{} {}", exact.symbol, exact.reference);
+            *inside += usize::from((low..=high).contains(&exact.value));
+        }
+    }
+    println!("{inside:?}");
+    // 95 % of 60 are 57 ± 1.7.
+    assert!(inside.iter().all(|(_, inside)| *inside >= 50), "{inside:?}");
 }
 
 #[allow(clippy::type_complexity, reason = "taken apart at once by the test")]
