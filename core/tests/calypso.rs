@@ -49,7 +49,8 @@ fn points(path: &Path, columns: usize) -> Vec<[f64; 3]> {
             counts[from.parse().unwrap()..=to.parse().unwrap()].fill(false);
         }
     }
-    let each = numbers.chunks_exact(columns).map(|row| [row[0], if columns == 3 { row[1] } else { 0.0 }, row[columns - 1]]);
+    let each =
+        numbers.chunks_exact(columns).map(|row| [row[0], if columns == 3 { row[1] } else { 0.0 }, row[columns - 1]]);
     let counted = each.zip(counts).filter(|(point, counts)| *counts && point.iter().all(|value| value.is_finite()));
     counted.map(|([angle, z_mm, deviation_mm], _)| [angle, z_mm, 1e3 * deviation_mm]).collect()
 }

@@ -157,8 +157,8 @@ fn a_keyway_is_left_out_of_every_value_and_each_says_so() {
     assert!(ront(&mistaken) > 3.0 * ront(&whole), "{} and {}", ront(&mistaken), ront(&whole));
 }
 
-/// A speed that wobbles by 0.1 % puts marks and angles between samples: interpolation, and a low-pass before it, do not take the keyway
-/// to angles beside it.
+/// A speed that wobbles by 0.1 % puts marks and angles between samples: interpolation, and a low-pass before it, do not take
+/// the keyway to angles beside it.
 #[test]
 fn a_keyway_between_samples_stays_where_it_is() {
     let folder = tempfile::tempdir().unwrap();

@@ -68,10 +68,15 @@ impl Filter {
         self.band.below_upr.is_some_and(|cutoff| transmission(half_power_upr, cutoff) >= MATTERS)
     }
 
-    /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there are.
+    /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there
+    /// are.
     pub fn reaches_above(&self, order: usize) -> bool {
-        let passed = |cutoff| transmission((order + 1) as f64, cutoff);
-        self.band.below_upr.is_some_and(|cutoff| passed(cutoff) >= REACHES)
+        self.reach_upr().is_some_and(|reach| order < reach)
+    }
+
+    /// The highest order of which it passes a thousandth or more: 3.157 times its cut-off; `None` where everything passes.
+    pub fn reach_upr(&self) -> Option<usize> {
+        self.band.below_upr.map(|cutoff| (cutoff * (-REACHES.log2()).sqrt()) as usize)
     }
 
     /// The highest order that it passes, of those up to `highest`.
