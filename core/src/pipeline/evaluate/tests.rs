@@ -432,10 +432,12 @@ fn a_wall_and_a_surface_say_what_their_filter_asks_for_and_they_do_not_have() {
         find(&found.values, "CYLt", "LSCY of centred sections", "Gaussian 50 UPR").absent_above_upr
     };
     assert_eq!([wall([170, 170]), wall([170, 60])], [None, Some(60)]);
-    // More orders than the surface's 360 angles hold, where the filter asks for them and the sections know them.
+    // More orders than the usual 720 angles hold, where the filter asks for them and the surface has them.
     let fine = |highest| {
-        let rings = [0.0, 5.0].map(|z| station(z, &[lobes(300, 1.0)], highest, 1e-6, &[]));
-        let found = part(&rings, false, "references = ['LSCI']\nfilter_upr = [150]");
+        let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 1400, step_mm: None });
+        [0.0, 5.0].iter().for_each(|z| builder.add(&station(*z, &[lobes(300, 1.0)], highest, 1e-6, &[])));
+        let evaluate = evaluate("values = ['cylindricity']\nreferences = ['LSCI']\nfilter_upr = [150]").unwrap();
+        let found = part_summary(builder.sections(), 1400, &evaluate, RADIUS_MM, false).unwrap();
         let cylt = find(&found.values, "CYLt", "LSCY of centred sections", "Gaussian 150 UPR");
         (cylt.absent_above_upr, cylt.value)
     };
