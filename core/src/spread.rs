@@ -70,6 +70,33 @@ pub struct Projection {
 }
 
 impl Projection {
+    /// The same, and what it gives along these lines (and of tilt towards them) where x and y are both there.
+    #[must_use]
+    pub fn with_lines(mut self, lines: &[Azimuth]) -> Self {
+        for line in lines {
+            for (wanted, parts) in [
+                (Quantity::Along(*line), [Quantity::X, Quantity::Y]),
+                (Quantity::TiltAlong(*line), [Quantity::TiltX, Quantity::TiltY]),
+            ] {
+                let row = |wanted: Quantity| self.rows.iter().find(|(quantity, _)| *quantity == wanted);
+                let (None, [Some(first), Some(second)]) = (row(wanted), parts.map(row)) else { continue };
+                let [x, y, tilt_x, tilt_y] = wanted.cartesian();
+                let factors = if wanted.is_tilt() { [tilt_x, tilt_y] } else { [x, y] };
+                let mut weights: Vec<(usize, f64)> = Vec::new();
+                for ((_, weighted), factor) in [first, second].into_iter().zip(factors) {
+                    for (sensor, weight) in weighted {
+                        match weights.iter_mut().find(|(known, _)| known == sensor) {
+                            Some((_, sum)) => *sum += factor * weight,
+                            None => weights.push((*sensor, factor * weight)),
+                        }
+                    }
+                }
+                self.rows.push((wanted, weights));
+            }
+        }
+        self
+    }
+
     /// The directions in which it gives motion.
     #[must_use]
     pub fn directions(&self) -> Vec<Direction> {
@@ -102,6 +129,8 @@ pub struct Spread {
     pub low: Vec<f64>,
     /// Highest turn less the mean, likewise.
     pub high: Vec<f64>,
+    /// Variance of a turn about the mean of all, its mean over the angles, µm² or µrad², `[direction]`.
+    pub variance: Vec<f64>,
 }
 
 impl Spread {
@@ -111,6 +140,13 @@ impl Spread {
         let place = self.directions.iter().position(|known| *known == direction)?;
         let range = place * self.angles..(place + 1) * self.angles;
         Some((self.low.get(range.clone())?, self.high.get(range)?))
+    }
+
+    /// Root mean square of single turns about the mean of all, over all angles, in one direction.
+    #[must_use]
+    pub fn rms(&self, direction: Direction) -> Option<f64> {
+        let place = self.directions.iter().position(|known| *known == direction)?;
+        self.variance.get(place).map(|variance| variance.max(0.0).sqrt())
     }
 
     /// What 1 µm in every sensor makes in a direction at most, whatever the signs, in µm or µrad.
@@ -147,6 +183,32 @@ impl Spread {
 mod tests {
     use super::*;
 
+    /// cos φ·x + sin φ·y, and the tilt towards the same line.
+    #[test]
+    fn a_line_is_the_sum_of_x_and_y() {
+        let rows = vec![
+            (Quantity::X, vec![(0, 1.0), (2, 0.5)]),
+            (Quantity::Y, vec![(1, 1.0), (2, -0.5)]),
+            (Quantity::TiltX, vec![(1, -3.0)]),
+            (Quantity::TiltY, vec![(0, 3.0)]),
+        ];
+        let line = Azimuth::of(30_f64.to_radians());
+        let found = Projection { rows, z_mm: 0.0, rotation: 1.0 }.with_lines(&[line, line]);
+        assert_eq!(found.rows.len(), 6);
+        let (cosine, sine) = (0.75_f64.sqrt(), 0.5);
+        let expected =
+            [vec![(0, cosine), (2, 0.5 * cosine - 0.5 * sine), (1, sine)], vec![(1, 3.0 * sine), (0, 3.0 * cosine)]];
+        for ((_, found), expected) in found.rows[4..].iter().zip(expected) {
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!(found.0 == expected.0 && (found.1 - expected.1).abs() < 1e-12, "{found:?} {expected:?}");
+            }
+        }
+        assert!(found.directions().contains(&Direction::TiltAlong(line)));
+        // Without y there is only x.
+        let x = Projection { rows: found.rows[..1].to_vec(), ..found };
+        assert_eq!(x.clone().with_lines(&[line]), x);
+    }
+
     #[test]
     fn noise_of_sensors_at_right_angles_and_of_three_at_equal_ones() {
         let spread = |rows| Spread {
@@ -156,6 +218,7 @@ mod tests {
             turns: 2,
             low: Vec::new(),
             high: Vec::new(),
+            variance: Vec::new(),
         };
         let square = spread(vec![(Quantity::X, vec![(0, 1.0)]), (Quantity::Y, vec![(1, 1.0)])]);
         // 2/3 of each cosine: the least-squares inverse of three directions at 120°.

@@ -72,22 +72,26 @@ const STAGES: &str = r#"
     filter_upr = [50]
 "#;
 
-fn simulated(keyway: &str) -> SpindleSimulator {
-    let config: SpindleConfig = toml::from_str(&format!("seed = 3\n{RIG}\n{RECORDING}\n{keyway}")).unwrap();
+fn simulated(recording: &str, keyway: &str) -> SpindleSimulator {
+    let config: SpindleConfig = toml::from_str(&format!("seed = 3\n{RIG}\n{recording}\n{keyway}")).unwrap();
     simulator(&config).unwrap()
 }
 
 fn summary(folder: &Path, name: &str, keyway: &str, interruptions: &str) -> Summary {
+    summary_of(folder, name, [RECORDING, keyway, interruptions, STAGES])
+}
+
+fn summary_of(folder: &Path, name: &str, [recording, keyway, interruptions, stages]: [&str; 4]) -> Summary {
     let mut registry = Registry::default();
     runout_hdf5::register(&mut registry);
     runout_preprocess::register(&mut registry);
     runout_spindle::register(&mut registry);
-    let simulator = simulated(keyway);
+    let simulator = simulated(recording, keyway);
     let path = folder.join(format!("{name}.h5"));
     write_measurement(&simulator.spindle_recording(), simulator.rig(), &path, &WriteOptions::default(), &mut |_| {})
         .unwrap();
     let text = format!(
-        "{RIG}{interruptions}\n[load]\nplugin = \"hdf5\"\npath = \"{name}.h5\"\n{STAGES}\n\
+        "{RIG}{interruptions}\n[load]\nplugin = \"hdf5\"\npath = \"{name}.h5\"\n{stages}\n\
          [[export]]\nplugin = \"hdf5\"\npath = \"{name}-result.h5\"\n"
     );
     let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY).unwrap();
@@ -120,7 +124,7 @@ fn a_keyway_is_left_out_of_every_value_and_each_says_so() {
         assert!(apart < 3.0 * uncertainty.std + 0.01 * one.value, "{}: {} and {}", one.symbol, one.value, other.value);
     }
     // What is known of the part besides the keyway is the truth.
-    let simulator = simulated(KEYWAY);
+    let simulator = simulated(RECORDING, KEYWAY);
     let recording = simulator.spindle_recording();
     let mut gaps = Gaps::default();
     gaps.add(351.5_f64.to_radians(), 13_f64.to_radians());
@@ -151,4 +155,31 @@ fn a_keyway_is_left_out_of_every_value_and_each_says_so() {
     let mistaken = summary(folder.path(), "mistaken", &KEYWAY.replace("300", "30"), "");
     let ront = |summary: &Summary| values(summary).iter().find(|value| value.symbol == "RONt").unwrap().value;
     assert!(ront(&mistaken) > 3.0 * ront(&whole), "{} and {}", ront(&mistaken), ront(&whole));
+}
+
+/// A speed that wobbles by 0.1 % puts marks and angles between samples: interpolation, and a low-pass before it, do not take
+/// the keyway to angles beside it.
+#[test]
+fn a_keyway_between_samples_stays_where_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = RECORDING.replace(
+        "samples_per_rev = 1024",
+        "samples_per_rev = 512\n    speed_wobble_percent = 0.1\n    speed_rpm = 500",
+    );
+    // The edges are those of the keyway.
+    let interrupted = "interruptions = [{ from_deg = 352, to_deg = 4 }]\n";
+    let filtered = format!("[[preprocess]]\nplugin = \"low-pass\"\ncutoff_hz = 1000\n{STAGES}");
+    for (name, stages) in [("plain", STAGES), ("filtered", &filtered)] {
+        let [masked, grooved] = ["", KEYWAY].map(|keyway| {
+            let name = format!("{name}-{}", if keyway.is_empty() { "masked" } else { "grooved" });
+            summary_of(folder.path(), &name, [&recording, keyway, interrupted, stages])
+        });
+        assert_eq!(values(&masked).len(), values(&grooved).len());
+        for (one, other) in values(&masked).iter().zip(values(&grooved)) {
+            let uncertainty = one.uncertainty.as_ref().unwrap();
+            let apart = (one.value - other.value).abs();
+            println!("{name}, {} {}: {:.4} and {:.4}", one.symbol, one.filter, one.value, other.value);
+            assert!(apart < uncertainty.std + 0.002 * one.value, "{}: {} and {}", one.symbol, one.value, other.value);
+        }
+    }
 }

@@ -10,6 +10,7 @@ pub mod position;
 pub mod reading;
 pub mod reference;
 pub mod roundness;
+pub mod slope;
 pub mod straightness;
 pub mod texture;
 pub mod twist;
@@ -33,8 +34,8 @@ pub struct Value {
     pub band_upr: [usize; 2],
     /// Orders that the layout cannot tell, of which the filter would pass a hundredth or more: they are not in the value.
     pub lost_orders: Vec<usize>,
-    /// Undulations per revolution from which on a filter before the average passes less than half of the power, where the value's own
-    /// filter passes a hundredth or more: what is above is not in the value; null where nothing is missing.
+    /// Undulations per revolution from which on a filter before the average passes less than half of the power, where the
+    /// value's own filter passes a hundredth or more: what is above is not in the value; null where nothing is missing.
     #[serde(default)]
     pub weakened_above_upr: Option<f64>,
     /// Highest order that there is, where the value's own filter passes a thousandth or more of those above: they are not in

@@ -19,6 +19,8 @@ pub const LARGEST: f64 = 5.0;
 const TURNS_OF_A_DRAW: usize = 16;
 /// Share of the draws below the interval, and above it.
 const TAIL: f64 = 0.025;
+/// Half of the 95 % interval of a normal distribution, in standard deviations.
+pub const NORMAL_95: f64 = 1.96;
 
 /// What is known of a value's error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -237,6 +239,58 @@ fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
         interval_95: [(2.0 * value - point(1.0 - TAIL)).max(floor), 2.0 * value - point(TAIL)],
         draws: draws.len(),
     }
+}
+
+/// Weights by order of a profile that is to stand for the truth: what noise adds to an extreme can be drawn about the truth
+/// only, and about what was found, which has noise already, too little would be drawn.
+///
+/// An order is weighted by the share of its power that is not noise (Wiener's filter): taken from its own power where that
+/// is nine times the noise or more, else from the mean over the orders from 2/3 to 4/3 of it, at least four to each side;
+/// mean power that noise alone exceeds in 2 % of all cases counts as noise. Orders below `lowest`, and those without a known
+/// variance, keep all.
+#[must_use]
+pub fn stand_in(harmonics: &[Complex64], variance: &[f64], lowest: usize) -> Vec<f64> {
+    let noise = |order: usize| variance.get(order).copied().filter(|variance| *variance > 0.0).unwrap_or(0.0);
+    let count = harmonics.len();
+    let weight = |order: usize| {
+        let (own, own_noise) = (harmonics[order].norm_sqr(), noise(order));
+        if order < lowest || own_noise == 0.0 {
+            return 1.0;
+        }
+        let beside = (order / 3).max(4);
+        let near = order.saturating_sub(beside).max(lowest)..(order + beside + 1).min(count);
+        let number = near.len() as f64;
+        let power = near.clone().map(|order| harmonics[order].norm_sqr()).sum::<f64>() / number;
+        let noise = near.map(noise).sum::<f64>() / number;
+        let signal = power - noise;
+        let together = if signal > 2.0 * noise / number.sqrt() { signal / power } else { 0.0 };
+        if own > 9.0 * own_noise { together.max(1.0 - own_noise / own) } else { together }
+    };
+    (0..count).map(weight).collect()
+}
+
+/// Share of the standard deviation of noise to which it is known: it is taken from 20 complex degrees of freedom.
+const NOISE_KNOWN_TO: f64 = 0.11;
+/// Half of the 95 % interval of Student's distribution of these 40 real degrees of freedom, in standard deviations.
+const STUDENT_95: f64 = 2.02;
+
+/// What noise adds to an extreme in the mean, and the uncertainty of the extreme without that share, `value` − share: from
+/// the value at the profile that [stands for the truth](stand_in) and from those drawn about it. The interval reaches as far
+/// to both sides as the draws do to the farther one, and at least as far as Student's distribution says.
+#[must_use]
+pub fn extreme(value: f64, at_stand_in: f64, mut drawn: Vec<f64>) -> Option<(f64, Uncertainty)> {
+    if drawn.len() < 2 || !value.is_finite() || !at_stand_in.is_finite() || drawn.iter().any(|draw| !draw.is_finite()) {
+        return None;
+    }
+    let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
+    // Chance draws of no noise may lie below.
+    let share = (mean - at_stand_in).max(0.0);
+    let known = summed_up(&mut drawn, mean);
+    let reach = known.interval_95.map(|end| (end - mean).abs()).into_iter().fold(0.0, f64::max);
+    let reach = reach.max(STUDENT_95 * known.std).hypot(NORMAL_95 * NOISE_KNOWN_TO * share);
+    let middle = value - share;
+    let interval_95 = [(middle - reach).max(0.0), middle + reach];
+    Some((share, Uncertainty { std: known.std.hypot(NOISE_KNOWN_TO * share), interval_95, ..known }))
 }
 
 /// A seed that depends on names only, so that it is the same however the work is shared.

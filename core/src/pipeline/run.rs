@@ -78,7 +78,9 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
                 .as_ref()
                 .ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
             let wanted = pipeline.evaluate.has(Group::ErrorMotion);
-            let projection = |setup| separator.projection(setup).filter(|_| wanted);
+            let directions = &pipeline.evaluate.directions;
+            let projection =
+                |setup| separator.projection(setup).filter(|_| wanted).map(|found| found.with_lines(directions));
             let line = Line {
                 rig,
                 recording: &**recording,

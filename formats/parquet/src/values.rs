@@ -41,7 +41,7 @@ pub fn schema() -> Schema {
             DataType::UInt32,
             true,
             "1/rev",
-            "highest order there is, where the value's filter passes a thousandth or more of those above; null where nothing is missing",
+            "highest order there is, where the value's filter passes 0.1 % or more above it; null where nothing is missing",
         ),
         text("filter", false, "the filter applied"),
         text("reference", false, "what the profile was referred to"),

@@ -1,10 +1,10 @@
 //! Raw readings where the part's surface is interrupted, bridged before a filter or an interpolation spreads them.
 //!
-//! A sensor over a keyway reads hundreds of micrometres beside the form. What is computed from several samples (a low-pass, a
-//! value between two samples) takes that to angles beside the keyway. These readings are therefore replaced, in each turn of
-//! each channel, by a cubic polynomial through the readings on both sides (least squares) and a straight line over what it
-//! leaves at both ends. The bridge is continuous and as smooth as eccentricity and low orders are. It carries no information: the
-//! average bridges the same angles once more by its own harmonics, and every value leaves them out.
+//! A sensor over a keyway reads hundreds of micrometres beside the form. What is computed from several samples (a low-pass,
+//! a value between two samples) takes that to angles beside the keyway. These readings are therefore replaced, in each turn
+//! of each channel, by a cubic polynomial through the readings on both sides (least squares) and a straight line over what
+//! it leaves at both ends. The bridge is continuous and as smooth as eccentricity and low orders are. It carries no
+//! information: the average bridges the same angles once more by its own harmonics, and every value leaves them out.
 
 use std::{collections::VecDeque, f64::consts::TAU, ops::Range};
 
@@ -29,8 +29,8 @@ pub(crate) fn interrupted(rig: Option<&Rig>) -> Option<Rig> {
     rig.filter(|rig| rig.gaps.iter().any(|gaps| !gaps.is_empty())).cloned()
 }
 
-/// A stream with the interruptions of the part's surface bridged; the stream itself where no sensor sees one, and where nothing
-/// tells the spindle's angle.
+/// A stream with the interruptions of the part's surface bridged; the stream itself where no sensor sees one, and where
+/// nothing tells the spindle's angle.
 pub(crate) fn bridged<'a>(input: Box<dyn SampleStream + 'a>, rig: Option<&Rig>) -> Box<dyn SampleStream + 'a> {
     let Some(rig) = rig else { return input };
     let capture = input.capture();

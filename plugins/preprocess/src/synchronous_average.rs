@@ -4,8 +4,9 @@
 //! ([`kernel`]), fine enough that nothing the recording can hold folds onto a kept order. Sums over the turns, for their
 //! mean and its covariance across channels ([`slow`]), are accumulated in one pass ([`mean`]) and then transformed. Of the
 //! harmonics, those that `samples_per_rev` equal angles can hold are kept: leaving out the rest is the anti-alias filter.
-//! Some turns are transformed by themselves, for their scatter ([`scatter`]). Where the part's surface is interrupted, readings
-//! are bridged before anything is interpolated between them ([`interruptions`]), and each turn once more ([`bridge`]).
+//! Some turns are transformed by themselves, for their scatter ([`scatter`]). Where the part's surface is interrupted,
+//! readings are bridged before anything is interpolated between them ([`interruptions`]), and each turn once more
+//! ([`bridge`]).
 
 mod bridge;
 mod encoder;

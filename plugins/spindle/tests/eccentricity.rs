@@ -42,7 +42,8 @@ fn form_error_um(separation: &Separation, truth: &StationTruth) -> f64 {
     (0.5 * squares / truth.form_um.len() as f64).sqrt()
 }
 
-/// To 1 mm on a radius of 30 mm, with and without weights; noise of 0.05 µm over 60 turns makes no more of it than when centred.
+/// To 1 mm on a radius of 30 mm, with and without weights; noise of 0.05 µm over 60 turns makes no more of it than when
+/// centred.
 #[test]
 fn form_is_exact_to_an_eccentricity_of_a_millimetre() {
     let separated = |eccentricity_um: f64, noise_um: f64, weighting| {

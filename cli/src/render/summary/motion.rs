@@ -38,7 +38,8 @@ pub fn section(page: &mut Page, stations: &[StationSummary]) {
         table.row(std::iter::once(format!("{} {unit}", named(direction))).chain(KINDS.map(cell)));
     }
     let of = if stations.len() > 1 { ", lowest to highest of the stations" } else { "" };
-    page.headed_table(format_args!("Error motion of the axis, peak to valley about {}{of}", first.reference), &table);
+    let about = &first.reference;
+    page.headed_table(format_args!("Error motion of the axis about {about}, peak to valley and rms{of}"), &table);
 }
 
 /// Whether it is drawn about a centre.

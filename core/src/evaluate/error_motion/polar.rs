@@ -87,16 +87,29 @@ pub(super) struct Synchronous {
 impl Synchronous {
     /// Motion at `z_mm` along the spindle; `None` where the separation does not know it.
     ///
-    /// In a fixed direction 1/rev is centring and left out. In one that turns, what is left of 1/rev (the part that turns
-    /// against the spindle) is a 2/rev of the plot, and belongs to it.
+    /// In a fixed direction 1/rev is centring and left out. In a radial one that turns, what is left of 1/rev (the part that
+    /// turns against the spindle) is a 2/rev of the plot, and belongs to it. Tilt is residual: the fundamental is no part of
+    /// it.
     pub fn new(separation: &Separation, projection: &Projection, direction: Direction, z_mm: f64) -> Option<Self> {
+        let lowest = if direction.rotates() && !direction.is_tilt() { 1 } else { 2 };
+        Self::from_order(lowest, separation, projection, direction, z_mm)
+    }
+
+    /// The same, of orders from this one on: from 1, with the part of 1/rev that turns against the spindle.
+    pub fn from_order(
+        lowest: usize,
+        separation: &Separation,
+        projection: &Projection,
+        direction: Direction,
+        z_mm: f64,
+    ) -> Option<Self> {
         let (first, second) = direction.parts();
         let first = Motion::new(separation, first, z_mm)?;
         let second = match second {
             Some((quantity, factor)) => Some((factor * projection.rotation, Motion::new(separation, quantity, z_mm)?)),
             None => None,
         };
-        let band = [if second.is_some() { 1 } else { 2 }, separation.max_order()];
+        let band = [lowest, separation.max_order()];
         let motions = || std::iter::once(&first).chain(second.iter().map(|(_, motion)| motion));
         let mut lost: Vec<usize> = motions().flat_map(|motion| motion.lost_orders(separation)).collect();
         lost.retain(|order| *order >= band[0]);
@@ -158,8 +171,18 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// x + z·ε_y, y − z·ε_x, or a tilt.
+    /// x + z·ε_y, y − z·ε_x, or a tilt; along a line that was not separated, the sum of what was along x and y.
     pub fn new(separation: &Separation, quantity: Quantity, z_mm: f64) -> Option<Self> {
+        if separation.position(quantity).is_none() && quantity.azimuth().is_some() {
+            let mut terms = Vec::new();
+            let each =
+                [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY].into_iter().zip(quantity.cartesian());
+            for (part, share) in each.filter(|(_, share)| *share != 0.0) {
+                let part = Self::new(separation, part, z_mm)?;
+                terms.extend(part.terms.into_iter().map(|(unknown, before, factor)| (unknown, before, share * factor)));
+            }
+            return Some(Self { terms });
+        }
         let lever = (z_mm - separation.motion_z_mm) * UM_PER_MM_URAD;
         let term = |quantity: Quantity, factor: f64| {
             let unknown = separation.position(quantity)?;

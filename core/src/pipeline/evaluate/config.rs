@@ -11,6 +11,7 @@ use super::{
     limit::Limit,
 };
 use crate::{
+    azimuth::Azimuth,
     evaluate::{
         areal,
         error_motion::{self, Centre},
@@ -56,6 +57,9 @@ pub struct EvaluateConfig {
     pub lambda_s_mm: Option<f64>,
     /// Centres of polar plots that error motion values are about; without it LSC.
     pub centres: Option<Vec<CentreConfig>>,
+    /// Fixed sensitive directions of error motion besides x and y, in degrees from x towards y: where the tool stands. A
+    /// direction and its opposite are one, 0 to below 180°.
+    pub directions_deg: Option<Vec<f64>>,
     /// What texture values are of, besides λs and λc.
     #[serde(default)]
     pub texture: TextureConfig,
@@ -367,6 +371,7 @@ pub struct Evaluate {
     pub(in crate::pipeline) centres: Vec<Centre>,
     pub(super) texture: Texture,
     pub(super) areal: Areal,
+    pub(in crate::pipeline) directions: Vec<Azimuth>,
     limits: Vec<Limit>,
 }
 
@@ -388,6 +393,7 @@ impl Default for Evaluate {
             centres: vec![error_motion::CENTRE],
             texture: Texture::default(),
             areal: Areal::default(),
+            directions: Vec::new(),
             limits: Vec::new(),
         }
     }
@@ -454,6 +460,13 @@ impl EvaluateConfig {
             Place::Path(ref path) if path.is_empty() => fault.under("lambda_s_mm"),
             _ => fault.under("texture"),
         })?;
+        for (index, direction) in self.directions_deg.iter().flatten().enumerate() {
+            if !direction.is_finite() {
+                let fault = Fault::here(format!("the direction must be a number of degrees, found {direction}"));
+                return Err(fault.under_item("directions_deg", index));
+            }
+        }
+        let directions = self.directions_deg.unwrap_or_default();
         let usual = Evaluate::default();
         Ok(Evaluate {
             all: self.values == Some(Groups::All),
@@ -477,6 +490,9 @@ impl EvaluateConfig {
                 .map_or(usual.centres, |centres| once_each(centres.into_iter().map(Centre::from).collect())),
             texture,
             areal: self.areal.check().map_err(|fault| fault.under("areal"))?,
+            directions: once_each(
+                directions.into_iter().map(|angle_deg| Azimuth::of(angle_deg.to_radians())).collect(),
+            ),
             limits: Vec::new(),
         })
     }
@@ -564,8 +580,8 @@ impl Evaluate {
     }
 
     /// Symbols and units of the values that may come.
-    pub(super) fn symbols(&self) -> Vec<(&'static str, &'static str)> {
-        let mut symbols = Vec::new();
+    pub(super) fn symbols(&self) -> Vec<(String, &'static str)> {
+        let mut symbols: Vec<(&'static str, &'static str)> = Vec::new();
         if self.has(Group::Roundness) {
             symbols.extend(["RONt", "RONp", "RONv", "RONq"].map(|symbol| (symbol, "µm")));
             symbols.push(("dr/dtheta", "µm/°"));
@@ -586,7 +602,7 @@ impl Evaluate {
             }
         }
         if self.has(Group::Cylindricity) {
-            let names = ["CYLt", "CYLp", "CYLv", "CYLq", "CYLtt", "STRt", "coaxiality", "parallelism"];
+            let names = ["CYLt", "CYLp", "CYLv", "CYLq", "CYLtt", "STRsg", "STRsa", "coaxiality", "parallelism"];
             symbols.extend(names.map(|symbol| (symbol, "µm")));
             if !self.datum.is_empty() {
                 symbols.extend(["eccentricity", "circular-run-out", "total-run-out"].map(|symbol| (symbol, "µm")));
@@ -599,8 +615,10 @@ impl Evaluate {
         if self.has(Group::Twist) {
             symbols.extend(twist::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
         }
+        let mut symbols: Vec<(String, &'static str)> =
+            symbols.into_iter().map(|(symbol, unit)| (symbol.to_owned(), unit)).collect();
         if self.has(Group::ErrorMotion) {
-            symbols.extend(error_motion::SYMBOLS);
+            symbols.extend(error_motion::symbols(&self.directions));
         }
         symbols
     }

@@ -91,9 +91,28 @@ impl Filter {
         self.band.below_upr.is_some_and(|cutoff| self.passes(half_power_upr, cutoff) >= MATTERS)
     }
 
-    /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there are.
+    /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there
+    /// are.
     pub fn reaches_above(&self, order: usize) -> bool {
         self.band.below_upr.is_some_and(|cutoff| self.passes((order + 1) as f64, cutoff) >= REACHES)
+    }
+
+    /// The highest order of which it passes a thousandth or more, 3.157 times its cut-off for a Gaussian; `None` where
+    /// everything passes.
+    pub fn reach_upr(&self) -> Option<usize> {
+        self.band.below_upr.map(|cutoff| {
+            // Every low-pass falls with the order.
+            let passes = |order: usize| self.passes(order as f64, cutoff) >= REACHES;
+            let (mut low, mut high) = (0, cutoff as usize + 1);
+            while passes(high) {
+                (low, high) = (high, 2 * high);
+            }
+            while high - low > 1 {
+                let middle = low.midpoint(high);
+                if passes(middle) { low = middle } else { high = middle }
+            }
+            low
+        })
     }
 
     /// The highest order that it passes, of those up to `highest`.

@@ -5,7 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{Evaluate, PlacedValue, ascii_unit};
 use crate::{
-    evaluate::Value,
+    evaluate::{
+        Value,
+        error_motion::{Centre, WITH_FUNDAMENTAL},
+    },
     pipeline::error::{Fault, known_names},
     rig::Rig,
 };
@@ -66,7 +69,8 @@ pub struct LimitValue {
     pub reference: String,
     /// Its filter.
     pub filter: String,
-    /// Undulations per revolution that it is of, both ends included: what is said of a value without filter is said of these.
+    /// Undulations per revolution that it is of, both ends included: what is said of a value without filter is said of
+    /// these.
     #[serde(default)]
     pub band_upr: [usize; 2],
     /// The number.
@@ -96,7 +100,7 @@ impl Limit {
             }
             None => {
                 let fault = Fault::at("symbol", format!("no value `{}` is computed", self.symbol));
-                let mut known: Vec<&str> = symbols.iter().map(|(symbol, _)| *symbol).collect();
+                let mut known: Vec<&str> = symbols.iter().map(|(symbol, _)| &**symbol).collect();
                 known.dedup();
                 let more = "`values` and `lambda_c_mm` in [evaluate] give more";
                 return Err(fault.help(format!("{}; {more}", known_names(&self.symbol, known))));
@@ -120,6 +124,9 @@ impl Limit {
             }
             "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
                 known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;
+            }
+            symbol if symbol.ends_with(WITH_FUNDAMENTAL) => {
+                known("reference", &self.reference, vec![Centre::PolarChart.symbol().to_owned()])?;
             }
             symbol if ["synchronous-", "residual-", "total-"].iter().any(|kind| symbol.starts_with(kind)) => {
                 let centres = evaluate.centres.iter().map(|centre| centre.symbol().to_owned());

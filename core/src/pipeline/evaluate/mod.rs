@@ -91,9 +91,9 @@ impl Held {
     }
 }
 
-/// Units as files write them.
+/// Units as files write them: "um", "um/deg". Micro is a sign of its own and a Greek letter.
 fn ascii_unit(unit: &str) -> String {
-    unit.replace('µ', "u").replace('°', "deg")
+    unit.replace(['\u{b5}', '\u{3bc}'], "u").replace('°', "deg")
 }
 
 /// A number, and what is known of its error.

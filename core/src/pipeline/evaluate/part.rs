@@ -65,8 +65,13 @@ pub fn part_summary(
     let mut part = PartSummary { sections: there.len(), z_mm, angles: wall.count, ..PartSummary::default() };
     if evaluate.has(Group::Cylindricity) {
         part.remarks.extend(wall.missing_cylinders(&evaluate.references));
+        let known = there.iter().map(|section| section.orders.len().saturating_sub(1)).min().unwrap_or(0);
         for cutoff in evaluate.cutoffs_upr(wall.held.highest) {
-            part.values.extend(wall.cylindricity(&evaluate.low_pass(cutoff), &evaluate.references));
+            let filter = evaluate.low_pass(cutoff);
+            // What a filter passes and the sections know, needs its angles.
+            let wanted = filter.reach_upr().map_or(0, |reach| reach.min(known));
+            let finer = (wanted > wall.held.highest).then(|| Wall::of(&there, 2 * wanted + 2, radius_mm, placed));
+            part.values.extend(finer.as_ref().unwrap_or(&wall).cylindricity(&filter, &evaluate.references));
         }
         if placed {
             part.values.extend(wall.lines());
@@ -273,11 +278,13 @@ impl Wall {
     /// What needs the sections' centres and mean radii.
     fn lines(&self) -> Vec<Value> {
         let coaxiality = "ISO 1101:2017, coaxiality: the largest of a section's LSCI centre with the axis";
+        let generatrices = "ISO 12180-1:2011, generatrix straightness deviation: the largest STRt of the generatrices";
+        let median_line = "ISO 12180-1:2011, straightness deviation of the extracted median line: a diameter";
         let parallelism = "ISO 1101:2017, parallelism: the largest of the generatrices";
         let labels = vec![
             Label::new("CYLtt", "µm", "ISO 12180-1:2011, cylinder taper", "LSCY"),
-            Label::new("STRt", "µm", "ISO 12780-1:2011, the largest of the generatrices", "LSLI of generatrices"),
-            Label::new("STRt", "µm", "ISO 12780-1:2011, of the median line, a diameter", "LSLI of the median line"),
+            Label::new("STRsg", "µm", generatrices, "LSLI of generatrices"),
+            Label::new("STRsa", "µm", median_line, "LSLI of the median line"),
             Label::new("coaxiality", "µm", coaxiality, "LSCY"),
             Label::new("parallelism", "µm", parallelism, "LSLI of the opposite generatrix"),
         ];

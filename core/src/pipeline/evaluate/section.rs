@@ -6,7 +6,8 @@ use crate::{
     evaluate::{
         Value,
         roundness::{Angles, Disturbed, Points, Reference, Values, between_angles},
-        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed},
+        slope::{largest_on_angles, steepest_um_per_rad},
+        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, extreme, monte_carlo_of, seed, stand_in},
     },
     numerics::{
         filter::{Degree, Smoother, robust_gaussian},
@@ -271,14 +272,7 @@ impl Form {
     }
 
     fn round(&self, filter: &Filter, references: &[Reference]) -> Vec<Value> {
-        let mut labels = Vec::new();
-        for reference in references {
-            labels.extend(roundness_labels(*reference));
-            if *reference == Reference::LeastSquares {
-                let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
-                labels.push(Label::new("dr/dtheta", "µm/°", steepest, reference.symbol()));
-            }
-        }
+        let mut labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
         if labels.is_empty() {
             return Vec::new();
         }
@@ -299,8 +293,50 @@ impl Form {
             let known = known.map(|known| known.moved(value - about));
             (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
         });
-        let found = found.collect();
+        let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
+        if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
+            let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
+            let reference = Reference::LeastSquares.symbol();
+            labels.insert(last + 1, Label::new("dr/dtheta", "µm/°", steepest, reference));
+            found.insert(last + 1, self.steepest(filter));
+        }
         self.labelled(labels, found, filter)
+    }
+
+    /// The steepest slope, µm/°, from the harmonics. High orders count by their number, and noise with them: it is drawn
+    /// about a profile that stands for the truth.
+    fn steepest(&self, filter: &Filter) -> (f64, Option<Uncertainty>) {
+        let harmonics = filter.harmonics(&self.harmonics);
+        let value = steepest_um_per_rad(&harmonics, &self.at.gaps).to_radians();
+        let variance = filter.variance(&self.variance);
+        let slopes = |harmonics: &[Complex64]| -> Vec<Complex64> {
+            harmonics
+                .iter()
+                .enumerate()
+                .map(|(order, value)| Complex64::I * (order as f64).to_radians() * value)
+                .collect()
+        };
+        let of_slopes: Vec<f64> = (variance.iter().enumerate())
+            .map(|(order, variance)| variance * (order as f64).to_radians().powi(2))
+            .collect();
+        let Some(mut errors) = Errors::new(&of_slopes, 2, self.seed) else { return (value, None) };
+        let weights = stand_in(&harmonics, &variance, 2);
+        let likely: Vec<Complex64> = harmonics.iter().zip(weights).map(|(value, weight)| value * weight).collect();
+        let waves = filter.highest(self.held.highest).max(2);
+        let mut fourier = Fourier::new((DRAWN_POINTS_A_WAVE * waves).next_power_of_two());
+        let likely = fourier.synthesise(slopes(&likely)).to_vec();
+        let mut drawn = likely.clone();
+        let largest = |drawn: &mut Vec<f64>| {
+            self.at.gaps.blank(drawn);
+            largest_on_angles(drawn)
+        };
+        let about = largest(&mut drawn);
+        let draws = (0..DRAWS).map(|_| {
+            errors.draw(&mut fourier, &likely, &mut drawn);
+            largest(&mut drawn)
+        });
+        let known = extreme(value, about, draws.collect()).map(|(_, known)| known);
+        (value, known)
     }
 }
 
@@ -380,12 +416,7 @@ impl<'a> Circles<'a> {
             let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
             found.push(of(|values| values.ront_um));
             if *reference == Reference::LeastSquares {
-                found.extend([
-                    of(|values| values.ronp_um),
-                    of(|values| values.ronv_um),
-                    of(|values| values.ronq_um),
-                    steepest_um_per_deg(profile_um),
-                ]);
+                found.extend([of(|values| values.ronp_um), of(|values| values.ronv_um), of(|values| values.ronq_um)]);
             }
         }
     }

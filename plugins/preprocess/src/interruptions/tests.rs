@@ -123,7 +123,8 @@ fn a_keyway_changes_nothing_beside_it() {
     }
 }
 
-/// Every reading inside is bridged, none outside is touched, and blocks of any size give the same; by marks and by an encoder.
+/// Every reading inside is bridged, none outside is touched, and blocks of any size give the same; by marks and by an
+/// encoder.
 #[test]
 fn blocks_of_any_size_are_bridged_alike() {
     let rig = rig();

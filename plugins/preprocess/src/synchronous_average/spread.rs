@@ -64,6 +64,7 @@ impl Motion {
             turns: 0,
             low: vec![f64::INFINITY; length],
             high: vec![f64::NEG_INFINITY; length],
+            squares: Vec::new(),
             sum: vec![0.0; rows.len() * self.angles],
             projection: self.projection.clone(),
         }
@@ -83,6 +84,8 @@ pub(super) struct Extremes {
     /// `[direction][angle]`.
     low: Vec<f64>,
     high: Vec<f64>,
+    /// Of each direction, over all turns and angles.
+    squares: Vec<f64>,
     /// `[motion][angle]`.
     sum: Vec<f64>,
 }
@@ -93,12 +96,15 @@ impl Extremes {
         self.turns += 1;
         self.sum.iter_mut().zip(motion).for_each(|(sum, value)| *sum += value);
         let angles = self.cos.len();
-        let extremes = self.low.chunks_exact_mut(angles).zip(self.high.chunks_exact_mut(angles));
-        for ((_, first, second), (low, high)) in self.directions.iter().zip(extremes) {
+        self.squares.resize(self.directions.len(), 0.0);
+        let extremes = self.low.chunks_exact_mut(angles).zip(self.high.chunks_exact_mut(angles)).zip(&mut self.squares);
+        for ((_, first, second), ((low, high), squares)) in self.directions.iter().zip(extremes) {
             let first = &motion[first * angles..(first + 1) * angles];
             let extremes = low.iter_mut().zip(high);
             // Written out, so that neither a branch nor the rules for what is no number stand in the loop.
-            let widen = |(low, high): (&mut f64, &mut f64), value: f64| {
+            let mut square = 0.0;
+            let mut widen = |(low, high): (&mut f64, &mut f64), value: f64| {
+                square += value * value;
                 *low = if value < *low { value } else { *low };
                 *high = if value > *high { value } else { *high };
             };
@@ -112,6 +118,7 @@ impl Extremes {
                     }
                 }
             }
+            *squares += square;
         }
     }
 
@@ -122,8 +129,8 @@ impl Extremes {
         }
         let angles = self.cos.len();
         let share = 1.0 / self.turns as f64;
-        let extremes = self.low.chunks_exact_mut(angles).zip(self.high.chunks_exact_mut(angles));
-        for ((_, first, second), (low, high)) in self.directions.iter().zip(extremes) {
+        let extremes = self.low.chunks_exact_mut(angles).zip(self.high.chunks_exact_mut(angles)).zip(&mut self.squares);
+        for ((_, first, second), ((low, high), squares)) in self.directions.iter().zip(extremes) {
             let sum = |row: usize, angle: usize| self.sum[row * angles + angle];
             for (angle, (low, high)) in low.iter_mut().zip(high).enumerate() {
                 let mean = share
@@ -135,7 +142,9 @@ impl Extremes {
                     };
                 *low -= mean;
                 *high -= mean;
+                *squares -= self.turns as f64 * mean * mean;
             }
+            *squares /= ((self.turns - 1) * angles) as f64;
         }
         Some(Spread {
             projection: self.projection,
@@ -144,6 +153,7 @@ impl Extremes {
             turns: self.turns,
             low: self.low,
             high: self.high,
+            variance: self.squares,
         })
     }
 }

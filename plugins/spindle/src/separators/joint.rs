@@ -1,12 +1,12 @@
 //! The solution of all orders together, where a large eccentricity couples them.
 //!
-//! A surface that goes sideways by t is seen turned by t/R. Form of order n thereby goes to the orders around it by the share
-//! n·e/(2R) of an eccentricity e and, where n·e/R is near to 1 or above it, to many of them. Orders solved one by one, with what
-//! exact geometry adds taken from the last solution, then do not settle. Here the angles at which each line meets the profile are kept
-//! (they follow from eccentricity and motion, which are known far better than a wave's length), which makes readings linear in
-//! form and motion again; the weighted least squares over all orders are found by conjugate gradients (CGLS: Björck, *Numerical
-//! Methods for Least Squares Problems*, 1996, algorithm 7.4.1), with the solution order by order as preconditioner. New
-//! angles, and again (Gauss–Newton), until nothing moves.
+//! A surface that goes sideways by t is seen turned by t/R. Form of order n thereby goes to the orders around it by the
+//! share n·e/(2R) of an eccentricity e and, where n·e/R is near to 1 or above it, to many of them. Orders solved one by one,
+//! with what exact geometry adds taken from the last solution, then do not settle. Here the angles at which each line meets
+//! the profile are kept (they follow from eccentricity and motion, which are known far better than a wave's length), which
+//! makes readings linear in form and motion again; the weighted least squares over all orders are found by conjugate
+//! gradients (CGLS: Björck, *Numerical Methods for Least Squares Problems*, 1996, algorithm 7.4.1), with the solution order
+//! by order as preconditioner. New angles, and again (Gauss–Newton), until nothing moves.
 
 use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
 
@@ -74,8 +74,8 @@ impl<'a> Joint<'a> {
         }
     }
 
-    /// The change of the readings order by order, `[order][reading]` from order 0, whose own solutions are together nearest to a
-    /// change of all readings.
+    /// The change of the readings order by order, `[order][reading]` from order 0, whose own solutions are together nearest
+    /// to a change of all readings.
     pub(super) fn solve(&mut self, change: &[Complex64]) -> Vec<Complex64> {
         let mut left = self.weighted(change);
         let mut solution = vec![Complex64::ZERO; change.len()];

@@ -32,8 +32,8 @@ const CARRIED: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e5];
 const SETTLED_UM: f64 = 1e-9;
 /// Orders one by one are given up when they still move more than this after all passes.
 const APART_UM: f64 = 1e-6;
-/// The highest order times eccentricity over radius, n·e/R, from which on orders may be solved together: half of it is the share
-/// of form that goes to either side.
+/// The highest order times eccentricity over radius, n·e/R, from which on orders may be solved together: half of it is the
+/// share of form that goes to either side.
 const COUPLED: f64 = 0.2;
 /// Passes of all orders together, at most.
 const JOINT_PASSES: usize = 10;
@@ -112,7 +112,8 @@ impl Solver<'_> {
     fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
         let eccentricity_um = eccentricity_um(readings);
         let problem = format!(
-            "an eccentricity of {eccentricity_um:.0} µm on a radius of {} mm couples the orders so strongly that no solution settles: the              last pass still moves the readings by {:.2e} µm rms",
+            "an eccentricity of {eccentricity_um:.0} µm on a radius of {} mm couples the orders so strongly \
+             that no solution settles: the last pass still moves the readings by {:.2e} µm rms",
             self.selection.rig.part_radius_mm, estimate.moved_um
         );
         let help =
@@ -200,7 +201,8 @@ impl Solver<'_> {
         }
     }
 
-    /// Whether the eccentricity takes the highest order to the orders beside it by so much that they do not settle one by one.
+    /// Whether the eccentricity takes the highest order to the orders beside it by so much that they do not settle one by
+    /// one.
     fn couples(&self, readings: &Readings) -> bool {
         let share = eccentricity_um(readings) / (1e3 * self.selection.rig.part_radius_mm);
         self.second_order && share * readings.max_order as f64 > COUPLED
