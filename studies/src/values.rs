@@ -140,7 +140,8 @@ pub fn rows(rig: Layout, spectrum: Spectrum, campaigns: u64, folder: &Path) -> R
                 let config = config(rig, spectrum, seed);
                 let found = evaluated(&config, folder, worker)?;
                 let truth = evaluated(&without_noise(config), folder, worker)?;
-                count(&found, &truth, &mut total.lock().map_err(|_| stopped())?);
+                let mut total = total.lock().map_err(|_| stopped())?;
+                count(&found, &truth, &mut total);
             }
         };
         let handles: Vec<_> = (0..workers).map(|worker| scope.spawn(move || work(worker))).collect();
@@ -163,8 +164,11 @@ fn evaluated(config: &SpindleConfig, folder: &Path, worker: usize) -> Result<Sum
     let rig = toml::to_string(&BTreeMap::from([("rig", &config.rig)]))
         .map_err(|error| Error::new("write", "the rig", error))?;
     let text = format!("{}\n{rig}", STAGES.replace("NAME", &name));
-    let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY)?;
-    run(&Pipeline::from_sources(&sources, &registry)?, NonZeroUsize::new(1), &Silent)
+    let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY)
+        .map_err(|error| Error::new("read", "the pipeline", error))?;
+    let pipeline =
+        Pipeline::from_sources(&sources, &registry).map_err(|error| Error::new("check", "the pipeline", error))?;
+    run(&pipeline, NonZeroUsize::new(1), &Silent)
 }
 
 /// What is beside the spread over the turns has its truth without them.
