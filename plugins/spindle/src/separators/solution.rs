@@ -110,14 +110,21 @@ impl Solver<'_> {
 
     /// Where exact geometry does not settle.
     fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
-        let eccentricity_um = eccentricity_um(readings);
-        let problem = format!(
-            "an eccentricity of {eccentricity_um:.0} µm on a radius of {} mm couples the orders so strongly \
-             that no solution settles: the last pass still moves the readings by {:.2e} µm rms",
-            self.selection.rig.part_radius_mm, estimate.moved_um
-        );
-        let help =
-            "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the order";
+        let (eccentricity_um, radius_mm) = (eccentricity_um(readings), self.selection.rig.part_radius_mm);
+        let ratio = format!("an eccentricity of {eccentricity_um:.0} µm on a radius of {radius_mm} mm");
+        let (problem, help) = if estimate.moved_um.is_finite() {
+            let moved_um = estimate.moved_um;
+            let problem = format!(
+                "{ratio} couples the orders so strongly that no solution settles: the last pass still moves the readings \
+                 by {moved_um:.2e} µm rms"
+            );
+            let help = "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the \
+                        order";
+            (problem, help)
+        } else {
+            let problem = format!("{ratio}: sensors' lines do not meet the part, and the result is no number");
+            (problem, "check part_radius_mm and the unit of the readings")
+        };
         Error::new("separate", format!("station {}", station.name), problem).help(help)
     }
 
