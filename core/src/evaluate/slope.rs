@@ -54,7 +54,7 @@ fn peak_near(series: &[Complex64], start: f64, step: f64) -> f64 {
             second -= (order * order) as f64 * turned.re;
         }
         let next = angle - first / second;
-        if !((next - start).abs() <= step) {
+        if next.is_nan() || (next - start).abs() > step {
             break;
         }
         angle = next;
@@ -120,13 +120,16 @@ mod tests {
         let mut all = Gaps::default();
         all.add(0.0, TAU);
         assert!(steepest_um_per_rad(&series(&waves, 255), &all).is_finite(), "its two ends");
-        assert_eq!(steepest_um_per_rad(&series(&[], 5), &whole), 0.0);
+        assert!(steepest_um_per_rad(&series(&[], 5), &whole).abs() < 1e-300);
     }
 
     #[test]
     fn a_parabola_meets_a_peak_between_angles() {
         let slopes: Vec<f64> = (0..16).map(|step| (TAU * (f64::from(step) - 0.4) / 16.0).cos()).collect();
         assert!((largest_on_angles(&slopes) - 1.0).abs() < 1e-3);
-        assert!(largest_on_angles(&[f64::NAN; 4]).is_nan() && largest_on_angles(&[f64::NAN, -2.0, 1.0]) == 2.0);
+        assert!(
+            largest_on_angles(&[f64::NAN; 4]).is_nan()
+                && (largest_on_angles(&[f64::NAN, -2.0, 1.0]) - 2.0).abs() < 1e-15
+        );
     }
 }

@@ -9,6 +9,8 @@ use crate::{
 
 /// χ² per degree of freedom below which the noise is estimated too high: covariances of few turns stay above it.
 const INFLATED_CHI2: f64 = 0.2;
+/// Orders that the residual has at least for that: χ² of ten orders is as low once in 10⁵ times by chance, of one order in 18 %.
+const ORDERS_ENOUGH: usize = 10;
 /// Of many stations, this share must show a creep: chance has more opportunities there.
 const SHARE: f64 = 0.1;
 
@@ -83,8 +85,11 @@ fn place(creep: &Creep, station: &str, profile: Option<&Profile>, rig: &Rig) -> 
 
 /// Warns where the residual is far below what the noise measured over the turns lets expect.
 pub(super) fn inflated(stations: &[StationSummary]) -> Option<String> {
-    let chi2 = |station: &&StationSummary| station.chi2_per_dof.filter(|chi2| *chi2 < INFLATED_CHI2);
-    let below: Vec<&StationSummary> = stations.iter().filter(|station| chi2(station).is_some()).collect();
+    let is_low = |station: &&StationSummary| station.chi2_per_dof.is_some_and(|chi2| chi2 < INFLATED_CHI2);
+    let has_orders = |station: &&StationSummary| {
+        station.residual_orders.is_none_or(|[lowest, highest]| highest + 1 >= lowest + ORDERS_ENOUGH)
+    };
+    let below: Vec<&StationSummary> = stations.iter().filter(is_low).filter(has_orders).collect();
     let lowest = below.iter().min_by(|a, b| a.chi2_per_dof.unwrap_or(1.0).total_cmp(&b.chi2_per_dof.unwrap_or(1.0)))?;
     Some(format!(
         "at {} of {} stations the residual is far below the noise measured over the turns: χ² per degree of freedom is down to \

@@ -280,8 +280,8 @@ fn add(runs: &mut VecDeque<Range<usize>>, run: Range<usize>) {
 
 /// The cubic polynomial nearest to [place, value].
 fn polynomial(points: &[[f64; 2]]) -> [f64; TERMS] {
-    let powers = |place: f64| (0..TERMS as i32).map(move |power| Complex64::from(place.powi(power)));
-    let matrix: Vec<Complex64> = points.iter().flat_map(|[place, _]| powers(*place)).collect();
+    let powers = |place: f64| std::iter::successors(Some(1.0), move |power| Some(power * place)).take(TERMS);
+    let matrix: Vec<Complex64> = points.iter().flat_map(|[place, _]| powers(*place)).map(Complex64::from).collect();
     let operator = PivotedQr::new(points.len(), TERMS, &matrix, 1e-12).operator();
     let mut found = [0.0; TERMS];
     for (coefficient, row) in found.iter_mut().zip(operator.chunks_exact(points.len())) {

@@ -727,7 +727,9 @@ fn a_wall_and_a_surface_say_what_their_filter_asks_for_and_they_do_not_have() {
     // More orders than the usual 720 angles hold, where the filter asks for them and the surface has them.
     let fine = |highest| {
         let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 1400, step_mm: None });
-        [0.0, 5.0].iter().for_each(|z| builder.add(&station(*z, &[lobes(300, 1.0)], highest, 1e-6, &[])));
+        for z in [0.0, 5.0] {
+            builder.add(&station(z, &[lobes(300, 1.0)], highest, 1e-6, &[]));
+        }
         let evaluate = evaluate("values = ['cylindricity']\nreferences = ['LSCI']\nfilter_upr = [150]").unwrap();
         let found = part_summary(builder.sections(), 1400, &evaluate, RADIUS_MM, false).unwrap();
         let cylt = find(&found.values, "CYLt", "LSCY of centred sections", "Gaussian 150 UPR");
@@ -797,7 +799,7 @@ fn a_unit_may_be_written_in_each_usual_way() {
     }
     // No symbol is given to two values; Ra has a filter or none.
     let evaluate = evaluate("values = ['roundness', 'cylindricity', 'areal', 'error-motion']").unwrap();
-    let mut symbols: Vec<String> = evaluate.symbols().iter().map(|(symbol, _)| symbol.to_string()).collect();
+    let mut symbols: Vec<String> = evaluate.symbols().into_iter().map(|(symbol, _)| symbol).collect();
     let count = symbols.len();
     symbols.sort();
     symbols.dedup();

@@ -108,7 +108,9 @@ impl<'a> Joint<'a> {
     fn scale(&self, values: &mut [Complex64]) {
         let count = self.layout.readings.len();
         for (row, scale) in values.chunks_exact_mut(count).skip(1).zip(&self.scales) {
-            row.iter_mut().for_each(|value| *value *= *scale);
+            for value in row {
+                *value *= *scale;
+            }
         }
     }
 

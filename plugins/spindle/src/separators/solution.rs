@@ -91,7 +91,7 @@ impl Solver<'_> {
         }
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
-        if self.couples(&readings) && !(estimate.moved_um <= UNSETTLED_UM) {
+        if self.couples(&readings) && is_above(estimate.moved_um, UNSETTLED_UM) {
             return Err(self.unsettled(station, &readings, &estimate));
         }
         let mut warnings = wiring::copies(&self.selection.rig, &readings);
@@ -201,7 +201,7 @@ impl Solver<'_> {
             }
         }
         match geometry {
-            Some(geometry) if coupled && !(estimate.moved_um <= APART_UM) => {
+            Some(geometry) if coupled && is_above(estimate.moved_um, APART_UM) => {
                 self.together(readings, operators, geometry, beyond)
             }
             _ => (estimate, linear),
@@ -514,4 +514,9 @@ fn about(covariance: &[Complex64], times: impl Fn(&[Complex64], usize) -> Vec<Co
     let adjoint: Vec<Complex64> =
         (0..size).flat_map(|column| rows.iter().skip(column).step_by(size).map(Complex64::conj)).collect();
     times(&adjoint, rows.len() / size)
+}
+
+/// Whether a value is above a limit, or no number.
+fn is_above(value: f64, limit: f64) -> bool {
+    value.is_nan() || value > limit
 }
