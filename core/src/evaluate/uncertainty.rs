@@ -21,6 +21,8 @@ const TURNS_OF_A_DRAW: usize = 16;
 const TAIL: f64 = 0.025;
 /// Half of the 95 % interval of a normal distribution, in standard deviations.
 pub const NORMAL_95: f64 = 1.96;
+/// Amplitude of noise that 5 % of all are above, in standard deviations of its real part: √(2 ln 20).
+pub const RAYLEIGH_95: f64 = 2.447_746_830_680_816;
 
 /// What is known of a value's error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,6 +37,14 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
+    /// Of an amplitude, from the standard uncertainty of its part along the phasor. An amplitude that noise alone exceeds in
+    /// 5 % of all cases (the 95 % point of Rayleigh's distribution) may be noise: its interval begins at 0.
+    #[must_use]
+    pub fn of_amplitude(value: f64, std: f64) -> Self {
+        let low = if value < RAYLEIGH_95 * std { 0.0 } else { value - NORMAL_95 * std };
+        Self { std, interval_95: [low, value + NORMAL_95 * std], draws: 0 }
+    }
+
     /// The same of a value that is larger by so much; an interval from 0 on stays one.
     #[must_use]
     pub fn moved(mut self, by: f64) -> Self {

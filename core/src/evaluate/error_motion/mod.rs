@@ -342,11 +342,7 @@ impl ErrorMotion<'_> {
             filter: "none".into(),
             reference: "PC".into(),
             coverage: 1.0,
-            uncertainty: (std > 0.0).then(|| Uncertainty {
-                std,
-                interval_95: [(value - NORMAL_95 * std).max(0.0), value + NORMAL_95 * std],
-                draws: 0,
-            }),
+            uncertainty: (std > 0.0).then(|| Uncertainty::of_amplitude(value, std)),
         })
     }
 }

@@ -7,7 +7,9 @@ use crate::{
         Value,
         roundness::{Angles, Disturbed, Points, Reference, Values, between_angles},
         slope::{largest_on_angles, steepest_um_per_rad},
-        uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, extreme, monte_carlo_of, seed, stand_in},
+        uncertainty::{
+            DRAWS, Errors, LARGEST, NORMAL_95, RAYLEIGH_95, Uncertainty, extreme, monte_carlo_of, seed, stand_in,
+        },
     },
     numerics::{
         filter::{Degree, Smoother, robust_gaussian},
@@ -193,11 +195,9 @@ impl Form {
 
     /// Amplitude and phase of each order from 2 to at most `highest`.
     ///
-    /// Half of an order's variance is along its amplitude and half across it. An amplitude below 2.45 times its standard
-    /// uncertainty may be noise alone (the 95 % point of Rayleigh's distribution): its interval begins at 0, and its phase has none.
+    /// Half of an order's variance is along its amplitude and half across it. The phase of an amplitude that may be noise
+    /// alone has no uncertainty.
     fn harmonics(&self, highest: usize) -> Vec<Value> {
-        const NOISE_ALONE: f64 = 2.447_746_830_680_816;
-        const NORMAL_95: f64 = 1.959_963_984_540_054;
         let mut values = Vec::new();
         let known = |order: &usize| !self.held.lost.contains(order);
         for order in (2..=highest.min(self.held.highest)).filter(known) {
@@ -207,18 +207,10 @@ impl Form {
             let phase = (-value.arg().to_degrees() / turns).rem_euclid(360.0 / turns);
             let variance = self.variance.get(order).copied().filter(|variance| variance.is_finite());
             let std = variance.map(|variance| (0.5 * variance).sqrt());
-            let about = |value: f64, std: f64, low: f64| Uncertainty {
-                std,
-                interval_95: [low, value + NORMAL_95 * std],
-                draws: 0,
-            };
-            let of_amplitude = std.map(|std| {
-                let low = if amplitude < NOISE_ALONE * std { 0.0 } else { amplitude - NORMAL_95 * std };
-                about(amplitude, std, low)
-            });
-            let of_phase = std.filter(|std| amplitude >= NOISE_ALONE * std).map(|std| {
+            let of_amplitude = std.map(|std| Uncertainty::of_amplitude(amplitude, std));
+            let of_phase = std.filter(|std| amplitude >= RAYLEIGH_95 * std).map(|std| {
                 let std = (std / (amplitude * turns)).to_degrees();
-                about(phase, std, phase - NORMAL_95 * std)
+                Uncertainty { std, interval_95: [phase - NORMAL_95 * std, phase + NORMAL_95 * std], draws: 0 }
             });
             let labels = vec![
                 Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),
