@@ -14,10 +14,8 @@ use std::{
 use divan::{Bencher, counter::ItemsCount};
 use runout_cli::builtin::registry;
 use runout_core::{
-    pipeline::{
-        registry::Context,
-        run::{RunInfo, Summary},
-    },
+    pipeline::{registry::Context, run::Summary},
+    stage::{About, Completed, ResultInfo},
     surface::Surface,
 };
 use tempfile::TempDir;
@@ -89,8 +87,9 @@ fn mesh(plugin: &str, extension: &str, surface: &Surface) -> u64 {
     let config = format!("plugin = \"{plugin}\"\npath = \"part.{extension}\"");
     let context = Context { folder: FOLDER.path(), rig: None };
     let exporter = registry().exporters.build(&DeTable::parse(&config).unwrap(), &context).unwrap();
-    let export = exporter.begin(&RunInfo { title: "bench".into(), ..RunInfo::default() }).unwrap();
-    let files = export.finish(&summary(), Some(surface)).unwrap();
+    let export = exporter.begin(&ResultInfo { title: "bench".into(), ..ResultInfo::default() }).unwrap();
+    let (summary, about) = (summary(), About::default());
+    let files = export.finish(&Completed { summary: &summary, about: &about, surface: Some(surface) }).unwrap();
     // The files are not kept: they go as they are dropped.
     files.iter().map(|file| fs::metadata(file.path()).unwrap().len()).sum()
 }

@@ -16,15 +16,15 @@ use std::{
 use runout_cli::builtin::registry;
 use runout_core::{
     atomic_file::commit_all,
-    measurement::{Block, MemoryStream, Recording, SampleStream, StationKey},
+    measurement::{Block, MemoryStream, Recording, SampleStream},
     pipeline::{
         config::{INCLUDE_KEY, Pipeline, Route},
         document::Sources,
-        run::{RunInfo, StationResult, Summary},
+        run::{StationResult, StationTables, Summary},
     },
     profile::Profile,
     separation::Separation,
-    stage::{Averager, Conditioner, Source, Station, StationSeparator, Wanted},
+    stage::{Averager, Conditioner, ResultInfo, Source, Station, StationSeparator, Wanted},
 };
 
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;
@@ -132,7 +132,7 @@ fn csv_settings(folder: &Path, out: &[String]) -> Vec<String> {
 }
 
 fn opened(pipeline: &Pipeline) -> Outcome<Box<dyn Recording>> {
-    match pipeline.loader.open(pipeline.rig.as_ref())? {
+    match pipeline.loader.open(&pipeline.request())? {
         Source::Turns(recording) => Ok(recording),
         Source::Points(_) => Err("the record holds points".into()),
     }
@@ -170,11 +170,12 @@ fn result(index: usize, separation: Separation) -> StationResult {
 
 /// Writes all results by one of the pipeline's exporters.
 fn write(pipeline: &Pipeline, exporter: usize, results: &[StationResult]) -> Outcome {
-    let names = results.iter().map(|result| StationKey { name: result.station.clone(), z_mm: result.z_mm });
-    let info = RunInfo::of(pipeline, &names.collect::<Vec<_>>());
+    let mut tables = StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref());
+    // As for names of the rig and of stations, which are short here.
+    let info = ResultInfo { longest_name: Some(4), ..tables.info(&pipeline.title) };
     let mut export = pipeline.exporters.get(exporter).ok_or("the pipeline has too few exporters")?.begin(&info)?;
-    results.iter().try_for_each(|result| export.station(result))?;
-    commit_all(export.finish(&Summary::default(), None)?)?;
+    results.iter().try_for_each(|result| tables.write(result, &mut *export))?;
+    commit_all(tables.finish(export, &Summary::default(), None)?)?;
     Ok(())
 }
 

@@ -24,7 +24,6 @@ pub mod rig;
 pub mod separation;
 pub mod spread;
 pub mod stage;
-pub mod straightness;
 pub mod surface;
 pub mod table;
 

@@ -10,7 +10,7 @@ use runout_studies::{
     blind::{self, draw::Layout},
     coverage, eccentricity,
     minimum_zone_cylinder::{self, Wall},
-    monte_carlo, scaling, straightness, surface as unrolled,
+    monte_carlo, results, scaling, straightness, surface as unrolled,
     values::{self, Spectrum},
 };
 
@@ -26,6 +26,7 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth
+       runout-studies compare-results A B [RELATIVE]   numbers of two folders that differ by more
        runout-studies minimum-zone-cylinder [WALLS [STARTS]]   MZCY beside a global search, simulated and measured";
 
 fn main() -> ExitCode {
@@ -54,6 +55,10 @@ fn main() -> ExitCode {
             monte_carlo(campaigns.parse().unwrap_or_default())
         }
         ["diagnose-scaling"] => scaling::rows().map(|rows| println!("{}", scaling::table(&rows))),
+        ["compare-results", a, b] => compare_results(a, b, 1e-12),
+        ["compare-results", a, b, relative] if relative.parse::<f64>().is_ok() => {
+            compare_results(a, b, relative.parse().unwrap_or_default())
+        }
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["straightness-traces", file] => straightness_traces(file),
         ["straightness", file, picture] => straightness(file, picture),
@@ -159,6 +164,12 @@ fn blind_campaign([index, seed]: [u64; 2], only: Option<Layout>) -> Result<()> {
     println!("{:?}: {}\n{:#?}", judged.campaign.rig, judged.planted(), judged.diagnosis);
     println!("{:#?}\n{:?}\n{:?}\n{}", judged.effects, judged.form, judged.failures(), judged.said());
     Ok(())
+}
+
+fn compare_results(a: &str, b: &str, relative: f64) -> Result<()> {
+    let found = results::compare(Path::new(a), Path::new(b), relative)?;
+    println!("{}", found.report());
+    if found.differ() { Err(Error::new("compare", format!("{a} and {b}"), "they differ")) } else { Ok(()) }
 }
 
 fn surface(pipeline: &str, picture: &str) -> Result<()> {

@@ -8,7 +8,6 @@ use runout_core::{
     Error, Result,
     evaluate::cylindricity::{Points, Reference},
 };
-use runout_traces::Columns;
 
 /// Zones may differ by that: rounding of coordinates of 15 mm and of distances from an axis, in µm, with room.
 pub const ROUNDING_UM: f64 = 1e-9;
@@ -66,13 +65,12 @@ impl Wall {
         Self { name: format!("simulated {seed}"), radius_mm: 15.0, points }
     }
 
-    /// The circles of a file of the loader `cylinder-traces`.
+    /// The circles of a file of measured points.
     ///
     /// # Errors
     /// When it cannot be read, or holds no circle.
     pub fn measured(path: &Path, radius_mm: f64) -> Result<Self> {
-        let file =
-            Columns { kind: "kind", numbers: &["z_mm", "angle_deg", "deviation_um"], optional: &[] }.read(path)?;
+        let file = runout_points::read(path, &runout_cylinder::COLUMNS)?;
         let [z, angle, form] = [file.column("z_mm")?, file.column("angle_deg")?, file.column("deviation_um")?];
         let circles = file.traces.iter().filter(|trace| trace.kind == "circle");
         let points = circles.flat_map(|trace| trace.points.clone());

@@ -1,22 +1,12 @@
 //! Reversal along an axis on simulated traces: the file of example 4, and its picture.
 
-use std::{
-    f64::consts::TAU,
-    fmt::Write,
-    path::{Path, PathBuf},
-};
+use std::{f64::consts::TAU, fmt::Write, path::Path};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use runout_core::{
-    Error, Result,
-    evaluate::straightness::about_lsli_um,
-    pipeline::registry::{Context, StageConfig},
-    stage::{Source, TraceSeparator},
-    straightness::Straightness,
-};
-use runout_straightness::{AxialReversalConfig, AxialTracesConfig};
+use runout_core::{Error, Result, evaluate::straightness::about_lsli_um, stage::PointSeparator};
+use runout_straightness::{AxialReversalConfig, Straightness};
 
 use crate::plot::{self, Axes, Curve};
 
@@ -67,15 +57,9 @@ pub fn traces() -> Result<String> {
 /// # Errors
 /// When the file cannot be read or separated.
 pub fn separate(file: &Path) -> Result<Straightness> {
-    let configured = |fault| Error::new("set up", "the stages", fault);
-    let loader = AxialTracesConfig { path: file.to_path_buf() }
-        .check(&Context { folder: &PathBuf::new(), rig: None })
-        .map_err(configured)?;
-    let config = AxialReversalConfig::default();
-    match loader.open(None)? {
-        Source::Points(points) => config.separator().map_err(configured)?.separate(&points),
-        Source::Turns(_) => Err(Error::new("read", file.display().to_string(), "it holds turns")),
-    }
+    let configured = |fault| Error::new("set up", "the separator", fault);
+    let separator = AxialReversalConfig::default().separator().map_err(configured)?;
+    separator.separated(&runout_points::read(file, &separator.columns())?)
 }
 
 /// True error and stated uncertainty of part and slide, in µm rms, as Markdown.

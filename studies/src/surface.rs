@@ -9,10 +9,11 @@ use runout_core::{
         Pipeline, Registry,
         config::INCLUDE_KEY,
         document::{ConfigError, Sources},
-        run::{self, RunInfo, Silent, StationResult, Summary},
+        run::{self, Silent},
     },
-    stage::{Export, Exporter},
+    stage::{Completed, Export, Exporter, ResultInfo, Takes},
     surface::Surface,
+    table::{RecordBatch, TableSpec},
 };
 
 use crate::plot::{self, Axes, Map};
@@ -71,27 +72,27 @@ fn unrolled(surface: &Surface) -> Map {
 struct Keep(std::sync::Arc<Mutex<Option<Surface>>>);
 
 impl Exporter for Keep {
-    fn outputs(&self) -> Vec<PathBuf> {
+    fn takes(&self) -> Takes {
+        Takes::Surface
+    }
+
+    fn outputs(&self, _tables: &[TableSpec]) -> Vec<PathBuf> {
         Vec::new()
     }
 
-    fn needs_surface(&self) -> bool {
-        true
-    }
-
-    fn begin(&self, _run: &RunInfo) -> Result<Box<dyn Export>> {
+    fn begin(&self, _result: &ResultInfo) -> Result<Box<dyn Export>> {
         Ok(Box::new(Self(self.0.clone())))
     }
 }
 
 impl Export for Keep {
-    fn station(&mut self, _result: &StationResult) -> Result<()> {
+    fn rows(&mut self, _table: &TableSpec, _rows: &RecordBatch) -> Result<()> {
         Ok(())
     }
 
-    fn finish(self: Box<Self>, _summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
+    fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
         if let Ok(mut kept) = self.0.lock() {
-            *kept = surface.cloned();
+            *kept = result.surface.cloned();
         }
         Ok(Vec::new())
     }

@@ -180,7 +180,7 @@ fn count(found: &Summary, truth: &Summary, rows: &mut Rows) {
     // Every section and station in turn: the n-th of a name is that of the other.
     let named = |summary: &Summary| {
         let mut places: BTreeMap<String, Vec<Value>> = BTreeMap::new();
-        for placed in summary.values() {
+        for placed in summary.placed_values() {
             let value = placed.value;
             let name = format!("{} | {} | {}", value.symbol, value.reference, value.filter);
             places.entry(name).or_default().push(value.clone());

@@ -14,8 +14,8 @@ use runout_core::{
         registry::{Context, Plugin, StageConfig},
         run::Silent,
     },
-    rig::{Rig, RigConfig},
-    stage::{Loader, Simulator, Source, SourceKind},
+    rig::RigConfig,
+    stage::{Loader, Request, Simulator, Source, SourceKind},
 };
 use runout_spindle::simulate::{SpindleConfig, SpindleSimulator, simulator};
 use schemars::JsonSchema;
@@ -44,7 +44,7 @@ impl Loader for Held {
         SourceKind::Turns
     }
 
-    fn open(&self, _rig: Option<&Rig>) -> Result<Source> {
+    fn open(&self, _wanted: &Request) -> Result<Source> {
         Ok(Source::Turns(self.0.recording()?))
     }
 }

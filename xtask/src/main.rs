@@ -5,6 +5,7 @@ mod bench;
 mod chores;
 mod foreign;
 mod process;
+mod results;
 mod setup;
 
 use std::process::ExitCode;
@@ -30,6 +31,10 @@ cargo xtask COMMAND
                 time reference circles of 2560 and 36 000 points beside SciPy and others
   areal-peers [RINGS POINTS ROUNDS]
                 print areal and profile values of one surface beside surfalize's, with both times
+  record-results FOLDER [PROGRAM]
+                run the commands of all examples' READMEs in a copy of the examples below FOLDER
+  compare-results A B [RELATIVE]
+                compare every number in two such folders (Parquet, HDF5, JSON), to 1e-12 or RELATIVE
 
 Every command does the set-up it needs first.
 ";
@@ -48,6 +53,8 @@ fn main() -> ExitCode {
         ["test", "--ci"] => chores::test(true),
         ["schemas"] => chores::schemas(),
         ["areal-peers", ref rest @ ..] => areal::peers(rest),
+        ["record-results", ref rest @ ..] => results::record(rest),
+        ["compare-results", ref rest @ ..] => results::compare(rest),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
         ["bench-peers", ref rest @ ..] => bench::all_peers(rest),
         ["bench-stages", ref rest @ ..] => bench::stages(rest),

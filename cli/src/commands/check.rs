@@ -10,9 +10,9 @@ use runout_core::{
         effects::EffectCatalogue,
         run::LostOrders,
     },
+    points::PointColumn,
     rig::{Rig, Rotation},
     separation::{Assessment, OrderAssessment, Quantity},
-    straightness::LIMIT,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -36,8 +36,26 @@ pub struct Report {
     /// Effects that the closed loop would show, be blind to or confound; absent where there is no model of effects.
     #[serde(flatten)]
     pub foresight: Option<Foresight>,
+    /// The columns that the separator takes of measured points.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub columns: Vec<TakenColumn>,
+    /// The tables of the result, also those that it may lack.
+    pub tables: Vec<String>,
     /// What the user should know.
     pub notes: Vec<String>,
+}
+
+/// A column of measured points.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TakenColumn {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit; empty for what has none.
+    pub unit: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Whether points may lack it.
+    pub optional: bool,
 }
 
 /// A plugin in its place.
@@ -131,15 +149,11 @@ pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(
 
 fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
-    if let Err(error) = pipeline.loader.open(pipeline.rig.as_ref()) {
+    if let Err(error) = pipeline.loader.open(&pipeline.request()) {
         notes.push(format!("the data are not there yet, or cannot be used: {error}"));
     }
-    if matches!(pipeline.route, Route::Traces { .. }) {
-        notes.push(LIMIT.to_owned());
-    }
-    if matches!(pipeline.route, Route::Model { .. }) {
-        notes.push("there is no form to separate: `runout diagnose` finds what the declared model lacks".into());
-    } else if pipeline.exporters.is_empty() {
+    notes.extend(pipeline.route.point_separator().map(|separator| separator.notes()).unwrap_or_default());
+    if pipeline.exporters.is_empty() {
         notes.push("there is no [[export]]: a run would only print its summary".into());
     }
     let foresight = match &pipeline.route {
@@ -152,6 +166,8 @@ fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> 
         rig: pipeline.rig.as_ref().map(RigSize::from),
         separability: pipeline.assessment.as_ref().map(|found| Separability::new(found, pipeline.rig.as_ref())),
         foresight,
+        columns: pipeline.request().columns.iter().map(TakenColumn::from).collect(),
+        tables: pipeline.tables.iter().map(|table| table.name.clone()).collect(),
         notes,
     })
 }
@@ -170,6 +186,13 @@ fn stages(sources: &Sources) -> Result<Vec<Stage>, Failure> {
         stages.extend(names.into_iter().map(|plugin| Stage { stage, plugin }));
     }
     Ok(stages)
+}
+
+impl From<&PointColumn> for TakenColumn {
+    fn from(column: &PointColumn) -> Self {
+        let PointColumn { name, unit, about, optional, .. } = *column;
+        Self { name, unit, about, optional }
+    }
 }
 
 impl From<&Rig> for RigSize {

@@ -23,6 +23,11 @@ pub fn text(report: &Report) -> String {
         stages.row([stage.stage, &stage.plugin]);
     }
     page.headed_table("Stages", &stages);
+    let mut columns = Table::new(4, ["column", "unit", "", "what it is"]);
+    for column in &report.columns {
+        columns.row([column.name, column.unit, if column.optional { "optional" } else { "" }, column.about]);
+    }
+    page.headed_table("Columns of the points", &columns);
     if let Some(size) = &report.rig {
         rig(&mut page, size);
     }

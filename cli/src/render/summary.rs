@@ -1,8 +1,8 @@
 //! What a run found, for people: `run`'s last words.
 
 mod motion;
+mod named;
 mod reading;
-mod straightness;
 mod values;
 
 use runout_core::{
@@ -29,8 +29,8 @@ pub fn text(summary: &Summary) -> String {
     let stations = &summary.stations;
     let mut page = Page::default();
     page.line(&summary.title);
-    if let Some(found) = &summary.straightness {
-        straightness::section(&mut page, found);
+    if stations.is_empty() {
+        named::section(&mut page, &summary.values);
     } else {
         page.line(count(stations.len(), "station"));
         turns(&mut page, stations);

@@ -9,7 +9,7 @@ use crate::folder::Folder;
 const PIPELINE: &str = r#"title = "Straightedge"
 
 [load]
-plugin = "axial-traces"
+plugin = "points"
 path = "traces.csv"
 
 [separate]
@@ -48,16 +48,20 @@ fn from_traces_to_tables() {
     let ran = folder.run(&["run", "pipeline.toml", "--json"]);
     assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
     let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
-    let found = &summary["straightness"];
+    let values = summary["values"].as_array().unwrap();
+    let value = |symbol: &str, of: &str| {
+        let found = values.iter().find(|one| one["symbol"] == symbol && (of.is_empty() || one["of"] == of));
+        found.unwrap()["value"].clone()
+    };
     // Peak to valley of a parabola of height 1 is 1, its line being level; 1e-12: rounding.
     for (quantity, expected) in [("part", 2.0), ("slide", 1.0)] {
-        let strt_um = found[quantity]["strt_um"].as_f64().unwrap();
+        let strt_um = value("STRt", quantity).as_f64().unwrap();
         assert!((strt_um - expected).abs() < 1e-12, "{quantity}: {strt_um}");
-        assert_eq!(found[quantity]["std_um"], Value::Null, "one trace a setup has no uncertainty");
+        assert_eq!(value("std", quantity), Value::Null, "one trace a setup has no uncertainty");
     }
-    assert_eq!(found["points"], 21);
+    assert_eq!(value("positions", "").as_f64(), Some(21.0));
     let written: Vec<&str> = summary["outputs"].as_array().unwrap().iter().map(|path| path.as_str().unwrap()).collect();
-    assert_eq!(written, ["out/straightness.parquet", "result.h5", "out/summary.json"]);
+    assert_eq!(written, ["out/straightness.parquet", "out/values.parquet", "result.h5", "out/summary.json"]);
     assert!(written.iter().all(|path| folder.path().join(path).is_file()));
 
     let table = folder.run(&["inspect", "out/straightness.parquet", "--json"]);

@@ -80,6 +80,8 @@ struct Data {
     terms: Vec<Term>,
     /// Points of each group.
     members: Vec<Vec<usize>>,
+    /// Where each observation was before they were put in the order of the groups.
+    places: Vec<usize>,
     unseen: Vec<Unseen>,
     /// Effects that are declared with their values: never refitted.
     known: Vec<usize>,
@@ -109,7 +111,7 @@ impl LinearTerms {
         if columns().chain([&observations.values]).flatten().any(|value| !value.is_finite()) {
             return Err(refuse("a value is no finite number".into()));
         }
-        sort_by_group(&mut observations, &mut declared, &mut terms);
+        let places = sort_by_group(&mut observations, &mut declared, &mut terms);
         let mut members = vec![Vec::new(); observations.groups.len()];
         for (point, group) in observations.group.iter().enumerate() {
             let group = members.get_mut(*group).ok_or_else(|| refuse(format!("there is no group {group}")))?;
@@ -130,6 +132,7 @@ impl LinearTerms {
             effects,
             terms,
             members,
+            places,
             unseen,
             known,
             ends,
@@ -137,6 +140,18 @@ impl LinearTerms {
             judged,
             told_apart_by,
         })))
+    }
+
+    /// What was measured, in the order of the groups.
+    #[must_use]
+    pub fn observations(&self) -> &Observations {
+        &self.0.observations
+    }
+
+    /// Where each observation was in what the model was made of.
+    #[must_use]
+    pub fn places(&self) -> &[usize] {
+        &self.0.places
     }
 
     /// Adds points that are only predicted; each set gives a value "rms of …".
@@ -267,8 +282,8 @@ fn mean(weights: &[f64], values: impl Iterator<Item = f64>) -> f64 {
     weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
-/// Puts points of one group next to each other: groups are independent stretches of the residual.
-fn sort_by_group(observations: &mut Observations, declared: &mut [Declared], terms: &mut [Term]) {
+/// Puts points of one group next to each other: groups are independent stretches of the residual. Gives where each was.
+fn sort_by_group(observations: &mut Observations, declared: &mut [Declared], terms: &mut [Term]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..observations.group.len()).collect();
     order.sort_by_key(|point| observations.group[*point]);
     let columns = declared.iter_mut().map(|known| &mut known.column);
@@ -277,6 +292,7 @@ fn sort_by_group(observations: &mut Observations, declared: &mut [Declared], ter
         *column = order.iter().map(|point| column[*point]).collect();
     }
     observations.group.sort_unstable();
+    order
 }
 
 fn subtract(from: &mut [f64], columns: &[Vec<f64>], values: &[f64]) {
@@ -321,6 +337,13 @@ impl LinearFit {
             let variance = known.map_or_else(|| vec![f64::NAN; setting.values.len()], |(_, variance)| variance.clone());
             Some((self.data.effects.get(setting.effect)?, setting.values.as_slice(), variance))
         })
+    }
+
+    /// What the fit leaves of each observation, in their unit and order.
+    #[must_use]
+    pub fn residual(&self) -> Vec<f64> {
+        let scale = self.data.observations.std.unwrap_or(1.0);
+        self.remainder.residual.iter().map(|value| value * scale).collect()
     }
 
     /// Whether an effect might have been added, and is not declared.

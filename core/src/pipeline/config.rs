@@ -13,17 +13,20 @@ use super::{
     error::{Fault, known_names},
     evaluate::{Evaluate, EvaluateConfig, Limit},
     registry::{Catalogue, Context, Plugin, Registry},
+    tables::{self, StationTables},
 };
 use crate::{
     atomic_file::resolved,
     model::Effect,
+    points::PointColumn,
     rig::{Rig, RigConfig},
     separation::{Assessment, NOTHING_SEPARATED},
     stage::{
-        Averager, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Separator, SourceKind,
-        StationModel, StationSeparator, TraceModel, TraceSeparator,
+        Averager, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Request, Separator,
+        SourceKind, StationModel, StationSeparator, Takes,
     },
     surface::SurfaceConfig,
+    table::TableSpec,
 };
 
 /// The key whose string value names a file of its own.
@@ -55,6 +58,8 @@ pub struct Pipeline {
     pub exporters: Vec<Box<dyn Exporter>>,
     /// The same for the results of a diagnosis: below `diagnosed/`, or where `[diagnose] out` says.
     pub diagnosed: Vec<Box<dyn Exporter>>,
+    /// The tables of its result, also those that it may lack.
+    pub tables: Vec<TableSpec>,
     /// What the separator can tell with the rig.
     pub assessment: Option<Assessment>,
     /// The configuration with includes and overrides in their places, for provenance: it runs again as it is.
@@ -76,29 +81,34 @@ pub enum Route {
     },
     /// Measured points, all at once.
     Points {
-        /// Points to form.
+        /// Points to tables, values and form.
         separator: Box<dyn PointSeparator>,
-    },
-    /// Measured points with a model for the closed loop, and no form.
-    Model {
-        /// Points to terms.
-        model: Box<dyn PointModel>,
-    },
-    /// Measured traces along an axis, all at once.
-    Traces {
-        /// Traces to straightness.
-        separator: Box<dyn TraceSeparator>,
+        /// The columns that it takes.
+        columns: Vec<PointColumn>,
     },
 }
 
 impl Route {
+    /// The separator of measured points.
+    #[must_use]
+    pub fn point_separator(&self) -> Option<&dyn PointSeparator> {
+        match self {
+            Self::Turns { .. } => None,
+            Self::Points { separator, .. } => Some(&**separator),
+        }
+    }
+
+    /// Whether its result has form.
+    #[must_use]
+    pub fn gives_form(&self) -> bool {
+        self.point_separator().is_none_or(PointSeparator::gives_form)
+    }
+
     /// Whether there is a model for the closed loop.
     fn has_model(&self) -> bool {
         match self {
             Self::Turns { model, .. } => model.is_some(),
-            Self::Points { separator } => separator.model().is_some(),
-            Self::Model { .. } => true,
-            Self::Traces { .. } => false,
+            Self::Points { separator, .. } => separator.model().is_some(),
         }
     }
 
@@ -106,10 +116,28 @@ impl Route {
     fn effects(&self) -> Vec<Effect> {
         match self {
             Self::Turns { model, .. } => model.as_ref().map_or_else(Vec::new, |model| model.effects().to_vec()),
-            Self::Points { separator } => separator.model().map_or_else(Vec::new, PointModel::effects),
-            Self::Model { model } => model.effects(),
-            Self::Traces { separator } => separator.model().map_or_else(Vec::new, TraceModel::effects),
+            Self::Points { separator, .. } => separator.model().map_or_else(Vec::new, PointModel::effects),
         }
+    }
+
+    /// Whether only the data name the targets of its effects.
+    fn data_name_targets(&self) -> bool {
+        let model = self.point_separator().and_then(PointSeparator::model);
+        model.is_some_and(PointModel::points_name_targets)
+    }
+
+    /// The tables of its result.
+    fn tables(&self, assessment: Option<&Assessment>, rig: Option<&Rig>) -> Vec<TableSpec> {
+        let mut tables = Vec::new();
+        if self.gives_form() {
+            tables.extend(StationTables::new(assessment, rig).specs());
+        }
+        tables.extend(self.point_separator().into_iter().flat_map(PointSeparator::tables));
+        if !self.gives_form() {
+            tables.push(tables::named_values());
+        }
+        tables.push(tables::corrections());
+        tables
     }
 }
 
@@ -176,12 +204,7 @@ impl Pipeline {
         let diagnose = table(root, "diagnose")?
             .map(|table| {
                 checked::<DiagnoseConfig, _>(&table, |config| {
-                    config.check(
-                        sources.folder(),
-                        loader.kind(),
-                        &route.effects(),
-                        matches!(route, Route::Traces { .. }),
-                    )
+                    config.check(sources.folder(), loader.kind(), &route.effects(), route.data_name_targets())
                 })
             })
             .transpose()?
@@ -191,7 +214,9 @@ impl Pipeline {
             .map(|table| compare::candidate(table, registry, &context))
             .collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref())?;
-        let Exports { exporters, diagnosed } = exports(root, sources, registry, &context, &route, &diagnose)?;
+        let tables = route.tables(assessment.as_ref(), rig.as_ref());
+        let exporting = Exporting { registry, context: &context, route: &route, tables: &tables, diagnose: &diagnose };
+        let Exports { exporters, diagnosed } = exporting.exports(root, sources)?;
         Ok(Self {
             title,
             rig,
@@ -205,6 +230,7 @@ impl Pipeline {
             evaluate,
             exporters,
             diagnosed,
+            tables,
             assessment,
             configuration: document::resolved_text(root, sources)?,
         })
@@ -212,29 +238,39 @@ impl Pipeline {
 }
 
 impl Pipeline {
+    /// What it wants of the files that are loaded.
+    #[must_use]
+    pub fn request(&self) -> Request<'_> {
+        let columns = match &self.route {
+            Route::Turns { .. } => &[][..],
+            Route::Points { columns, .. } => columns,
+        };
+        Request { rig: self.rig.as_ref(), columns }
+    }
+
     /// Every file that a run writes.
     #[must_use]
     pub fn outputs(&self) -> Vec<PathBuf> {
-        written(&self.exporters)
+        written(&self.exporters, &self.tables)
     }
 
     /// Every file that a diagnosis writes.
     #[must_use]
     pub fn diagnosed_outputs(&self) -> Vec<PathBuf> {
         let more = self.diagnosis_path().into_iter().chain(self.diagnose.write_rig.clone());
-        written(&self.diagnosed).into_iter().chain(more).collect()
+        written(&self.diagnosed, &self.tables).into_iter().chain(more).collect()
     }
 
     /// Where the run's summary goes: beside the first export.
     #[must_use]
     pub fn summary_path(&self) -> Option<PathBuf> {
-        summary_path(&self.exporters)
+        summary_path(&self.exporters, &self.tables)
     }
 
     /// Where the diagnosis goes: where `[diagnose]` says, or beside the first export of the final model.
     #[must_use]
     pub fn diagnosis_path(&self) -> Option<PathBuf> {
-        self.diagnose.path.clone().or_else(|| beside_the_first(&self.diagnosed, DIAGNOSIS))
+        self.diagnose.path.clone().or_else(|| beside_the_first(&self.diagnosed, &self.tables, DIAGNOSIS))
     }
 
     /// Where a diagnosis may be that describes files which a run replaces: the configured one beside them, and the one that
@@ -243,7 +279,7 @@ impl Pipeline {
         let outputs = self.outputs();
         let beside = move |path: &PathBuf| outputs.iter().any(|output| output.parent() == path.parent());
         let configured = self.diagnose.path.clone().filter(beside);
-        beside_the_first(&self.exporters, DIAGNOSIS).into_iter().chain(configured)
+        beside_the_first(&self.exporters, &self.tables, DIAGNOSIS).into_iter().chain(configured)
     }
 }
 
@@ -258,27 +294,27 @@ fn beside(output: &Path, name: &str) -> PathBuf {
     output.with_file_name(name)
 }
 
-fn beside_the_first(exporters: &[Box<dyn Exporter>], name: &str) -> Option<PathBuf> {
-    exporters.iter().find_map(|exporter| exporter.outputs().first().map(|path| beside(path, name)))
+fn beside_the_first(exporters: &[Box<dyn Exporter>], tables: &[TableSpec], name: &str) -> Option<PathBuf> {
+    exporters.iter().find_map(|exporter| exporter.outputs(tables).first().map(|path| beside(path, name)))
 }
 
 /// Where the summary of these exports goes: beside the first of their files.
-pub(super) fn summary_path(exporters: &[Box<dyn Exporter>]) -> Option<PathBuf> {
-    beside_the_first(exporters, SUMMARY)
+pub(super) fn summary_path(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Option<PathBuf> {
+    beside_the_first(exporters, tables, SUMMARY)
 }
 
-fn written(exporters: &[Box<dyn Exporter>]) -> Vec<PathBuf> {
-    exporters.iter().flat_map(|exporter| exporter.outputs()).chain(summary_path(exporters)).collect()
+fn written(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Vec<PathBuf> {
+    exporters.iter().flat_map(|exporter| exporter.outputs(tables)).chain(summary_path(exporters, tables)).collect()
 }
 
 /// The route of measured points.
 fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<Route, Fault> {
     match separator {
-        Separator::Points(separator) => Ok(Route::Points { separator }),
-        Separator::Model(model) => Ok(Route::Model { model }),
-        Separator::Traces(separator) => match table(root, "surface")? {
-            Some(table) => Err(Fault::span(table.span(), "straightness along one line makes no surface")),
-            None => Ok(Route::Traces { separator }),
+        Separator::Points(separator) => match table(root, "surface")? {
+            Some(table) if !separator.gives_form() => {
+                Err(Fault::span(table.span(), "this separator gives no form: it makes no surface"))
+            }
+            _ => Ok(Route::Points { columns: separator.columns(), separator }),
         },
         Separator::Stations(_) => {
             let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
@@ -291,7 +327,7 @@ fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<
 fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, Fault> {
     let configured = table(root, "evaluate")?;
     let limits = tables(root, "limit")?;
-    if let (Route::Traces { .. } | Route::Model { .. }, Some(table)) = (route, configured.as_ref().or(limits.first())) {
+    if let (false, Some(table)) = (route.gives_form(), configured.as_ref().or(limits.first())) {
         return Err(Fault::span(table.span(), "there is no form here whose values could be chosen or limited"));
     }
     let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, EvaluateConfig::check)).transpose()?;
@@ -310,61 +346,79 @@ struct Exports {
     diagnosed: Vec<Box<dyn Exporter>>,
 }
 
-/// The exporters, none of which writes over what is read or what another file is for.
-fn exports(
-    root: &Table,
-    sources: &Sources,
-    registry: &Registry,
-    context: &Context,
-    route: &Route,
-    diagnose: &Diagnose,
-) -> Result<Exports, Fault> {
-    let mut exports = Exports::default();
-    let mut taken = Taken(sources.files().map(|file| (resolved(file), "read as configuration")).collect());
-    taken.0.extend(diagnose.path.as_ref().map(|path| (resolved(path), DIAGNOSIS_USE)));
-    let tables = tables(root, "export")?;
-    for table in &tables {
-        let exporter = registry.exporters.build(table, context)?;
-        match route {
-            Route::Traces { .. } if exporter.straightness().is_none() => {
-                let fault = Fault::at("plugin", "this exporter takes form; [separate] gives straightness along a line");
+/// What exporters are built from.
+struct Exporting<'a> {
+    registry: &'a Registry,
+    context: &'a Context<'a>,
+    route: &'a Route,
+    tables: &'a [TableSpec],
+    diagnose: &'a Diagnose,
+}
+
+impl Exporting<'_> {
+    /// The exporters, none of which writes over what is read or what another file is for.
+    fn exports(&self, root: &Table, sources: &Sources) -> Result<Exports, Fault> {
+        let Self { registry, context, route, diagnose, .. } = self;
+        let mut exports = Exports::default();
+        let files = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
+        let mut taken = Taken { files, tables: self.tables };
+        taken.files.extend(diagnose.path.as_ref().map(|path| (resolved(path), DIAGNOSIS_USE)));
+        let tables = tables(root, "export")?;
+        for table in &tables {
+            let exporter = registry.exporters.build(table, context)?;
+            if exporter.takes() == Takes::Surface && !route.gives_form() {
+                let fault = Fault::at("plugin", "this exporter takes form along an axis; [separate] gives tables");
                 return Err(document::resolve(fault.help("take one that writes tables"), table));
             }
-            Route::Model { model } if model.table().is_none() => {
-                let fault = Fault::at("plugin", "this exporter takes form; [separate] is a model for `diagnose` only");
-                return Err(document::resolve(fault.help("name a file by `path` in [diagnose]"), table));
-            }
-            Route::Model { .. } if exporter.tables().is_none() => {
-                let fault = Fault::at("plugin", "this exporter takes form; [separate] gives a table");
-                return Err(document::resolve(fault.help("take one that writes tables"), table));
-            }
-            _ => {}
+            taken
+                .add(&*exporter, "written by an exporter", &[(SUMMARY, SUMMARY_USE)])
+                .map_err(|fault| document::resolve(fault, table))?;
+            exports.exporters.push(exporter);
         }
-        taken
-            .add(&*exporter, "written by an exporter", &[(SUMMARY, SUMMARY_USE)])
-            .map_err(|fault| document::resolve(fault, table))?;
-        exports.exporters.push(exporter);
+        if !route.has_model() {
+            return Ok(exports);
+        }
+        let beside: &[_] = match &diagnose.path {
+            None => &[(SUMMARY, DIAGNOSED_USE), (DIAGNOSIS, DIAGNOSIS_USE)],
+            Some(_) => &[(SUMMARY, DIAGNOSED_USE)],
+        };
+        for (table, exporter) in tables.iter().zip(&exports.exporters) {
+            let moved = self.diagnosed(table, &**exporter);
+            let diagnosed = registry.exporters.build(&moved, context)?;
+            taken.add(&*diagnosed, DIAGNOSED_USE, beside).map_err(|fault| document::resolve(fault, table))?;
+            exports.diagnosed.push(diagnosed);
+        }
+        Ok(exports)
     }
-    if !route.has_model() {
-        return Ok(exports);
+
+    /// The table of an exporter with another path: a folder `out` becomes `out/diagnosed`, a file `out/shaft.glb`
+    /// `out/diagnosed/shaft.glb`. `out` of `[diagnose]` stands for the folder where there is one.
+    fn diagnosed<'t>(&self, table: &Table<'t>, exporter: &dyn Exporter) -> Table<'t> {
+        let mut keys = table.get_ref().clone();
+        if let Some(value) = keys.get_mut("path")
+            && let Some(path) = value.get_ref().as_str().map(PathBuf::from)
+        {
+            let is_file = exporter.outputs(self.tables).contains(&self.context.path(&path));
+            let folder = match (&self.diagnose.out, is_file) {
+                (Some(out), _) => out.clone(),
+                (None, true) => path.with_file_name(DIAGNOSED),
+                (None, false) => path.join(DIAGNOSED),
+            };
+            let moved =
+                if is_file { path.file_name().map_or(folder.clone(), |name| folder.join(name)) } else { folder };
+            *value.get_mut() = DeValue::String(moved.to_string_lossy().into_owned().into());
+        }
+        Spanned::new(table.span(), keys)
     }
-    let beside: &[_] = match &diagnose.path {
-        None => &[(SUMMARY, DIAGNOSED_USE), (DIAGNOSIS, DIAGNOSIS_USE)],
-        Some(_) => &[(SUMMARY, DIAGNOSED_USE)],
-    };
-    for (table, exporter) in tables.iter().zip(&exports.exporters) {
-        let diagnosed =
-            registry.exporters.build(&diagnosed(table, &**exporter, diagnose.out.as_deref(), context), context)?;
-        taken.add(&*diagnosed, DIAGNOSED_USE, beside).map_err(|fault| document::resolve(fault, table))?;
-        exports.diagnosed.push(diagnosed);
-    }
-    Ok(exports)
 }
 
 /// Files that are read or written, each with its use.
-struct Taken(Vec<(PathBuf, &'static str)>);
+struct Taken<'a> {
+    files: Vec<(PathBuf, &'static str)>,
+    tables: &'a [TableSpec],
+}
 
-impl Taken {
+impl Taken<'_> {
     /// Adds an exporter's files, and those beside the first of them where no exporter of this kind has brought them.
     fn add(
         &mut self,
@@ -372,40 +426,21 @@ impl Taken {
         own_use: &'static str,
         beside_it: &[(&str, &'static str)],
     ) -> Result<(), Fault> {
-        for output in exporter.outputs() {
+        for output in exporter.outputs(self.tables) {
             let place = resolved(&output);
-            if let Some((_, use_of_it)) = self.0.iter().find(|(other, _)| *other == place) {
+            if let Some((_, use_of_it)) = self.files.iter().find(|(other, _)| *other == place) {
                 return Err(Fault::at("path", format!("{} is already {use_of_it}", output.display())));
             }
-            self.0.push((place, own_use));
+            self.files.push((place, own_use));
             for (name, use_of_it) in beside_it {
                 // A summary of a diagnosis is one of its files.
-                if self.0.iter().all(|(path, known)| known != use_of_it || !path.ends_with(name)) {
-                    self.0.push((resolved(&beside(&output, name)), use_of_it));
+                if self.files.iter().all(|(path, known)| known != use_of_it || !path.ends_with(name)) {
+                    self.files.push((resolved(&beside(&output, name)), use_of_it));
                 }
             }
         }
         Ok(())
     }
-}
-
-/// The table of an exporter with another path: a folder `out` becomes `out/diagnosed`, a file `out/shaft.glb`
-/// `out/diagnosed/shaft.glb`. `out` of `[diagnose]` stands for the folder where there is one.
-fn diagnosed<'a>(table: &Table<'a>, exporter: &dyn Exporter, out: Option<&Path>, context: &Context) -> Table<'a> {
-    let mut keys = table.get_ref().clone();
-    if let Some(value) = keys.get_mut("path")
-        && let Some(path) = value.get_ref().as_str().map(PathBuf::from)
-    {
-        let is_file = exporter.outputs().contains(&context.path(&path));
-        let folder = match (out, is_file) {
-            (Some(out), _) => out.to_path_buf(),
-            (None, true) => path.with_file_name(DIAGNOSED),
-            (None, false) => path.join(DIAGNOSED),
-        };
-        let moved = if is_file { path.file_name().map_or(folder.clone(), |name| folder.join(name)) } else { folder };
-        *value.get_mut() = DeValue::String(moved.to_string_lossy().into_owned().into());
-    }
-    Spanned::new(table.span(), keys)
 }
 
 fn turns(
@@ -441,7 +476,7 @@ fn turns(
             let model = separator.model(&registry.effects);
             Ok((Route::Turns { conditioners, averager, separator, model }, Some(assessment)))
         }
-        Separator::Points(_) | Separator::Model(_) | Separator::Traces(_) => {
+        Separator::Points(_) => {
             let fault = Fault::at("plugin", "this separator takes measured points; [load] gives recorded turns");
             Err(document::resolve(fault, separate_table))
         }

@@ -9,24 +9,23 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use corrected_rig::Change;
 
 use super::{
-    config::{Pipeline, Route, summary_path},
+    config::{Pipeline, Route},
     line::Line,
-    result::{Evaluation, RunInfo, complete, true_error},
-    run::{Finished, Gathering, Observer, begun, spare_inputs, take_sections},
-    traces,
+    point_run::PointResult,
+    result::{Evaluation, complete, true_error},
+    result_writer::{Finished, ResultWriter},
+    run::{Observer, spare_inputs},
 };
 use crate::{
     Error, Result,
-    atomic_file::{PendingFile, commit_all},
+    atomic_file::PendingFile,
     model::{
         Effect, Setting, closed_loop,
         diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
     },
     points::Points,
-    provenance::Input,
     separation::Quantity,
-    stage::{Conclusion, PointModel, Source, Station, StationModel, StationSeparator, TraceModel},
-    table::Table,
+    stage::{PointModel, Source, Station, StationModel, StationSeparator},
 };
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form. These do not
@@ -35,19 +34,14 @@ use crate::{
 /// # Errors
 /// When the data or a file fails, or the separator has no model for the loop. Exports that had begun leave nothing behind.
 pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Diagnosis> {
-    let source = pipeline.loader.open(pipeline.rig.as_ref())?;
+    let source = pipeline.loader.open(&pipeline.request())?;
     let no_model = |separator: &str| {
         Error::new("diagnose", &pipeline.title, format!("`{separator}` has no model of effects for the closed loop"))
     };
     match (&source, &pipeline.route) {
-        (Source::Points(points), Route::Points { separator }) => {
+        (Source::Points(points), Route::Points { separator, .. }) => {
             let model = separator.model().ok_or_else(|| no_model(&pipeline.separator))?;
             diagnose_points(pipeline, points, model, observer)
-        }
-        (Source::Points(points), Route::Model { model }) => diagnose_points(pipeline, points, &**model, observer),
-        (Source::Points(points), Route::Traces { separator }) => {
-            let model = separator.model().ok_or_else(|| no_model(&pipeline.separator))?;
-            diagnose_traces(pipeline, points, model)
         }
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator, model: Some(model) }) => {
             let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
@@ -92,11 +86,10 @@ fn diagnose_turns(
     let found = model.diagnose(&stations, settings)?;
     let mut diagnosis = found.diagnosis;
     diagnosis.moved.clear();
-    let info = RunInfo::of(pipeline, recording.stations());
-    let mut gathering = Gathering::begin(pipeline, &pipeline.diagnosed, &info)?;
+    let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
     let known = known(model.effects(), &settings.known, |effect| model.changes(effect, &settings.known));
     let changes = changes(known, &diagnosis);
-    gathering.corrected_for(corrections(&changes));
+    writer.corrected_for(corrections(&changes));
     let rig = pipeline.diagnose.write_rig.clone();
     diagnosis.warnings.extend(rig.as_ref().and_then(|path| corrected_rig::left_out(&changes, path)));
     let mut errors = [Vec::new(), Vec::new()];
@@ -120,7 +113,7 @@ fn diagnose_turns(
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);
             errors.extend(forms.filter_map(|form| true_error(result, form)));
         }
-        gathering.take(&result, pipeline.rig.as_ref())?;
+        writer.take(&result, pipeline.rig.as_ref())?;
     }
     let rms = |errors: &Vec<f64>| {
         let squares: f64 = errors.iter().map(|error| error * error).sum();
@@ -129,14 +122,14 @@ fn diagnose_turns(
     if !errors[0].is_empty() {
         diagnosis.truth = Some(Truth { form_rms_error_um: Step { before: rms(&errors[0]), after: rms(&errors[1]) } });
     }
-    let surface = gathering.build_surface(radius_mm)?;
+    let surface = writer.build_surface(radius_mm)?;
     let mut remarks = recording.remarks();
     remarks.extend(diagnosis.warnings.iter().cloned());
-    let mut finished = gathering.finish(inputs, remarks, surface.as_ref())?;
+    let mut finished = writer.finish(inputs, remarks, surface.as_ref())?;
     if let Some(path) = rig {
         finished.add(corrected_rig::pending(path, pipeline, &changes)?);
     }
-    commit(Some(finished), pipeline.diagnosis_path(), diagnosis)
+    commit(finished, pipeline.diagnosis_path(), diagnosis)
 }
 
 /// More than any model of points has effects that earn their place.
@@ -148,34 +141,22 @@ fn diagnose_points(
     model: &dyn PointModel,
     observer: &dyn Observer,
 ) -> Result<Diagnosis> {
-    let mut outputs = pipeline.diagnosed_outputs();
-    if let Some(name) = model.table() {
-        let tables = pipeline.diagnosed.iter().filter_map(|exporter| exporter.tables());
-        outputs.extend(tables.map(|tables| tables.table_output(name)));
-    }
-    spare_inputs(&outputs, std::slice::from_ref(&points.input))?;
-    let terms = model.terms(points)?;
-    let settings = closed_loop::Settings { max_added: MOST_ADDED, ..pipeline.diagnose.settings.clone() };
-    let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
-    let closed = closed_loop::diagnose(&terms, &settings)?;
-    let Conclusion { shape, table, remarks } = model.conclude(points, &closed.after)?;
-    let mut diagnosis = closed.diagnosis;
-    diagnosis.warnings.extend(remarks);
-    let Some(shape) = shape else {
-        let known = known(&model.effects(), &settings.known, |_| Vec::new());
-        let effects = corrections(&changes(known, &diagnosis));
-        let exports = export_table(pipeline, points, table.as_ref(), &diagnosis, effects)?;
-        return commit(exports, pipeline.diagnosis_path(), diagnosis);
+    spare_inputs(&pipeline.diagnosed_outputs(), std::slice::from_ref(&points.input))?;
+    let effects = model.effects_of(points)?;
+    let settings = if model.points_name_targets() {
+        let settings = pipeline.diagnose.settings_for(&effects);
+        settings.map_err(|fault| Error::new("diagnose", &pipeline.title, fault))?
+    } else {
+        pipeline.diagnose.settings.clone()
     };
-    let info = RunInfo { title: pipeline.title.clone(), ..RunInfo::default() };
-    let mut gathering = Gathering::begin(pipeline, &pipeline.diagnosed, &info)?;
-    let known = known(&model.effects(), &settings.known, |_| Vec::new());
-    gathering.corrected_for(corrections(&changes(known, &diagnosis)));
-    take_sections(shape.sections, pipeline, shape.radius_mm, observer, &mut gathering)?;
-    let surface = gathering.build_surface(shape.radius_mm)?;
-    let inputs = vec![Input::of(&points.input)?];
-    let finished = gathering.finish(inputs, diagnosis.warnings.clone(), surface.as_ref())?;
-    commit(Some(finished), pipeline.diagnosis_path(), diagnosis)
+    let known = known(&effects, &settings.known, |_| Vec::new());
+    let found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
+    let effects = corrections(&changes(known, &found.diagnosis));
+    let mut outcome = found.after;
+    outcome.remarks.splice(0..0, found.diagnosis.warnings.iter().cloned());
+    let result = PointResult { outcome, remarks: None, effects };
+    let finished = result.write(pipeline, &pipeline.diagnosed, points, observer)?;
+    commit(finished, pipeline.diagnosis_path(), found.diagnosis)
 }
 
 /// Effects that are declared as known, each with the lines that declare it in a rig.
@@ -214,49 +195,12 @@ fn corrections(changes: &[Change]) -> Vec<Correction> {
 }
 
 /// Gives the exports their names, and the diagnosis, which lists them, with them.
-fn commit(exports: Option<Finished>, path: Option<PathBuf>, mut diagnosis: Diagnosis) -> Result<Diagnosis> {
-    diagnosis.outputs = exports.as_ref().map_or_else(Vec::new, Finished::outputs);
+fn commit(exports: Finished, path: Option<PathBuf>, mut diagnosis: Diagnosis) -> Result<Diagnosis> {
+    diagnosis.outputs = exports.outputs();
     diagnosis.outputs.extend(path.clone());
     let written = path.map(|path| pending(path, &diagnosis)).transpose()?;
-    match exports {
-        Some(exports) => exports.commit(written).map(|_| ())?,
-        None => commit_all(written.into_iter().collect()).map(|_| ())?,
-    }
+    exports.commit(written)?;
     Ok(diagnosis)
-}
-
-/// A model's table in every exporter that writes tables; nothing where there is no table or no exporter.
-fn export_table(
-    pipeline: &Pipeline,
-    points: &Points,
-    table: Option<&Table>,
-    diagnosis: &Diagnosis,
-    effects: Vec<Correction>,
-) -> Result<Option<Finished>> {
-    let exporters: Vec<_> = pipeline.diagnosed.iter().filter_map(|exporter| exporter.tables()).collect();
-    let (Some(table), false) = (table, exporters.is_empty()) else { return Ok(None) };
-    let mut summary = begun(pipeline);
-    summary.provenance.inputs = vec![Input::of(&points.input)?];
-    summary.warnings.extend(diagnosis.warnings.iter().cloned());
-    summary.effects = effects;
-    let mut complete: Vec<PendingFile> = Vec::new();
-    for exporter in exporters {
-        complete.extend(exporter.write_table(table, &summary)?);
-    }
-    Ok(Some(Finished::new(summary, complete, summary_path(&pipeline.diagnosed))))
-}
-
-fn diagnose_traces(pipeline: &Pipeline, points: &Points, model: &dyn TraceModel) -> Result<Diagnosis> {
-    spare_inputs(&pipeline.diagnosed_outputs(), std::slice::from_ref(&points.input))?;
-    let effects = model.effects_of(points)?;
-    let settings = pipeline.diagnose.settings_for(&effects);
-    let settings = settings.map_err(|fault| Error::new("diagnose", &pipeline.title, fault))?;
-    let known = known(&effects, &settings.known, |_| Vec::new());
-    let found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
-    let corrected = corrections(&changes(known, &found.diagnosis));
-    let remarks = found.diagnosis.warnings.clone();
-    let finished = traces::finished(pipeline, &pipeline.diagnosed, points, found.after, remarks, corrected)?;
-    commit(Some(finished), pipeline.diagnosis_path(), found.diagnosis)
 }
 
 /// `diagnosis.json`, written and waiting for its name.

@@ -11,12 +11,14 @@ mod line;
 mod outdated;
 mod overlap;
 mod pinpoint;
+mod point_run;
 pub mod registry;
 pub mod result;
+mod result_writer;
 pub mod run;
 mod steadiness;
 pub mod summary;
-mod traces;
+pub mod tables;
 mod turnstile;
 
 pub use config::Pipeline;

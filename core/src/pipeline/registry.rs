@@ -50,6 +50,7 @@ pub struct Plugin<S> {
     pub name: &'static str,
     /// One line for lists.
     pub about: &'static str,
+    former: bool,
     schema: fn() -> Schema,
     build: fn(&Table, &Context) -> Result<S, Fault>,
 }
@@ -98,9 +99,16 @@ impl<S> Plugin<S> {
         Self {
             name: C::NAME,
             about: C::ABOUT,
+            former: false,
             schema: super::config::inline::<C>,
             build: |table, context| document::read_besides::<C>(table, &["plugin"])?.check(context),
         }
+    }
+
+    /// The same plugin under a name that it had before: found by it, and in no list.
+    #[must_use]
+    pub fn former<C: StageConfig<Stage = S>>(name: &'static str) -> Self {
+        Self { name, former: true, ..Self::of::<C>() }
     }
 
     /// JSON Schema of the plugin's own keys.
@@ -116,9 +124,9 @@ impl<S> Catalogue<S> {
         self.plugins.push(plugin);
     }
 
-    /// All plugins in the order added.
+    /// All plugins in the order added, under the names that they have.
     pub fn iter(&self) -> impl Iterator<Item = &Plugin<S>> {
-        self.plugins.iter()
+        self.plugins.iter().filter(|plugin| !plugin.former)
     }
 
     /// Builds the stage that a table names by `plugin = "…"`.
@@ -127,7 +135,7 @@ impl<S> Catalogue<S> {
     /// When the name is missing or unknown, or the plugin refuses its configuration. Places are resolved.
     pub fn build(&self, table: &Table, context: &Context) -> Result<S, Fault> {
         let mut keys: DeTable = table.get_ref().clone();
-        let known = || self.plugins.iter().map(|plugin| plugin.name);
+        let known = || self.iter().map(|plugin| plugin.name);
         let Some(name) = keys.remove("plugin") else {
             let fault = Fault::here("missing key `plugin`").help(known_names("", known()));
             return Err(document::resolve(fault, table));

@@ -1,44 +1,15 @@
-//! What a run knows of one station, and gives to exporters.
+//! What a run knows of one station.
 
-use super::{
-    config::Pipeline,
-    evaluate::{Evaluate, missing_circles, section_values},
-};
+use super::evaluate::{Evaluate, missing_circles, section_values};
 use crate::{
     Complex64,
     evaluate::Value,
-    measurement::{StationKey, StationTruth},
+    measurement::StationTruth,
     numerics::fourier::Fourier,
     profile::Profile,
     rig::Rig,
-    separation::{Assessment, Quantity, Separation, UM_PER_MM_URAD},
+    separation::{Quantity, Separation, UM_PER_MM_URAD},
 };
-
-/// What exporters know when they begin.
-#[derive(Debug, Clone, Default)]
-pub struct RunInfo {
-    /// The pipeline's title.
-    pub title: String,
-    /// Sensors and setups, where there are any.
-    pub rig: Option<Rig>,
-    /// What the separator can tell with the rig.
-    pub assessment: Option<Assessment>,
-    /// Names of the stations that will come, in their order; empty for measured points.
-    pub stations: Vec<String>,
-}
-
-impl RunInfo {
-    /// Of a pipeline and the stations that it will be run on.
-    #[must_use]
-    pub fn of(pipeline: &Pipeline, stations: &[StationKey]) -> Self {
-        Self {
-            title: pipeline.title.clone(),
-            rig: pipeline.rig.clone(),
-            assessment: pipeline.assessment.clone(),
-            stations: stations.iter().map(|station| station.name.clone()).collect(),
-        }
-    }
-}
 
 /// One station, done.
 #[derive(Debug, Clone, PartialEq)]

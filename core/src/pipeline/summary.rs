@@ -11,13 +11,13 @@ use super::{
 };
 use crate::{
     azimuth::Azimuth,
-    evaluate::{Value, reading::ReadingValues, straightness::strt_lsli_um},
+    evaluate::{Value, reading::ReadingValues},
     model::diagnosis::Correction,
     profile::{Profile, Rejection, TurnLength},
     provenance::Provenance,
     rig::Rig,
     separation::{Assessment, Quantity},
-    straightness::Straightness,
+    stage::NamedValue,
     surface::Meeting,
 };
 
@@ -42,8 +42,9 @@ pub struct Summary {
     pub limits: Vec<LimitSummary>,
     /// The surface, where one was built.
     pub surface: Option<SurfaceSummary>,
-    /// Straightness of part and slide, where traces along an axis were separated.
-    pub straightness: Option<StraightnessSummary>,
+    /// Values of a domain that are not those of a form: of measured points.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub values: Vec<NamedValue>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
     /// What the user should know.
@@ -51,9 +52,9 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Every value of the run: of sections, then of their station, station by station; the whole part's last.
+    /// Every value of form and motion: of sections, then of their station, station by station; the whole part's last.
     #[must_use]
-    pub fn values(&self) -> Vec<PlacedValue<'_>> {
+    pub fn placed_values(&self) -> Vec<PlacedValue<'_>> {
         placed(&self.stations, self.part.as_ref())
     }
 
@@ -198,60 +199,6 @@ pub struct SurfaceSummary {
     pub meetings: Vec<Meeting>,
 }
 
-/// Straightness of part and slide in a [`Summary`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct StraightnessSummary {
-    /// First and last position, in mm.
-    pub z_mm: [f64; 2],
-    /// Positions.
-    pub points: usize,
-    /// Of the part.
-    pub part: StraightnessValues,
-    /// Of the slide.
-    pub slide: StraightnessValues,
-    /// Standard deviation of one trace at one position (root mean square over the positions), in µm; null without
-    /// repeated traces.
-    pub repeatability_um: Option<f64>,
-    /// Degrees of freedom behind each position's standard uncertainty.
-    pub degrees_of_freedom: usize,
-}
-
-/// One straightness deviation of a [`StraightnessSummary`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct StraightnessValues {
-    /// Peak-to-valley straightness deviation STRt about the least-squares line LSLI (ISO 12780-1), unfiltered, in µm.
-    pub strt_um: f64,
-    /// Root mean square deviation about that line, in µm.
-    pub rms_um: f64,
-    /// Standard uncertainty of the deviation at a position (root mean square over the positions), in µm; null without
-    /// repeated traces.
-    pub std_um: Option<f64>,
-}
-
-impl From<&Straightness> for StraightnessSummary {
-    fn from(result: &Straightness) -> Self {
-        let known = |value: f64| value.is_finite().then_some(value);
-        let values = |deviation_um: &[f64], std_um: &[f64]| StraightnessValues {
-            strt_um: strt_lsli_um(&result.z_mm, deviation_um),
-            rms_um: rms(deviation_um),
-            std_um: known(rms(std_um)),
-        };
-        let end = |z_mm: Option<&f64>| z_mm.copied().unwrap_or(f64::NAN);
-        Self {
-            z_mm: [end(result.z_mm.first()), end(result.z_mm.last())],
-            points: result.z_mm.len(),
-            part: values(&result.part_um, &result.part_std_um),
-            slide: values(&result.slide_um, &result.slide_std_um),
-            repeatability_um: known(result.repeatability_um),
-            degrees_of_freedom: result.degrees_of_freedom,
-        }
-    }
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
-}
-
 pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSummary {
     let separation = &result.separation;
     let known = |value: f64| value.is_finite().then_some(value);
@@ -299,11 +246,11 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
     }
 }
 
-fn setup_id(profile: &Profile, rig: Option<&Rig>) -> String {
+pub(super) fn setup_id(profile: &Profile, rig: Option<&Rig>) -> String {
     rig.and_then(|rig| rig.setups.get(profile.setup)).map_or_else(String::new, |setup| setup.id.clone())
 }
 
-fn sensor_id(index: usize, rig: Option<&Rig>) -> String {
+pub(super) fn sensor_id(index: usize, rig: Option<&Rig>) -> String {
     rig.and_then(|rig| rig.sensors.get(index)).map_or_else(|| format!("sensor {index}"), |sensor| sensor.id.clone())
 }
 

@@ -1,17 +1,31 @@
 //! Loading: from files to recorded turns or measured points.
 
-use crate::{Result, measurement::Recording, points::Points, rig::Rig};
+use crate::{
+    Result,
+    measurement::Recording,
+    points::{PointColumn, Points},
+    rig::Rig,
+};
 
 /// Opens a measurement.
 pub trait Loader: Send + Sync {
     /// What it will give, so that `check` can refuse a pipeline before it runs.
     fn kind(&self) -> SourceKind;
 
-    /// Opens the files. `rig` is there whenever [`kind`](Self::kind) is [`SourceKind::Turns`].
+    /// Opens the files.
     ///
     /// # Errors
-    /// When a file is missing, damaged, or does not hold what the rig names.
-    fn open(&self, rig: Option<&Rig>) -> Result<Source>;
+    /// When a file is missing, damaged, or does not hold what is wanted of it.
+    fn open(&self, wanted: &Request) -> Result<Source>;
+}
+
+/// What a pipeline wants of its files.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Request<'a> {
+    /// Sensors and setups; always there for [`SourceKind::Turns`].
+    pub rig: Option<&'a Rig>,
+    /// Columns of points, for [`SourceKind::Points`].
+    pub columns: &'a [PointColumn],
 }
 
 /// What a loader gives.

@@ -2,15 +2,14 @@
 
 pub mod exporter;
 pub mod loader;
+pub mod points;
 pub mod preprocessor;
 pub mod separator;
 pub mod simulator;
 
-pub use exporter::{Export, Exporter, StraightnessExporter, TableExporter};
-pub use loader::{Loader, Source, SourceKind};
+pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
+pub use loader::{Loader, Request, Source, SourceKind};
+pub use points::{Form, LinearModel, NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator};
 pub use preprocessor::{Averager, Conditioner, Preprocessor, Wanted};
-pub use separator::{
-    Conclusion, PointModel, PointSeparator, Separator, Shape, Station, StationDiagnosis, StationModel,
-    StationSeparator, TraceDiagnosis, TraceModel, TraceSeparator,
-};
+pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator};
 pub use simulator::Simulator;

@@ -1,18 +1,14 @@
-//! Separation: from profiles or points to form and motion.
+//! Separation: from profiles to form and motion.
 
+use super::points::PointSeparator;
 use crate::{
     Result,
-    model::linear_terms::{LinearFit, LinearTerms},
     model::{Effect, Setting, closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight},
     pipeline::{effects::EffectCatalogue, error::Fault},
-    points::Points,
     profile::Profile,
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},
     spread::Projection,
-    straightness::Straightness,
-    surface::Surface,
-    table::Table,
 };
 
 /// A separator, by what it takes.
@@ -21,10 +17,6 @@ pub enum Separator {
     Stations(Box<dyn StationSeparator>),
     /// All points at once.
     Points(Box<dyn PointSeparator>),
-    /// All points at once, and only for the closed loop: there is no form to separate.
-    Model(Box<dyn PointModel>),
-    /// All traces along an axis at once.
-    Traces(Box<dyn TraceSeparator>),
 }
 
 /// Separates the profiles of one station. Built for one rig, which it has checked.
@@ -104,124 +96,6 @@ pub struct Station {
     pub z_mm: f64,
     /// One profile a setup, in the rig's order.
     pub profiles: Vec<Profile>,
-}
-
-/// Separates measured points as a whole, for example circles from the cylinder that they lie on.
-pub trait PointSeparator: Send + Sync {
-    /// One separation a section, in the order of z, named by the section's id.
-    ///
-    /// # Errors
-    /// When the points do not hold what the method needs.
-    fn separate(&self, points: &Points) -> Result<Vec<Separation>>;
-
-    /// Radius of the cylinder that the deviations of [`separate`](Self::separate) count from, in mm.
-    ///
-    /// # Errors
-    /// When the points do not hold what the method needs.
-    fn reference_radius_mm(&self, points: &Points) -> Result<f64>;
-
-    /// Whether [`remarks`](Self::remarks) needs the surface.
-    fn needs_surface(&self) -> bool {
-        false
-    }
-
-    /// What the user should know of the whole, once it is done: what was fitted, and how well the surface predicts
-    /// points that were not used.
-    ///
-    /// # Errors
-    /// When the points do not hold what it needs.
-    fn remarks(&self, _points: &Points, _surface: Option<&Surface>) -> Result<Vec<String>> {
-        Ok(Vec::new())
-    }
-
-    /// Its model for the closed loop, where it has one.
-    fn model(&self) -> Option<&dyn PointModel> {
-        None
-    }
-}
-
-/// A model of measured points for the closed loop.
-pub trait PointModel: Send + Sync {
-    /// What it may lack, in the order of the terms; what is usual of a parameter may depend on the points.
-    fn effects(&self) -> Vec<Effect>;
-
-    /// What is declared of these points, and the effects that this may lack.
-    ///
-    /// # Errors
-    /// When the points do not hold what the model needs.
-    fn terms(&self, points: &Points) -> Result<LinearTerms>;
-
-    /// The name of the table that its conclusion gives, where it gives one.
-    fn table(&self) -> Option<&'static str> {
-        None
-    }
-
-    /// What the final fit says.
-    ///
-    /// # Errors
-    /// When the points do not hold what it needs.
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion>;
-}
-
-/// What a model's final fit says.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Conclusion {
-    /// The form by the effects that were found, where there is one.
-    pub shape: Option<Shape>,
-    /// Numbers that the effects that were found give of each point, where there are any.
-    pub table: Option<Table>,
-    /// What the user should know.
-    pub remarks: Vec<String>,
-}
-
-/// Form that a model's fit describes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Shape {
-    /// One separation a section, in the order of z.
-    pub sections: Vec<Separation>,
-    /// Radius of the cylinder that it counts from, in mm.
-    pub radius_mm: f64,
-}
-
-/// Separates traces along an axis into the straightness of the part and of the slide.
-pub trait TraceSeparator: Send + Sync {
-    /// Straightness of both.
-    ///
-    /// # Errors
-    /// When the traces do not hold what the method needs.
-    fn separate(&self, points: &Points) -> Result<Straightness>;
-
-    /// Its model for the closed loop, where it has one.
-    fn model(&self) -> Option<&dyn TraceModel> {
-        None
-    }
-}
-
-/// A model of traces along an axis for the closed loop.
-pub trait TraceModel: Send + Sync {
-    /// What it may lack, without targets: these are traces and setups, which the data name.
-    fn effects(&self) -> Vec<Effect>;
-
-    /// What it may lack with these traces, at each target.
-    ///
-    /// # Errors
-    /// When the traces do not hold what the model needs.
-    fn effects_of(&self, points: &Points) -> Result<Vec<Effect>>;
-
-    /// Runs the loop; `settings` count effects as [`effects_of`](Self::effects_of) does.
-    ///
-    /// # Errors
-    /// When the traces do not hold what the model needs.
-    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<TraceDiagnosis>;
-}
-
-/// What the closed loop found, with the straightness of the final model.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TraceDiagnosis {
-    /// What was found.
-    pub diagnosis: Diagnosis,
-    /// Straightness of part and slide with the effects added.
-    pub after: Straightness,
 }
 
 /// What a separator is built with besides its own configuration.

@@ -8,7 +8,7 @@ use runout_core::{
     measurement::Block,
     pipeline::registry::{Context, Registry},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
-    stage::Source,
+    stage::{Request, Source},
 };
 use tempfile::TempDir;
 use toml::de::DeTable;
@@ -59,7 +59,9 @@ fn read(bencher: Bencher, delimiter: char, decimal: char) {
     let context = Context { folder: folder.path(), rig: Some(&rig) };
     let loader = registry.loaders.build(&DeTable::parse(&config).unwrap(), &context).unwrap();
     bencher.counter(BytesCount::new(fs::metadata(&path).unwrap().len())).bench_local(|| {
-        let Source::Turns(recording) = loader.open(Some(&rig)).unwrap() else { panic!("it holds turns") };
+        let Source::Turns(recording) = loader.open(&Request { rig: Some(&rig), columns: &[] }).unwrap() else {
+            panic!("it holds turns")
+        };
         let mut stream = recording.open(0, 0).unwrap();
         let mut block = Block::default();
         while stream.next_block(&mut block).unwrap() {

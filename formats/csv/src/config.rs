@@ -11,7 +11,7 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     rig::Rig,
-    stage::{Loader, Source, SourceKind},
+    stage::{Loader, Request, Source, SourceKind},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -192,8 +192,8 @@ impl Loader for CsvLoader {
         SourceKind::Turns
     }
 
-    fn open(&self, rig: Option<&Rig>) -> Result<Source> {
-        let rig = rig.filter(|_| !self.paths.is_empty());
+    fn open(&self, wanted: &Request) -> Result<Source> {
+        let rig = wanted.rig.filter(|_| !self.paths.is_empty());
         let rig = rig.ok_or_else(|| Error::new("open", "the CSV files", "recorded turns need a [rig]"))?;
         let recording = CsvRecording::open(rig, self.stations.clone(), self.paths.clone(), self.stated.clone())?;
         Ok(Source::Turns(Box::new(recording)))

@@ -9,7 +9,7 @@ use runout_core::{
     measurement::{Block, Capture, Recording},
     pipeline::registry::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
-    stage::Source,
+    stage::{Request, Source},
 };
 use runout_csv::{CsvConfig, FileConfig, StationConfig};
 
@@ -47,7 +47,7 @@ fn config(pattern: Option<&str>) -> CsvConfig {
 
 fn open(folder: &Path, config: CsvConfig, rig: &Rig) -> Result<Box<dyn Recording>> {
     let loader = config.check(&Context { folder, rig: Some(rig) }).unwrap();
-    match loader.open(Some(rig))? {
+    match loader.open(&Request { rig: Some(rig), columns: &[] })? {
         Source::Turns(recording) => Ok(recording),
         Source::Points(_) => unreachable!("a CSV measurement is of turns"),
     }

@@ -11,7 +11,7 @@ use std::{
 };
 
 use gltf::{Accessor, Gltf, Semantic};
-use runout_core::{pipeline::Registry, surface::Surface};
+use runout_core::{pipeline::Registry, stage::Takes, surface::Surface};
 use support::{ANGLES, RADIUS_MM, angle, deviation_um, export, exporter, names, surface, volume_mm3};
 
 const RINGS: usize = 10;
@@ -73,7 +73,7 @@ fn written(keys: &str, surface: &Surface) -> Vec<Read> {
     let toml = format!("plugin = \"gltf\"\npath = \"out/part.glb\"\n{keys}");
     let exporter = exporter(&registry(), &toml, folder.path()).unwrap();
     let files = export(&*exporter, Some(surface)).unwrap();
-    assert_eq!(files, exporter.outputs());
+    assert_eq!(files, exporter.outputs(&[]));
     assert_eq!(names(&folder.path().join("out")).len(), files.len());
     files.iter().map(|file| read(file)).collect()
 }
@@ -223,7 +223,7 @@ fn failure_leaves_what_was_there() {
     assert!(error.advice().unwrap().contains("magnification"), "{error}");
     assert_eq!(names(folder.path()), ["part.glb"]);
     assert_eq!(std::fs::read(folder.path().join("part.glb")).unwrap(), b"before");
-    assert!(build("").needs_surface());
+    assert_eq!(build("").takes(), Takes::Surface);
 }
 
 #[test]

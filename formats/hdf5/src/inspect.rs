@@ -149,17 +149,18 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
 
 fn tables(file: &File, place: &Place) -> Result<Vec<TableReport>> {
     let mut tables = Vec::new();
-    for table in ["form", "motion", "harmonics", "straightness", "angle"] {
-        if !file.link_exists(table) {
+    for table in node::members(file, place)? {
+        let kind = file.loc_type_by_name(&table).map_err(|error| place.child(&table).error(error))?;
+        if kind != LocationType::Group || table == "provenance" {
             continue;
         }
-        let (group, place) = node::group(file, place, table)?;
+        let (group, place) = node::group(file, place, &table)?;
         let columns = node::members(&group, &place)?;
         let rows = match columns.first() {
             Some(column) => node::dataset(&group, &place, column)?.0.size(),
             None => 0,
         };
-        tables.push(TableReport { table: table.into(), rows, columns });
+        tables.push(TableReport { table, rows, columns });
     }
     Ok(tables)
 }

@@ -265,11 +265,6 @@ pub(crate) fn put<T: H5Type>(location: &Location, name: &str, value: &T) -> hdf5
     location.new_attr::<T>().create(name)?.write_scalar(value)
 }
 
-/// The same, unless it is there already.
-pub(crate) fn put_once<T: H5Type>(location: &Location, name: &str, value: &T) -> hdf5_metno::Result<()> {
-    if location.attr(name).is_ok() { Ok(()) } else { put(location, name, value) }
-}
-
 /// Writes an attribute of one element, or one element a channel.
 pub(crate) fn put_list<T: H5Type>(location: &Location, name: &str, values: &[T]) -> hdf5_metno::Result<()> {
     location.new_attr::<T>().shape(values.len()).create(name)?.write(values)

@@ -6,7 +6,7 @@ use runout_core::{
     measurement::{MemoryStream, Recording},
     pipeline::registry::{Context, StageConfig},
     rig::Rig,
-    stage::Source,
+    stage::{Request, Source},
 };
 use runout_csv::{CsvConfig, StationConfig};
 use runout_hdf5::WriteOptions;
@@ -38,7 +38,7 @@ fn load_csv(folder: &Path, memory: &Memory, rig: &Rig) -> Box<dyn Recording> {
         marker: None,
     };
     let loader = config.check(&Context { folder, rig: Some(rig) }).unwrap();
-    match loader.open(Some(rig)).unwrap() {
+    match loader.open(&Request { rig: Some(rig), columns: &[] }).unwrap() {
         Source::Turns(recording) => recording,
         Source::Points(_) => panic!("a CSV measurement is of turns"),
     }

@@ -8,7 +8,7 @@ use runout_core::{
     measurement::{Block, Capture, MemoryStream, Recording, SampleStream, StationKey, StationTruth},
     pipeline::registry::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
-    stage::Source,
+    stage::{Request, Source},
 };
 use runout_hdf5::{Hdf5Config, WriteOptions, write_measurement};
 
@@ -122,7 +122,7 @@ pub fn load(path: &Path, rig: &Rig) -> Result<Box<dyn Recording>> {
 pub fn load_marked(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Box<dyn Recording>> {
     let context = Context { folder: Path::new(""), rig: Some(rig) };
     let loader = Hdf5Config { path: path.to_owned(), marker }.check(&context).unwrap();
-    match loader.open(Some(rig))? {
+    match loader.open(&Request { rig: Some(rig), columns: &[] })? {
         Source::Turns(recording) => Ok(recording),
         Source::Points(_) => Err(Error::new("load", "a measurement", "it gave points")),
     }

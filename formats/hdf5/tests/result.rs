@@ -12,7 +12,7 @@ use runout_core::{
     model::diagnosis::Correction,
     pipeline::{
         registry::{Context, StageConfig},
-        run::{LostOrders, RunInfo, StationResult, StationSummary, Summary},
+        run::{LostOrders, StationResult, StationSummary, StationTables, Summary},
     },
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
@@ -91,21 +91,23 @@ pub fn summary() -> Summary {
     }
 }
 
-pub fn begin(path: &Path) -> Box<dyn Export> {
+pub fn begin(path: &Path) -> (StationTables, Box<dyn Export>) {
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ResultConfig { path: path.to_owned() }.check(&context).unwrap();
-    assert_eq!(exporter.outputs(), [path]);
-    exporter.begin(&RunInfo { title: "Shaft".into(), ..RunInfo::default() }).unwrap()
+    let tables = StationTables::new(None, None);
+    assert_eq!(exporter.outputs(&tables.specs()), [path]);
+    let export = exporter.begin(&tables.info("Shaft")).unwrap();
+    (tables, export)
 }
 
 /// Writes a result of two stations.
 pub fn write(path: &Path) {
-    let mut export = begin(path);
+    let (mut tables, mut export) = begin(path);
     for name in ["s1", "s2"] {
-        export.station(&station(name)).unwrap();
+        tables.write(&station(name), &mut *export).unwrap();
     }
     assert!(!path.exists(), "no file before it is finished");
-    assert_eq!(commit_all(export.finish(&summary(), None).unwrap()).unwrap(), [path]);
+    assert_eq!(commit_all(tables.finish(export, &summary(), None).unwrap()).unwrap(), [path]);
 }
 
 fn column<T: H5Type>(file: &File, name: &str) -> Vec<T> {
@@ -166,7 +168,7 @@ fn a_result_explains_itself() {
     for group in ["form", "motion", "harmonics"] {
         for column in file.group(group).unwrap().datasets().unwrap() {
             let (name, unit) = (column.name(), text(&column, "unit"));
-            assert!(!text(&column, "meaning").is_empty(), "{name}");
+            assert!(!text(&column, "about").is_empty(), "{name}");
             let expected = ["um", "urad", "mm", "deg"].into_iter().find(|unit| name.ends_with(&format!("_{unit}")));
             if let Some(expected) = expected {
                 assert_eq!(unit, expected, "{name}");
@@ -177,7 +179,7 @@ fn a_result_explains_itself() {
         let column = file.dataset(&format!("harmonics/{name}")).unwrap();
         assert_eq!(text(&column, "unit"), "um; urad for tilts");
     }
-    assert!(text(&file.dataset("harmonics/std").unwrap(), "meaning").starts_with("sqrt(E|delta|^2)"));
+    assert!(text(&file.dataset("harmonics/std").unwrap(), "about").starts_with("sqrt(E|delta|^2)"));
     let lines = |name: &str| -> Vec<String> {
         column::<VarLenUnicode>(&file, name).iter().map(|text| text.as_str().to_owned()).collect()
     };
@@ -189,9 +191,9 @@ fn a_result_explains_itself() {
 #[test]
 fn an_unfinished_result_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let mut export = begin(&folder.path().join("result.h5"));
-    export.station(&station("s1")).unwrap();
-    assert!(export.station(&station(&"long".repeat(20))).is_err());
+    let (mut tables, mut export) = begin(&folder.path().join("result.h5"));
+    tables.write(&station("s1"), &mut *export).unwrap();
+    assert!(tables.write(&station(&"long".repeat(20)), &mut *export).is_err());
     drop(export);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

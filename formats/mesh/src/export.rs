@@ -5,16 +5,11 @@ use std::{fs::File, io, path::PathBuf, thread};
 use runout_core::{
     Error, Result,
     atomic_file::PendingFile,
-    pipeline::run::{RunInfo, StationResult, Summary},
-    stage::{Export, Exporter},
-    surface::Surface,
+    stage::{Completed, Export, Exporter, ResultInfo, Takes},
+    table::{RecordBatch, TableSpec},
 };
 
-use crate::{
-    config::MeshConfig,
-    mesh::Mesh,
-    notes::{Band, Notes},
-};
+use crate::{config::MeshConfig, mesh::Mesh, notes::Notes};
 
 /// How a mesh becomes a file.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +33,6 @@ struct MeshExport {
     format: Format,
     config: MeshConfig,
     files: Vec<Target>,
-    band: Band,
 }
 
 struct Target {
@@ -48,15 +42,15 @@ struct Target {
 }
 
 impl Exporter for MeshExporter {
-    fn outputs(&self) -> Vec<PathBuf> {
+    fn takes(&self) -> Takes {
+        Takes::Surface
+    }
+
+    fn outputs(&self, _tables: &[TableSpec]) -> Vec<PathBuf> {
         self.config.files().into_iter().map(|(path, _)| path).collect()
     }
 
-    fn needs_surface(&self) -> bool {
-        true
-    }
-
-    fn begin(&self, _run: &RunInfo) -> Result<Box<dyn Export>> {
+    fn begin(&self, _result: &ResultInfo) -> Result<Box<dyn Export>> {
         // Opened now: a folder that cannot be written to shows before the work, not after it.
         let open = |(path, scale)| {
             let place = PendingFile::new(path)?;
@@ -64,23 +58,17 @@ impl Exporter for MeshExporter {
             Ok(Target { place, file, scale })
         };
         let files: Result<Vec<_>> = self.config.files().into_iter().map(open).collect();
-        Ok(Box::new(MeshExport {
-            format: self.format,
-            config: self.config.clone(),
-            files: files?,
-            band: Band::default(),
-        }))
+        Ok(Box::new(MeshExport { format: self.format, config: self.config.clone(), files: files? }))
     }
 }
 
 impl Export for MeshExport {
-    fn station(&mut self, result: &StationResult) -> Result<()> {
-        self.band.add(result);
+    fn rows(&mut self, _table: &TableSpec, _rows: &RecordBatch) -> Result<()> {
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>, summary: &Summary, surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
-        let surface = surface.ok_or_else(|| {
+    fn finish(mut self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
+        let surface = result.surface.ok_or_else(|| {
             Error::new("write", self.config.path.display().to_string(), "the run built no surface to draw")
         })?;
         let draw = |target: &Target| Mesh::new(surface, target.scale, self.config.capped, self.config.colour_range_um);
@@ -91,7 +79,7 @@ impl Export for MeshExport {
         });
         let checksum = checksum.map_err(|_| Error::new("draw", "the surface", "the thread of its checksum stopped"))?;
         for (Target { place, file, .. }, mesh) in self.files.iter_mut().zip(meshes?) {
-            let notes = Notes::new(&self.format, &mesh, surface, &checksum, &self.band, summary);
+            let notes = Notes::new(&self.format, &mesh, surface, &checksum, result);
             (self.format.write)(&mesh, &notes, file).map_err(|error| place.failure(error))?;
         }
         // Closed: some systems do not rename what is open.

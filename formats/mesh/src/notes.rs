@@ -1,11 +1,6 @@
 //! What a mesh says of itself, in glTF's extras and in comments.
 
-use runout_core::{
-    numerics::fourier::max_order,
-    pipeline::run::{StationResult, Summary},
-    separation::Quantity,
-    surface::Surface,
-};
+use runout_core::{numerics::fourier::max_order, stage::Completed, surface::Surface};
 use serde::Serialize;
 
 use crate::{export::Format, mesh::Mesh};
@@ -55,37 +50,11 @@ pub struct InputNote {
     pub blake3: String,
 }
 
-/// Orders that forms hold, gathered station by station.
-#[derive(Debug, Default)]
-pub(crate) struct Band(Option<[usize; 2]>);
-
-impl Band {
-    pub(crate) fn add(&mut self, result: &StationResult) {
-        let separation = &result.separation;
-        for unknown in (0..separation.sections.len()).filter_map(|index| separation.position(Quantity::Form(index))) {
-            let Some(lowest) = separation.coefficients(unknown).position(|value| value.norm_sqr() > 0.0) else {
-                continue;
-            };
-            let highest = separation.max_order();
-            self.0 = Some(self.0.map_or([lowest, highest], |[low, high]| [low.min(lowest), high.max(highest)]));
-        }
-    }
-
-    fn of(&self, surface: &Surface) -> Option<[usize; 2]> {
-        self.0.map(|[lowest, highest]| [lowest, highest.min(max_order(surface.angles))])
-    }
-}
-
 impl Notes {
-    pub(crate) fn new(
-        format: &Format,
-        mesh: &Mesh,
-        surface: &Surface,
-        checksum: &str,
-        band: &Band,
-        summary: &Summary,
-    ) -> Self {
-        let band_upr = band.of(surface);
+    pub(crate) fn new(format: &Format, mesh: &Mesh, surface: &Surface, checksum: &str, result: &Completed) -> Self {
+        let Completed { summary, about, .. } = result;
+        let fitting = max_order(surface.angles);
+        let band_upr = about.form_band_upr.map(|[lowest, highest]| [lowest, highest.min(fitting)]);
         let inputs = summary.provenance.inputs.iter();
         let within = |order: &&usize| band_upr.is_some_and(|[lowest, highest]| (lowest..=highest).contains(order));
         Self {

@@ -40,7 +40,7 @@ fn every_vertex_is_where_it_was_measured() {
     let surface = surface();
     let exporter = exporter(&registry(), "plugin = \"obj\"\npath = \"part.obj\"", folder.path()).unwrap();
     let files = export(&*exporter, Some(&surface)).unwrap();
-    assert_eq!(files, exporter.outputs());
+    assert_eq!(files, exporter.outputs(&[]));
     assert_eq!(names(folder.path()), ["part.obj"]);
     let mesh = read(&files[0]);
     let positions = vectors(&mesh.positions);

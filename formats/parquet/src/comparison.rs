@@ -1,24 +1,22 @@
 //! The table of a comparison of separators.
 
-use std::{iter::repeat_n, path::PathBuf, sync::Arc};
+use std::{iter::repeat_n, path::PathBuf};
 
-use arrow_array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt32Array};
-use arrow_schema::{DataType, Schema};
 use runout_core::{
     Result,
     atomic_file::PendingFile,
     pipeline::compare::{Comparison, Difference, MethodValue, QuantityComparison, StationComparison},
     separation::CONVENTION,
+    table::{ArrayRef, ColumnSpec, TableSpec, counts, flags, numbers, numbers_or_null, texts, texts_or_null},
 };
 
-use crate::{
-    about,
-    columns::{column, number, numbers, text},
-    table::Table,
-};
+use crate::{about, table::TableFile};
 
 /// One row a station, quantity, section, order and method.
-pub struct ComparisonTable(Table);
+pub struct ComparisonTable {
+    file: TableFile,
+    spec: TableSpec,
+}
 
 impl ComparisonTable {
     /// Begins a file that will appear as `path`.
@@ -26,7 +24,8 @@ impl ComparisonTable {
     /// # Errors
     /// When it cannot be created.
     pub fn create(path: PathBuf) -> Result<Self> {
-        Table::create(path, schema()).map(Self)
+        let spec = spec();
+        Ok(Self { file: TableFile::create(path, &spec)?, spec })
     }
 
     /// Appends a station's rows.
@@ -34,7 +33,7 @@ impl ComparisonTable {
     /// # Errors
     /// When the file system refuses them.
     pub fn append(&mut self, station: &StationComparison) -> Result<()> {
-        self.0.append(rows(station))
+        self.file.append(&self.spec.rows(rows(station))?)
     }
 
     /// Completes the file; it appears when the result is committed.
@@ -45,29 +44,41 @@ impl ComparisonTable {
         let stations = comparison.stations.iter().flat_map(|station| station.warnings.iter());
         let warnings: Vec<String> = comparison.warnings.iter().chain(stations).cloned().collect();
         let convention = format!("{CONVENTION} Differences are those from the method {}.", comparison.reference);
-        self.0.close(&about::entries(&comparison.title, &comparison.provenance, &convention, &warnings))
+        self.file.close(&about::of_program(&comparison.title, &comparison.provenance, &convention, &warnings))
     }
 }
 
 const UNIT: &str = "um; urad for tilt";
 
-fn schema() -> Schema {
-    let optional = |name: &str, unit: &str, meaning: &str| column(name, DataType::Float64, true, unit, meaning);
-    Schema::new(vec![
-        text("station", false, "name of the axial station"),
-        text("quantity", false, "form, x, y, tilt_x or tilt_y"),
-        text("section", true, "id of the section; null for motion"),
-        optional("z_mm", "mm", "place of the section, or of the plane whose displacement x and y are; null for tilt"),
-        column("order", DataType::UInt32, false, "1/rev", "undulations per revolution"),
-        text("method", false, "the separator"),
-        number("re", UNIT, "real part of c; NaN where the method cannot tell the order"),
-        number("im", UNIT, "imaginary part of c; NaN where the method cannot tell the order"),
-        number("std", UNIT, "root of E|error of c|², both parts together, from the scatter; NaN if not known"),
-        column("observable", DataType::Boolean, false, "", "whether the method can tell this order"),
-        optional("difference", UNIT, "|c − c of the reference|; null for the reference, and where one is lost"),
-        optional("difference_std", UNIT, "root of E|error of that difference|², from the joint covariance"),
-        optional("e_n", "", "difference / (2 difference_std); 0 where both are equal to rounding"),
-    ])
+fn spec() -> TableSpec {
+    let optional = |name: &str, unit: &str, about: &str| ColumnSpec::number(name, unit, about).or_null();
+    TableSpec::new(
+        "comparison",
+        "coefficients by order and separator, and their differences",
+        vec![
+            ColumnSpec::name("station", "name of the axial station"),
+            ColumnSpec::name("quantity", "form, x, y, tilt_x or tilt_y"),
+            ColumnSpec::name("section", "id of the section; null for motion").or_null(),
+            optional(
+                "z_mm",
+                "mm",
+                "place of the section, or of the plane whose displacement x and y are; null for tilt",
+            ),
+            ColumnSpec::count("order", "1/rev", "undulations per revolution"),
+            ColumnSpec::name("method", "the separator"),
+            ColumnSpec::number("re", UNIT, "real part of c; NaN where the method does not separate the order"),
+            ColumnSpec::number("im", UNIT, "imaginary part of c; NaN where the method does not separate the order"),
+            ColumnSpec::number(
+                "std",
+                UNIT,
+                "root of E|error of c|², both parts together, from the scatter; NaN if not known",
+            ),
+            ColumnSpec::flag("observable", "whether the method separates this order"),
+            optional("difference", UNIT, "|c − c of the reference|; null for the reference, and where one is lost"),
+            optional("difference_std", UNIT, "root of E|error of that difference|², from the joint covariance"),
+            optional("e_n", "", "difference / (2 difference_std); 0 where both are equal to rounding"),
+        ],
+    )
 }
 
 /// One method's orders of one quantity.
@@ -104,38 +115,38 @@ fn rows(station: &StationComparison) -> Vec<ArrayRef> {
         })
         .collect();
     let rows: usize = blocks.iter().map(Block::orders).sum();
-    let repeated = |of: fn(&Block) -> Option<String>| -> StringArray {
-        blocks.iter().flat_map(|block| repeat_n(of(block), block.orders())).collect()
+    let repeated = |of: fn(&Block) -> Option<String>| {
+        texts_or_null(blocks.iter().flat_map(|block| repeat_n(of(block), block.orders())))
     };
     let harmonic = |of: fn(&MethodValue) -> &Vec<Option<f64>>| {
         numbers(blocks.iter().flat_map(|block| of(block.value).iter().map(|value| value.unwrap_or(f64::NAN))))
     };
-    let difference = |of: fn(&Difference) -> &Vec<Option<f64>>| -> Float64Array {
-        blocks.iter().flat_map(|block| block.of_difference(of)).collect()
+    let difference = |of: fn(&Difference) -> &Vec<Option<f64>>| {
+        numbers_or_null(blocks.iter().flat_map(|block| block.of_difference(of)))
     };
     let orders = blocks.iter().flat_map(|block| (1..).take(block.orders()));
     let z_mm = blocks.iter().flat_map(|block| repeat_n(block.value.z_mm, block.orders()));
-    let told = blocks.iter().flat_map(|block| block.value.harmonics.re.iter().map(|value| Some(value.is_some())));
+    let told = blocks.iter().flat_map(|block| block.value.harmonics.re.iter().map(Option::is_some));
     vec![
-        Arc::new(StringArray::from_iter_values(repeat_n(station.station.as_str(), rows))),
-        Arc::new(repeated(|block| Some(block.quantity.quantity.clone()))),
-        Arc::new(repeated(|block| block.quantity.section.clone())),
-        Arc::new(z_mm.collect::<Float64Array>()),
-        Arc::new(UInt32Array::from_iter_values(orders)),
-        Arc::new(repeated(|block| Some(block.value.method.clone()))),
+        texts(repeat_n(station.station.as_str(), rows)),
+        repeated(|block| Some(block.quantity.quantity.clone())),
+        repeated(|block| block.quantity.section.clone()),
+        numbers_or_null(z_mm),
+        counts(orders),
+        repeated(|block| Some(block.value.method.clone())),
         harmonic(|value| &value.harmonics.re),
         harmonic(|value| &value.harmonics.im),
         harmonic(|value| &value.harmonics.std),
-        Arc::new(told.collect::<BooleanArray>()),
-        Arc::new(difference(|one| &one.by_order.difference)),
-        Arc::new(difference(|one| &one.by_order.std)),
-        Arc::new(difference(|one| &one.by_order.e_n)),
+        flags(told),
+        difference(|one| &one.by_order.difference),
+        difference(|one| &one.by_order.std),
+        difference(|one| &one.by_order.e_n),
     ]
 }
 
 #[cfg(test)]
 mod tests {
-    use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
+    use arrow_array::{Array, cast::AsArray, types::Float64Type};
     use runout_core::pipeline::compare::{DifferenceOrders, Harmonics};
 
     use super::*;
@@ -160,7 +171,7 @@ mod tests {
         };
         let station =
             StationComparison { station: "s001".into(), z_mm: 0.0, quantities: vec![quantity], warnings: Vec::new() };
-        let batch = RecordBatch::try_new(Arc::new(schema()), rows(&station)).unwrap();
+        let batch = spec().rows(rows(&station)).unwrap();
         let numbers = |name: &str| batch.column_by_name(name).unwrap().as_primitive::<Float64Type>().clone();
         let observable = batch.column_by_name("observable").unwrap().as_boolean().clone();
         assert_eq!(observable.iter().flatten().collect::<Vec<_>>(), [true, true, true, false]);

@@ -1,53 +1,30 @@
-//! Parquet tables of form, motion and harmonics: the exporter `parquet`.
+//! Parquet: the exporter `parquet`, which writes the tables of a result.
 //!
-//! Its path is a folder that receives
-//!
-//! - `form.parquet`: form of each section over the part's angle, one row a (station, section, angle);
-//! - `motion.parquet`: error motion over the spindle's angle, one row a (station, angle); only where a motion was
-//!   solved for. Columns of a motion that was not (a tilt seen by one section) are null. Where all sensors look along one
-//!   line that is neither x nor y, motion is in `along_um` and `tilt_along_urad`, and the line in `along_deg`;
-//! - `harmonics.parquet`: the coefficients that both are made of, one row a (station, quantity, section, order).
-//!   Orders run from 1; order 0, the mean level, has a row where the method knows it (its value is not 0);
-//! - `reading.parquet`: averaged readings over the spindle's angle, one row a (station, setup, sensor, angle); only where no order
-//!   of form is observable, so that readings are all that there is;
-//! - `values.parquet`: the standards' values of sections, stations and the whole part, one row each.
-//!
-//! Orders that the layout cannot tell are NaN with `observable` false in the harmonics, and left out of the sums in
-//! the other two, whose metadata names them. Where traces along an axis were separated, the folder receives
-//! `straightness.parquet` instead, one row a position; where a model gives a table, that of its name (`angle.parquet`). Every column carries its unit and meaning, every file the configuration,
-//! the checksums of the inputs and the warnings.
+//! Its path is a folder that receives one file a table, named by it (`form.parquet`). Every column carries its `unit` and what it
+//! is (`about`) as metadata, every file the configuration, the checksums of the inputs, the effects that the result is corrected
+//! for and the warnings.
 
 mod about;
-mod columns;
 mod comparison;
-mod reading;
-mod straightness;
 mod table;
-mod values;
 
 use std::path::PathBuf;
 
-use arrow_schema::Schema;
 use runout_core::{
     Error, Result,
     atomic_file::PendingFile,
     pipeline::{
         error::Fault,
         registry::{Context, Plugin, Registry, StageConfig},
-        run::{RunInfo, StationResult, Summary},
     },
-    rig::Rig,
-    stage::{Export, Exporter, StraightnessExporter, TableExporter},
-    straightness::{CONVENTION, Straightness},
-    surface::Surface,
-    table::Table as NumberTable,
+    stage::{Completed, Export, Exporter, ResultInfo, Takes},
+    table::{RecordBatch, TableSpec},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use about::Content;
 pub use comparison::ComparisonTable;
-use table::Table;
+use table::TableFile;
 
 /// Adds the exporter `parquet`.
 pub fn register(registry: &mut Registry) {
@@ -58,7 +35,8 @@ pub fn register(registry: &mut Registry) {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParquetConfig {
-    /// Folder for form.parquet, motion.parquet, harmonics.parquet and values.parquet, or straightness.parquet, or a model's table (angle.parquet); made where it is missing.
+    /// Folder for the tables, one file each: form.parquet, motion.parquet, harmonics.parquet, values.parquet; of measured points
+    /// those of their separator. Made where it is missing.
     pub path: PathBuf,
 }
 
@@ -66,7 +44,7 @@ impl StageConfig for ParquetConfig {
     type Stage = Box<dyn Exporter>;
 
     const NAME: &'static str = "parquet";
-    const ABOUT: &'static str = "tables of form, motion, harmonics and values, or of straightness";
+    const ABOUT: &'static str = "the tables of a result, one file each";
 
     fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         if self.path.as_os_str().is_empty() {
@@ -77,144 +55,62 @@ impl StageConfig for ParquetConfig {
 }
 
 /// The exporter `parquet`.
+#[derive(Debug, Clone)]
 struct Parquet {
     folder: PathBuf,
 }
 
 impl Parquet {
-    fn form(&self) -> PathBuf {
-        self.folder.join("form.parquet")
-    }
-
-    fn motion(&self) -> PathBuf {
-        self.folder.join("motion.parquet")
-    }
-
-    fn harmonics(&self) -> PathBuf {
-        self.folder.join("harmonics.parquet")
-    }
-
-    fn reading(&self) -> PathBuf {
-        self.folder.join("reading.parquet")
-    }
-
-    fn values(&self) -> PathBuf {
-        self.folder.join("values.parquet")
-    }
-
-    fn straightness_table(&self) -> PathBuf {
-        self.folder.join("straightness.parquet")
-    }
-
-    /// Refuses a file where the folder should be.
-    fn folder_free(&self) -> Result<()> {
-        if self.folder.is_file() {
-            let shown = self.folder.display().to_string();
-            return Err(Error::new("write to", shown, "there is a file of that name").help("name a folder"));
-        }
-        Ok(())
+    fn file(&self, table: &TableSpec) -> PathBuf {
+        self.folder.join(format!("{}.parquet", table.name))
     }
 }
 
 impl Exporter for Parquet {
-    fn outputs(&self) -> Vec<PathBuf> {
-        vec![self.form(), self.motion(), self.harmonics(), self.reading(), self.values(), self.straightness_table()]
+    fn takes(&self) -> Takes {
+        Takes::Tables
     }
 
-    fn straightness(&self) -> Option<&dyn StraightnessExporter> {
-        Some(self)
+    fn outputs(&self, tables: &[TableSpec]) -> Vec<PathBuf> {
+        tables.iter().map(|table| self.file(table)).collect()
     }
 
-    fn tables(&self) -> Option<&dyn TableExporter> {
-        Some(self)
-    }
-
-    fn begin(&self, run: &RunInfo) -> Result<Box<dyn Export>> {
-        self.folder_free()?;
-        Ok(Box::new(Tables {
-            form: Table::create(self.form(), columns::form_schema())?,
-            harmonics: Table::create(self.harmonics(), columns::harmonics_schema())?,
-            values: Table::create(self.values(), values::schema())?,
-            motion: None,
-            motion_path: self.motion(),
-            reading: None,
-            reading_path: self.reading(),
-            rig: run.rig.clone(),
-            content: Content::default(),
-        }))
-    }
-}
-
-impl StraightnessExporter for Parquet {
-    fn write(&self, result: &Straightness, summary: &Summary) -> Result<Vec<PendingFile>> {
-        self.folder_free()?;
-        let mut table = Table::create(self.straightness_table(), straightness::schema())?;
-        table.append(straightness::rows(result))?;
-        Ok(vec![table.close(&about::common(summary, CONVENTION))?])
-    }
-}
-
-impl TableExporter for Parquet {
-    fn table_output(&self, name: &str) -> PathBuf {
-        self.folder.join(format!("{name}.parquet"))
-    }
-
-    fn write_table(&self, numbers: &NumberTable, summary: &Summary) -> Result<Vec<PendingFile>> {
-        self.folder_free()?;
-        let fields: Vec<_> =
-            numbers.columns.iter().map(|column| columns::number(&column.name, &column.unit, &column.about)).collect();
-        let mut table = Table::create(self.table_output(&numbers.name), Schema::new(fields))?;
-        table.append(numbers.columns.iter().map(|column| columns::numbers(column.values.iter().copied())).collect())?;
-        Ok(vec![table.close(&about::common(summary, &numbers.about))?])
+    fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
+        if self.folder.is_file() {
+            let shown = self.folder.display().to_string();
+            return Err(Error::new("write to", shown, "there is a file of that name").help("name a folder"));
+        }
+        let (always, optional): (Vec<_>, Vec<_>) = result.tables.iter().cloned().partition(|table| !table.optional);
+        let begun = always.into_iter().map(|table| Ok((TableFile::create(self.file(&table), &table)?, table)));
+        Ok(Box::new(TableFiles { place: self.clone(), begun: begun.collect::<Result<_>>()?, optional }))
     }
 }
 
 /// The tables being written.
-struct Tables {
-    form: Table,
-    harmonics: Table,
-    values: Table,
-    motion: Option<Table>,
-    motion_path: PathBuf,
-    reading: Option<Table>,
-    reading_path: PathBuf,
-    rig: Option<Rig>,
-    content: Content,
+struct TableFiles {
+    place: Parquet,
+    begun: Vec<(TableFile, TableSpec)>,
+    /// Those of which no rows have come yet.
+    optional: Vec<TableSpec>,
 }
 
-impl Export for Tables {
-    fn station(&mut self, result: &StationResult) -> Result<()> {
-        self.content.note(result);
-        self.form.append(columns::form(result))?;
-        self.harmonics.append(columns::harmonics(result))?;
-        if result.separation.unknowns.iter().any(|unknown| !unknown.is_form()) {
-            let table = if let Some(table) = &mut self.motion {
-                table
-            } else {
-                let schema = columns::motion_schema(result.separation.azimuth());
-                self.motion.insert(Table::create(self.motion_path.clone(), schema)?)
-            };
-            table.append(columns::motion(result))?;
+impl Export for TableFiles {
+    fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
+        if let Some((file, _)) = self.begun.iter_mut().find(|(_, known)| known.name == table.name) {
+            return file.append(rows);
         }
-        if result.separation.tells_no_form() {
-            let table = match &mut self.reading {
-                Some(table) => table,
-                None => self.reading.insert(Table::create(self.reading_path.clone(), reading::schema())?),
-            };
-            table.append(reading::rows(result, self.rig.as_ref()))?;
-        }
+        self.optional.retain(|other| other.name != table.name);
+        let mut file = TableFile::create(self.place.file(table), table)?;
+        file.append(rows)?;
+        self.begun.push((file, table.clone()));
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
-        let entries = self.content.entries(summary);
-        self.values.append(values::rows(summary))?;
+    fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
+        let complete = close_all(self.begun, result)?;
         // An earlier run's motion beside this run's form would be taken for this run's.
-        let absent = [(self.motion.is_none(), self.motion_path), (self.reading.is_none(), self.reading_path)];
-        let tables = [Some(self.form), self.motion, Some(self.harmonics), self.reading, Some(self.values)];
-        let complete = close_all(tables.into_iter().flatten(), &entries)?;
-        for (_, path) in absent.iter().filter(|(absent, path)| *absent && path.is_file()) {
-            std::fs::remove_file(path)
+        for path in self.optional.iter().map(|table| self.place.file(table)).filter(|path| path.is_file()) {
+            std::fs::remove_file(&path)
                 .map_err(|error| Error::new("remove the outdated", path.display().to_string(), error))?;
         }
         Ok(complete)
@@ -222,10 +118,12 @@ impl Export for Tables {
 }
 
 /// Completes tables side by side: each has rows that were not packed yet, and nothing else is left to do meanwhile.
-fn close_all(tables: impl Iterator<Item = Table>, entries: &[(String, String)]) -> Result<Vec<PendingFile>> {
+fn close_all(tables: Vec<(TableFile, TableSpec)>, result: &Completed) -> Result<Vec<PendingFile>> {
     let stopped = |_| Err(Error::new("write", "the tables", "a thread that wrote them stopped"));
     std::thread::scope(|scope| {
-        let closing: Vec<_> = tables.map(|table| scope.spawn(|| table.close(entries))).collect();
+        let close =
+            |(file, table): (TableFile, TableSpec)| scope.spawn(move || file.close(&about::entries(&table, result)));
+        let closing: Vec<_> = tables.into_iter().map(close).collect();
         closing.into_iter().map(|table| table.join().unwrap_or_else(stopped)).collect()
     })
 }

@@ -1,8 +1,7 @@
 //! One Parquet file, written row group by row group.
 
-use std::{fs::File, path::PathBuf, sync::Arc};
+use std::{fs::File, path::PathBuf};
 
-use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::{DataType, Schema};
 use parquet::{
     arrow::ArrowWriter,
@@ -13,42 +12,43 @@ use parquet::{
     },
     schema::types::ColumnPath,
 };
-use runout_core::{Result, atomic_file::PendingFile};
+use runout_core::{
+    Result,
+    atomic_file::PendingFile,
+    table::{RecordBatch, TableSpec},
+};
 
 /// Rows in a row group. What is buffered, some 2 MB, does not depend on the number of stations, and a reader that
 /// wants one station skips all other groups by their statistics.
 const ROWS_PER_GROUP: usize = 65_536;
 
 /// A table under a temporary name.
-pub struct Table {
+pub struct TableFile {
     writer: ArrowWriter<File>,
-    schema: Arc<Schema>,
     // Last, so that the file is closed before its temporary name is removed.
     pending: PendingFile,
 }
 
-impl Table {
+impl TableFile {
     /// Begins a file that will appear as `path`.
     ///
     /// # Errors
     /// When it cannot be created.
-    pub fn create(path: PathBuf, schema: Schema) -> Result<Self> {
+    pub fn create(path: PathBuf, table: &TableSpec) -> Result<Self> {
         let pending = PendingFile::new(path)?;
+        let schema = table.schema();
         let properties = properties(&schema).build();
-        let schema = Arc::new(schema);
-        let writer = ArrowWriter::try_new(pending.create()?, Arc::clone(&schema), Some(properties))
+        let writer = ArrowWriter::try_new(pending.create()?, schema, Some(properties))
             .map_err(|error| pending.failure(error))?;
-        Ok(Self { writer, schema, pending })
+        Ok(Self { writer, pending })
     }
 
-    /// Appends rows, column by column in the order of the schema.
+    /// Appends rows.
     ///
     /// # Errors
     /// When the file system refuses them.
-    pub fn append(&mut self, columns: Vec<ArrayRef>) -> Result<()> {
-        RecordBatch::try_new(Arc::clone(&self.schema), columns)
-            .map_err(|error| self.pending.failure(error))
-            .and_then(|batch| self.writer.write(&batch).map_err(|error| self.pending.failure(error)))
+    pub fn append(&mut self, rows: &RecordBatch) -> Result<()> {
+        self.writer.write(rows).map_err(|error| self.pending.failure(error))
     }
 
     /// Completes the file with metadata; it appears when the result is committed.
@@ -86,8 +86,7 @@ fn properties(schema: &Schema) -> WriterPropertiesBuilder {
 
 #[cfg(test)]
 mod tests {
-    use arrow_array::Float64Array;
-    use arrow_schema::Field;
+    use runout_core::table::{ColumnSpec, numbers};
 
     use super::*;
 
@@ -95,15 +94,15 @@ mod tests {
     fn what_is_buffered_does_not_grow_and_nothing_appears_before_its_time() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("numbers.parquet");
-        let schema = Schema::new(vec![Field::new("number", DataType::Float64, false)]);
-        let mut table = Table::create(path.clone(), schema).unwrap();
+        let spec = TableSpec::new("numbers", "", vec![ColumnSpec::number("number", "", "")]);
+        let mut table = TableFile::create(path.clone(), &spec).unwrap();
         let mut seed = 1_u64;
         for _ in 0..200 {
-            let column = Float64Array::from_iter_values((0..5120).map(|_| {
+            let column = numbers((0..5120).map(|_| {
                 seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 seed as f64
             }));
-            table.append(vec![Arc::new(column)]).unwrap();
+            table.append(&spec.rows(vec![column]).unwrap()).unwrap();
             assert!(table.writer.in_progress_rows() < ROWS_PER_GROUP);
             // A row group of one incompressible column takes 8 bytes a row; twice that leaves room for buffers.
             assert!(table.writer.memory_size() < 16 * ROWS_PER_GROUP);

@@ -12,7 +12,7 @@ use runout_core::{
     evaluate::{Value, uncertainty::Uncertainty},
     pipeline::{
         registry::{Context, StageConfig},
-        run::{LostOrders, PartSummary, RunInfo, SectionSummary, StationResult, StationSummary, Summary},
+        run::{LostOrders, PartSummary, SectionSummary, StationResult, StationSummary, StationTables, Summary},
     },
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
@@ -89,13 +89,14 @@ fn summary() -> Summary {
 fn export(folder: &Path, stations: usize, motion: bool) {
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ParquetConfig { path: folder.to_path_buf() }.check(&context).unwrap();
-    let info = RunInfo::default();
-    let mut export = exporter.begin(&info).unwrap();
+    let mut tables = StationTables::new(None, None);
+    let mut export = exporter.begin(&tables.info("")).unwrap();
     for index in 0..stations {
-        export.station(&station(index, motion)).unwrap();
+        tables.write(&station(index, motion), &mut *export).unwrap();
     }
-    let written = commit_all(export.finish(&summary(), None).unwrap()).unwrap();
-    assert!(written.iter().all(|path| exporter.outputs().contains(path) && path.is_file()));
+    let written = commit_all(tables.finish(export, &summary(), None).unwrap()).unwrap();
+    let outputs = exporter.outputs(&tables.specs());
+    assert!(written.iter().all(|path| outputs.contains(path) && path.is_file()));
 }
 
 /// All rows, and the file's own metadata.
@@ -161,7 +162,7 @@ fn form_is_the_sum_of_what_could_be_told() {
     let schema = form.schema();
     let about = schema.field_with_name("form_um").unwrap().metadata();
     assert_eq!(about["unit"], "um");
-    assert!(about["meaning"].contains("lost"));
+    assert!(about["about"].contains("lost"));
 }
 
 #[test]
@@ -238,9 +239,10 @@ fn a_run_that_fails_leaves_what_was_there() {
     let exporter = ParquetConfig { path: "".into() }.check(&context);
     assert!(exporter.is_err_and(|fault| fault.to_string().contains("folder")));
     let exporter = ParquetConfig { path: ".".into() }.check(&context).unwrap();
-    let info = RunInfo::default();
+    let mut tables = StationTables::new(None, None);
+    let info = tables.info("");
     let mut export = exporter.begin(&info).unwrap();
-    export.station(&station(5, true)).unwrap();
+    tables.write(&station(5, true), &mut *export).unwrap();
     drop(export);
     assert_eq!(std::fs::read(folder.path().join("form.parquet")).unwrap(), before);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
@@ -253,7 +255,7 @@ fn values_are_rows_and_null_where_there_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ParquetConfig { path: folder.path().to_path_buf() }.check(&context).unwrap();
-    let export = exporter.begin(&RunInfo::default()).unwrap();
+    let export = exporter.begin(&StationTables::new(None, None).info("")).unwrap();
     let interval = Uncertainty { std: 0.1, interval_95: [3.7, 4.1], draws: 400 };
     let value = |symbol: &str, value, uncertainty| Value {
         symbol: symbol.into(),
@@ -295,7 +297,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         warnings: Vec::new(),
     }];
     told.part = Some(PartSummary { values: vec![value("CYLt", 6.0, None)], ..PartSummary::default() });
-    commit_all(export.finish(&told, None).unwrap()).unwrap();
+    commit_all(StationTables::new(None, None).finish(export, &told, None).unwrap()).unwrap();
     let (table, entries) = read(&folder.path().join("values.parquet"));
     assert_eq!(entries["runout.title"], "Probelauf µ");
     assert_eq!(table.num_rows(), 3);
@@ -313,7 +315,7 @@ fn values_are_rows_and_null_where_there_is_none() {
     let ends: &UInt32Array = table.column_by_name("band_high_upr").unwrap().as_any().downcast_ref().unwrap();
     assert_eq!((ends.value(0), numbers(&table, "high_95").value(0)), (50, 4.1));
     let schema = table.schema();
-    assert!(schema.fields().iter().all(|field| field.metadata().contains_key("meaning")));
+    assert!(schema.fields().iter().all(|field| field.metadata().contains_key("about")));
 }
 
 /// pyarrow, a reader that shares no code with the writer, adds the harmonics up and gets form and motion.

@@ -17,7 +17,7 @@ use runout_core::{
     },
     points::Points,
     separation::{Quantity, Residual, Separation},
-    stage::{Conclusion, PointModel, Shape},
+    stage::{Form, LinearModel, Outcome},
 };
 
 use crate::{
@@ -43,6 +43,8 @@ struct Missing {
     effect: Effect,
     parts: Vec<Part>,
     rank: usize,
+    /// Their number, where it is lobes.
+    lobes: Option<usize>,
 }
 
 /// The effects, with lobes to an order; `mean_square` is the mean of the squared arms, in mm².
@@ -51,7 +53,7 @@ fn missing(max_lobes: usize, mean_square: f64) -> Vec<Missing> {
         let parameter =
             |(name, unit, tolerance): (&str, &str, f64)| Parameter { name: name.into(), unit: unit.into(), tolerance };
         let parameters = parameters.into_iter().map(parameter).collect();
-        Missing { effect: Effect { id, targets: Vec::new(), parameters }, parts, rank }
+        Missing { effect: Effect { id, targets: Vec::new(), parameters }, parts, rank, lobes: None }
     };
     let mut all = vec![
         one(
@@ -77,12 +79,13 @@ fn missing(max_lobes: usize, mean_square: f64) -> Vec<Missing> {
     ];
     all.extend((2..=max_lobes).map(|order| {
         let n = order as f64;
-        one(
+        let lobes = one(
             format!("lobes-{order}"),
             FORM,
             vec![("cosine", "um", 1.0), ("sine", "um", 1.0)],
             vec![Box::new(move |angle, _| (n * angle).cos()), Box::new(move |angle, _| (n * angle).sin())],
-        )
+        );
+        Missing { lobes: Some(order), ..lobes }
     }));
     all
 }
@@ -150,8 +153,8 @@ fn arm_mm(cylinder: &Cylinder, z_mm: f64) -> f64 {
     if cylinder.tilted { z_mm - cylinder.z_mm } else { 0.0 }
 }
 
-impl PointModel for LeastSquaresCylinder {
-    fn effects(&self) -> Vec<Effect> {
+impl LinearModel for LeastSquaresCylinder {
+    fn candidates(&self) -> Vec<Effect> {
         missing(self.max_lobes(), 0.0).into_iter().map(|missing| missing.effect).collect()
     }
 
@@ -177,7 +180,7 @@ impl PointModel for LeastSquaresCylinder {
         Ok(model.predicting(basis.unseen(self, points)?))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion> {
+    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let basis = Basis::of(self, points)?;
         let raised = correlation_factor(&fit.remainder().residual);
         let circles = basis.circles.iter().zip(&basis.placed);
@@ -206,8 +209,8 @@ impl PointModel for LeastSquaresCylinder {
         if !basis.cylinder.tilted {
             remarks.push("the circles are at one height: tilt, taper and barrel are not observable".into());
         }
-        let shape = Shape { sections, radius_mm: self.nominal_mm() + 1e-3 * offset_um };
-        Ok(Conclusion { shape: Some(shape), table: None, remarks })
+        let form = Form { sections, radius_mm: self.nominal_mm() + 1e-3 * offset_um };
+        Ok(Outcome { form: Some(form), remarks, ..Outcome::default() })
     }
 }
 
@@ -220,8 +223,7 @@ impl LeastSquaresCylinder {
         let (mut estimate, mut variance) = (vec![Complex64::ZERO; orders], vec![0.0; orders]);
         for (effect, values, variances) in fit.effects() {
             let Some(found) = basis.missing.iter().find(|missing| missing.effect.id == effect.id) else { continue };
-            let lobes = effect.id.strip_prefix("lobes-").and_then(|order| order.parse::<usize>().ok());
-            match (lobes, found.rank, values) {
+            match (found.lobes, found.rank, values) {
                 // a cos nα + b sin nα = Re (a − ib) e^{inα}.
                 (Some(order), FORM, [a, b]) => {
                     estimate[order] += Complex64::new(*a, -b);

@@ -8,11 +8,16 @@ use runout_core::{
         error::{Fault, known_names, within},
         registry::{Context, StageConfig},
     },
-    points::{Points, Trace},
+    points::{
+        PointColumn,
+        PointKind::{Number, Trace as TraceId, TraceKind},
+        Points, Trace,
+    },
     rig::Gaps,
     separation::{Quantity, Residual, SectionAt, Separation},
-    stage::{PointModel, PointSeparator, Separator},
+    stage::{Form, Outcome, PointModel, PointSeparator, Separator, points::residual_table},
     surface::Surface,
+    table::TableSpec,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -153,19 +158,30 @@ fn unseen(scan: &Scan, max_order: usize) -> impl Iterator<Item = [f64; 2]> {
     empty_stretches(&scan.angle_rad).into_iter().filter(move |[from, to]| to - from > PI / max_order as f64)
 }
 
+/// The columns that the separator takes.
+pub const COLUMNS: [PointColumn; 5] = [
+    PointColumn::needed("trace", TraceId, "", "name of the trace, whose points follow one another"),
+    PointColumn::needed("kind", TraceKind, "", "what the trace runs along: circle, helix, generatrix"),
+    PointColumn::needed("z_mm", Number, "mm", "height"),
+    PointColumn::needed("angle_deg", Number, "deg", "angle about the measuring machine's axis"),
+    PointColumn::needed("deviation_um", Number, "um", "distance from that axis less the nominal radius"),
+];
+
 impl PointSeparator for LeastSquaresCylinder {
-    fn separate(&self, points: &Points) -> Result<Vec<Separation>> {
-        let circles = self.circles(points)?;
-        let cylinder = cylinder(points, &circles, self.0.radius_mm)?;
-        let mut sections: Vec<Separation> =
-            circles.into_iter().map(|circle| self.section(points, circle, &cylinder)).collect::<Result<_>>()?;
-        let place = |section: &Separation| section.sections.first().map_or(f64::NAN, |at| at.z_mm);
-        sections.sort_by(|a, b| place(a).total_cmp(&place(b)));
-        Ok(sections)
+    fn columns(&self) -> Vec<PointColumn> {
+        COLUMNS.into()
     }
 
-    fn reference_radius_mm(&self, points: &Points) -> Result<f64> {
-        Ok(self.cylinder(points)?.radius_mm())
+    fn tables(&self) -> Vec<TableSpec> {
+        vec![residual_table("um").optional()]
+    }
+
+    fn gives_form(&self) -> bool {
+        true
+    }
+
+    fn separate(&self, points: &Points) -> Result<Outcome> {
+        Ok(Outcome { form: Some(self.form(points)?), ..Outcome::default() })
     }
 
     fn needs_surface(&self) -> bool {
@@ -193,6 +209,20 @@ impl PointSeparator for LeastSquaresCylinder {
 }
 
 impl LeastSquaresCylinder {
+    /// Form of each circle, in the order of z.
+    ///
+    /// # Errors
+    /// When the points do not hold what the method needs.
+    pub fn form(&self, points: &Points) -> Result<Form> {
+        let circles = self.circles(points)?;
+        let cylinder = cylinder(points, &circles, self.0.radius_mm)?;
+        let mut sections: Vec<Separation> =
+            circles.into_iter().map(|circle| self.section(points, circle, &cylinder)).collect::<Result<_>>()?;
+        let place = |section: &Separation| section.sections.first().map_or(f64::NAN, |at| at.z_mm);
+        sections.sort_by(|a, b| place(a).total_cmp(&place(b)));
+        Ok(Form { sections, radius_mm: cylinder.radius_mm() })
+    }
+
     /// The cylinder that is fitted to the traces used, their outliers left out.
     ///
     /// # Errors

@@ -14,14 +14,13 @@ use runout_core::{
         Pipeline, Registry,
         diagnose::diagnose,
         document::Sources,
-        registry::{Context, StageConfig},
         run::{Silent, StationResult, Summary, run},
     },
     points::Points,
-    stage::{PointSeparator, Source},
+    stage::{LinearModel, PointSeparator},
     surface::{Surface, SurfaceBuilder, SurfaceConfig},
 };
-use runout_cylinder::{CylinderTracesConfig, LeastSquaresCylinder, LeastSquaresCylinderConfig};
+use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
 use simulator::{Part, Recording};
 
 /// The measured file, where it is.
@@ -36,12 +35,7 @@ fn measured() -> Option<PathBuf> {
 }
 
 fn load(path: PathBuf) -> Points {
-    let context = Context { folder: &PathBuf::new(), rig: None };
-    let loader = CylinderTracesConfig { path }.check(&context).unwrap();
-    match loader.open(None).unwrap() {
-        Source::Points(points) => points,
-        Source::Turns(_) => unreachable!("the loader gives points"),
-    }
+    runout_points::read(&path, &separator(50, &[]).columns()).unwrap()
 }
 
 fn separator(max_order: usize, hold_out: &[&str]) -> LeastSquaresCylinder {
@@ -59,7 +53,7 @@ fn separator(max_order: usize, hold_out: &[&str]) -> LeastSquaresCylinder {
 
 fn surface(separator: &LeastSquaresCylinder, points: &Points) -> Surface {
     let mut builder = SurfaceBuilder::new(&SurfaceConfig::default());
-    for separation in separator.separate(points).unwrap() {
+    for separation in separator.form(points).unwrap().sections {
         builder.add(&StationResult {
             station: separation.sections[0].id.clone(),
             z_mm: separation.sections[0].z_mm,
@@ -71,11 +65,12 @@ fn surface(separator: &LeastSquaresCylinder, points: &Points) -> Surface {
             truth: None,
         });
     }
-    builder.build(separator.reference_radius_mm(points).unwrap()).unwrap().0
+    builder.build(separator.form(points).unwrap().radius_mm).unwrap().0
 }
 
 fn run_pipeline(text: &str) -> runout_core::Result<Summary> {
     let mut registry = Registry::default();
+    runout_points::register(&mut registry);
     runout_cylinder::register(&mut registry);
     let sources = Sources::from_text("test.toml", text, PathBuf::new(), &[], "rig").unwrap();
     run(&Pipeline::from_sources(&sources, &registry).unwrap(), None, &Silent)
@@ -194,7 +189,7 @@ fn a_circle_held_out_is_predicted_by_its_neighbours() {
 fn the_run_says_what_it_left_out_and_how_well_it_predicts() {
     let Some(path) = measured() else { return };
     let summary = run_pipeline(&format!(
-        "load = {{ plugin = 'cylinder-traces', path = '{}' }}\n\
+        "load = {{ plugin = 'points', path = '{}' }}\n\
          separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056 }}",
         path.display()
     ))
@@ -239,7 +234,7 @@ fn a_made_surface_is_predicted_between_its_circles() {
     assert!((cylinder.x_um - (4.0 + 0.2 * 9.5)).abs() < 1e-3 && (cylinder.y_um + 0.95).abs() < 1e-3, "{cylinder:?}");
     let tilt = cylinder.tilt_urad();
     assert!((tilt[0] - 100.0).abs() < 0.2 && (tilt[1] - 200.0).abs() < 0.2, "{tilt:?}");
-    let sections = separator.separate(&points).unwrap();
+    let sections = separator.form(&points).unwrap().sections;
     let order: Vec<_> = sections.iter().map(|section| section.sections[0].id.clone()).collect();
     assert_eq!(order, ["C1", "C2", "C0", "C3"], "ascending z");
     let lobes = sections[0].coefficients(0).nth(3).unwrap();
@@ -257,7 +252,7 @@ fn points_left_out_are_in_the_coverage() {
     let wild = points.columns[2].values[133..147].iter_mut().zip([40.0, -40.0].into_iter().cycle());
     wild.for_each(|(deviation, off)| *deviation += off);
     for (max_order, gap) in [(15, true), (12, false)] {
-        let separated = separator(max_order, &[]).separate(&points).unwrap();
+        let separated = separator(max_order, &[]).form(&points).unwrap().sections;
         let at = |index: usize| &separated[index].sections[0];
         assert!((at(0).used - 386.0 / 400.0).abs() < 1e-12, "{}", at(0).used);
         assert_eq!(at(0).gaps.is_empty(), !gap);
@@ -293,7 +288,7 @@ fn the_surface_stands_on_the_fitted_radius() {
 
 #[test]
 fn points_that_cannot_tell_a_cylinder_are_refused() {
-    let refused = |points: &Points, hold_out: &[&str]| separator(50, hold_out).separate(points).unwrap_err();
+    let refused = |points: &Points, hold_out: &[&str]| separator(50, hold_out).form(points).unwrap_err();
     let two = made(&[5.0, 9.0]);
     assert!(refused(&two, &["circle"]).to_string().contains("held out"));
     let unknown = refused(&two, &["generatrx"]);
@@ -308,7 +303,7 @@ fn points_that_cannot_tell_a_cylinder_are_refused() {
         outlier_order: 50,
         max_lobes: 8,
     };
-    let lines = config.separator().unwrap().separate(&two).unwrap_err();
+    let lines = config.separator().unwrap().form(&two).unwrap_err();
     assert!(
         lines.to_string().contains("trace G0 of simulated.csv: its points do not determine orders 0 to 2"),
         "{lines}"
@@ -317,6 +312,7 @@ fn points_that_cannot_tell_a_cylinder_are_refused() {
 
 fn diagnosed(text: &str) -> Diagnosis {
     let mut registry = Registry::default();
+    runout_points::register(&mut registry);
     runout_cylinder::register(&mut registry);
     let sources = Sources::from_text("test.toml", text, PathBuf::new(), &[], "rig").unwrap();
     diagnose(&Pipeline::from_sources(&sources, &registry).unwrap(), None, &Silent).unwrap()
@@ -326,7 +322,7 @@ fn diagnosed(text: &str) -> Diagnosis {
 fn the_loop_finds_what_a_radius_lacks() {
     let Some(path) = measured() else { return };
     let found = diagnosed(&format!(
-        "load = {{ plugin = 'cylinder-traces', path = '{}' }}\n\
+        "load = {{ plugin = 'points', path = '{}' }}\n\
          separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056 }}",
         path.display()
     ));
@@ -364,12 +360,11 @@ fn the_final_model_is_exported_with_its_form() {
     // The three lobes of made() grow along z, which the model does not know: it finds their mean.
     let points = made(&[2.0, 7.0, 12.0, 17.0]);
     let separator = separator(15, &[]);
-    let model = separator.model().unwrap();
-    let terms = model.terms(&points).unwrap();
+    let terms = separator.terms(&points).unwrap();
     let closed = closed_loop::diagnose(&terms, &closed_loop::Settings::default()).unwrap();
     let added: Vec<&str> = closed.diagnosis.added.iter().map(|added| added.effect.as_str()).collect();
     assert_eq!(added, ["part-eccentricity", "axis-tilt", "lobes-3"]);
-    let shape = model.conclude(&points, &closed.after).unwrap().shape.unwrap();
+    let shape = separator.conclude(&points, &closed.after).unwrap().form.unwrap();
     let order: Vec<f64> = shape.sections.iter().map(|section| section.sections[0].z_mm).collect();
     // Along the tilted axis, heights differ by its slope times the axis's offset.
     assert!(order.iter().zip([2.0, 7.0, 12.0, 17.0]).all(|(z, truth)| (z - truth).abs() < 1e-5), "{order:?}");

@@ -15,7 +15,6 @@ use runout_core::{
         run::{Silent, Summary, run},
     },
     points::Points,
-    stage::PointSeparator,
 };
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
 use simulator::{Part, Recording, around};
@@ -34,11 +33,12 @@ fn pipeline(points: &Points, separate: &str) -> (Pipeline, tempfile::NamedTempFi
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), csv(points)).unwrap();
     let text = format!(
-        "load = {{ plugin = 'cylinder-traces', path = '{}' }}\n\
+        "load = {{ plugin = 'points', path = '{}' }}\n\
          separate = {{ plugin = 'least-squares-cylinder', {separate} }}",
         file.path().display()
     );
     let mut registry = Registry::default();
+    runout_points::register(&mut registry);
     runout_cylinder::register(&mut registry);
     let sources = Sources::from_text("test.toml", &text, PathBuf::new(), &[], "rig").unwrap();
     (Pipeline::from_sources(&sources, &registry).unwrap(), file)
@@ -149,7 +149,7 @@ fn a_tilted_cylinder_far_off_centre_is_evaluated_about_its_axis() {
     // either end: its share of 2 % moves the centre of the least-squares cylinder there, by 0.042 µm over 7 mm, 6 µrad.
     let moved = (tilt[0] + 1e3).hypot(tilt[1] - 2e3);
     assert!((4.0..8.0).contains(&moved), "{tilt:?}");
-    for section in separator.separate(&points).unwrap() {
+    for section in separator.form(&points).unwrap().sections {
         let orders: Vec<_> = section.coefficients(0).collect();
         let found = |order: usize| (orders[order].norm(), orders[order].arg());
         // 1 nm: the taper over the height that a tilted circle goes through, 50 µm · 0.3 µm/mm, has 1/rev and 15 nm; what of
@@ -171,7 +171,7 @@ fn a_helix_is_recognised_and_cut_into_its_turns() {
     };
     for kind in ["helix", "circle"] {
         let points = Recording::of(part(), 20.0, 0.01, 4).trace("H", kind, turns(8.3)).points();
-        let sections = separator(20.0, 30).separate(&points).unwrap();
+        let sections = separator(20.0, 30).form(&points).unwrap().sections;
         let ids: Vec<&str> = sections.iter().map(|section| section.sections[0].id.as_str()).collect();
         assert_eq!(ids, ["H.1", "H.2", "H.3", "H.4", "H.5", "H.6", "H.7", "H.8"]);
         assert!(sections[0].warnings[0].contains("helix of 2.0000 mm a turn"), "{:?}", sections[0].warnings);
@@ -221,7 +221,7 @@ fn an_arc_without_points_limits_the_orders_and_says_so() {
     let limited = station.warnings.iter().find(|warning| warning.contains("are not observable"));
     println!("{limited:?}");
     assert!(limited.unwrap().contains("there is no point between 57.") && limited.unwrap().contains("and 115."));
-    let section = separator(12.0, 50).separate(&points).unwrap().remove(0);
+    let section = separator(12.0, 50).form(&points).unwrap().sections.remove(0);
     let highest = section.observable.iter().filter(|known| **known).count() - 1;
     assert!((3..20).contains(&highest), "{highest}");
     let mut orders = section.coefficients(0);
@@ -240,7 +240,7 @@ fn the_highest_order_of_the_form_steers_neither_outliers_nor_candidates() {
     let part = || Part { radius_um: 12_000.0, through_um: [70.0, 0.0], slope: [0.0; 2], form_um: &rough };
     let points = Recording::of(part(), 12.0, 0.05, 7).circle("C1", 5.0, 900).circle("C2", 9.0, 900).points();
     let left_out = |max_order: usize| -> Vec<f64> {
-        let sections = separator(12.0, max_order).separate(&points).unwrap();
+        let sections = separator(12.0, max_order).form(&points).unwrap().sections;
         sections.iter().map(|section| (900.0 * (1.0 - section.sections[0].used)).round()).collect()
     };
     assert_eq!(left_out(5), left_out(80));

@@ -6,14 +6,10 @@ use runout_core::{
     Complex64, Result,
     model::{Fit, linear_terms::LinearFit},
     points::Points,
-    table::{Table, TableColumn},
+    table::{ColumnSpec, TableRows, TableSpec, counts, numbers, numbers_or_null},
 };
 
-use crate::{
-    components::Component,
-    model::{Samples, TABLE},
-    signal::Signal,
-};
+use crate::{components::Component, model::Samples, signal::Signal};
 
 /// The sum P of two unknown components of one order is known, their difference Q is not. Where both are of one unknown size,
 /// the chance of |Q| > k·|P| is 1/(1 + k²): two standard deviations hold 95 % where E|Q|² is this many times |P|².
@@ -129,48 +125,47 @@ impl Correction {
         remarks
     }
 
-    /// One row a sample, in the order of the file.
-    pub fn table(&self, points: &Points, samples: &Samples) -> Table {
+    /// Rows of [`angle_table`], in the order of the file.
+    ///
+    /// # Errors
+    /// Never in practice: the columns are of one length.
+    pub fn rows(&self, points: &Points, samples: &Samples) -> Result<TableRows> {
         let corrected = samples.phase_rad.iter().zip(&samples.radius).map(|(phase, radius)| {
             let angle = self.signal.angle_rad(*phase, *radius);
             // The same turn as the phase has.
             let ahead = (angle - phase + PI).rem_euclid(2.0 * PI) - PI;
             (phase + ahead).to_degrees()
         });
-        let corrected: Vec<f64> = corrected.collect();
-        let phase: Vec<f64> = samples.phase_rad.iter().map(|phase| phase.to_degrees()).collect();
-        let count = phase.len();
-        let column = |name: &str, unit: &str, about: &str, values: Vec<f64>| TableColumn {
-            name: name.into(),
-            unit: unit.into(),
-            about: about.into(),
-            values,
-        };
-        let first = match points.column("time_s") {
-            Ok(time) => column("time_s", "s", "time of the reading", time.to_vec()),
-            Err(_) => column(
-                "index",
-                "",
-                "row of the reading in the file, from 0",
-                (0..count).map(|row| row as f64).collect(),
-            ),
-        };
-        Table {
-            name: TABLE.into(),
-            about: "Angle of a quadrature signal within its period. corrected_deg is phase_deg without the errors that the \
-                diagnosis decided; std_deg includes what it did not decide and the noise of the reading."
-                .into(),
-            columns: vec![
-                first,
-                column("phase_deg", "deg", "angle of the pair (cosine, sine) as read", phase),
-                column("corrected_deg", "deg", "angle of the pair without the errors that were decided", corrected),
-                column(
-                    "std_deg",
-                    "deg",
-                    "standard uncertainty of corrected_deg, but for a constant",
-                    vec![self.std_rad().to_degrees(); count],
-                ),
-            ],
-        }
+        let count = samples.phase_rad.len();
+        let time = points.column("time_s").ok();
+        let table = angle_table();
+        let rows = table.rows(vec![
+            counts(0..count),
+            numbers_or_null((0..count).map(|row| time.map(|time| time[row]))),
+            numbers(samples.phase_rad.iter().map(|phase| phase.to_degrees())),
+            numbers(corrected),
+            numbers(std::iter::repeat_n(self.std_rad().to_degrees(), count)),
+        ])?;
+        Ok(TableRows { table: table.name, rows })
     }
+}
+
+/// What the numbers of the angle are.
+pub const ANGLE: &str = "Angle of a quadrature signal within its period. corrected_deg is phase_deg without the errors that the \
+    diagnosis decided; std_deg includes what it did not decide and the noise of the reading.";
+
+/// The table of angles, one row a sample.
+pub fn angle_table() -> TableSpec {
+    TableSpec::new(
+        "angle",
+        ANGLE,
+        vec![
+            ColumnSpec::count("index", "", "row of the reading in the file, from 0"),
+            ColumnSpec::number("time_s", "s", "time of the reading; null where the file has none").or_null(),
+            ColumnSpec::number("phase_deg", "deg", "angle of the pair (cosine, sine) as read"),
+            ColumnSpec::number("corrected_deg", "deg", "angle of the pair without the errors that were decided"),
+            ColumnSpec::number("std_deg", "deg", "standard uncertainty of corrected_deg, but for a constant")
+                .repeating(),
+        ],
+    )
 }

@@ -9,21 +9,25 @@ use std::f64::consts::TAU;
 use runout_core::{
     Complex64, Error, Result,
     model::{
-        Effect,
+        Effect, Fit,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     pipeline::{
         error::{Fault, within},
         registry::{Context, StageConfig},
     },
-    points::Points,
-    stage::{Conclusion, PointModel, Separator},
+    points::{PointColumn, PointKind::Number, Points},
+    stage::{
+        LinearModel, Outcome, PointModel, PointSeparator, Separator,
+        points::{residual_table, separate_declared, value},
+    },
+    table::TableSpec,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    angle::Correction,
+    angle::{ANGLE, Correction, angle_table},
     components::{Component, UNIT},
     signal::{Signal, least_squares},
 };
@@ -58,10 +62,10 @@ impl StageConfig for QuadratureConfig {
 
     const NAME: &'static str = "quadrature";
     const ABOUT: &'static str =
-        "offset, gain ratio, angle and harmonics of a quadrature signal, and its angle, for `diagnose`";
+        "offset, gain ratio, angle and harmonics of a quadrature signal, and its corrected angle";
 
     fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        Ok(Separator::Model(Box::new(self.model()?)))
+        Ok(Separator::Points(Box::new(self.model()?)))
     }
 }
 
@@ -81,8 +85,17 @@ impl QuadratureConfig {
 #[derive(Debug, Clone)]
 pub struct Quadrature(QuadratureConfig);
 
-/// The name of the table of angles.
-pub const TABLE: &str = "angle";
+const COLUMNS: [PointColumn; 4] = [
+    PointColumn::needed("phase_deg", Number, "deg", "angle of the pair (cosine, sine)"),
+    PointColumn::needed("radius_counts", Number, "counts", "length of the pair"),
+    PointColumn::optional("time_s", Number, "s", "time"),
+    PointColumn::optional(
+        "reference_deg",
+        Number,
+        "deg",
+        "true angle in degrees of the signal's own period, from any zero",
+    ),
+];
 /// A reference that does not follow the phase within this, in rad, is none of it.
 const FAR_OFF: f64 = 0.5;
 const TOLD_APART: &str = "a reference angle: the column reference_deg; or signals that are known to be sines: \
@@ -205,13 +218,27 @@ impl Samples {
     }
 }
 
-impl PointModel for Quadrature {
-    fn effects(&self) -> Vec<Effect> {
-        Component::all(self.0.max_order).into_iter().map(|component| component.effect(1.0)).collect()
+impl PointSeparator for Quadrature {
+    fn columns(&self) -> Vec<PointColumn> {
+        COLUMNS.into()
     }
 
-    fn table(&self) -> Option<&'static str> {
-        Some(TABLE)
+    fn tables(&self) -> Vec<TableSpec> {
+        vec![angle_table(), residual_table(UNIT)]
+    }
+
+    fn separate(&self, points: &Points) -> Result<Outcome> {
+        separate_declared(self, points)
+    }
+
+    fn model(&self) -> Option<&dyn PointModel> {
+        Some(self)
+    }
+}
+
+impl LinearModel for Quadrature {
+    fn candidates(&self) -> Vec<Effect> {
+        Component::all(self.0.max_order).into_iter().map(|component| component.effect(1.0)).collect()
     }
 
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
@@ -252,7 +279,7 @@ impl PointModel for Quadrature {
         Ok(model.told_apart_by(TOLD_APART))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion> {
+    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let samples = Samples::of(points)?;
         let count = samples.phase_rad.len();
         let blocks = format!(
@@ -266,7 +293,17 @@ impl PointModel for Quadrature {
         let correction = Correction::of(&samples, self.0.max_order, fit)?;
         let mut remarks = vec![blocks, evidence.to_owned()];
         remarks.extend(correction.remarks());
-        Ok(Conclusion { shape: None, table: Some(correction.table(points, &samples)), remarks })
+        let values = fit
+            .values()
+            .into_iter()
+            .map(|found| value(&found.value, found.number, found.std, &found.unit, "declared part of the signal"));
+        Ok(Outcome {
+            convention: ANGLE.into(),
+            tables: vec![correction.rows(points, &samples)?],
+            values: values.collect(),
+            form: None,
+            remarks,
+        })
     }
 }
 

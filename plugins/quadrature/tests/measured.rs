@@ -16,13 +16,14 @@ use runout_core::{
 
 fn pipeline(text: &str) -> Pipeline {
     let mut registry = Registry::default();
+    runout_points::register(&mut registry);
     runout_quadrature::register(&mut registry);
     let sources = Sources::from_text("test.toml", text, PathBuf::new(), &[], "rig").unwrap();
     Pipeline::from_sources(&sources, &registry).unwrap()
 }
 
 fn text(path: &std::path::Path) -> String {
-    format!("load = {{ plugin = 'quadrature-samples', path = '{}' }}\nseparate.plugin = 'quadrature'\n", path.display())
+    format!("load = {{ plugin = 'points', path = '{}' }}\nseparate.plugin = 'quadrature'\n", path.display())
 }
 
 fn diagnosed(path: &std::path::Path) -> Diagnosis {
@@ -121,6 +122,7 @@ fn the_diagnosis_is_written_and_a_run_says_what_it_cannot() {
 #[test]
 fn what_a_model_cannot_take_is_refused_before_it_runs() {
     let mut registry = Registry::default();
+    runout_points::register(&mut registry);
     runout_quadrature::register(&mut registry);
     let refused = |more: &str| {
         let text = format!("{}{more}", text(std::path::Path::new("signal.csv")));

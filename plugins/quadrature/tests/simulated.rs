@@ -6,23 +6,17 @@
 use std::{
     f64::consts::{PI, TAU},
     fmt::Write,
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
+use arrow_array::{Array, cast::AsArray, types::Float64Type};
 use runout_core::{
     model::{closed_loop, diagnosis::Diagnosis},
-    pipeline::{
-        Pipeline, Registry,
-        diagnose::diagnose,
-        document::Sources,
-        registry::{Context, StageConfig},
-        run::Silent,
-    },
+    pipeline::{Pipeline, Registry, diagnose::diagnose, document::Sources, run::Silent},
     points::Points,
-    stage::{PointModel, Source},
-    table::Table,
+    stage::{LinearModel, PointSeparator},
 };
-use runout_quadrature::{QuadratureConfig, QuadratureSamplesConfig};
+use runout_quadrature::{Quadrature, QuadratureConfig};
 
 struct Random(u64);
 
@@ -95,31 +89,32 @@ fn error_rms(angles: &[f64], truth: &[f64]) -> f64 {
     (off.iter().map(|off| (off - mean).powi(2)).sum::<f64>() / off.len() as f64).sqrt()
 }
 
-fn load(path: PathBuf) -> Points {
-    let loader = QuadratureSamplesConfig { path }.check(&Context { folder: &PathBuf::new(), rig: None }).unwrap();
-    match loader.open(None).unwrap() {
-        Source::Points(points) => points,
-        Source::Turns(_) => unreachable!("the loader gives points"),
-    }
+fn model(blocks: usize, max_order: usize) -> Quadrature {
+    QuadratureConfig { blocks, max_order }.model().unwrap()
+}
+
+fn load(path: &Path) -> Points {
+    runout_points::read(path, &model(50, 6).columns()).unwrap()
 }
 
 /// The diagnosis, and root mean squares of the angle in rad: error before, error after, stated.
 fn corrected(recording: &Recording, effects: Option<&[&str]>) -> (Diagnosis, [f64; 3]) {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), &recording.csv).unwrap();
-    let points = load(file.path().to_path_buf());
-    let model = QuadratureConfig { blocks: 50, max_order: 6 }.model().unwrap();
+    let points = load(file.path());
+    let model = model(50, 6);
     let effects = effects.map(|ids| ids.iter().map(|id| (*id).to_owned()).collect::<Vec<_>>());
     let terms = model.terms(&points).unwrap().considering(effects.as_deref());
     let settings = closed_loop::Settings { effects, max_added: 20, ..closed_loop::Settings::default() };
     let closed = closed_loop::diagnose(&terms, &settings).unwrap();
     let conclusion = model.conclude(&points, &closed.after).unwrap();
-    let table: Table = conclusion.table.unwrap();
+    let table = &conclusion.tables[0];
+    assert_eq!(table.table, "angle");
     let column = |name: &str| {
-        let column = table.columns.iter().find(|column| column.name == name).unwrap();
-        column.values.iter().map(|degrees| degrees.to_radians()).collect::<Vec<f64>>()
+        let column = table.rows.column_by_name(name).unwrap().as_primitive::<Float64Type>();
+        column.values().iter().map(|degrees| degrees.to_radians()).collect::<Vec<f64>>()
     };
-    assert_eq!(table.columns[0].name, "time_s");
+    assert_eq!(table.rows.column_by_name("time_s").unwrap().null_count(), 0);
     let stated = column("std_deg").iter().map(|std| std * std).sum::<f64>() / recording.true_rad.len() as f64;
     let errors = [&recording.phase_rad, &column("corrected_deg")].map(|angles| error_rms(angles, &recording.true_rad));
     (closed.diagnosis, [errors[0], errors[1], stated.sqrt()])
@@ -249,22 +244,21 @@ fn a_reference_that_does_not_follow_is_refused() {
     let rows = (0..400).map(|row| format!("{row},500,{}\n", -row));
     let text: String = std::iter::once("phase_deg,radius_counts,reference_deg\n".to_owned()).chain(rows).collect();
     std::fs::write(file.path(), text).unwrap();
-    let model = QuadratureConfig { blocks: 10, max_order: 4 }.model().unwrap();
-    let error = model.terms(&load(file.path().to_path_buf())).unwrap_err();
+    let model = model(10, 4);
+    let error = model.terms(&load(file.path())).unwrap_err();
     assert!(error.to_string().contains("does not follow phase_deg"), "{error}");
 }
 
 #[test]
 fn the_pipeline_takes_exporters_of_tables_only() {
     let mut registry = Registry::default();
+    runout_points::register(&mut registry);
     runout_quadrature::register(&mut registry);
     let recording = recorded(&perfect(), 0.5, false, &mut Random(5));
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), &recording.csv).unwrap();
-    let text = format!(
-        "load = {{ plugin = 'quadrature-samples', path = '{}' }}\nseparate.plugin = 'quadrature'\n",
-        file.path().display()
-    );
+    let text =
+        format!("load = {{ plugin = 'points', path = '{}' }}\nseparate.plugin = 'quadrature'\n", file.path().display());
     let sources = Sources::from_text("test.toml", &text, PathBuf::new(), &[], "rig").unwrap();
     let found = diagnose(&Pipeline::from_sources(&sources, &registry).unwrap(), None, &Silent).unwrap();
     assert!(found.added.is_empty(), "{:?}", found.added);

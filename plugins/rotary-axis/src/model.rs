@@ -17,8 +17,12 @@ use runout_core::{
         error::{Fault, within},
         registry::{Context, StageConfig},
     },
-    points::Points,
-    stage::{Conclusion, PointModel, Separator},
+    points::{PointColumn, PointKind::Number, Points},
+    stage::{
+        LinearModel, Outcome, PointModel, PointSeparator, Separator,
+        points::{residual_table, separate_declared, value},
+    },
+    table::TableSpec,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -50,10 +54,10 @@ impl StageConfig for RTestConfig {
     type Stage = Separator;
 
     const NAME: &'static str = "r-test";
-    const ABOUT: &'static str = "installation and harmonics of a C axis by an R-test, for `diagnose`";
+    const ABOUT: &'static str = "installation and harmonics of a C axis by an R-test";
 
     fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        Ok(Separator::Model(Box::new(self.model()?)))
+        Ok(Separator::Points(Box::new(self.model()?)))
     }
 }
 
@@ -95,8 +99,34 @@ impl RTest {
     }
 }
 
-impl PointModel for RTest {
-    fn effects(&self) -> Vec<Effect> {
+const COLUMNS: [PointColumn; 5] = [
+    PointColumn::needed("a_deg", Number, "deg", "command of the A axis"),
+    PointColumn::needed("c_deg", Number, "deg", "command of the C axis"),
+    PointColumn::needed("dx_mm", Number, "mm", "actual less nominal place of the ball along x"),
+    PointColumn::needed("dy_mm", Number, "mm", "actual less nominal place of the ball along y"),
+    PointColumn::needed("dz_mm", Number, "mm", "actual less nominal place of the ball along z"),
+];
+
+impl PointSeparator for RTest {
+    fn columns(&self) -> Vec<PointColumn> {
+        COLUMNS.into()
+    }
+
+    fn tables(&self) -> Vec<TableSpec> {
+        vec![residual_table("um")]
+    }
+
+    fn separate(&self, points: &Points) -> Result<Outcome> {
+        separate_declared(self, points)
+    }
+
+    fn model(&self) -> Option<&dyn PointModel> {
+        Some(self)
+    }
+}
+
+impl LinearModel for RTest {
+    fn candidates(&self) -> Vec<Effect> {
         let harmonic = |order: usize| {
             let names = COORDINATES.iter().flat_map(|(name, _)| [format!("{name}_cosine"), format!("{name}_sine")]);
             let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
@@ -127,7 +157,7 @@ impl PointModel for RTest {
             };
             [one("level", 0, f64::cos), one("cos C", 1, f64::cos), one("sin C", 1, f64::sin)]
         });
-        let terms = (2..).zip(self.effects()).map(|(order, effect)| {
+        let terms = (2..).zip(self.candidates()).map(|(order, effect)| {
             let columns =
                 (0..3).flat_map(|coordinate| [wave(coordinate, order, f64::cos), wave(coordinate, order, f64::sin)]);
             Term { effect, columns: columns.collect(), rank: 0 }
@@ -146,7 +176,7 @@ impl PointModel for RTest {
         Ok(model.ending_at(format!("harmonic-{highest}"), format!("`separate.max_order` is {highest}")))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Conclusion> {
+    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let used = self.used(points)?;
         let Remainder { rms, dof, held_out_rms, .. } = fit.remainder();
         let all = points.column("a_deg")?.len();
@@ -169,6 +199,10 @@ impl PointModel for RTest {
                 held_out_rms / self.0.std_um
             ));
         }
-        Ok(Conclusion { shape: None, table: None, remarks })
+        let about = "level or first harmonic of C of the ball's deviation: installation of the axis and of the ball";
+        let values =
+            fit.values().into_iter().map(|found| value(&found.value, found.number, found.std, &found.unit, about));
+        let convention = "actual less nominal place of the ball, in machine coordinates".into();
+        Ok(Outcome { convention, values: values.collect(), remarks, ..Outcome::default() })
     }
 }

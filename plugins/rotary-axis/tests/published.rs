@@ -14,9 +14,10 @@ use runout_core::{
 
 fn diagnosed(path: &Path, keys: &str) -> runout_core::Result<Diagnosis> {
     let mut registry = Registry::default();
+    runout_points::register(&mut registry);
     runout_rotary_axis::register(&mut registry);
     let text = format!(
-        "load = {{ plugin = 'r-test-points', path = '{}' }}\nseparate = {{ plugin = 'r-test', {keys} }}",
+        "load = {{ plugin = 'points', path = '{}' }}\nseparate = {{ plugin = 'r-test', {keys} }}",
         path.display()
     );
     let sources = Sources::from_text("test.toml", &text, PathBuf::new(), &[], "rig").unwrap();

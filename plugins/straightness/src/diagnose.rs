@@ -6,11 +6,10 @@ use runout_core::{
     model::{
         Effect, Fit, Model, Setting,
         closed_loop::{self, Closed, Settings},
-        diagnosis::Moved,
+        diagnosis::{Diagnosis, Moved},
     },
     points::Points,
-    stage::{TraceDiagnosis, TraceModel},
-    straightness::Straightness,
+    stage::{PointDiagnosis, PointModel},
 };
 
 use crate::{
@@ -21,7 +20,8 @@ use crate::{
     model::{Data, TracesFit, TracesModel},
     moves::{Results, corrected, cosine, rms},
     positions::{common_range, positions},
-    separate::Traces,
+    separate::{Traces, finite},
+    straightness::Straightness,
     trace::AxialTrace,
 };
 
@@ -36,16 +36,31 @@ const SHARED: f64 = 0.5;
 /// Effects that are looked for when a run only asks whether traces are shifted.
 const REGISTRATION: &str = "axial-registration";
 
-impl TraceModel for AxialReversal {
+impl PointModel for AxialReversal {
     fn effects(&self) -> Vec<Effect> {
         KINDS.iter().map(|kind| kind.at(None)).collect()
+    }
+
+    fn points_name_targets(&self) -> bool {
+        true
     }
 
     fn effects_of(&self, points: &Points) -> Result<Vec<Effect>> {
         Ok(self.candidates(&self.traces(points)?).into_iter().map(|one| one.effect).collect())
     }
 
-    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<TraceDiagnosis> {
+    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
+        let (diagnosis, after) = self.diagnosed(points, settings)?;
+        Ok(PointDiagnosis { diagnosis, after: after.outcome()? })
+    }
+}
+
+impl AxialReversal {
+    /// Runs the loop; gives the straightness with the effects added.
+    ///
+    /// # Errors
+    /// When the traces do not hold what the model needs.
+    pub fn diagnosed(&self, points: &Points, settings: &Settings) -> Result<(Diagnosis, Straightness)> {
         let traces = self.traces(points)?;
         let model = self.traces_model(points, &traces, self.0.slide_cutoff_mm, &settings.known)?;
         let Closed { mut diagnosis, after: fit, .. } = closed_loop::diagnose(&model, settings)?;
@@ -67,11 +82,10 @@ impl TraceModel for AxialReversal {
         diagnosis.moved = moved(&before, &after);
         // The remarks are part of the diagnosis now.
         after.warnings.clear();
-        Ok(TraceDiagnosis { diagnosis, after })
+        finite(points, &after)?;
+        Ok((diagnosis, after))
     }
-}
 
-impl AxialReversal {
     fn candidates(&self, traces: &Traces) -> Vec<crate::effects::Candidate> {
         let named = traces.all.iter().zip(&traces.setups).map(|(trace, setup)| (trace.id.clone(), *setup));
         candidates([&self.0.initial, &self.0.reversed], &named.collect::<Vec<_>>())
@@ -555,7 +569,7 @@ mod tests {
             Column { name: "z_mm".into(), values: z_mm },
             Column { name: "reading_um".into(), values: reading_um },
         ];
-        Points { input: "made.csv".into(), columns, traces }
+        Points { input: "made.csv".into(), columns, labels: Vec::new(), traces }
     }
 
     fn model(slide_cutoff_mm: Option<f64>) -> TracesModel {

@@ -1,19 +1,19 @@
 //! Reversal along an axis: the straightness of a part and of the slide that carries the probe along it.
 //!
 //! A probe rides on a slide along a generatrix of a cylinder, or along a straightedge. In the second setup the part is
-//! turned by 180° about its axis and the probe looks at the same line of it from the opposite side. The loader
-//! `axial-traces` reads traces of both setups; the separator `axial-reversal` tells part and slide apart.
+//! turned by 180° about its axis and the probe looks at the same line of it from the opposite side. The separator `axial-reversal`
+//! takes traces of both setups and separates part and slide.
 
 mod diagnose;
 mod effects;
 mod grid;
 mod interpolate;
-mod load;
 mod model;
 mod moves;
 mod positions;
 mod separate;
 mod spline;
+mod straightness;
 mod trace;
 
 use runout_core::pipeline::{
@@ -21,12 +21,11 @@ use runout_core::pipeline::{
     registry::{Plugin, Registry},
 };
 
-pub use load::AxialTracesConfig;
 pub use separate::{AxialReversal, AxialReversalConfig};
+pub use straightness::Straightness;
 
-/// Adds the loader `axial-traces`, the separator `axial-reversal` and what a reversal may lack.
+/// Adds the separator `axial-reversal` and what a reversal may lack.
 pub fn register(registry: &mut Registry) {
-    registry.loaders.add(Plugin::of::<AxialTracesConfig>());
     registry.separators.add(Plugin::of::<AxialReversalConfig>());
     for kind in effects::KINDS {
         registry.effects.add(EffectEntry::new(kind.id(), kind.about(), kind.parameters(), kind));

@@ -6,9 +6,13 @@ use runout_core::{
         error::{Fault, known_names},
         registry::{Context, StageConfig},
     },
-    points::Points,
-    stage::{Separator, TraceModel, TraceSeparator},
-    straightness::Straightness,
+    points::{
+        PointColumn,
+        PointKind::{Flag, Number, Trace, TraceKind},
+        Points,
+    },
+    stage::{Outcome, PointModel, PointSeparator, Separator},
+    table::TableSpec,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -17,6 +21,7 @@ use crate::{
     grid::{Split, smooth},
     moves::{grid, rows},
     positions::{coarsest_mm, common_range, positions},
+    straightness::{self, LIMIT, Straightness},
     trace::AxialTrace,
 };
 
@@ -80,7 +85,7 @@ impl StageConfig for AxialReversalConfig {
     const ABOUT: &'static str = "straightness of part and slide along z, part turned by 180° and probe reversed";
 
     fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        Ok(Separator::Traces(Box::new(self.separator()?)))
+        Ok(Separator::Points(Box::new(self.separator()?)))
     }
 }
 
@@ -139,17 +144,68 @@ pub(crate) struct Traces {
     pub setups: Vec<usize>,
 }
 
-impl TraceSeparator for AxialReversal {
-    fn separate(&self, points: &Points) -> Result<Straightness> {
+const COLUMNS: [PointColumn; 6] = [
+    PointColumn::needed(
+        "trace",
+        Trace,
+        "",
+        "name of the trace, whose points follow one another, with z rising or falling",
+    ),
+    PointColumn::needed("setup", TraceKind, "", "setup that the trace was measured in"),
+    PointColumn::needed("z_mm", Number, "mm", "place along the axis"),
+    PointColumn::needed("reading_um", Number, "um", "reading, which grows when the surface comes nearer to the probe"),
+    PointColumn::optional(
+        "time_s",
+        Number,
+        "s",
+        "time, for drifts along a trace; without it a trace runs at constant speed in the order of its rows",
+    ),
+    PointColumn::optional("flag", Flag, "", "1 leaves the point out, 0 uses it"),
+];
+
+impl PointSeparator for AxialReversal {
+    fn columns(&self) -> Vec<PointColumn> {
+        COLUMNS.into()
+    }
+
+    fn tables(&self) -> Vec<TableSpec> {
+        vec![straightness::table()]
+    }
+
+    fn separate(&self, points: &Points) -> Result<Outcome> {
+        self.separated(points)?.outcome()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        vec![LIMIT.to_owned()]
+    }
+
+    fn model(&self) -> Option<&dyn PointModel> {
+        Some(self)
+    }
+}
+
+impl AxialReversal {
+    /// Straightness of part and slide.
+    ///
+    /// # Errors
+    /// When the traces do not hold what the method needs.
+    pub fn separated(&self, points: &Points) -> Result<Straightness> {
         let traces = self.traces(points)?;
         let mut result = self.straightness(points, &traces, 1.0, None)?.0;
         result.warnings.extend(self.contradictions(points, &traces)?);
+        finite(points, &result)?;
         Ok(result)
     }
+}
 
-    fn model(&self) -> Option<&dyn TraceModel> {
-        Some(self)
+/// Refuses what is not a number.
+pub(crate) fn finite(points: &Points, result: &Straightness) -> Result<()> {
+    if result.is_finite() {
+        return Ok(());
     }
+    let problem = "the straightness comes out as no number";
+    Err(Error::new("separate", points.input.display().to_string(), problem).help("look for absurd readings"))
 }
 
 impl AxialReversal {

@@ -5,25 +5,27 @@
 mod common;
 
 use common::{Campaign, Shot, ground, rms};
-use runout_core::{
-    model::{closed_loop::Settings, diagnosis::Diagnosis},
-    stage::{TraceDiagnosis, TraceSeparator},
-    straightness::Straightness,
-};
-use runout_straightness::{AxialReversal, AxialReversalConfig};
+use runout_core::model::{closed_loop::Settings, diagnosis::Diagnosis};
+use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 
 fn separator(slide_cutoff_mm: Option<f64>) -> AxialReversal {
     AxialReversalConfig { slide_cutoff_mm, ..AxialReversalConfig::default() }.separator().unwrap()
 }
 
-fn diagnosed(campaign: &Campaign, slide_cutoff_mm: Option<f64>) -> TraceDiagnosis {
+struct Diagnosed {
+    diagnosis: Diagnosis,
+    after: Straightness,
+}
+
+fn diagnosed(campaign: &Campaign, slide_cutoff_mm: Option<f64>) -> Diagnosed {
     let separator = separator(slide_cutoff_mm);
     let settings = Settings { max_added: 40, ..Settings::default() };
-    separator.model().unwrap().diagnose(&campaign.points(), &settings).unwrap()
+    let (diagnosis, after) = separator.diagnosed(&campaign.points(), &settings).unwrap();
+    Diagnosed { diagnosis, after }
 }
 
 fn run(campaign: &Campaign, slide_cutoff_mm: Option<f64>) -> Straightness {
-    separator(slide_cutoff_mm).separate(&campaign.points()).unwrap()
+    separator(slide_cutoff_mm).separated(&campaign.points()).unwrap()
 }
 
 fn errors(campaign: &Campaign, found: &Straightness) -> [f64; 2] {
@@ -181,11 +183,11 @@ fn other_effects_of_one_trace_are_named() {
 fn a_linear_drift_is_a_slope() {
     let campaign = ground(9, [2, 2]);
     let mut points = campaign.points();
-    let plain = separator(None).separate(&points).unwrap();
+    let plain = separator(None).separated(&points).unwrap();
     for (row, reading) in points.columns[1].values.iter_mut().enumerate() {
         *reading += 0.004 * row as f64;
     }
-    let drifting = separator(None).separate(&points).unwrap();
+    let drifting = separator(None).separated(&points).unwrap();
     let differ = plain.slide_um.iter().zip(&drifting.slide_um).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     // 1e-9 µm: rounding of readings near 30 µm, interpolated.
     assert!(differ < 1e-9, "{differ}");
@@ -208,7 +210,7 @@ fn flagged_points_are_left_out() {
     assert!(after.iter().zip(before).all(|(after, before)| *after < 1.2 * before), "{before:?} {after:?}");
     let mut points = campaign.points();
     points.columns.pop();
-    let chipped = separator(None).separate(&points).unwrap();
+    let chipped = separator(None).separated(&points).unwrap();
     assert!(errors(&campaign, &chipped)[1] > 5.0 * after[1], "without the flag the chip is in the result");
     // The loop does not see it either.
     assert!(diagnosed(&campaign, None).diagnosis.added.is_empty());

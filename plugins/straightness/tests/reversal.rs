@@ -7,12 +7,8 @@ use std::f64::consts::TAU;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use runout_core::{
-    points::{Column, Points, Trace},
-    stage::TraceSeparator,
-    straightness::Straightness,
-};
-use runout_straightness::{AxialReversal, AxialReversalConfig};
+use runout_core::points::{Column, Points, Trace};
+use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 
 fn config(step_mm: Option<f64>) -> AxialReversalConfig {
     AxialReversalConfig { step_mm, ..AxialReversalConfig::default() }
@@ -41,6 +37,7 @@ impl File {
         });
         Points {
             input: "made.csv".into(),
+            labels: Vec::new(),
             traces: traces.collect(),
             columns: vec![
                 column("z_mm", rows().map(|row| row.0).collect()),
@@ -50,11 +47,11 @@ impl File {
     }
 
     fn separate(&self, step_mm: Option<f64>) -> Straightness {
-        separator(step_mm).separate(&self.points()).unwrap()
+        separator(step_mm).separated(&self.points()).unwrap()
     }
 
     fn refused(&self, step_mm: Option<f64>) -> (String, String) {
-        let error = separator(step_mm).separate(&self.points()).unwrap_err();
+        let error = separator(step_mm).separated(&self.points()).unwrap_err();
         (error.to_string(), error.advice().unwrap_or_default().to_owned())
     }
 }
@@ -287,7 +284,7 @@ fn traces_that_cannot_be_separated_are_refused() {
     assert!(beside(even(0.5, 1.0, 40)).refused(Some(30.0)).1.contains("smaller `step_mm`"));
     let mut points = beside(z.clone()).points();
     points.columns[1].name = "deviation_um".into();
-    assert!(separator(None).separate(&points).unwrap_err().to_string().contains("reading_um"));
+    assert!(separator(None).separated(&points).unwrap_err().to_string().contains("reading_um"));
 }
 
 #[test]

@@ -107,7 +107,7 @@ pub(super) fn choose(
     let others = registry.separators.iter().filter(|plugin| plugin.name != reference);
     others
         .filter_map(|plugin| match default(plugin.name)? {
-            Ok(Separator::Points(_) | Separator::Model(_) | Separator::Traces(_)) => None,
+            Ok(Separator::Points(_)) => None,
             // Keys that it cannot do without: those of other data have such, and nobody asked for it.
             Err(fault) if !fault.unfit => None,
             built => Some(Candidate::new(plugin.name, built)),

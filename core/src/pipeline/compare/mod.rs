@@ -39,7 +39,7 @@ use crate::{
     measurement::StationTruth,
     provenance::{Provenance, VERSION},
     rig::Rig,
-    stage::{Averager, Conditioner, Source, Station, StationSeparator},
+    stage::{Averager, Conditioner, Request, Source, Station, StationSeparator},
 };
 use estimates::{Estimates, Scatter};
 
@@ -109,7 +109,7 @@ impl<'a> Comparing<'a> {
         take: impl FnMut(StationComparison) -> Result<()> + Send,
     ) -> Result<Comparison> {
         let pipeline = self.pipeline;
-        let Source::Turns(recording) = pipeline.loader.open(Some(self.rig))? else {
+        let Source::Turns(recording) = pipeline.loader.open(&Request { rig: Some(self.rig), columns: &[] })? else {
             return Err(Error::new("compare", &pipeline.title, "the loader gave what it did not declare"));
         };
         spare_inputs(&outputs, &recording.inputs())?;

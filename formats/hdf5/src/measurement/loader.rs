@@ -13,7 +13,7 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     rig::Rig,
-    stage::{Loader, Source, SourceKind},
+    stage::{Loader, Request, Source, SourceKind},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -67,8 +67,8 @@ impl Loader for Hdf5Loader {
         SourceKind::Turns
     }
 
-    fn open(&self, rig: Option<&Rig>) -> Result<Source> {
-        let rig = rig.ok_or_else(|| {
+    fn open(&self, wanted: &Request) -> Result<Source> {
+        let rig = wanted.rig.ok_or_else(|| {
             Error::new("open", self.path.display().to_string(), "recorded turns need a [rig] to tell the sensors")
         })?;
         Ok(Source::Turns(Box::new(Hdf5Recording::open(&self.path, rig, self.marker.clone())?)))

@@ -2,46 +2,39 @@
 //!
 //! ```text
 //! /            format = "runout-result", version = 1, title, program, convention
-//! /form        section, station, z_mm, angle_deg, form_um, std_um: one dataset a column
-//! /motion      station, angle_deg, x_um, y_um, tilt_x_urad, tilt_y_urad, and std_… of each; where motion is observable along
-//!              one line only, along_um, tilt_along_urad, and along_deg (also the attribute motion_along_deg of the file)
-//! /harmonics   quantity, section, station, order, re, im, std, observable
+//! /TABLE       one group a table of the result, with the attribute about: one dataset a column. Of a spindle form, motion,
+//!              harmonics and values; of measured points those of their separator
 //! /provenance  configuration, inputs/{path, bytes, blake3}
-//! /straightness z_mm, part_um, part_std_um, slide_um, slide_std_um; then there is no form, motion and harmonics
-//! /angle       of a quadrature signal: index or time_s, phase_deg, corrected_deg, std_deg; then there is nothing else
 //! /warnings    [n] texts: the run's, then each station's behind its name
 //! /effects     [n] texts: the effects that the results are corrected for, with their values; none after a run
 //! /summary     the run's summary as JSON
 //! ```
 //!
-//! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; texts of the tables are
-//! UTF-8 of fixed length (`.asstr()` in h5py). Each column has the attributes `unit` and `meaning`. What was not solved for, and what the layout cannot tell, is NaN.
+//! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; names are UTF-8 of fixed length, other
+//! texts of any length (`.asstr()` in h5py). Each column has the attributes `unit` and `about`. What was not solved for, and lost
+//! orders, are NaN.
 
-mod numbers;
-mod straightness;
 mod table;
 
 use std::path::{Path, PathBuf};
 
 use hdf5_metno::{File, Group, types::VarLenUnicode};
 use runout_core::{
-    Error, Result,
+    Result,
     atomic_file::PendingFile,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
-        run::{RunInfo, StationResult, Summary},
     },
     provenance::Input,
-    separation::{CONVENTION, Quantity},
-    stage::{Export, Exporter, StraightnessExporter, TableExporter},
-    surface::Surface,
+    stage::{Completed, Export, Exporter, ResultInfo, Takes},
+    table::{RecordBatch, TableSpec},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{RESULT_FORMAT, VERSION, node};
-use table::{FormTable, HarmonicsTable, LONG, MotionTable, SHORT};
+use table::{LONG, SHORT, TableGroup};
 
 /// `[[export]] plugin = "hdf5"`: a result file.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -54,7 +47,7 @@ pub struct ResultConfig {
 impl StageConfig for ResultConfig {
     type Stage = Box<dyn Exporter>;
     const NAME: &'static str = "hdf5";
-    const ABOUT: &'static str = "one file with form, motion, harmonics (or straightness) and where they came from";
+    const ABOUT: &'static str = "one file with the tables of a result and where they came from";
 
     fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         if self.path.file_name().is_none() {
@@ -69,80 +62,66 @@ struct ResultExporter {
 }
 
 impl Exporter for ResultExporter {
-    fn outputs(&self) -> Vec<PathBuf> {
+    fn takes(&self) -> Takes {
+        Takes::Tables
+    }
+
+    fn outputs(&self, _tables: &[TableSpec]) -> Vec<PathBuf> {
         vec![self.path.clone()]
     }
 
-    fn straightness(&self) -> Option<&dyn StraightnessExporter> {
-        Some(self)
-    }
-
-    fn tables(&self) -> Option<&dyn TableExporter> {
-        Some(self)
-    }
-
-    fn begin(&self, run: &RunInfo) -> Result<Box<dyn Export>> {
-        let sections = run.rig.iter().flat_map(|rig| &rig.sections);
-        let longest = run.stations.iter().chain(sections).map(String::len).max();
-        // Without stations the names that will come are not known.
-        if !run.stations.is_empty() && longest.is_some_and(|longest| longest <= SHORT) {
-            Ok(Box::new(ResultExport::<SHORT>::begin(&self.path, &run.title)?))
+    fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
+        if result.longest_name.is_some_and(|longest| longest <= SHORT) {
+            Ok(Box::new(ResultExport::<SHORT>::begin(&self.path, result)?))
         } else {
-            Ok(Box::new(ResultExport::<LONG>::begin(&self.path, &run.title)?))
+            Ok(Box::new(ResultExport::<LONG>::begin(&self.path, result)?))
         }
     }
 }
 
-/// A result file being written. The datasets come first: they have to be closed before the file gets its name.
+/// A result file being written. The tables come first: they have to be closed before the file gets its name.
 struct ResultExport<const N: usize> {
-    form: FormTable<N>,
-    motion: MotionTable<N>,
-    harmonics: HarmonicsTable<N>,
+    tables: Vec<TableGroup<N>>,
     file: File,
-    pending: Option<PendingFile>,
+    pending: PendingFile,
 }
 
 impl<const N: usize> ResultExport<N> {
-    fn begin(path: &Path, title: &str) -> Result<Self> {
+    fn begin(path: &Path, result: &ResultInfo) -> Result<Self> {
         let pending = PendingFile::new(path)?;
-        let begin = || -> hdf5_metno::Result<Self> {
-            let file = create(pending.path(), title, CONVENTION)?;
-            Ok(Self {
-                form: FormTable::create(&file)?,
-                motion: MotionTable::create(&file)?,
-                harmonics: HarmonicsTable::create(&file)?,
-                file,
-                // Taken in below: the closure only borrows it.
-                pending: None,
-            })
+        let begin = || -> hdf5_metno::Result<_> {
+            let file = create(pending.path(), &result.title)?;
+            let always = result.tables.iter().filter(|table| !table.optional);
+            let tables = always.map(|table| TableGroup::create(&file, table)).collect::<hdf5_metno::Result<_>>()?;
+            Ok((tables, file))
         };
-        let export = begin().map_err(|error| pending.failure(error))?;
-        Ok(Self { pending: Some(pending), ..export })
-    }
-
-    fn failure(&self, problem: impl ToString) -> Error {
-        match &self.pending {
-            Some(pending) => pending.failure(problem),
-            None => Error::new("write", "the result", problem),
-        }
+        let (tables, file) = begin().map_err(|error| pending.failure(error))?;
+        Ok(Self { tables, file, pending })
     }
 }
 
 /// A result file with its head.
-fn create(path: &Path, title: &str, convention: &str) -> hdf5_metno::Result<File> {
+fn create(path: &Path, title: &str) -> hdf5_metno::Result<File> {
     let file = File::with_options().with_fapl(|access| access.libver_v110()).create(path)?;
     node::put_text(&file, "format", RESULT_FORMAT)?;
     node::put(&file, "version", &VERSION)?;
     node::put_text(&file, "title", title)?;
-    node::put_text(&file, "convention", convention)?;
     Ok(file)
 }
 
 /// Adds where the numbers came from, when they are all there.
-fn complete(file: &File, summary: &Summary) -> hdf5_metno::Result<()> {
+fn complete(file: &File, result: &Completed) -> hdf5_metno::Result<()> {
+    let Completed { summary, about, .. } = result;
     let provenance = &summary.provenance;
     node::put_text(file, "program", &provenance.program)?;
-    let json = serde_json::to_string_pretty(summary)
+    node::put_text(file, "convention", &about.convention)?;
+    for (key, value) in &about.notes {
+        match value.parse::<f64>() {
+            Ok(number) => node::put(file, key, &number)?,
+            Err(_) => node::put_text(file, key, value)?,
+        }
+    }
+    let json = serde_json::to_string_pretty(*summary)
         .map_err(|error| hdf5_metno::Error::from(format!("the summary: {error}")))?;
     put_dataset(file, "summary", &json)?;
     put_texts(file, "warnings", summary.all_warnings())?;
@@ -159,35 +138,27 @@ fn complete(file: &File, summary: &Summary) -> hdf5_metno::Result<()> {
 }
 
 impl<const N: usize> Export for ResultExport<N> {
-    fn station(&mut self, result: &StationResult) -> Result<()> {
-        let name = table::name(&result.station).map_err(|error| self.failure(error))?;
-        let separation = &result.separation;
-        for (unknown, quantity) in separation.unknowns.iter().enumerate() {
-            let written = match quantity {
-                Quantity::Form(section) => match separation.sections.get(*section) {
-                    Some(section) => self.form.append(result, &name, section, unknown),
-                    None => Err(format!("the form of section {section} has no section").into()),
-                },
-                _ => Ok(()),
+    fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
+        let place = self.tables.iter().position(|known| known.name == table.name);
+        let mut append = || -> hdf5_metno::Result<()> {
+            let known = match place {
+                Some(place) => &mut self.tables[place],
+                None => {
+                    self.tables.push(TableGroup::create(&self.file, table)?);
+                    let last = self.tables.len() - 1;
+                    &mut self.tables[last]
+                }
             };
-            written
-                .and_then(|()| self.harmonics.append(separation, &name, unknown))
-                .map_err(|error| self.failure(error))?;
-        }
-        if separation.unknowns.iter().any(|unknown| !unknown.is_form()) {
-            self.motion.append(result, &name).map_err(|error| self.failure(error))?;
-        }
-        if let Some(line) = separation.azimuth() {
-            node::put_once(&self.file, "motion_along_deg", &line.degrees()).map_err(|error| self.failure(error))?;
-        }
-        Ok(())
+            known.append(rows)
+        };
+        append().map_err(|error| self.pending.failure(error))
     }
 
-    fn finish(self: Box<Self>, summary: &Summary, _surface: Option<&Surface>) -> Result<Vec<PendingFile>> {
-        complete(&self.file, summary).map_err(|error| self.failure(error))?;
-        let Self { form, motion, harmonics, file, pending } = *self;
-        drop((form, motion, harmonics, file));
-        Ok(pending.into_iter().collect())
+    fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
+        complete(&self.file, result).map_err(|error| self.pending.failure(error))?;
+        let Self { tables, file, pending } = *self;
+        drop((tables, file));
+        Ok(vec![pending])
     }
 }
 

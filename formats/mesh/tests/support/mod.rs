@@ -14,7 +14,7 @@ use runout_core::{
     pipeline::{
         error::Fault,
         registry::{Context, Registry},
-        run::{LostOrders, RunInfo, StationResult, Summary},
+        run::{LostOrders, StationResult, StationTables, Summary},
     },
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
@@ -77,9 +77,9 @@ pub fn exporter(registry: &Registry, toml: &str, folder: &Path) -> Result<Box<dy
 /// Runs an exporter over a surface.
 pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<PathBuf>, Error> {
     let title = "Waisted part\nwith a second line";
-    let run = RunInfo { title: title.into(), ..RunInfo::default() };
-    let mut export = exporter.begin(&run)?;
-    export.station(&station())?;
+    let mut tables = StationTables::new(None, None);
+    let mut export = exporter.begin(&tables.info(title))?;
+    tables.write(&station(), &mut *export)?;
     let summary = Summary {
         title: title.into(),
         provenance: Provenance {
@@ -90,7 +90,7 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
         lost_orders: LostOrders { form: vec![1, 4, 500], motion: Vec::new() },
         ..Summary::default()
     };
-    commit_all(export.finish(&summary, surface)?)
+    commit_all(tables.finish(export, &summary, surface)?)
 }
 
 /// A form that holds orders 2 to 250, of which the surface's 360 angles hold 179.

@@ -39,7 +39,7 @@ fn placed(further: [f64; 2], more: impl Fn(usize, f64, f64) -> f64) -> Diagnosis
     let path = folder.path().join("made.csv");
     std::fs::write(&path, rows).unwrap();
     super::diagnosed(&format!(
-        "load = {{ plugin = 'cylinder-traces', path = '{}' }}\n\
+        "load = {{ plugin = 'points', path = '{}' }}\n\
          separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.0 }}",
         path.display()
     ))

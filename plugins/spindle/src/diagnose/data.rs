@@ -16,7 +16,7 @@ use super::{
     lines::{self, Line},
 };
 use crate::{
-    effects::{Alterations, SpindleEffect},
+    effects::{Alterations, SpindleEffect, TurnEvidence},
     layout::Layout,
     selection::Selection,
     separators::{Blocks, Operators, Propagation, Readings, apply, leak, smooth, whitening},
@@ -36,6 +36,13 @@ pub struct Shared {
     /// Of the places, for the loop.
     pub effects: Vec<Effect>,
     pub data: Vec<StationData>,
+}
+
+impl Shared {
+    /// What single turns show of the effect of an id.
+    pub fn turn_evidence(&self, id: &str) -> Option<TurnEvidence> {
+        self.kinds.iter().find(|kind| kind.about().id == id)?.turn_evidence()
+    }
 }
 
 /// An effect at one of its targets.

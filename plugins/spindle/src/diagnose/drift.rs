@@ -5,13 +5,13 @@ use std::{ops::Range, sync::Arc};
 use runout_core::{
     Complex64,
     creep::{Creep, Levels, creeps},
-    model::diagnosis::{Diagnosis, Estimated},
+    model::diagnosis::{Added, Diagnosis, Estimated},
     profile::{Neighbours, Profile},
     stage::Station,
 };
 
 use super::data::Shared;
-use crate::{selection::Selection, separators::Readings};
+use crate::{effects::TurnEvidence, selection::Selection, separators::Readings};
 
 /// Share of a variance that stays whatever is taken out of it.
 const LEAST_LEFT: f64 = 0.05;
@@ -234,7 +234,8 @@ fn held_out(creeping: &Creeping, selection: &Selection, station: &Station, senso
 pub fn say(diagnosis: &mut Diagnosis, shared: &Shared) {
     let rig = &shared.selection.rig;
     let mut drifts = vec![0.0; rig.sensors.len()];
-    for added in diagnosis.added.iter_mut().filter(|added| added.effect == "thermal-drift") {
+    let creeps = |added: &&mut Added| shared.turn_evidence(&added.effect) == Some(TurnEvidence::Levels);
+    for added in diagnosis.added.iter_mut().filter(creeps) {
         let sensor = added.targets.first().and_then(|id| rig.sensors.iter().position(|sensor| sensor.id == *id));
         let creeping = sensor.and_then(|sensor| {
             let of_station = |station: &super::data::StationData| station.seen.creeping.get(sensor)?.clone();

@@ -25,7 +25,7 @@ use runout_core::{
 };
 
 use crate::{
-    effects::{ActsOn, SpindleEffect, ordered_pairs, pair_of, pairs},
+    effects::{ActsOn, SpindleEffect, TurnEvidence, ordered_pairs, pair_of, pairs},
     layout::Layout,
     selection::Selection,
     separators::wiring,
@@ -239,7 +239,7 @@ pub fn diagnose(
     let creeping = model.traced.data.first().map_or(&[][..], |station| &station.seen.creeping);
     let steady = |place: &data::Place| {
         let creeping = creeping.get(place.index).and_then(Option::as_ref);
-        model.traced.kinds[place.kind].about().id == "thermal-drift"
+        model.traced.kinds[place.kind].turn_evidence() == Some(TurnEvidence::Levels)
             && creeping.is_some_and(|creeping| !creeping.certain())
     };
     // Lines are there or not, and of one kind: what no station has is no candidate.
@@ -298,13 +298,9 @@ pub fn diagnose(
     })
 }
 
-fn is_line(model: &SpindleModel, place: &data::Place) -> bool {
-    model.traced.kinds[place.kind].line().is_some()
-}
-
 /// Whether single turns show an effect.
 fn of_turns(model: &SpindleModel, place: &data::Place) -> bool {
-    is_line(model, place) || model.traced.kinds[place.kind].about().id == "thermal-drift"
+    model.traced.kinds[place.kind].turn_evidence().is_some()
 }
 
 fn lost_orders(fit: &SpindleFit) -> LostOrders {

@@ -4,7 +4,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, MOST_LINES, Predicted, SpindleEffect};
+use super::{About, ActsOn, Alterations, MOST_LINES, Predicted, SpindleEffect, TurnEvidence};
 
 /// A line of the turns' spectrum.
 pub struct AsynchronousLine {
@@ -34,7 +34,7 @@ impl SpindleEffect for AsynchronousLine {
         (self.number + 1 == MOST_LINES).then(|| format!("{MOST_LINES} lines are looked for at most"))
     }
 
-    fn line(&self) -> Option<usize> {
-        Some(self.number)
+    fn turn_evidence(&self) -> Option<TurnEvidence> {
+        Some(TurnEvidence::Line(self.number))
     }
 }

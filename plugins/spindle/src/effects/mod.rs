@@ -88,15 +88,32 @@ pub trait SpindleEffect: Send + Sync {
         None
     }
 
+    /// What single turns show of it besides their average, where they do.
+    fn turn_evidence(&self) -> Option<TurnEvidence> {
+        None
+    }
+
     /// The number of the line in the turns' spectrum that it is, where it is one.
     fn line(&self) -> Option<usize> {
-        None
+        match self.turn_evidence()? {
+            TurnEvidence::Line(number) => Some(number),
+            TurnEvidence::Levels => None,
+        }
     }
 
     /// Its parameters as people say them.
     fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {
         estimated
     }
+}
+
+/// What single turns show of an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TurnEvidence {
+    /// The levels of the turns creep.
+    Levels,
+    /// The spectrum of the turns has a line: its number among those found.
+    Line(usize),
 }
 
 /// What an effect is.

@@ -4,7 +4,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, TurnEvidence};
 
 /// A line of the turns' spectrum in one channel.
 pub struct SensorLine {
@@ -30,7 +30,7 @@ impl SpindleEffect for SensorLine {
         Vec::new()
     }
 
-    fn line(&self) -> Option<usize> {
-        Some(self.number)
+    fn turn_evidence(&self) -> Option<TurnEvidence> {
+        Some(TurnEvidence::Line(self.number))
     }
 }

@@ -4,7 +4,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, creep, parameter};
+use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, TurnEvidence, creep, parameter};
 
 /// A sensor's drift.
 pub struct ThermalDrift;
@@ -32,6 +32,10 @@ impl SpindleEffect for ThermalDrift {
             share * creep(order, predicted.turn_angles_of(at)) / (1.0 + sensor.gain)
         };
         vec![predicted.each(|reading| reading.sensor == target, value)]
+    }
+
+    fn turn_evidence(&self) -> Option<TurnEvidence> {
+        Some(TurnEvidence::Levels)
     }
 
     fn creep_partials(&self, target: usize, sensor: usize) -> Vec<f64> {

@@ -22,9 +22,6 @@ use crate::{
 /// Angles at which the part is clamped or a sensor stands, in degrees, round ones first.
 const TRIED_DEG: [f64; 9] = [90.0, 180.0, 270.0, 45.0, 135.0, 225.0, 60.0, 120.0, 100.0];
 
-/// Left out: single turns show them in any rig, and an average says little of them.
-const SHOWN_BY_TURNS: [&str; 3] = ["thermal-drift", "asynchronous-line", "sensor-line"];
-
 /// An addition, and what the rig would tell with it that it does not without.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
@@ -63,8 +60,9 @@ pub fn foresee(
     let station = nominal::station(selection);
     kinds.retain(|kind| {
         let about = kind.about();
-        // Each mistake is there or not, and a ripple of one setup shows as a common one does.
-        !SHOWN_BY_TURNS.contains(&about.id) && kind.mistake().is_none() && about.acts_on != ActsOn::Setup
+        // What single turns show, they show in any rig, and an average says little of it. Each mistake is there or not, and a
+        // ripple of one setup shows as a common one does.
+        kind.turn_evidence().is_none() && kind.mistake().is_none() && about.acts_on != ActsOn::Setup
     });
     let model = SpindleModel::new(selection.clone(), layout.clone(), second_order, kinds, &[station])?;
     Ok(Foresight { assuming: nominal::words(), ..foresight::foresee(&model)? })

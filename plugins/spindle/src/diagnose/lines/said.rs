@@ -6,7 +6,10 @@ use runout_core::{
 };
 
 use super::{Line, source::Source};
-use crate::diagnose::data::Shared;
+use crate::{
+    diagnose::data::Shared,
+    effects::{ActsOn, TurnEvidence},
+};
 
 /// Frequencies of mains, in Hz.
 const MAINS_HZ: [f64; 2] = [50.0, 60.0];
@@ -26,10 +29,13 @@ pub(super) fn mains(frequency_hz: f64, tolerance_hz: f64) -> Option<f64> {
 pub fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
     let sensors = &shared.selection.rig.sensors;
     let id = |sensor: &usize| sensors.get(*sensor).map_or_else(String::new, |sensor| sensor.id.clone());
+    // The line of the motion, which one that few sensors show may be as well.
+    let of_motion = shared.kinds.iter().filter(|kind| kind.line().is_some()).map(|kind| kind.about());
+    let of_motion = of_motion.into_iter().find(|about| about.acts_on == ActsOn::Rig).map(|about| about.id.to_owned());
     let mut said: Vec<Option<usize>> = Vec::new();
     let mut remarks = Vec::new();
     for added in &mut diagnosis.added {
-        if !matches!(added.effect.as_str(), "asynchronous-line" | "sensor-line") {
+        if !matches!(shared.turn_evidence(&added.effect), Some(TurnEvidence::Line(_))) {
             continue;
         }
         let sensor = added.targets.first().and_then(|id| sensors.iter().position(|sensor| sensor.id == *id));
@@ -43,7 +49,7 @@ pub fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
         if let Source::Sensors { channels, motion } = &line.source {
             added.targets = channels.iter().map(id).collect();
             if *motion {
-                added.confounded_with.push("asynchronous-line".into());
+                added.confounded_with.extend(of_motion.clone());
                 let by = "a sensor at another angle, which a motion along this one would show in too";
                 added.told_apart_by = Some(by.into());
             }

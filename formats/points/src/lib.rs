@@ -1,0 +1,127 @@
+//! The loader `points`: measured points from CSV or Parquet, for the separators of any domain.
+//!
+//! A row is a point. The separator says which columns it takes ([`PointColumn`]); other columns are not read. `columns` gives the
+//! file's names where they differ, `where` selects rows.
+//!
+mod parquet;
+mod select;
+mod text;
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use runout_core::{
+    Error, Result,
+    pipeline::{
+        error::Fault,
+        registry::{Context, Plugin, Registry, StageConfig},
+    },
+    points::{PointColumn, Points},
+    stage::{Loader, Request, Source, SourceKind},
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// Adds the loader `points`, also under the names that it had for single domains.
+pub fn register(registry: &mut Registry) {
+    registry.loaders.add(Plugin::of::<PointsConfig>());
+    for former in ["axial-traces", "cylinder-traces", "quadrature-samples", "r-test-points"] {
+        registry.loaders.add(Plugin::former::<PointsConfig>(former));
+    }
+}
+
+/// `[load] plugin = "points"`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PointsConfig {
+    /// CSV or Parquet file with one row a point, relative to the TOML. The separator says which columns it takes; `check` lists
+    /// them. CSV is separated by comma, semicolon or tab; the last two allow a decimal comma.
+    pub path: PathBuf,
+    /// The file's names of columns that differ from the separator's: `columns = { "ΔX" = "dx_mm" }`.
+    #[serde(default)]
+    pub columns: BTreeMap<String, String>,
+    /// Only rows with these values are read: `where = { a_deg = 0 }`.
+    #[serde(default, rename = "where")]
+    pub selected: BTreeMap<String, Cell>,
+}
+
+/// A value that rows are selected by.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Cell {
+    /// A number; a cell is equal within a millionth.
+    Number(f64),
+    /// A text.
+    Text(String),
+}
+
+impl StageConfig for PointsConfig {
+    type Stage = Box<dyn Loader>;
+
+    const NAME: &'static str = "points";
+    const ABOUT: &'static str = "measured points from CSV or Parquet, for any separator of points";
+
+    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        if self.path.as_os_str().is_empty() {
+            return Err(Fault::at("path", "expected the name of a file"));
+        }
+        let mut names: Vec<&String> = self.columns.values().collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(Fault::at("columns", format!("two columns of the file are named `{}`", pair[0])));
+        }
+        Ok(Box::new(PointFile { path: context.path(&self.path), config: self }))
+    }
+}
+
+/// Reads these columns of a file.
+///
+/// # Errors
+/// When it cannot be read, lacks a column, or a row is not what its columns say.
+pub fn read(path: &Path, columns: &[PointColumn]) -> Result<Points> {
+    let config = PointsConfig { path: path.to_path_buf(), columns: BTreeMap::new(), selected: BTreeMap::new() };
+    select::points(RawTable::read(path)?, path, &config, columns)
+}
+
+struct PointFile {
+    path: PathBuf,
+    config: PointsConfig,
+}
+
+impl Loader for PointFile {
+    fn kind(&self) -> SourceKind {
+        SourceKind::Points
+    }
+
+    fn open(&self, wanted: &Request) -> Result<Source> {
+        let table = RawTable::read(&self.path)?;
+        select::points(table, &self.path, &self.config, wanted.columns).map(Source::Points)
+    }
+}
+
+/// A file's columns as they are.
+struct RawTable {
+    names: Vec<String>,
+    columns: Vec<RawColumn>,
+    rows: usize,
+    /// Line of each row in a text file.
+    lines: Vec<u64>,
+    decimal_comma: bool,
+}
+
+/// A column as it is in a file.
+enum RawColumn {
+    Texts(Vec<String>),
+    Numbers(Vec<f64>),
+}
+
+impl RawTable {
+    fn read(path: &Path) -> Result<Self> {
+        let mut start = [0; 4];
+        let read = std::fs::File::open(path).and_then(|mut file| std::io::Read::read(&mut file, &mut start));
+        let length = read.map_err(|error| Error::new("read", path.display().to_string(), error))?;
+        if start[..length] == *b"PAR1" { parquet::read(path) } else { text::read(path) }
+    }
+}

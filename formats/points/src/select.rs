@@ -1,0 +1,215 @@
+//! From a file's columns to the points that a separator takes.
+
+use std::path::Path;
+
+use runout_core::{
+    Error, Result,
+    pipeline::error::known_names,
+    points::{Column, Labels, PointColumn, PointKind, Points, Trace},
+};
+
+use crate::{Cell, PointsConfig, RawColumn, RawTable};
+
+/// Cells are equal to a selected number within this share of it, or this much below 1: half the last digit of most exports.
+const SAME: f64 = 1e-6;
+/// Two names as near as this (Jaro-Winkler) are one with a slip of the pen.
+const ALIKE: f64 = 0.93;
+
+pub fn points(table: RawTable, path: &Path, config: &PointsConfig, wanted: &[PointColumn]) -> Result<Points> {
+    let table = renamed(table, path, config)?;
+    let file = Raw { file: path.display().to_string(), table };
+    file.has_all(wanted)?;
+    let rows = file.selected(config)?;
+    if rows.is_empty() {
+        let problem = if file.table.rows == 0 { "it holds no points" } else { "no point has the values of `where`" };
+        return Err(Error::new("read", file.file, problem));
+    }
+    let mut points = Points { input: path.to_path_buf(), ..Points::default() };
+    let mut traces = [None, None];
+    for column in wanted {
+        let Some(place) = file.place(column.name) else { continue };
+        match column.kind {
+            PointKind::Number => {
+                let values = rows.iter().map(|row| file.number(place, *row)).collect::<Result<_>>()?;
+                points.columns.push(Column { name: column.name.into(), values });
+            }
+            PointKind::Flag => {
+                let values = rows.iter().map(|row| file.flag(place, *row)).collect::<Result<_>>()?;
+                points.columns.push(Column { name: column.name.into(), values });
+            }
+            PointKind::Label => {
+                let values = rows.iter().map(|row| file.text(place, *row)).collect::<Result<_>>()?;
+                points.labels.push(Labels { name: column.name.into(), values });
+            }
+            PointKind::Trace => traces[0] = Some(place),
+            PointKind::TraceKind => traces[1] = Some(place),
+        }
+    }
+    points.traces = match traces[0] {
+        Some(id) => file.traces(&rows, id, traces[1])?,
+        None => vec![Trace { id: "points".into(), kind: "points".into(), points: 0..rows.len() }],
+    };
+    Ok(points)
+}
+
+/// The table with the names that `columns` gives.
+fn renamed(mut table: RawTable, path: &Path, config: &PointsConfig) -> Result<RawTable> {
+    let refuse = |problem: String| Error::new("read", path.display().to_string(), problem);
+    for (from, to) in &config.columns {
+        if let Some(other) = table.names.iter().position(|name| name == to && name != from) {
+            // What the separator's name is given to stands in the place of a column that has it by chance.
+            table.names[other] = format!("{to} of the file");
+        }
+        let Some(place) = table.names.iter().position(|name| name == from) else {
+            let problem = format!("`columns` names `{from}`, which the file does not have");
+            return Err(refuse(problem).help(known_names(from, table.names.iter().map(String::as_str))));
+        };
+        table.names[place].clone_from(to);
+    }
+    Ok(table)
+}
+
+/// A file with its name for messages.
+struct Raw {
+    file: String,
+    table: RawTable,
+}
+
+impl Raw {
+    fn place(&self, name: &str) -> Option<usize> {
+        self.table.names.iter().position(|known| known == name)
+    }
+
+    /// Refuses a file that lacks a column, has one twice, or has one whose name is nearly that of an optional one.
+    fn has_all(&self, wanted: &[PointColumn]) -> Result<()> {
+        let names = &self.table.names;
+        let refuse = |problem: String| {
+            let (optional, needed): (Vec<_>, Vec<_>) = wanted.iter().partition(|column| column.optional);
+            let list = |columns: Vec<&PointColumn>| {
+                columns.into_iter().map(|column| column.name).collect::<Vec<_>>().join(", ")
+            };
+            let besides = if optional.is_empty() { String::new() } else { format!("; optional: {}", list(optional)) };
+            let help = format!("the columns are {}{besides}; `columns` in [load] gives the file's names", list(needed));
+            Error::new("read", format!("{}, line 1", self.file), problem).help(help)
+        };
+        for column in wanted {
+            match names.iter().filter(|name| *name == column.name).count() {
+                0 if !column.optional => {
+                    let unit = if column.unit.is_empty() { String::new() } else { format!(", in {}", column.unit) };
+                    let problem = format!("the column `{}` is missing ({}{unit})", column.name, column.about);
+                    return Err(refuse(problem));
+                }
+                0 => {
+                    let unknown = || names.iter().filter(|name| wanted.iter().all(|known| known.name != **name));
+                    let alike = |name: &&String| strsim::jaro_winkler(name, column.name) > ALIKE;
+                    if let Some(name) = unknown().find(alike) {
+                        let problem = format!("unknown column `{name}`: is it `{}`?", column.name);
+                        return Err(refuse(problem));
+                    }
+                }
+                1 => {}
+                _ => return Err(refuse(format!("the column `{}` is there twice", column.name))),
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows that `where` selects.
+    fn selected(&self, config: &PointsConfig) -> Result<Vec<usize>> {
+        let mut rows: Vec<usize> = (0..self.table.rows).collect();
+        for (name, value) in &config.selected {
+            let place = self.place(name).ok_or_else(|| {
+                let problem = format!("`where` names `{name}`, which the file does not have");
+                let known = self.table.names.iter().map(String::as_str);
+                Error::new("read", &self.file, problem).help(known_names(name, known))
+            })?;
+            let mut kept = Vec::with_capacity(rows.len());
+            for row in rows {
+                let equal = match value {
+                    Cell::Number(number) => (self.number(place, row)? - number).abs() <= SAME * number.abs().max(1.0),
+                    Cell::Text(text) => self.text(place, row)? == *text,
+                };
+                if equal {
+                    kept.push(row);
+                }
+            }
+            rows = kept;
+        }
+        Ok(rows)
+    }
+
+    /// Stretches of rows of one trace. A trace does not come back, and is of one kind.
+    fn traces(&self, rows: &[usize], id: usize, kind: Option<usize>) -> Result<Vec<Trace>> {
+        let mut traces: Vec<Trace> = Vec::new();
+        for (index, row) in rows.iter().enumerate() {
+            let name = self.text(id, *row)?;
+            let of = kind.map_or_else(|| Ok(name.clone()), |place| self.text(place, *row))?;
+            match traces.last_mut() {
+                Some(last) if last.id == name && last.kind == of => last.points.end = index + 1,
+                _ => {
+                    if let Some(known) = traces.iter().find(|trace| trace.id == name) {
+                        return Err(self.again(known, &of, *row, (id, kind)));
+                    }
+                    traces.push(Trace { id: name, kind: of, points: index..index + 1 });
+                }
+            }
+        }
+        Ok(traces)
+    }
+
+    /// Why a trace cannot come back.
+    fn again(&self, known: &Trace, of: &str, row: usize, (id, kind): (usize, Option<usize>)) -> Error {
+        let name = &known.id;
+        match kind {
+            Some(kind) if known.kind != of => {
+                let problem = format!("trace {name} is of {} {} above, not {of}", self.table.names[kind], known.kind);
+                self.refuse(kind, row, &problem).help("give each trace a name of its own")
+            }
+            _ => {
+                let problem = format!("trace {name} has ended above; the points of a trace follow one another");
+                self.refuse(id, row, &problem)
+            }
+        }
+    }
+
+    fn text(&self, place: usize, row: usize) -> Result<String> {
+        let text = match &self.table.columns[place] {
+            RawColumn::Texts(texts) => texts[row].clone(),
+            RawColumn::Numbers(numbers) if numbers[row].is_nan() => String::new(),
+            RawColumn::Numbers(numbers) => numbers[row].to_string(),
+        };
+        if text.is_empty() { Err(self.refuse(place, row, "it is empty")) } else { Ok(text) }
+    }
+
+    fn number(&self, place: usize, row: usize) -> Result<f64> {
+        let text = match &self.table.columns[place] {
+            RawColumn::Numbers(numbers) if numbers[row].is_finite() => return Ok(numbers[row]),
+            RawColumn::Numbers(numbers) => numbers[row].to_string(),
+            RawColumn::Texts(_) => self.text(place, row)?,
+        };
+        let parsed = if self.table.decimal_comma { text.replace(',', ".").parse() } else { text.parse() };
+        match parsed {
+            Ok(number) if f64::is_finite(number) => Ok(number),
+            _ => Err(self.refuse(place, row, &format!("expected a finite number, found `{text}`"))),
+        }
+    }
+
+    fn flag(&self, place: usize, row: usize) -> Result<f64> {
+        let refuse =
+            |found: &str| Err(self.refuse(place, row, &format!("expected 0 (used) or 1 (left out), found `{found}`")));
+        match self.text(place, row)?.as_str() {
+            "0" => Ok(0.0),
+            "1" => Ok(1.0),
+            other => refuse(other),
+        }
+    }
+
+    fn refuse(&self, place: usize, row: usize, problem: &str) -> Error {
+        let at = self.table.lines.get(row).map_or_else(|| format!("row {row}"), |line| format!("line {line}"));
+        let name = &self.table.names[place];
+        Error::new("read", format!("{}, {at}, column {} ({name})", self.file, place + 1), problem)
+    }
+}
+
+#[cfg(test)]
+mod tests;

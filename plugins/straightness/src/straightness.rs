@@ -1,0 +1,106 @@
+//! Straightness along an axis: of a part, and of the slide that carried the probe.
+
+use runout_core::{
+    Result,
+    evaluate::straightness::strt_lsli_um,
+    stage::{NamedValue, Outcome, points::value},
+    table::{ColumnSpec, TableRows, TableSpec, numbers},
+};
+
+use crate::moves::rms;
+
+/// What the numbers are, for files that explain themselves.
+pub const CONVENTION: &str = "Straightness along z about the least-squares line (LSLI, ISO 12780-1). part_um is \
+    positive where the part stands out towards the probe; slide_um is the slide's displacement towards the part in the \
+    initial setup. Standard uncertainties are those of one position, from the scatter of repeated traces; NaN if not \
+    known.";
+
+/// What the readings cannot tell, whatever the data.
+pub const LIMIT: &str = "each trace has an offset and a slope of its own, so only the straightness about the \
+    least-squares line is known: neither taper, nor parallelism, nor the angle between slide and part";
+
+/// Straightness of part and slide on common positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Straightness {
+    /// Ascending positions along the axis, in mm.
+    pub z_mm: Vec<f64>,
+    /// Deviation of the part from its least-squares line at each position, outward positive, in µm.
+    pub part_um: Vec<f64>,
+    /// Its standard uncertainty from the scatter of repeated traces; NaN where not known.
+    pub part_std_um: Vec<f64>,
+    /// Deviation of the slide from its least-squares line, towards the part of the initial setup positive, in µm.
+    pub slide_um: Vec<f64>,
+    /// Its standard uncertainty; NaN where not known.
+    pub slide_std_um: Vec<f64>,
+    /// Standard deviation of one trace at one position (root mean square over the positions), in µm; NaN without repeats.
+    pub repeatability_um: f64,
+    /// Degrees of freedom behind each position's standard uncertainty.
+    pub degrees_of_freedom: usize,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// The table of straightness.
+pub fn table() -> TableSpec {
+    let std = |name: &str, of: &str| {
+        let about =
+            format!("standard uncertainty of {of} at this position, from the scatter; NaN where it is not known");
+        ColumnSpec::number(name, "um", about)
+    };
+    TableSpec::new(
+        "straightness",
+        CONVENTION,
+        vec![
+            ColumnSpec::number("z_mm", "mm", "place along the axis"),
+            ColumnSpec::number("part_um", "um", "the part's deviation from its least-squares line, outward positive"),
+            std("part_std_um", "part_um"),
+            ColumnSpec::number(
+                "slide_um",
+                "um",
+                "the slide's deviation from its least-squares line, towards the part positive",
+            ),
+            std("slide_std_um", "slide_um"),
+        ],
+    )
+}
+
+impl Straightness {
+    /// As a result.
+    ///
+    /// # Errors
+    /// Never in practice: the columns are of one length.
+    pub(crate) fn outcome(self) -> Result<Outcome> {
+        let columns = [&self.z_mm, &self.part_um, &self.part_std_um, &self.slide_um, &self.slide_std_um];
+        let columns = columns.map(|column| numbers(column.iter().copied()));
+        let table = table();
+        let tables = vec![TableRows { rows: table.rows(columns.into())?, table: table.name }];
+        let values = self.values();
+        Ok(Outcome { convention: CONVENTION.into(), tables, values, form: None, remarks: self.warnings })
+    }
+
+    fn values(&self) -> Vec<NamedValue> {
+        let of = |name: &str, deviation_um: &[f64], std_um: &[f64]| {
+            let strt = "peak-to-valley straightness deviation about LSLI, unfiltered (ISO 12780-1)";
+            let each = "standard uncertainty of the deviation at one position, rms over the positions";
+            [
+                value("STRt", strt_lsli_um(&self.z_mm, deviation_um), f64::NAN, "um", strt).of(name),
+                value("STRq", rms(deviation_um), f64::NAN, "um", "rms straightness deviation about LSLI").of(name),
+                value("std", rms(std_um), f64::NAN, "um", each).of(name),
+            ]
+        };
+        let repeatability = "standard deviation of one trace at one position, rms over the positions";
+        let mut values = Vec::from(of("part", &self.part_um, &self.part_std_um));
+        values.extend(of("slide", &self.slide_um, &self.slide_std_um));
+        values.push(value("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
+        let end = |z_mm: Option<&f64>| z_mm.copied().unwrap_or(f64::NAN);
+        values.push(value("first-position", end(self.z_mm.first()), f64::NAN, "mm", "first position along the axis"));
+        values.push(value("last-position", end(self.z_mm.last()), f64::NAN, "mm", "last position along the axis"));
+        values.push(value("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
+        values
+    }
+
+    /// Whether all its deviations are numbers.
+    pub(crate) fn is_finite(&self) -> bool {
+        [&self.z_mm, &self.part_um, &self.slide_um].into_iter().flatten().all(|value| value.is_finite())
+    }
+}

@@ -1,0 +1,130 @@
+//! Every number of every example, before and after a change.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use crate::{
+    chores,
+    process::{Outcome, root, say, target},
+    setup::cargo,
+};
+
+/// What the READMEs' commands begin with.
+const PROGRAM: &str = "target/release/runout";
+
+/// Runs the commands of all examples' READMEs in a copy of the repository's examples, by the release program or another one. The
+/// folder then holds what they wrote, and what they printed as `NUMBER.txt`.
+pub fn record(words: &[&str]) -> Outcome {
+    let (folder, program) = match words {
+        [folder] => {
+            crate::process::run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
+            (Path::new(folder), target().join("release/runout"))
+        }
+        [folder, program] => (Path::new(folder), PathBuf::from(program)),
+        _ => return Err("usage: cargo xtask record-results FOLDER [PROGRAM]".into()),
+    };
+    let program = program.canonicalize().map_err(|error| format!("cannot find {}: {error}", program.display()))?;
+    let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
+    fs::create_dir_all(folder).map_err(failed)?;
+    let folder = folder.canonicalize().map_err(failed)?;
+    let mut examples: Vec<PathBuf> = fs::read_dir(root().join("examples"))
+        .map_err(|error| format!("cannot read examples/: {error}"))?
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.join("README.md").is_file())
+        .collect();
+    examples.sort();
+    for example in examples {
+        let name = example.file_name().unwrap_or_default();
+        let copied = folder.join("examples").join(name);
+        copy(&example, &copied).map_err(failed)?;
+        let text = fs::read_to_string(example.join("README.md"))
+            .map_err(|error| format!("cannot read {}: {error}", example.display()))?;
+        for (number, line) in commands(&text).into_iter().enumerate() {
+            let words = words_of(&line);
+            say(&format!("$ runout {}", words.join(" ")));
+            let output = Command::new(&program)
+                .args(&words)
+                .current_dir(&folder)
+                .output()
+                .map_err(|error| format!("cannot start {}: {error}", program.display()))?;
+            if !output.status.success() {
+                say(&format!("  {}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim_end()));
+            }
+            fs::write(copied.join(format!("{number}.txt")), output.stdout).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
+
+/// Compares the numbers of two recorded folders, to 1e-12 relative or to what is given.
+pub fn compare(words: &[&str]) -> Outcome {
+    chores::studies(&[&["compare-results"], words].concat())
+}
+
+/// The commands of a README, each on one line without its comment and the program's name.
+fn commands(text: &str) -> Vec<String> {
+    let mut commands = Vec::new();
+    let mut inside = false;
+    for line in text.replace("\\\n", " ").lines() {
+        if line.starts_with("```") {
+            inside = !inside;
+        } else if let (true, Some(rest)) = (inside, line.trim().strip_prefix(PROGRAM)) {
+            commands.push(rest.split("  #").next().unwrap_or(rest).trim().to_owned());
+        }
+    }
+    commands
+}
+
+/// Words as a shell splits them, with quotes and without expansions.
+fn words_of(line: &str) -> Vec<String> {
+    let (mut words, mut word, mut quote) = (Vec::new(), String::new(), None);
+    for letter in line.chars() {
+        match quote {
+            Some(open) if letter == open => quote = None,
+            None if letter == '\'' || letter == '"' => quote = Some(letter),
+            None if letter.is_whitespace() => {
+                if !word.is_empty() {
+                    words.push(std::mem::take(&mut word));
+                }
+            }
+            _ => word.push(letter),
+        }
+    }
+    if !word.is_empty() {
+        words.push(word);
+    }
+    words
+}
+
+fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            // What an earlier run has left is not copied.
+            if entry.file_name() != "out" {
+                copy(&entry.path(), &target)?;
+            }
+        } else if entry.path().extension().is_none_or(|extension| extension != "h5") {
+            fs::copy(entry.path(), target)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_of_a_readme() {
+        let text = "text\n```\ntarget/release/runout run a.toml \\\n  --set 'x = [1]'   # a comment\nprinted\n```\n\
+                    target/release/runout no\n```text\ntarget/release/runout check b.toml\n```\n";
+        assert_eq!(commands(text), ["run a.toml    --set 'x = [1]'", "check b.toml"]);
+        assert_eq!(words_of(&commands(text)[0]), ["run", "a.toml", "--set", "x = [1]"]);
+    }
+}
