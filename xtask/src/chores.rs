@@ -3,13 +3,14 @@
 use std::{fs, path::Path, process::Command, time::SystemTime};
 
 use crate::{
-    foreign,
+    foreign, house,
     process::{Outcome, answer, root, run, say, target},
     setup::{self, cargo},
 };
 
 /// Format, lints, tests, and the demo with the program that the tests were built with.
 pub fn test(foreign_readers: bool) -> Outcome {
+    house::check_quietly()?;
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
     run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;

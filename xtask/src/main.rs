@@ -4,6 +4,7 @@ mod areal;
 mod bench;
 mod chores;
 mod foreign;
+mod house;
 mod process;
 mod setup;
 
@@ -18,6 +19,9 @@ cargo xtask COMMAND
   demo          build runout, make the campaign of examples/01-four-sensor once, run its pipeline
   test [--ci]   format, lints, tests, and the demo with the tests' build; with --ci also files read by Python and
                 Node, which it installs below target/
+  check-house [--strict]
+                print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, and
+                on a cycle of modules; with --strict also on long files without a reason
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types
   bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]
@@ -46,6 +50,7 @@ fn main() -> ExitCode {
         ["demo"] => chores::demo(),
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1")),
         ["test", "--ci"] => chores::test(true),
+        ["check-house", ref rest @ ..] => house::check(rest),
         ["schemas"] => chores::schemas(),
         ["areal-peers", ref rest @ ..] => areal::peers(rest),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
