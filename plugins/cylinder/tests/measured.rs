@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod bad_data;
+#[path = "../../../tests/support/measured_data.rs"]
+mod measured_data;
 mod simulator;
 
 use std::path::PathBuf;
@@ -26,13 +28,7 @@ use simulator::{Part, Recording};
 
 /// The measured file, where it is.
 fn measured() -> Option<PathBuf> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/zeiss-cylinder/cylinder-r15.csv");
-    let path = PathBuf::from(path);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
+    measured_data::file("zeiss-cylinder/cylinder-r15.csv")
 }
 
 fn load(path: PathBuf) -> Points {

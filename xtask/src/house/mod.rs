@@ -178,7 +178,7 @@ fn long_files(root: &Path, members: &[Member]) -> Vec<(PathBuf, usize)> {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use std::{
         fs,
         ops::Deref,
