@@ -145,7 +145,7 @@ fn generatrices_that_were_never_used_are_predicted() {
         assert!(found.points >= 140 && found.outliers <= 7, "{found:?}");
         assert!(found.rms_um <= 1.6, "{found:?}");
         assert!(found.rms_um < found.cylinder_rms_um, "the form says nothing: {found:?}");
-        // As examples/10-measured-cylinder runs it, also with every point.
+        // As examples/09-measured-cylinder runs it, also with every point.
         assert!(max_order > 15 || found.rms_all_um <= 1.6, "{found:?}");
     }
 }

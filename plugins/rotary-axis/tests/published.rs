@@ -27,7 +27,7 @@ fn diagnosed(path: &Path, keys: &str) -> runout_core::Result<Diagnosis> {
 }
 
 fn published() -> PathBuf {
-    concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/12-measured-r-test/r-test.csv").into()
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/11-measured-r-test/r-test.csv").into()
 }
 
 #[test]

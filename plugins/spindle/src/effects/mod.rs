@@ -6,7 +6,7 @@
 //! which a rig or a scenario is written: angles in degrees, places in mm.
 //!
 //! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own whose `register` adds it
-//! by [`entry`] (`examples/14-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
+//! by [`entry`] (`examples/13-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
 
 mod alterations;
 mod asynchronous_line;
