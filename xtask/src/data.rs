@@ -185,7 +185,7 @@ fn all<'a>(files: &'a [Public], to: &Path, from: Option<&Path>) -> Outcome<Vec<(
                 return Err(format!("{} as converted is not what it has to be (BLAKE3 {})", made.place, made.blake3));
             }
             write(&to.join(made.place), text.as_bytes())?;
-            say(&format!("{} from {}", made.place, public.url));
+            say(&format!("{} made from {}", made.place, public.place));
         }
     }
     Ok(missing)

@@ -99,6 +99,19 @@ impl Findings {
         if !top.is_empty() {
             self.graph.push(format!("Modules of {folder}"));
         }
+        for (_, [one, other]) in picture.apart.iter().filter(|(apart, _)| apart == folder) {
+            for (from, to) in [(one, other), (other, one)] {
+                match top.get(from) {
+                    None => {
+                        self.remarks.push(format!("ARCHITECTURE.md: `apart {folder}`, but it has no module `{from}`"));
+                    }
+                    Some(uses) if uses.contains(to) => {
+                        self.faults.push(format!("{folder}: {from} -> {to}, which are to share nothing"));
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
         for (from, to) in top {
             let to: Vec<String> = to.into_iter().collect();
             self.graph.push(if to.is_empty() { format!("  {from}") } else { format!("  {from} -> {}", to.join(" ")) });
@@ -262,6 +275,17 @@ pub mod tests {
             stale.verdict(false).is_ok()
                 && stale.verdict(true).unwrap_err().contains("`cycle core`, but there is none")
         );
+    }
+
+    #[test]
+    fn modules_that_are_apart_share_nothing() {
+        let arrows = "plugins/* -> core\nplugins/b -> plugins/a\nformats/c -> plugins/b\napart core: a b";
+        let files = [("core/src/lib.rs", "mod a; mod b;"), ("core/src/a.rs", "use crate::b;"), ("core/src/b.rs", "")];
+        assert_eq!(house(arrows, &files).faults, ["core: a -> b, which are to share nothing"]);
+        let files = [("core/src/lib.rs", "mod a; mod b;"), ("core/src/a.rs", ""), ("core/src/b.rs", "")];
+        assert!(house(arrows, &files).verdict(true).is_ok());
+        let fault = house(arrows, &[("core/src/lib.rs", "mod a;"), ("core/src/a.rs", "")]).verdict(true).unwrap_err();
+        assert!(fault.contains("no module `b`"), "{fault}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! ```text
 //! # folder -> folders; `*` stands for one name
 //! plugins/* -> core
+//! apart plugins/a: simulate separators
 //! cycle core: why its modules still depend on each other
 //! cycle core::pipeline: why those inside `pipeline` do
 //! ```
@@ -13,6 +14,8 @@ use crate::process::Outcome;
 #[derive(Debug, Default)]
 pub struct Picture {
     arrows: Vec<(String, String)>,
+    /// Crates and two of their modules of which neither may take anything from the other.
+    pub apart: Vec<(String, [String; 2])>,
     /// Crates and their modules whose children depend on each other in a cycle, and why.
     pub cycles: Vec<(String, String)>,
 }
@@ -28,13 +31,18 @@ impl Picture {
         for line in block.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {
             if let Some((folder, reason)) = line.strip_prefix("cycle ").and_then(|rest| rest.split_once(": ")) {
                 picture.cycles.push((folder.trim().into(), reason.trim().into()));
+            } else if let Some((folder, modules)) = line.strip_prefix("apart ").and_then(|rest| rest.split_once(": ")) {
+                let [one, other] = modules.split_whitespace().collect::<Vec<_>>()[..] else {
+                    return Err(format!("ARCHITECTURE.md: `{line}` does not name two modules"));
+                };
+                picture.apart.push((folder.trim().into(), [one.into(), other.into()]));
             } else if let Some((from, to)) = line.split_once("->") {
                 for to in to.split_whitespace() {
                     picture.arrows.push((from.trim().into(), to.into()));
                 }
             } else {
                 return Err(format!(
-                    "ARCHITECTURE.md: `{line}` is neither `FOLDER -> FOLDER …` nor `cycle FOLDER: REASON`"
+                    "ARCHITECTURE.md: `{line}` is none of `FOLDER -> FOLDER …`, `apart FOLDER: MODULE MODULE`, `cycle FOLDER: REASON`"
                 ));
             }
         }
@@ -84,6 +92,7 @@ mod tests {
     fn a_line_that_says_nothing_is_refused() {
         assert!(Picture::read("no block").is_err());
         assert!(Picture::read("```house\ncore plugins\n```").unwrap_err().contains("core plugins"));
+        assert!(Picture::read("```house\napart core: a b c\n```").unwrap_err().contains("two modules"));
         assert!(Picture::read("```house\ncycle core:\n```").unwrap_err().contains("REASON"));
     }
 }
