@@ -3,6 +3,7 @@
 use std::{num::NonZeroUsize, ops::RangeInclusive, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 
 /// Separates the form of a turning part from the error motion of its spindle.
 ///
@@ -40,6 +41,8 @@ pub enum Command {
     Schema(SchemaArgs),
     /// Say what a file holds (HDF5, Parquet).
     Inspect(InspectArgs),
+    /// Print the completion script of a shell.
+    Completions(CompletionsArgs),
 }
 
 /// A pipeline and what to change in it.
@@ -225,4 +228,11 @@ pub struct SchemaArgs {
 pub struct InspectArgs {
     /// A measurement, a result or a table.
     pub file: PathBuf,
+}
+
+/// `runout completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell that reads the script: `runout completions bash > ~/.local/share/bash-completion/completions/runout`.
+    pub shell: Shell,
 }

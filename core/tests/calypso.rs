@@ -1,8 +1,11 @@
 //! Minimum-zone circles and cylinders beside those that ZEISS Calypso stored in its plots: public files of
 //! ZEISS-PiWeb/PiWeb-Formplots (BSD-3-Clause, `src/Tests/TestData/pltx`, commit 23dc4d3). The files are not in this repository:
-//! `RUNOUT_DATA` names the folder that holds them.
+//! `cargo xtask data` fetches them.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+#[path = "../../tests/support/measured_data.rs"]
+mod measured_data;
 
 use std::{
     f64::consts::TAU,
@@ -55,15 +58,13 @@ fn points(path: &Path, columns: usize) -> Vec<[f64; 3]> {
     counted.map(|([angle, z_mm, deviation_mm], _)| [angle, z_mm, 1e3 * deviation_mm]).collect()
 }
 
-/// The file, where it is: from `RUNOUT_DATA`, or two of them from the data beside the project.
+/// Plots that every folder of measured data holds.
+const ALWAYS: [&str; 2] = ["DIN Zylinderform2", "DIN Zylinderform3"];
+
+/// The file of a plot, where it is.
 fn file(name: &str) -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/zeiss-cylinder/original");
-    let folders = std::env::var_os("RUNOUT_DATA").map(PathBuf::from).into_iter().chain([PathBuf::from(beside)]);
-    let found = folders.map(|folder| folder.join(format!("{name}.pltx"))).find(|path| path.exists());
-    if found.is_none() {
-        println!("skipped: {name}.pltx is not there; RUNOUT_DATA names its folder");
-    }
-    found
+    let place = format!("zeiss-cylinder/original/{name}.pltx");
+    if ALWAYS.contains(&name) { measured_data::file(&place) } else { measured_data::optional_file(&place) }
 }
 
 fn compare(name: &str, found_um: f64, stored_um: f64, digit_um: f64) {

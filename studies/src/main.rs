@@ -135,11 +135,12 @@ fn sizes(words: &[&str], [first, second]: [u64; 2]) -> Option<[u64; 2]> {
 
 fn minimum_zone_cylinder(walls: u64, starts: usize) -> Result<()> {
     let mut rows = (0..walls).map(|seed| Wall::simulated(seed).study(starts)).collect::<Result<Vec<_>>>()?;
-    let measured = Path::new("../shared/data/zeiss-cylinder/cylinder-r15.csv");
+    let folder = std::env::var_os("RUNOUT_DATA").unwrap_or_else(|| "target/data".into());
+    let measured = Path::new(&folder).join("zeiss-cylinder/cylinder-r15.csv");
     if measured.is_file() {
-        rows.push(Wall::measured(measured, 15.056)?.study(starts)?);
+        rows.push(Wall::measured(&measured, 15.056)?.study(starts)?);
     } else {
-        println!("{} is not there; example 10 says where it is public", measured.display());
+        println!("{} is not there; `cargo xtask data` fetches it", measured.display());
     }
     println!("{}", minimum_zone_cylinder::table(&rows, starts));
     Ok(())

@@ -1,15 +1,17 @@
 //! The chores themselves.
 
-use std::{fs, path::Path, process::Command, time::SystemTime};
+use std::{collections::BTreeSet, fs, path::Path, process::Command, time::SystemTime};
 
 use crate::{
-    foreign,
+    foreign, house,
     process::{Outcome, answer, root, run, say, target},
     setup::{self, cargo},
 };
 
-/// Format, lints, tests, and the demo with the program that the tests were built with.
-pub fn test(foreign_readers: bool) -> Outcome {
+/// Picture of the crates, format, lints, tests, and the demo with the program that the tests were built with. With `complete`
+/// files are also read by foreign readers, and a skipped test is a failure.
+pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
+    house::check_quietly()?;
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
     run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;
@@ -22,12 +24,53 @@ pub fn test(foreign_readers: bool) -> Outcome {
     let mut tests = cargo(runner)?;
     // Foreign readers that one test starts inherit the open files of the others, and HDF5's locks on them with it.
     tests.env("HDF5_USE_FILE_LOCKING", "FALSE");
+    let skips = target().join("skipped-tests.txt");
+    let _ = fs::remove_file(&skips);
+    tests.env("RUNOUT_SKIPS", &skips);
     if foreign_readers {
         foreign::equip(&mut tests)?;
     }
     run(&mut tests)?;
     run(&mut cargo(&["test", "--workspace", "--doc", "--quiet"])?)?;
-    run_example(&target().join("debug/runout"))
+    run_example(&target().join("debug/runout"))?;
+    let skips = Skips::read(&fs::read_to_string(&skips).unwrap_or_default());
+    say(&skips.text());
+    if complete && skips.skipped > 0 {
+        return Err("a test was skipped; with --ci none may be (`cargo xtask data`, RUNOUT_DATA)".into());
+    }
+    Ok(())
+}
+
+/// Tests without the measured data that they take, by what `tests/support/measured_data.rs` writes.
+struct Skips {
+    lines: Vec<String>,
+    skipped: usize,
+    not_compared: usize,
+}
+
+impl Skips {
+    fn read(list: &str) -> Self {
+        let mut lines: Vec<String> = list.lines().map(str::to_owned).collect();
+        lines.sort();
+        lines.dedup();
+        // A test may lack several files.
+        let tests = |outcome: &str| {
+            let names =
+                lines.iter().filter_map(|line| line.strip_prefix(outcome)?.strip_prefix(": ")?.split(": ").next());
+            names.collect::<BTreeSet<&str>>().len()
+        };
+        let (skipped, not_compared) = (tests("skipped"), tests("not compared"));
+        Self { lines, skipped, not_compared }
+    }
+
+    /// What is missing, and the counts in the last line.
+    fn text(&self) -> String {
+        let counts = format!(
+            "tests skipped for want of measured data: {}; without a file that only some folders of data hold: {}",
+            self.skipped, self.not_compared
+        );
+        self.lines.iter().map(String::as_str).chain([counts.as_str()]).collect::<Vec<_>>().join("\n")
+    }
 }
 
 /// Writes schemas/ anew.
@@ -68,4 +111,19 @@ pub fn studies(arguments: &[&str]) -> Outcome {
 fn newer(made: &Path, from: &Path) -> bool {
     let changed = |path: &Path| -> Option<SystemTime> { fs::metadata(root().join(path)).ok()?.modified().ok() };
     matches!((changed(made), changed(from)), (Some(made), Some(from)) if made >= from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Skips;
+
+    #[test]
+    fn a_test_counts_once_whatever_it_lacks() {
+        let list = "skipped: circles: a.csv is not there; fetch it\nskipped: circles: b.csv is not there\n\
+                    skipped: circles: a.csv is not there; fetch it\nnot compared: cylinders: c.csv is not there\n";
+        let skips = Skips::read(list);
+        assert_eq!((skips.skipped, skips.not_compared, skips.lines.len()), (1, 1, 3));
+        assert!(skips.text().ends_with("measured data: 1; without a file that only some folders of data hold: 1"));
+        assert_eq!(Skips::read("").text().lines().count(), 1);
+    }
 }

@@ -3,7 +3,10 @@
 mod areal;
 mod bench;
 mod chores;
+#[cfg(any(test, feature = "data"))]
+mod data;
 mod foreign;
+mod house;
 mod process;
 mod results;
 mod setup;
@@ -17,8 +20,15 @@ cargo xtask COMMAND
 
   setup         find or bring what a build needs besides Rust: a C compiler, make, CMake 3.26 or newer
   demo          build runout, make the campaign of examples/01-four-sensor once, run its pipeline
-  test [--ci]   format, lints, tests, and the demo with the tests' build; with --ci also files read by Python and
-                Node, which it installs below target/
+  data [--from FOLDER]
+                fetch public measured files, or take them from a folder, and convert them to target/data, where examples
+                and tests find them
+  test [--ci]   check-house, format, lints, tests, and the demo with the tests' build; the last line counts tests
+                skipped for want of measured data. With --ci none may be, and files are also read by Python and Node,
+                which it installs below target/
+  check-house [--strict]
+                print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, and
+                on a cycle of modules; with --strict also on long files without a reason
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types
   bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]
@@ -39,6 +49,24 @@ cargo xtask COMMAND
 Every command does the set-up it needs first.
 ";
 
+/// Brings measured data; what it needs is built now, if it is not.
+fn measured_data(words: &[&str]) -> Outcome {
+    let from = match words {
+        [] => None,
+        ["--from", folder] => Some(std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?),
+        _ => return Err("data takes --from FOLDER or nothing".into()),
+    };
+    #[cfg(any(test, feature = "data"))]
+    return data::bring(from.as_deref());
+    #[cfg(not(any(test, feature = "data")))]
+    {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let mut again = std::process::Command::new(cargo);
+        again.args(["run", "--quiet", "--package", "xtask", "--features", "data", "--", "data"]);
+        process::run(again.args(from.map(|folder| ["--from".into(), folder.into_os_string()]).into_iter().flatten()))
+    }
+}
+
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
@@ -49,8 +77,10 @@ fn main() -> ExitCode {
         }
         ["setup"] => setup::report(),
         ["demo"] => chores::demo(),
-        ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1")),
-        ["test", "--ci"] => chores::test(true),
+        ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1"), false),
+        ["test", "--ci"] => chores::test(true, true),
+        ["check-house", ref rest @ ..] => house::check(rest),
+        ["data", ref rest @ ..] => measured_data(rest),
         ["schemas"] => chores::schemas(),
         ["areal-peers", ref rest @ ..] => areal::peers(rest),
         ["record-results", ref rest @ ..] => results::record(rest),

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod compare;
+pub mod completions;
 pub mod diagnose;
 pub mod inspect;
 pub mod plan;
@@ -34,6 +35,7 @@ pub fn execute(command: Command, json: bool, registry: &Registry) -> Result<(), 
         Command::Plugins(args) => plugins::execute(&args, json, registry),
         Command::Schema(args) => schema::execute(&args, json, registry),
         Command::Inspect(args) => inspect::execute(&args, json),
+        Command::Completions(args) => completions::execute(&args, json),
     }
 }
 

@@ -35,6 +35,22 @@ fn help() {
     assert_snapshot!(Folder::with(&[]).run(&["--help"]).shown());
 }
 
+/// The scripts are clap's; that they know the commands and options is what can go wrong here.
+#[test]
+fn completions_know_the_commands() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let ran = Folder::with(&[]).run(&["completions", shell]);
+        assert_eq!((ran.status, ran.stderr.as_str()), (0, ""), "{shell}");
+        for word in ["runout", "diagnose", "completions", "fail-on-limit"] {
+            assert!(ran.stdout.contains(word), "{shell}: {word}");
+        }
+    }
+    let ran = Folder::with(&[]).run(&["completions", "fish", "--json"]);
+    let document: Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!(document["shell"], "fish");
+    assert_eq!(Folder::with(&[]).run(&["completions", "cmd"]).status, 2);
+}
+
 #[test]
 fn check_of_a_rig_that_tells_everything() {
     let folder = Folder::with(&[("pipeline.toml", &pipeline())]);

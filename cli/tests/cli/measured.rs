@@ -1,12 +1,12 @@
-//! `examples/12-measured-r-test` as it stands: a model of points that has no form to separate.
+//! `examples/11-measured-r-test` as it stands: a model of points that has no form to separate.
 
 use serde_json::Value;
 
 use crate::folder::Folder;
 
-const PIPELINE: &str = include_str!("../../../examples/12-measured-r-test/pipeline.toml");
-const POINTS: &str = include_str!("../../../examples/12-measured-r-test/r-test.csv");
-const DIAGNOSIS: &str = include_str!("../../../examples/12-measured-r-test/diagnosis.json");
+const PIPELINE: &str = include_str!("../../../examples/11-measured-r-test/pipeline.toml");
+const POINTS: &str = include_str!("../../../examples/11-measured-r-test/r-test.csv");
+const DIAGNOSIS: &str = include_str!("../../../examples/11-measured-r-test/diagnosis.json");
 
 fn example() -> Folder {
     Folder::with(&[("pipeline.toml", PIPELINE), ("r-test.csv", POINTS)])

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod bad_data;
+#[path = "../../../tests/support/measured_data.rs"]
+mod measured_data;
 mod simulator;
 
 use std::path::PathBuf;
@@ -25,13 +27,7 @@ use simulator::{Part, Recording};
 
 /// The measured file, where it is.
 fn measured() -> Option<PathBuf> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/zeiss-cylinder/cylinder-r15.csv");
-    let path = PathBuf::from(path);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
+    measured_data::file("zeiss-cylinder/cylinder-r15.csv")
 }
 
 fn load(path: PathBuf) -> Points {
@@ -144,7 +140,7 @@ fn generatrices_that_were_never_used_are_predicted() {
         assert!(found.points >= 140 && found.outliers <= 7, "{found:?}");
         assert!(found.rms_um <= 1.6, "{found:?}");
         assert!(found.rms_um < found.cylinder_rms_um, "the form says nothing: {found:?}");
-        // As examples/10-measured-cylinder runs it, also with every point.
+        // As examples/09-measured-cylinder runs it, also with every point.
         assert!(max_order > 15 || found.rms_all_um <= 1.6, "{found:?}");
     }
 }

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
+#[path = "../../../tests/support/measured_data.rs"]
+mod measured_data;
+
 use std::{f64::consts::TAU, fmt::Write, path::PathBuf};
 
 use runout_core::{
@@ -32,11 +35,7 @@ fn diagnosed(path: &std::path::Path) -> Diagnosis {
 
 #[test]
 fn a_measured_axis_is_an_ellipse_with_a_fourth_harmonic() {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/bev-quadrature/x-axis.csv"));
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return;
-    }
+    let Some(path) = measured_data::file("bev-quadrature/x-axis.csv") else { return };
     let found = diagnosed(&path);
     for added in &found.added {
         println!("{} {:?} {:?} {:.0}", added.effect, added.parameters, added.held_out_rms_um, added.delta_bic);

@@ -1,12 +1,12 @@
 //! What a spindle measurement may have that its rig does not declare: one file an effect.
 //!
 //! An effect says what it is described by, how it changes the model when applied ([`Alterations`]), and how it changes the
-//! readings per unit of each parameter. Readings are u = form + motion along the sensor (`physics.md` section 1). Partials are
-//! those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied. Parameters are in the units in
+//! readings per unit of each parameter. Readings are u = form + motion along the sensor (`docs/physics.md` section 1).
+//! Partials are those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied. Parameters are in the units in
 //! which a rig or a scenario is written: angles in degrees, places in mm.
 //!
 //! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own whose `register` adds it
-//! by [`entry`] (`examples/14-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
+//! by [`entry`] (`examples/13-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
 
 mod alterations;
 mod asynchronous_line;
