@@ -3,7 +3,7 @@
 //! Errors of a separated form are normal, favour no phase, and do not couple orders: over the angle they are a stationary
 //! process, so that one drawn profile, turned by any angle, is another draw. Each transform thus gives several draws.
 
-use std::{cell::RefCell, rc::Rc};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -123,14 +123,14 @@ pub fn farthest(value: f64, others: impl IntoIterator<Item = f64>) -> f64 {
 pub struct Noise {
     seed: u64,
     orders: usize,
-    sets: Rc<RefCell<Sets>>,
+    sets: Arc<Mutex<Sets>>,
 }
 
 #[derive(Debug)]
 struct Sets {
     random: ChaCha8Rng,
     /// Of each draw, two numbers for every order, and the generator behind them.
-    drawn: Vec<(Rc<[Complex64]>, ChaCha8Rng)>,
+    drawn: Vec<(Arc<[Complex64]>, ChaCha8Rng)>,
 }
 
 impl Noise {
@@ -138,12 +138,12 @@ impl Noise {
     #[must_use]
     pub fn new(orders: usize, seed: u64) -> Self {
         let sets = Sets { random: ChaCha8Rng::seed_from_u64(seed), drawn: Vec::new() };
-        Self { seed, orders, sets: Rc::new(RefCell::new(sets)) }
+        Self { seed, orders, sets: Arc::new(Mutex::new(sets)) }
     }
 
     /// Numbers of draw number `index`, and the generator behind them; the same for all that ask.
-    fn of_draw(&self, index: usize) -> (Rc<[Complex64]>, ChaCha8Rng) {
-        let mut sets = self.sets.borrow_mut();
+    fn of_draw(&self, index: usize) -> (Arc<[Complex64]>, ChaCha8Rng) {
+        let mut sets = self.sets.lock().unwrap_or_else(PoisonError::into_inner);
         while sets.drawn.len() <= index {
             let numbers = (0..self.orders).map(|_| normal(&mut sets.random)).collect();
             let behind = sets.random.clone();
