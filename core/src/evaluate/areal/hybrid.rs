@@ -27,9 +27,10 @@ impl Hybrid {
 }
 
 /// Derivative at the middle of seven values at distance 1.
+#[inline(always)]
 pub(in crate::evaluate) fn derivative(at: impl Fn(isize) -> f64) -> f64 {
-    let differences = [1, 2, 3].map(|step| at(step) - at(-step));
-    GRADIENT.iter().zip(differences).map(|(weight, difference)| weight * difference).sum::<f64>() / 60.0
+    let [near, next, far] = GRADIENT;
+    (near * (at(1) - at(-1)) + next * (at(2) - at(-2)) + far * (at(3) - at(-3))) / 60.0
 }
 
 fn gradient(map: &HeightMap) -> f64 {
@@ -125,12 +126,8 @@ impl NullaryFnOnce for Gradients<'_> {
             let above: [[f64; LANES]; 7] = std::array::from_fn(|index| load(rings[index], offset + 3));
             let mut squares = [0.0; LANES];
             for l in 0..LANES {
-                let of = |all: &[[f64; LANES]; 7]| {
-                    GRADIENT[0] * (all[4][l] - all[2][l])
-                        + GRADIENT[1] * (all[5][l] - all[1][l])
-                        + GRADIENT[2] * (all[6][l] - all[0][l])
-                };
-                let (slope, rise) = (across * (of(&beside) / 60.0), along * (of(&above) / 60.0));
+                let of = |all: &[[f64; LANES]; 7]| derivative(|step| all[(step + 3) as usize][l]);
+                let (slope, rise) = (across * of(&beside), along * of(&above));
                 squares[l] = slope * slope + rise * rise;
             }
             lanes.add(squares);

@@ -1,11 +1,17 @@
 //! The points of a profile, and what they are about a circle.
 
+#![allow(clippy::inline_always, reason = "see crate::numerics::lanes")]
+
 use std::{cell::RefCell, f64::consts::TAU, rc::Rc};
 
 use super::{Circle, Reference, Undetermined, Values, circumscribed, least_squares, search};
 use crate::{
     evaluate::near::Course,
-    numerics::{chebyshev::Chebyshev, cloud::Cloud, lanes::vectorised},
+    numerics::{
+        chebyshev::Chebyshev,
+        cloud::Cloud,
+        lanes::{NullaryFnOnce, vectorised},
+    },
 };
 
 /// Sets of equal angles that are kept: those of the filters of one section.
@@ -90,22 +96,49 @@ pub struct Points {
     pub(super) span_um: f64,
 }
 
+/// Where points of a profile are put.
+struct Profile<'a> {
+    u: &'a mut [f64],
+    v: &'a mut [f64],
+    levels: &'a mut [f64],
+    form_um: &'a [f64],
+    cos: &'a [f64],
+    sin: &'a [f64],
+    radius_um: f64,
+}
+
+impl NullaryFnOnce for Profile<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { u, v, levels, form_um, cos, sin, radius_um } = self;
+        let (per_radius, half) = (radius_um.recip(), 0.5 / radius_um);
+        for (level, form) in levels.iter_mut().zip(form_um) {
+            // An infinite form is no point either.
+            *level = if form.abs() < f64::INFINITY { form + form * form * half } else { f64::NAN };
+        }
+        for (column, direction) in [(u, cos), (v, sin)] {
+            for ((feature, direction), form) in column.iter_mut().zip(direction).zip(form_um) {
+                let scale = if form.abs() < f64::INFINITY { 1.0 + form * per_radius } else { 0.0 };
+                *feature = scale * direction;
+            }
+        }
+    }
+}
+
 impl Points {
     /// Takes a profile: radial deviations `form_um` from a circle of `radius_mm` (positive), one at each angle.
     ///
     /// Deviations may be as large as the radius: for a polar plot, `radius_mm` is its base circle.
     pub fn set_profile(&mut self, angles: &Angles, form_um: &[f64], radius_mm: f64) {
-        let radius = 1e3 * radius_mm;
-        (self.radius_um, self.origin_um) = (radius, [0.0; 2]);
+        let radius_um = 1e3 * radius_mm;
+        (self.radius_um, self.origin_um) = (radius_um, [0.0; 2]);
         let ([u, v], levels) = self.cloud.columns_mut();
-        let scale = |form: &f64| if form.is_finite() { 1.0 + form / radius } else { 0.0 };
-        let level = |form: &f64| if form.is_finite() { form + form * form / (2.0 * radius) } else { f64::NAN };
-        u.clear();
-        u.extend(form_um.iter().zip(&angles.cos).map(|(form, cos)| scale(form) * cos));
-        v.clear();
-        v.extend(form_um.iter().zip(&angles.sin).map(|(form, sin)| scale(form) * sin));
-        levels.clear();
-        levels.extend(form_um.iter().zip(&angles.cos).map(|(form, _)| level(form)));
+        let count = form_um.len().min(angles.len());
+        [&mut *u, &mut *v, &mut *levels].into_iter().for_each(|column| column.resize(count, 0.0));
+        let form_um = &form_um[..count];
+        vectorised(Profile { u, v, levels, form_um, cos: &angles.cos[..count], sin: &angles.sin[..count], radius_um });
         self.measure();
     }
 
