@@ -39,6 +39,50 @@ impl Near {
     }
 }
 
+/// Points of a profile by height: with errors added, the highest is among the first.
+#[derive(Debug, Clone)]
+pub(super) struct Ranked {
+    /// Heights and places of the highest points, descending.
+    first: Vec<(f64, u32)>,
+    /// Whether these are all that there are.
+    all: bool,
+}
+
+/// Points that are ranked, at most.
+const RANKED: usize = 256;
+
+impl Ranked {
+    /// Of heights, of which missing ones are NaN.
+    pub fn new(heights: impl Iterator<Item = f64>) -> Self {
+        let there = heights.zip(0..).filter(|(height, _)| !height.is_nan());
+        let mut first: Vec<(f64, u32)> = there.collect();
+        let descending = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+        let all = first.len() <= RANKED;
+        if !all {
+            first.select_nth_unstable_by(RANKED, descending);
+            first.truncate(RANKED);
+        }
+        first.sort_unstable_by(descending);
+        Self { first, all }
+    }
+
+    /// The highest of `disturbed` heights, none of which is above its own by more than `largest`, and its place. `None` where
+    /// points that are not ranked could be higher, or there is none.
+    pub fn highest(&self, largest: f64, disturbed: impl Fn(usize) -> f64) -> Option<(f64, usize)> {
+        let (mut best, mut place) = (f64::NEG_INFINITY, None);
+        for (height, point) in &self.first {
+            if height + largest < best {
+                return place.map(|place| (best, place));
+            }
+            let found = disturbed(*point as usize);
+            if found > best {
+                (best, place) = (found, Some(*point as usize));
+            }
+        }
+        place.filter(|_| self.all).map(|place| (best, place))
+    }
+}
+
 /// What deviations come to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Course {
@@ -82,11 +126,20 @@ impl Course {
 
     /// Of drawn values less what they are above their deviations; none is missing.
     pub fn less(drawn: &[f64], offset: &[f64]) -> Self {
+        Self::of_both(drawn, offset, |drawn, offset| drawn - offset)
+    }
+
+    /// Of deviations with errors added; none is missing.
+    pub fn with_errors(deviations: &[f64], errors: &[f64]) -> Self {
+        Self::of_both(deviations, errors, |deviation, error| deviation + error)
+    }
+
+    fn of_both(first: &[f64], second: &[f64], deviation: impl Fn(f64, f64) -> f64) -> Self {
         // Lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
         let (mut low, mut high, mut squares) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES], [0.0; LANES]);
-        for (drawn, offset) in drawn.chunks(LANES).zip(offset.chunks(LANES)) {
-            for (lane, (drawn, offset)) in drawn.iter().zip(offset).enumerate() {
-                let deviation = drawn - offset;
+        for (first, second) in first.chunks(LANES).zip(second.chunks(LANES)) {
+            for (lane, (first, second)) in first.iter().zip(second).enumerate() {
+                let deviation = deviation(*first, *second);
                 low[lane] = if deviation < low[lane] { deviation } else { low[lane] };
                 high[lane] = if deviation > high[lane] { deviation } else { high[lane] };
                 squares[lane] += deviation * deviation;
@@ -96,7 +149,7 @@ impl Course {
             low: low.into_iter().fold(f64::INFINITY, f64::min),
             high: high.into_iter().fold(f64::NEG_INFINITY, f64::max),
             squares: squares.iter().sum(),
-            points: drawn.len(),
+            points: first.len(),
         }
     }
 }

@@ -1,14 +1,21 @@
 //! The steepest slope of a closed profile, from its harmonics.
 
-use std::f64::consts::TAU;
+use std::{borrow::Cow, f64::consts::TAU};
 
-use crate::{Complex64, numerics::fourier::Fourier, rig::Gaps};
+use super::near::Ranked;
+use crate::{
+    Complex64,
+    numerics::{fourier::Fourier, interpolation::Curve},
+    rig::Gaps,
+};
 
 /// Angles a wave of the highest order at which the slope is looked at first.
 const POINTS_A_WAVE: usize = 16;
 /// Peaks nearer to the largest than this share of it are refined: the largest slope between two of those angles exceeds both by
 /// less, 1 − cos(π/16).
 const NEAR: f64 = 0.02;
+/// Orders whose amplitudes together are below this share of all are rounding.
+const ROUNDING: f64 = 1e-15;
 /// Newton's steps from the nearest angle: each doubles the digits.
 const STEPS: usize = 6;
 
@@ -18,41 +25,68 @@ const STEPS: usize = 6;
 pub fn steepest_um_per_rad(harmonics: &[Complex64], gaps: &Gaps) -> f64 {
     let slopes: Vec<Complex64> =
         harmonics.iter().enumerate().map(|(order, value)| Complex64::I * order as f64 * value).collect();
-    let highest = slopes.iter().rposition(|value| value.norm_sqr() > 0.0).unwrap_or(0);
-    let count = (POINTS_A_WAVE * highest.max(1)).next_power_of_two();
+    let highest = highest_that_counts(&slopes);
+    let count = smooth(POINTS_A_WAVE * highest.max(1));
     let mut fourier = Fourier::new(count);
-    let mut on_angles = fourier.synthesise(slopes.iter().copied()).to_vec();
-    gaps.blank(&mut on_angles);
-    let series = &slopes[..slopes.len().min(highest + 1)];
-    // Of numbers and NaN the larger number.
-    let largest = on_angles.iter().map(|slope| slope.abs()).fold(f64::NAN, f64::max);
+    let on_angles = fourier.synthesise(slopes.iter().copied());
+    let curve = Curve::new(&slopes, on_angles);
+    let mut blanked = Cow::Borrowed(on_angles);
+    if !gaps.is_empty() {
+        gaps.blank(blanked.to_mut());
+    }
+    let largest = largest_of(&blanked);
     let step = TAU / count as f64;
     let mut steepest = largest;
-    for (index, slope) in on_angles.iter().enumerate() {
-        let beside = [on_angles[(index + count - 1) % count], on_angles[(index + 1) % count]];
-        let peak = beside.iter().all(|other| slope.abs() >= other.abs());
-        if peak && slope.abs() >= (1.0 - NEAR) * largest {
-            let start = index as f64 * step;
-            let found = peak_near(series, start, step);
+    for (index, slope) in blanked.iter().enumerate().filter(|(_, slope)| slope.abs() >= (1.0 - NEAR) * largest) {
+        let beside = [blanked[(index + count - 1) % count], blanked[(index + 1) % count]];
+        if beside.iter().all(|other| slope.abs() >= other.abs()) {
+            let found = peak_near(&curve, index as f64 * step, step);
             if !gaps.hold(found) {
-                steepest = steepest.max(value_at(series, found).abs());
+                steepest = steepest.max(curve.at(found)[0].abs());
             }
         }
     }
     let ends = gaps.stretches().flat_map(|[from, length]| [from, from + length]);
-    ends.map(|end| value_at(series, end).abs()).fold(steepest, f64::max)
+    ends.map(|end| curve.at(end)[0].abs()).fold(steepest, f64::max)
 }
 
-/// Where the slope of a series is 0 within a step of an angle; the angle itself where there is none.
-fn peak_near(series: &[Complex64], start: f64, step: f64) -> f64 {
+/// The highest order that is no rounding beside the others.
+fn highest_that_counts(series: &[Complex64]) -> usize {
+    let size = |value: &Complex64| value.norm_sqr().sqrt();
+    let all: f64 = series.iter().map(size).sum();
+    let above = series.iter().rev().scan(0.0, |sum, value| {
+        *sum += size(value);
+        Some(*sum)
+    });
+    let below = above.take_while(|above| *above <= ROUNDING * all).count();
+    series.len().saturating_sub(below + 1)
+}
+
+/// A number of angles, at least so many, for a quick transform.
+fn smooth(at_least: usize) -> usize {
+    let power = at_least.next_power_of_two().max(8);
+    [5 * (power / 8), 3 * (power / 4), power].into_iter().find(|count| *count >= at_least).unwrap_or(power)
+}
+
+/// The largest of some numbers, without sign; NaN of nothing but NaN.
+fn largest_of(values: &[f64]) -> f64 {
+    // Lanes that do not wait for each other.
+    let mut largest = [f64::NEG_INFINITY; 8];
+    for chunk in values.chunks(8) {
+        for (largest, value) in largest.iter_mut().zip(chunk) {
+            // Comparisons with NaN are false.
+            *largest = if value.abs() > *largest { value.abs() } else { *largest };
+        }
+    }
+    let largest = largest.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    if largest >= 0.0 { largest } else { f64::NAN }
+}
+
+/// Where the slope of a curve is 0 within a step of an angle; the angle itself where there is none.
+fn peak_near(curve: &Curve, start: f64, step: f64) -> f64 {
     let mut angle = start;
     for _ in 0..STEPS {
-        let (mut first, mut second) = (0.0, 0.0);
-        for (order, value) in series.iter().enumerate() {
-            let turned = value * Complex64::cis(order as f64 * angle);
-            first -= order as f64 * turned.im;
-            second -= (order * order) as f64 * turned.re;
-        }
+        let [_, first, second] = curve.at(angle);
         let next = angle - first / second;
         if next.is_nan() || (next - start).abs() > step {
             break;
@@ -62,19 +96,49 @@ fn peak_near(series: &[Complex64], start: f64, step: f64) -> f64 {
     angle
 }
 
-fn value_at(series: &[Complex64], angle: f64) -> f64 {
-    series.iter().enumerate().map(|(order, value)| (value * Complex64::cis(order as f64 * angle)).re).sum()
+/// Slopes on equal angles to which errors are added: of each draw the largest |dr/dα|, with a parabola through the three angles
+/// about it.
+pub struct Drawn<'a> {
+    slopes: &'a [f64],
+    ranked: Ranked,
 }
 
-/// The same on equal angles, with a parabola through the three angles about the largest: what many draws are compared by.
-#[must_use]
-pub fn largest_on_angles(slopes: &[f64]) -> f64 {
-    let count = slopes.len();
-    let largest = slopes.iter().enumerate().fold((0, f64::NAN), |best, (index, slope)| {
-        if slope.abs() > best.1 || (best.1.is_nan() && !slope.is_nan()) { (index, slope.abs()) } else { best }
+impl<'a> Drawn<'a> {
+    /// About slopes, of which missing ones are NaN.
+    #[must_use]
+    pub fn about(slopes: &'a [f64]) -> Self {
+        Self { slopes, ranked: Ranked::new(slopes.iter().map(|slope| slope.abs())) }
+    }
+
+    /// Of the slopes with errors of at most `largest` added.
+    #[must_use]
+    pub fn steepest(&self, errors: &[f64], largest: f64) -> f64 {
+        let size = |point: usize| (self.slopes[point] + errors[point]).abs();
+        match self.ranked.highest(largest, size) {
+            Some((peak, place)) => with_parabola(place, peak, self.slopes.len(), size),
+            None => with_errors(self.slopes, size),
+        }
+    }
+
+    /// Of the slopes themselves.
+    #[must_use]
+    pub fn undisturbed(&self) -> f64 {
+        with_errors(self.slopes, |point| self.slopes[point].abs())
+    }
+}
+
+/// The largest of all sizes, with its parabola.
+fn with_errors(slopes: &[f64], size: impl Fn(usize) -> f64) -> f64 {
+    let (index, peak) = (0..slopes.len()).fold((0, f64::NAN), |best, index| {
+        let size = size(index);
+        if size > best.1 || (best.1.is_nan() && !size.is_nan()) { (index, size) } else { best }
     });
-    let (index, peak) = largest;
-    let beside = |step: usize| slopes[(index + step) % count].abs();
+    with_parabola(index, peak, slopes.len(), size)
+}
+
+/// The top of the parabola through a peak and both of its neighbours.
+fn with_parabola(index: usize, peak: f64, count: usize, size: impl Fn(usize) -> f64) -> f64 {
+    let beside = |step: usize| size((index + step) % count);
     if count < 3 || peak.is_nan() {
         return peak;
     }
@@ -126,10 +190,26 @@ mod tests {
     #[test]
     fn a_parabola_meets_a_peak_between_angles() {
         let slopes: Vec<f64> = (0..16).map(|step| (TAU * (f64::from(step) - 0.4) / 16.0).cos()).collect();
-        assert!((largest_on_angles(&slopes) - 1.0).abs() < 1e-3);
-        assert!(
-            largest_on_angles(&[f64::NAN; 4]).is_nan()
-                && (largest_on_angles(&[f64::NAN, -2.0, 1.0]) - 2.0).abs() < 1e-15
-        );
+        assert!((Drawn::about(&slopes).undisturbed() - 1.0).abs() < 1e-3);
+        assert!(Drawn::about(&[f64::NAN; 4]).undisturbed().is_nan());
+        assert!((Drawn::about(&[f64::NAN, -2.0, 1.0]).undisturbed() - 2.0).abs() < 1e-15);
+    }
+
+    /// Ranks leave nothing out, however large errors are beside the slopes.
+    #[test]
+    #[allow(clippy::float_cmp, reason = "the same operations")]
+    fn ranked_slopes_give_the_largest_of_all() {
+        let wave = |point: usize, phase: f64| (0.37 * point as f64 + phase).sin() + (1.7 * point as f64 * phase).cos();
+        for count in [50, 2000] {
+            let mut slopes: Vec<f64> = (0..count).map(|point| wave(point, 0.3)).collect();
+            slopes[10..20].fill(f64::NAN);
+            let drawn = Drawn::about(&slopes);
+            for (draw, size) in (1..60).zip([1e-3, 0.1, 1.0, 30.0].into_iter().cycle()) {
+                let errors: Vec<f64> = (0..count).map(|point| size * wave(point, 0.7 * f64::from(draw))).collect();
+                let both: Vec<f64> = slopes.iter().zip(&errors).map(|(slope, error)| slope + error).collect();
+                let expected = Drawn::about(&both).undisturbed();
+                assert_eq!(drawn.steepest(&errors, largest_of(&errors)), expected, "{count} {draw}");
+            }
+        }
     }
 }

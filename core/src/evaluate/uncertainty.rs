@@ -3,6 +3,8 @@
 //! Errors of a separated form are normal, favour no phase, and do not couple orders: over the angle they are a stationary
 //! process, so that one drawn profile, turned by any angle, is another draw. Each transform thus gives several draws.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -116,15 +118,76 @@ pub fn farthest(value: f64, others: impl IntoIterator<Item = f64>) -> f64 {
     others.into_iter().map(|other| (other - value).abs()).fold(0.0, f64::max)
 }
 
+/// Normal numbers of one seed that several [`Errors`] share: those of one form behind different filters.
+#[derive(Debug, Clone)]
+pub struct Noise {
+    seed: u64,
+    orders: usize,
+    sets: Arc<Mutex<Sets>>,
+}
+
+#[derive(Debug)]
+struct Sets {
+    random: ChaCha8Rng,
+    /// Of each draw, two numbers for every order, and the generator behind them.
+    drawn: Vec<(Arc<[Complex64]>, ChaCha8Rng)>,
+}
+
+impl Noise {
+    /// For so many orders, from a seed.
+    #[must_use]
+    pub fn new(orders: usize, seed: u64) -> Self {
+        let sets = Sets { random: ChaCha8Rng::seed_from_u64(seed), drawn: Vec::new() };
+        Self { seed, orders, sets: Arc::new(Mutex::new(sets)) }
+    }
+
+    /// Numbers of draw number `index`, and the generator behind them; the same for all that ask.
+    fn of_draw(&self, index: usize) -> (Arc<[Complex64]>, ChaCha8Rng) {
+        let mut sets = self.sets.lock().unwrap_or_else(PoisonError::into_inner);
+        while sets.drawn.len() <= index {
+            let numbers = (0..self.orders).map(|_| normal(&mut sets.random)).collect();
+            let behind = sets.random.clone();
+            // What a draw takes for its start.
+            let _ = sets.random.random_range(0..self.orders.max(1));
+            sets.drawn.push((numbers, behind));
+        }
+        sets.drawn[index].clone()
+    }
+}
+
+/// Two independent normal numbers of variance 1.
+fn normal(random: &mut ChaCha8Rng) -> Complex64 {
+    Complex64::new(StandardNormal.sample(random), StandardNormal.sample(random))
+}
+
+/// Where the normal numbers of errors come from.
+enum Source {
+    Own(ChaCha8Rng),
+    /// And how many draws were taken.
+    Shared(Noise, usize),
+}
+
 /// Draws of the errors of a profile on equal angles.
 pub struct Errors {
     amplitudes: Vec<f64>,
-    random: ChaCha8Rng,
-    /// The errors last drawn, before they are turned.
+    source: Source,
+    /// The errors last drawn twice over, before they are turned.
     drawn_um: Vec<f64>,
     largest_um: f64,
+    squares_um2: f64,
     start: usize,
     turn: usize,
+}
+
+/// One draw of errors on equal angles.
+#[derive(Debug, Clone, Copy)]
+pub struct DrawnErrors<'a> {
+    /// At each angle, in µm.
+    pub errors_um: &'a [f64],
+    /// The largest of them, without sign.
+    pub largest_um: f64,
+    /// Sum of their squares.
+    pub squares_um2: f64,
 }
 
 impl Errors {
@@ -132,6 +195,21 @@ impl Errors {
     /// `lowest`, are taken as exact. `None` where no variance is known.
     #[must_use]
     pub fn new(variance: &[f64], lowest: usize, seed: u64) -> Option<Self> {
+        Self::from_source(variance, lowest, Source::Own(ChaCha8Rng::seed_from_u64(seed)))
+    }
+
+    /// The same from numbers that others take too: draw by draw, errors of both differ by their variance only.
+    #[must_use]
+    pub fn sharing(variance: &[f64], lowest: usize, noise: &Noise) -> Option<Self> {
+        let source = if variance.len() <= noise.orders {
+            Source::Shared(noise.clone(), 0)
+        } else {
+            Source::Own(ChaCha8Rng::seed_from_u64(noise.seed))
+        };
+        Self::from_source(variance, lowest, source)
+    }
+
+    fn from_source(variance: &[f64], lowest: usize, source: Source) -> Option<Self> {
         // A coefficient's real and imaginary part have half of its variance each; a level is real.
         let share = |order: usize| if order == 0 { 1.0 } else { 0.5 };
         let known = |order: usize, variance: f64| order >= lowest && variance.is_finite() && variance > 0.0;
@@ -140,8 +218,15 @@ impl Errors {
         };
         let amplitudes: Vec<f64> = variance.iter().enumerate().map(amplitude).collect();
         let some = amplitudes.iter().any(|amplitude| *amplitude > 0.0);
-        let random = ChaCha8Rng::seed_from_u64(seed);
-        some.then(|| Self { amplitudes, random, drawn_um: Vec::new(), largest_um: 0.0, start: 0, turn: 0 })
+        some.then(|| Self {
+            amplitudes,
+            source,
+            drawn_um: Vec::new(),
+            largest_um: 0.0,
+            squares_um2: 0.0,
+            start: 0,
+            turn: 0,
+        })
     }
 
     /// The standard deviation of an error at any one angle.
@@ -156,36 +241,73 @@ impl Errors {
         self.largest_um
     }
 
-    /// Harmonics of the next errors, independent of all before, by order from 0.
-    fn harmonics(&mut self) -> Vec<Complex64> {
-        let mut part = |amplitude: f64| -> f64 {
-            let normal: f64 = StandardNormal.sample(&mut self.random);
-            amplitude * normal
-        };
-        self.amplitudes.iter().map(|amplitude| Complex64::new(part(*amplitude), part(*amplitude))).collect()
+    /// The next errors on the equal angles that `fourier` has, independent of all before, and the generator behind them.
+    fn next<'a>(&mut self, fourier: &'a mut Fourier) -> (&'a [f64], ChaCha8Rng) {
+        let amplitudes = &self.amplitudes;
+        match &mut self.source {
+            Source::Own(random) => {
+                let harmonics: Vec<Complex64> =
+                    amplitudes.iter().map(|amplitude| *amplitude * normal(random)).collect();
+                (fourier.synthesise(harmonics), random.clone())
+            }
+            Source::Shared(noise, taken) => {
+                let (numbers, behind) = noise.of_draw(*taken);
+                *taken += 1;
+                let harmonics = amplitudes.iter().zip(&*numbers).map(|(amplitude, number)| *amplitude * number);
+                (fourier.synthesise(harmonics), behind)
+            }
+        }
     }
 
     /// Fills `errors_um` with the next errors on the equal angles that `fourier` has, independent of all before.
     pub fn fresh(&mut self, fourier: &mut Fourier, errors_um: &mut [f64]) {
-        let harmonics = self.harmonics();
-        errors_um.iter_mut().zip(fourier.synthesise(harmonics)).for_each(|(target, error)| *target = *error);
+        let (errors, _) = self.next(fourier);
+        errors_um.iter_mut().zip(errors).for_each(|(target, error)| *target = *error);
+    }
+
+    /// The next errors; all draws are of the one length that `fourier` has.
+    pub fn turned(&mut self, fourier: &mut Fourier) -> DrawnErrors<'_> {
+        let length = fourier.length();
+        if self.turn == 0 {
+            let mut drawn_um = std::mem::take(&mut self.drawn_um);
+            let (errors, mut random) = self.next(fourier);
+            drawn_um.clear();
+            drawn_um.extend_from_slice(errors);
+            drawn_um.extend_from_slice(errors);
+            self.start = random.random_range(0..length);
+            if let Source::Own(own) = &mut self.source {
+                *own = random;
+            }
+            (self.largest_um, self.squares_um2) = size(&drawn_um[..length]);
+            self.drawn_um = drawn_um;
+        }
+        let from = (self.start + self.turn * length / TURNS_OF_A_DRAW) % length;
+        self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
+        let errors_um = &self.drawn_um[from..from + length];
+        DrawnErrors { errors_um, largest_um: self.largest_um, squares_um2: self.squares_um2 }
     }
 
     /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
     pub fn draw(&mut self, fourier: &mut Fourier, form_um: &[f64], drawn: &mut Vec<f64>) {
-        let length = fourier.length();
-        if self.turn == 0 {
-            let harmonics = self.harmonics();
-            self.drawn_um.clear();
-            self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
-            self.largest_um = self.drawn_um.iter().fold(0.0, |largest, error| error.abs().max(largest));
-            self.start = self.random.random_range(0..length);
-        }
-        let (head, tail) = self.drawn_um.split_at((self.start + self.turn * length / TURNS_OF_A_DRAW) % length);
-        self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
+        let DrawnErrors { errors_um, .. } = self.turned(fourier);
         drawn.clear();
-        drawn.extend(form_um.iter().zip(tail.iter().chain(head)).map(|(form, error)| form + error));
+        drawn.extend(form_um.iter().zip(errors_um).map(|(form, error)| form + error));
     }
+}
+
+/// The largest of some errors, without sign, and the sum of their squares.
+fn size(errors: &[f64]) -> (f64, f64) {
+    const LANES: usize = 8;
+    // Lanes that do not wait for each other.
+    let (mut largest, mut squares) = ([0.0_f64; LANES], [0.0; LANES]);
+    for chunk in errors.chunks(LANES) {
+        for (error, (largest, squares)) in chunk.iter().zip(largest.iter_mut().zip(&mut squares)) {
+            let size = error.abs();
+            *largest = if size > *largest { size } else { *largest };
+            *squares += size * size;
+        }
+    }
+    (largest.into_iter().fold(0.0, f64::max), squares.iter().sum())
 }
 
 /// Values with their uncertainty: `draw` computes them once from what was found (given false) and then `draws` times from
@@ -262,16 +384,23 @@ fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
 pub fn stand_in(harmonics: &[Complex64], variance: &[f64], lowest: usize) -> Vec<f64> {
     let noise = |order: usize| variance.get(order).copied().filter(|variance| *variance > 0.0).unwrap_or(0.0);
     let count = harmonics.len();
+    // Sums from an order on, from the highest down: of two of them, the difference is the sum between, and as power falls with
+    // the order it loses few digits.
+    let mut above = vec![(0.0, 0.0); count + 1];
+    for order in (0..count).rev() {
+        let (power, noises) = above[order + 1];
+        above[order] = (power + harmonics[order].norm_sqr(), noises + noise(order));
+    }
     let weight = |order: usize| {
         let (own, own_noise) = (harmonics[order].norm_sqr(), noise(order));
         if order < lowest || own_noise == 0.0 {
             return 1.0;
         }
         let beside = (order / 3).max(4);
-        let near = order.saturating_sub(beside).max(lowest)..(order + beside + 1).min(count);
-        let number = near.len() as f64;
-        let power = near.clone().map(|order| harmonics[order].norm_sqr()).sum::<f64>() / number;
-        let noise = near.map(noise).sum::<f64>() / number;
+        let (from, to) = (order.saturating_sub(beside).max(lowest), (order + beside + 1).min(count));
+        let number = (to - from) as f64;
+        let power = (above[from].0 - above[to].0) / number;
+        let noise = (above[from].1 - above[to].1) / number;
         let signal = power - noise;
         let together = if signal > 2.0 * noise / number.sqrt() { signal / power } else { 0.0 };
         if own > 9.0 * own_noise { together.max(1.0 - own_noise / own) } else { together }

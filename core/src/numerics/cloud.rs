@@ -1,11 +1,15 @@
 //! Points whose heights over a plane of few dimensions are asked for again and again.
 
+#![allow(clippy::inline_always, reason = "see crate::numerics::lanes")]
+
 use std::ops::Range;
 
-use super::lanes::load;
+use super::lanes::{NullaryFnOnce, load, vectorised};
 
 /// Points that are looked at together.
 const LANES: usize = 8;
+/// From so many points on, wide registers are worth a call.
+const WIDE: usize = 32;
 
 /// Points (f, w), each with the height h(s) = w − f·s over the place s in `D` dimensions.
 ///
@@ -40,6 +44,12 @@ impl<const D: usize> Cloud<D> {
     pub fn clear(&mut self) {
         self.features.iter_mut().for_each(Vec::clear);
         self.levels.clear();
+    }
+
+    /// Takes away all points but the first.
+    pub fn truncate(&mut self, count: usize) {
+        self.features.iter_mut().for_each(|column| column.truncate(count));
+        self.levels.truncate(count);
     }
 
     /// Adds a point.
@@ -88,6 +98,42 @@ impl<const D: usize> Cloud<D> {
     pub fn extremes(&self, range: Range<usize>, place: &[f64; D]) -> (f64, f64) {
         let levels = &self.levels[range.clone()];
         let features: [&[f64]; D] = std::array::from_fn(|k| &self.features[k][range.clone()]);
+        let look = Extremes { levels, features, place };
+        // Of few points, the choice of registers costs more than they save.
+        if levels.len() < WIDE { look.call() } else { vectorised(look) }
+    }
+
+    /// Heights over `place` of the first points, as many as `heights` has.
+    pub fn heights(&self, place: &[f64; D], heights: &mut [f64]) {
+        heights.copy_from_slice(&self.levels[..heights.len()]);
+        for (column, place) in self.features.iter().zip(place) {
+            for (height, feature) in heights.iter_mut().zip(column) {
+                *height -= feature * place;
+            }
+        }
+    }
+
+    /// The first point of a range at exactly this height, as [`extremes`](Self::extremes) gave it.
+    #[must_use]
+    #[allow(clippy::float_cmp, reason = "the same operations in the same order")]
+    pub fn find(&self, mut range: Range<usize>, place: &[f64; D], height: f64) -> Option<usize> {
+        range.find(|point| self.height(*point, place) == height)
+    }
+}
+
+/// A look at the heights of some points.
+struct Extremes<'a, const D: usize> {
+    levels: &'a [f64],
+    features: [&'a [f64]; D],
+    place: &'a [f64; D],
+}
+
+impl<const D: usize> NullaryFnOnce for Extremes<'_, D> {
+    type Output = (f64, f64);
+
+    #[inline(always)]
+    fn call(self) -> (f64, f64) {
+        let Self { levels, features, place } = self;
         let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         let whole = levels.len() - levels.len() % LANES;
         for offset in (0..whole).step_by(LANES) {
@@ -106,18 +152,11 @@ impl<const D: usize> Cloud<D> {
         }
         let mut found =
             (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max));
-        for point in range.start + whole..range.end {
-            let height = self.height(point, place);
+        for point in whole..levels.len() {
+            let height = (0..D).fold(levels[point], |height, k| height - features[k][point] * place[k]);
             found = (found.0.min(height), found.1.max(height));
         }
         found
-    }
-
-    /// The first point of a range at exactly this height, as [`extremes`](Self::extremes) gave it.
-    #[must_use]
-    #[allow(clippy::float_cmp, reason = "the same operations in the same order")]
-    pub fn find(&self, mut range: Range<usize>, place: &[f64; D], height: f64) -> Option<usize> {
-        range.find(|point| self.height(*point, place) == height)
     }
 }
 

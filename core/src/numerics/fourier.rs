@@ -6,9 +6,52 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::Complex64;
 
+/// Buffers that a thread keeps for transforms to come.
+const MOST_SPARE: usize = 8;
+
 thread_local! {
     /// Keeps the plans that it has made: captures of one recording mostly ask for the same.
     static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+    static SPARE: RefCell<Vec<Buffers>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Memory of a transform: asking the system for it each time costs as much as a transform.
+#[derive(Default)]
+struct Buffers {
+    signal: Vec<f64>,
+    spectrum: Vec<Complex64>,
+    scratch: Vec<Complex64>,
+}
+
+impl Buffers {
+    /// Those of an earlier transform of the length, or new ones.
+    fn of(forward: &dyn RealToComplex<f64>, inverse: &dyn ComplexToReal<f64>) -> Self {
+        let spare = SPARE.with_borrow_mut(|spare| {
+            let place = spare.iter().position(|buffers| buffers.signal.len() == forward.len())?;
+            Some(spare.remove(place))
+        });
+        spare.unwrap_or_else(|| Self {
+            signal: forward.make_input_vec(),
+            spectrum: forward.make_output_vec(),
+            scratch: vec![Complex64::ZERO; forward.get_scratch_len().max(inverse.get_scratch_len())],
+        })
+    }
+}
+
+impl Drop for Fourier {
+    fn drop(&mut self) {
+        let buffers = Buffers {
+            signal: std::mem::take(&mut self.signal),
+            spectrum: std::mem::take(&mut self.spectrum),
+            scratch: std::mem::take(&mut self.scratch),
+        };
+        // A thread that ends keeps nothing.
+        let _ = SPARE.try_with(|spare| {
+            let mut spare = spare.borrow_mut();
+            spare.truncate(MOST_SPARE - 1);
+            spare.insert(0, buffers);
+        });
+    }
 }
 
 /// Transforms between one turn of equally spaced samples and its harmonics cₙ, signal = Re Σ cₙ e^{+inα}.
@@ -29,14 +72,8 @@ impl Fourier {
     pub fn new(length: usize) -> Self {
         let (forward, inverse) =
             PLANNER.with_borrow_mut(|planner| (planner.plan_fft_forward(length), planner.plan_fft_inverse(length)));
-        let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
-        Self {
-            signal: forward.make_input_vec(),
-            spectrum: forward.make_output_vec(),
-            scratch: vec![Complex64::ZERO; scratch],
-            forward,
-            inverse,
-        }
+        let Buffers { signal, spectrum, scratch } = Buffers::of(&*forward, &*inverse);
+        Self { forward, inverse, signal, spectrum, scratch }
     }
 
     /// Samples a turn.

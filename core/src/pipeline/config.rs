@@ -330,7 +330,13 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
     if let (false, Some(table)) = (route.gives_form(), configured.as_ref().or(limits.first())) {
         return Err(Fault::span(table.span(), "there is no form here whose values could be chosen or limited"));
     }
-    let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, EvaluateConfig::check)).transpose()?;
+    let measures = rig.filter(|_| matches!(route, Route::Turns { .. }));
+    let check = |config: EvaluateConfig| {
+        // Sections of measured points are those of their files.
+        measures.map_or(Ok(()), |rig| config.check_datum(rig))?;
+        config.check()
+    };
+    let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, check)).transpose()?;
     let mut evaluate = configured.unwrap_or_default();
     for table in limits {
         let limit = checked::<Limit, _>(&table, |limit| limit.check(&evaluate, rig))?;

@@ -205,11 +205,21 @@ impl Uncertain {
             each.map(|(variance, ring)| Errors::new(variance, lowest, seed.wrapping_add(ring))).collect();
         let mut errors = errors?;
         let angles = self.rings.angles;
-        let mut fourier = Fourier::new(angles);
-        Some(move |rings_um: &mut [f64]| {
+        let fill = move |errors: &mut [Errors], rings_um: &mut [f64]| {
+            let mut fourier = Fourier::new(angles);
             for (errors, ring) in errors.iter_mut().zip(rings_um.chunks_mut(angles)) {
                 errors.fresh(&mut fourier, ring);
             }
+        };
+        Some(move |rings_um: &mut [f64]| {
+            // Rings have numbers of their own, whichever thread draws them.
+            let half = errors.len() / 2;
+            let (first, rest) = errors.split_at_mut(half);
+            let (first_um, rest_um) = rings_um.split_at_mut((half * angles).min(rings_um.len()));
+            std::thread::scope(|scope| {
+                scope.spawn(|| fill(first, first_um));
+                fill(rest, rest_um);
+            });
         })
     }
 
@@ -217,7 +227,7 @@ impl Uncertain {
     pub(crate) fn laid(&self, rings_um: &[f64]) -> Vec<f64> {
         let Rings { angles, z_mm, .. } = &self.rings;
         let rings = Rings { angles: *angles, z_mm: z_mm.clone(), deviation_um: rings_um.to_vec() };
-        rings.laid(self.step_mm).deviation_um
+        if self.step_mm.is_some() { rings.laid(self.step_mm).deviation_um } else { rings.deviation_um }
     }
 }
 

@@ -1,6 +1,8 @@
 //! Spectrum and autocorrelation of a map, by one transform.
 
-use realfft::RealFftPlanner;
+use std::sync::Arc;
+
+use realfft::{ComplexToReal, RealFftPlanner};
 use rustfft::FftPlanner;
 
 use super::HeightMap;
@@ -12,9 +14,36 @@ const TOGETHER: usize = 8;
 /// Autocorrelation of a map over lags of rows from 0 and of columns, `[row lag][column lag]`. Column lags are taken
 /// round the row's length: negative ones stand at its end.
 pub(super) struct Correlation {
-    pub(super) values: Vec<f64>,
+    values: Vec<f64>,
     /// Column lags in a row: all of a closed map, twice those of an open one.
     pub(super) width: usize,
+    /// Of each row of lags, what the last transform takes, until it is asked for.
+    spectrum: Vec<Complex64>,
+    waiting: Vec<bool>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+    scratch: Vec<Complex64>,
+    scale: f64,
+}
+
+impl Correlation {
+    /// All lags of columns at a lag of rows: the sums of products.
+    pub(super) fn row(&mut self, lag: usize) -> &mut [f64] {
+        let target = &mut self.values[lag * self.width..][..self.width];
+        if std::mem::take(&mut self.waiting[lag]) {
+            let bins = self.width / 2 + 1;
+            let line = &mut self.spectrum[lag * bins..][..bins];
+            // Real in exact arithmetic; the inverse transform asks for it.
+            line[0].im = 0.0;
+            if self.width.is_multiple_of(2) {
+                line[bins - 1].im = 0.0;
+            }
+            // The buffers have the plan's lengths.
+            let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
+            let _ = self.inverse.process_with_scratch(line, target, scratch);
+            target.iter_mut().for_each(|value| *value *= self.scale);
+        }
+        target
+    }
 }
 
 /// A line of the map's spectrum.
@@ -81,20 +110,9 @@ pub(super) fn correlate(map: &HeightMap, heights: &[f64], mut visit: impl FnMut(
         }
     }
 
-    let mut values = vec![0.0; rows * width];
-    for (line, target) in spectrum.chunks_exact_mut(bins).zip(values.chunks_exact_mut(width)) {
-        // Real in exact arithmetic; the inverse transform asks for it.
-        line[0].im = 0.0;
-        if width.is_multiple_of(2) {
-            line[bins - 1].im = 0.0;
-        }
-        let _ = inverse.process_with_scratch(line, target, &mut scratch[..inverse.get_scratch_len()]);
-    }
     let scale = (width as f64 * height as f64).recip();
-    for value in &mut values {
-        *value *= scale;
-    }
-    Correlation { values, width }
+    let (values, waiting) = (vec![0.0; rows * width], vec![true; rows]);
+    Correlation { values, width, spectrum, waiting, inverse, scratch, scale }
 }
 
 /// Lines of one column of the padded spectrum; those at half the sampling, whose direction cannot be known, are left out.

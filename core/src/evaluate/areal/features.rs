@@ -1,6 +1,6 @@
 //! Feature parameters (ISO 25178-2:2021, clause 5): hills and dales by watersheds, pruned after Wolf.
 
-use super::HeightMap;
+use super::{HeightMap, beside};
 
 /// Peaks or pits of which the mean is S5p or S5v.
 const FIVE: usize = 5;
@@ -40,7 +40,8 @@ pub struct Features {
 impl Features {
     /// Of a map with mean 0; hills and dales lower than `pruning_um` are merged with a neighbour.
     pub(super) fn of(centred: &HeightMap, pruning_um: f64) -> Self {
-        let [dales, hills] = [1.0, -1.0].map(|sign| Relief::new(centred, sign).extremes(pruning_um));
+        let of = |sign: f64| Relief::new(centred, sign).extremes(pruning_um);
+        let (dales, hills) = beside(|| of(1.0), || of(-1.0));
         let area = centred.area_mm2();
         let [s5v, s5p] = [&dales, &hills].map(|found| {
             let mut depths: Vec<f64> = found.iter().map(|extreme| -extreme.depth).collect();

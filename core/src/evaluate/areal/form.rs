@@ -1,5 +1,7 @@
 //! Form removal: what is left is what a texture is evaluated on.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::HeightMap;
@@ -20,14 +22,9 @@ pub fn without_cylinder(map: &HeightMap) -> Result<HeightMap<'static>> {
         let problem = "only a map that goes all the way round is one";
         return Err(Error::new("remove", "the cylinder", problem).help("remove a polynomial instead"));
     }
-    let angles: Vec<(f64, f64)> = (0..map.columns())
-        .map(|column| (std::f64::consts::TAU * column as f64 / map.columns() as f64).sin_cos())
-        .collect();
-    Ok(without(map, 5, |row, column, terms| {
-        let (sine, cosine) = angles[column];
-        let z = middled(row, map.rows());
-        terms.copy_from_slice(&[1.0, cosine, sine, z * cosine, z * sine]);
-    }))
+    let along = (0..map.rows()).map(|row| vec![1.0, middled(row, map.rows())]).collect();
+    let terms = vec![[0, 0], [1, 0], [2, 0], [1, 1], [2, 1]];
+    Ok(without(map, &Terms { across: around(map), along, terms }))
 }
 
 /// A closed map without the least-squares line along the axis: mean radius and taper. It is what a plane is of a wall, which
@@ -40,7 +37,9 @@ pub fn without_taper(map: &HeightMap) -> Result<HeightMap<'static>> {
         let problem = "only a map that goes all the way round has one";
         return Err(Error::new("remove", "the taper", problem).help("remove a polynomial of degree 1 instead"));
     }
-    Ok(without(map, 2, |row, _, terms| terms.copy_from_slice(&[1.0, middled(row, map.rows())])))
+    let along = (0..map.rows()).map(|row| vec![1.0, middled(row, map.rows())]).collect();
+    let across = vec![vec![1.0; map.columns()]];
+    Ok(without(map, &Terms { across, along, terms: vec![[0, 0], [0, 1]] }))
 }
 
 /// A closed map without the least-squares body whose radius and centre are polynomials of a degree along the axis: 1, cos θ
@@ -56,16 +55,9 @@ pub fn without_turned_body(map: &HeightMap, degree: usize) -> Result<HeightMap<'
     if !map.closed() {
         return failure("only a map that goes all the way round is a turned body".into());
     }
-    let angles: Vec<(f64, f64)> = (0..map.columns())
-        .map(|column| (std::f64::consts::TAU * column as f64 / map.columns() as f64).sin_cos())
-        .collect();
-    let along: Vec<[f64; HIGHEST_DEGREE + 1]> = (0..map.rows()).map(|row| legendre(middled(row, map.rows()))).collect();
-    Ok(without(map, 3 * (degree + 1), |row, column, terms| {
-        let (sine, cosine) = angles[column];
-        for (terms, power) in terms.as_chunks_mut::<3>().0.iter_mut().zip(&along[row]) {
-            *terms = [1.0, cosine, sine].map(|term| term * power);
-        }
-    }))
+    let along = (0..map.rows()).map(|row| legendre(middled(row, map.rows())).to_vec()).collect();
+    let terms = (0..=degree).flat_map(|power| [[0, power], [1, power], [2, power]]).collect();
+    Ok(without(map, &Terms { across: around(map), along, terms }))
 }
 
 /// A map without the least-squares polynomial in x and y of a total degree (0 the mean, 1 a plane).
@@ -80,16 +72,28 @@ pub fn without_polynomial(map: &HeightMap, degree: usize) -> Result<HeightMap<'s
     if degree > 0 && map.closed() {
         return failure("the map goes all the way round, a polynomial does not".into());
     }
-    let across: Vec<[f64; HIGHEST_DEGREE + 1]> =
+    let points: Vec<[f64; HIGHEST_DEGREE + 1]> =
         (0..map.columns()).map(|column| legendre(middled(column, map.columns()))).collect();
-    let along: Vec<[f64; HIGHEST_DEGREE + 1]> = (0..map.rows()).map(|row| legendre(middled(row, map.rows()))).collect();
-    let count = (degree + 1) * (degree + 2) / 2;
-    Ok(without(map, count, |row, column, terms| {
-        let powers = (0..=degree).flat_map(|x| (0..=degree - x).map(move |y| (x, y)));
-        for (term, (x, y)) in terms.iter_mut().zip(powers) {
-            *term = across[column][x] * along[row][y];
-        }
-    }))
+    let across = (0..=degree).map(|power| points.iter().map(|point| point[power]).collect()).collect();
+    let along = (0..map.rows()).map(|row| legendre(middled(row, map.rows())).to_vec()).collect();
+    let terms = (0..=degree).flat_map(|x| (0..=degree - x).map(move |y| [x, y])).collect();
+    Ok(without(map, &Terms { across, along, terms }))
+}
+
+/// 1, cosine and sine of the columns of a closed map.
+fn around(map: &HeightMap) -> Vec<Vec<f64>> {
+    let angles = || (0..map.columns()).map(|column| std::f64::consts::TAU * column as f64 / map.columns() as f64);
+    vec![vec![1.0; map.columns()], angles().map(f64::cos).collect(), angles().map(f64::sin).collect()]
+}
+
+/// What is fitted: products of a function of the column and one of the row.
+struct Terms {
+    /// Functions over the columns, `[function][column]`.
+    across: Vec<Vec<f64>>,
+    /// Functions over the rows, `[row][function]`.
+    along: Vec<Vec<f64>>,
+    /// Of each term, its function across and its function along.
+    terms: Vec<[usize; 2]>,
 }
 
 /// −1 to 1 over the points of a line.
@@ -107,18 +111,46 @@ fn legendre(x: f64) -> [f64; HIGHEST_DEGREE + 1] {
     values
 }
 
-/// The map without the least-squares combination of terms, which `fill` computes at a row and column.
-fn without(map: &HeightMap, count: usize, fill: impl Fn(usize, usize, &mut [f64])) -> HeightMap<'static> {
-    let columns = map.columns();
+/// Σ a·b, over lanes that do not wait for each other.
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 16;
+    let mut sums = [0.0; LANES];
+    let ((whole_a, rest_a), (whole_b, rest_b)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    for (a, b) in whole_a.iter().zip(whole_b) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
+}
+
+/// The map without the least-squares combination of terms.
+fn without(map: &HeightMap, Terms { across, along, terms }: &Terms) -> HeightMap<'static> {
+    let (columns, count, functions) = (map.columns(), terms.len(), across.len());
     let mut normal = DMatrix::<f64>::zeros(count, count);
     let mut right = DVector::<f64>::zeros(count);
-    let mut terms = vec![0.0; count];
-    for (point, height) in map.heights_um().iter().enumerate().filter(|(_, height)| height.is_finite()) {
-        fill(point / columns, point % columns, &mut terms);
-        for (column, term) in terms.iter().enumerate() {
-            right[column] += term * height;
-            for (row, other) in terms[..=column].iter().enumerate() {
-                normal[(row, column)] += term * other;
+    // Σ over the columns of one row, of products of two functions; the same for every row that is whole.
+    let products = |known: &[Vec<f64>]| -> Vec<f64> {
+        known.iter().flat_map(|one| across.iter().map(|other| product(one, other))).collect()
+    };
+    let whole = products(across);
+    let whole_row = |row: &[f64]| row.iter().all(|height| height.is_finite());
+    for (row, along) in map.heights_um().chunks_exact(columns).zip(along) {
+        let known: Vec<f64>;
+        let (row, products) = if whole_row(row) {
+            (row, Cow::Borrowed(&whole))
+        } else {
+            let there = |(height, function): (&f64, &f64)| if height.is_finite() { *function } else { 0.0 };
+            let masked: Vec<Vec<f64>> =
+                across.iter().map(|function| row.iter().zip(function).map(there).collect()).collect();
+            known = row.iter().map(|height| if height.is_finite() { *height } else { 0.0 }).collect();
+            (&known[..], Cow::Owned(products(&masked)))
+        };
+        let sums: Vec<f64> = across.iter().map(|function| product(function, row)).collect();
+        for (column, [x, y]) in terms.iter().enumerate() {
+            right[column] += sums[*x] * along[*y];
+            for (row, [other_x, other_y]) in terms[..=column].iter().enumerate() {
+                normal[(row, column)] += products[x * functions + other_x] * along[*y] * along[*other_y];
             }
         }
     }
@@ -127,10 +159,16 @@ fn without(map: &HeightMap, count: usize, fill: impl Fn(usize, usize, &mut [f64]
     let smallest = RANK * svd.singular_values.max();
     // Both factors were asked for: there is a solution.
     let solution = svd.solve(&right, smallest).unwrap_or_else(|_| DVector::zeros(count));
-    let left = map.heights_um().iter().enumerate().map(|(point, height)| {
-        fill(point / columns, point % columns, &mut terms);
-        height - terms.iter().zip(solution.iter()).map(|(term, share)| term * share).sum::<f64>()
-    });
-    let left: Vec<f64> = left.collect();
+    let mut left = map.heights_um().to_vec();
+    let mut shares = vec![0.0; functions];
+    for (row, along) in left.chunks_exact_mut(columns).zip(along) {
+        shares.fill(0.0);
+        for ([x, y], share) in terms.iter().zip(solution.iter()) {
+            shares[*x] += share * along[*y];
+        }
+        for (share, function) in shares.iter().zip(across) {
+            row.iter_mut().zip(function).for_each(|(height, function)| *height -= share * function);
+        }
+    }
     map.with(left)
 }

@@ -108,13 +108,23 @@ pub struct Areal {
 #[must_use]
 pub fn areal(map: &HeightMap, settings: &Settings) -> Areal {
     let centred = map.with(height::centred(map.heights_um()));
-    let found = of_centred(&centred, settings);
-    let curve = MaterialRatio::of(&centred);
-    Areal {
-        functional: curve.functional(settings.difference_percent, settings.volume_percent),
-        features: Features::of(&centred, settings.pruning_percent / 100.0 * found.height.sz),
-        ..found
-    }
+    let Height { sz, .. } = Height::of(&centred);
+    let functional = || MaterialRatio::of(&centred).functional(settings.difference_percent, settings.volume_percent);
+    let (functional, (features, found)) = beside(functional, || {
+        let features = Features::of(&centred, settings.pruning_percent / 100.0 * sz);
+        (features, of_centred(&centred, settings))
+    });
+    Areal { functional, features, ..found }
+}
+
+/// Does work on another thread, and some here meanwhile.
+fn beside<A: Send, B>(other: impl FnOnce() -> A + Send, here: impl FnOnce() -> B) -> (A, B) {
+    std::thread::scope(|scope| {
+        let other = scope.spawn(other);
+        let here = here();
+        let other = other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        (other, here)
+    })
 }
 
 /// Heights, lengths and slopes alone, in a part of the time: what the material ratio curve, hills and dales give is NaN.

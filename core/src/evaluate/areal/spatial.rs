@@ -2,7 +2,7 @@
 
 use super::{
     HeightMap,
-    correlation::{Line, correlate},
+    correlation::{Correlation, Line, correlate},
 };
 
 /// Angles of the angular spectrum over half a turn: steps of 0.5°.
@@ -31,14 +31,13 @@ impl Spatial {
         let lengths = [centred.columns() as f64 * centred.dx_mm(), centred.rows() as f64 * centred.dy_mm()];
         let mut angular = [0.0; ANGLES];
         let (mut strongest, mut ssw_mm) = (0.0, f64::NAN);
+        let mut sectors = Sectors::new();
         let mut look = |Line { across, along, amplitude }: Line| {
             let (fx, fy) = (across as f64 / lengths[0], along as f64 / lengths[1]);
             if across == 0 && along == 0 {
                 return;
             }
-            let angle = fy.atan2(fx).to_degrees().rem_euclid(180.0);
-            let place = (angle * ANGLES as f64 / 180.0) as usize % ANGLES;
-            angular[place] += if across == 0 { amplitude } else { 2.0 * amplitude };
+            angular[sectors.of(fx, fy)] += if across == 0 { amplitude } else { 2.0 * amplitude };
             if amplitude > strongest {
                 (strongest, ssw_mm) = (amplitude, fx.hypot(fy).recip());
             }
@@ -53,59 +52,93 @@ impl Spatial {
         };
         let mut sums = correlate(centred, filled, &mut look);
         let places = (0..ANGLES).max_by(|a, b| angular[*a].total_cmp(&angular[*b]).then(b.cmp(a))).unwrap_or(0);
-        let (width, rows) = (sums.width, centred.rows());
         if missing {
             let mask: Vec<f64> = heights.iter().map(|height| f64::from(u8::from(height.is_finite()))).collect();
-            let pairs = correlate(centred, &mask, |_| ());
-            for (sum, pairs) in sums.values.iter_mut().zip(pairs.values) {
-                // Numbers of pairs are whole, but for rounding.
-                *sum = if pairs > 0.5 { *sum / pairs.round() } else { 0.0 };
-            }
-        } else {
-            for (lag, line) in sums.values.chunks_exact_mut(width).enumerate() {
-                for (place, sum) in line.iter_mut().enumerate() {
-                    let across =
-                        if centred.closed() { width } else { centred.columns().abs_diff(place.min(width - place)) };
-                    *sum /= (across.max(1) * (rows - lag)) as f64;
+            let mut pairs = correlate(centred, &mask, |_| ());
+            for lag in 0..centred.rows() {
+                for (sum, pairs) in sums.row(lag).iter_mut().zip(pairs.row(lag)) {
+                    // Numbers of pairs are whole, but for rounding.
+                    *sum = if *pairs > 0.5 { *sum / pairs.round() } else { 0.0 };
                 }
             }
         }
-        let [sal_mm, longest_mm] = Decay::new(centred, &sums.values, width, decay).lengths();
+        let [sal_mm, longest_mm] = Decay::new(centred, &mut sums, !missing, decay).lengths();
         let std_deg = if strongest > 0.0 { places as f64 * 180.0 / ANGLES as f64 } else { f64::NAN };
         Self { sal_mm, str: sal_mm / longest_mm, std_deg, ssw_mm }
+    }
+}
+
+/// Places in the angular spectrum of directions, of which the next is mostly near the last.
+struct Sectors {
+    /// Tangents of the angles at which places begin, of a quarter turn, and infinity.
+    tangents: Vec<f64>,
+    last: usize,
+}
+
+impl Sectors {
+    fn new() -> Self {
+        let tangents = (0..ANGLES / 2).map(|place| (place as f64 * 180.0 / ANGLES as f64).to_radians().tan());
+        Self { tangents: tangents.chain([f64::INFINITY]).collect(), last: 0 }
+    }
+
+    /// The place of the direction (fx, fy), fx from 0 on: of its angle modulo 180°.
+    fn of(&mut self, fx: f64, fy: f64) -> usize {
+        let (place, up) = (&mut self.last, fy.abs());
+        while up >= self.tangents[*place + 1] * fx && *place + 2 < self.tangents.len() {
+            *place += 1;
+        }
+        while up < self.tangents[*place] * fx {
+            *place -= 1;
+        }
+        let near = |place: usize| (up - self.tangents[place] * fx).abs() <= 1e-9 * up;
+        // Where places meet, and along the axes.
+        if fx <= 0.0 || up <= 0.0 || near(*place) || near(*place + 1) {
+            let angle = fy.atan2(fx).to_degrees().rem_euclid(180.0);
+            return (angle * ANGLES as f64 / 180.0) as usize % ANGLES;
+        }
+        if fy > 0.0 { *place } else { ANGLES - 1 - *place }
     }
 }
 
 /// The region around lag 0 in which the autocorrelation stays above a level.
 struct Decay<'a> {
     map: &'a HeightMap<'a>,
-    values: &'a [f64],
+    sums: &'a mut Correlation,
+    /// Whether sums are over all pairs of points, and still to be divided by their number.
+    undivided: bool,
     width: usize,
     level: f64,
 }
 
 impl<'a> Decay<'a> {
-    fn new(map: &'a HeightMap<'a>, values: &'a [f64], width: usize, decay: f64) -> Self {
-        Self { map, values, width, level: decay * values[0] }
+    fn new(map: &'a HeightMap<'a>, sums: &'a mut Correlation, undivided: bool, decay: f64) -> Self {
+        let width = sums.width;
+        let mut found = Self { map, sums, undivided, width, level: 0.0 };
+        found.level = decay * found.at(0, 0).unwrap_or(f64::NAN);
+        found
     }
 
     /// Value at a lag of columns and rows; `None` beyond the map. A lag and its opposite have the same.
-    fn at(&self, across: isize, along: isize) -> Option<f64> {
+    fn at(&mut self, across: isize, along: isize) -> Option<f64> {
         let (across, along) = if along < 0 { (-across, -along) } else { (across, along) };
         let inside = self.map.closed() || across.unsigned_abs() < self.map.columns();
-        let row = along.unsigned_abs();
-        (inside && row < self.map.rows())
-            .then(|| self.values[row * self.width + across.rem_euclid(self.width.cast_signed()) as usize])
+        let lag = along.unsigned_abs();
+        (inside && lag < self.map.rows()).then(|| {
+            let sum = self.sums.row(lag)[across.rem_euclid(self.width.cast_signed()) as usize];
+            let beside = if self.map.closed() { 0 } else { across.unsigned_abs() };
+            let pairs = (self.map.columns() - beside) * (self.map.rows() - lag);
+            if self.undivided { sum / pairs as f64 } else { sum }
+        })
     }
 
     /// Shortest and longest lag at which the level is reached, in mm. The shortest is NaN where it is never reached; the
     /// longest where the region reaches the end of the map, or goes all the way round.
-    fn lengths(&self) -> [f64; 2] {
+    fn lengths(&mut self) -> [f64; 2] {
         // A flat map has no autocorrelation.
         if self.level <= 0.0 {
             return [f64::NAN; 2];
         }
-        let mut seen = vec![false; self.values.len()];
+        let mut seen = vec![false; self.width * self.map.rows()];
         let mut open = vec![(0_isize, 0_isize)];
         seen[0] = true;
         let (mut shortest, mut longest) = (f64::INFINITY, 0.0_f64);
@@ -142,7 +175,7 @@ impl<'a> Decay<'a> {
 
     /// Where between two neighbouring lags the level is passed, 0 to 1: on the cubic through these and one beyond each,
     /// by bisection; on a straight line at the map's end.
-    fn crossing(&self, [x, y]: [isize; 2], [dx, dy]: [isize; 2], here: f64, there: f64) -> f64 {
+    fn crossing(&mut self, [x, y]: [isize; 2], [dx, dy]: [isize; 2], here: f64, there: f64) -> f64 {
         let ends = self.at(x - dx, y - dy).zip(self.at(x + 2 * dx, y + 2 * dy));
         let Some((before, beyond)) = ends else { return (here - self.level) / (here - there) };
         let cubic = |t: f64| {
@@ -156,5 +189,25 @@ impl<'a> Decay<'a> {
             if cubic(middle) > self.level { above = middle } else { below = middle }
         }
         0.5 * (above + below)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sectors_are_those_of_the_angle() {
+        let mut sectors = Sectors::new();
+        for across in 0..60 {
+            for along in (-80..80).filter(|along| across > 0 || *along != 0) {
+                for scale in [1.0, 0.013] {
+                    let (fx, fy) = (f64::from(across), scale * f64::from(along));
+                    let angle = fy.atan2(fx).to_degrees().rem_euclid(180.0);
+                    let expected = (angle * ANGLES as f64 / 180.0) as usize % ANGLES;
+                    assert_eq!(sectors.of(fx, fy), expected, "{fx} {fy}");
+                }
+            }
+        }
     }
 }

@@ -1,9 +1,14 @@
 //! The least-squares circle by Gauss and Newton, and a first guess for the others.
 
-use super::{Circle, Points};
-use crate::numerics::{chebyshev::inverse, lanes::load};
+#![allow(clippy::inline_always, reason = "see crate::numerics::lanes")]
 
-const LANES: usize = 4;
+use super::{Circle, Points};
+use crate::numerics::{
+    chebyshev::inverse,
+    lanes::{NullaryFnOnce, load, vectorised},
+};
+
+const LANES: usize = 8;
 /// Sums over the points: count, x, y, xx, xy, yy of the directions, and d, dx, dy, dd with the deviations.
 type Sums = [f64; 10];
 /// Points that the first guess looks at, at most about.
@@ -48,36 +53,117 @@ pub(super) fn circle(points: &Points) -> Option<Circle> {
 }
 
 fn sums(points: &Points, place: [f64; 2]) -> Sums {
-    let radius = points.radius_um();
-    let (u, v, levels) = (points.cloud.column(0), points.cloud.column(1), points.cloud.levels());
-    let common = points.common(&place);
-    let [x0, y0] = place.map(|place| place / radius);
-    let mut sums = [[0.0; LANES]; 10];
-    let mut add = |u: [f64; LANES], v: [f64; LANES], w: [f64; LANES]| {
-        let lanes = |value: &dyn Fn(usize) -> f64| -> [f64; LANES] { std::array::from_fn(value) };
-        let lifted = lanes(&|l| w[l] - u[l] * place[0] - v[l] * place[1] + common);
-        let there = lanes(&|l| if lifted[l].is_nan() { 0.0 } else { 1.0 });
-        let lifted = lanes(&|l| if lifted[l].is_nan() { 0.0 } else { lifted[l] });
-        let stretch = lanes(&|l| (1.0 + 2.0 * lifted[l] / radius).max(f64::MIN_POSITIVE).sqrt());
-        let d = lanes(&|l| 2.0 * lifted[l] / (1.0 + stretch[l]));
-        let x = lanes(&|l| there[l] * (u[l] - x0) / stretch[l]);
-        let y = lanes(&|l| there[l] * (v[l] - y0) / stretch[l]);
-        let product = |a: [f64; LANES], b: [f64; LANES]| lanes(&|l| a[l] * b[l]);
-        let terms =
-            [there, x, y, product(x, x), product(x, y), product(y, y), d, product(d, x), product(d, y), product(d, d)];
-        for (sum, term) in sums.iter_mut().zip(terms) {
-            (0..LANES).for_each(|l| sum[l] += term[l]);
+    let radius_um = points.radius_um();
+    vectorised(SumsOf {
+        levels: points.cloud.levels(),
+        directions: [points.cloud.column(0), points.cloud.column(1)],
+        place,
+        common: points.common(&place),
+        radius_um,
+    })
+}
+
+struct SumsOf<'a> {
+    levels: &'a [f64],
+    directions: [&'a [f64]; 2],
+    place: [f64; 2],
+    common: f64,
+    radius_um: f64,
+}
+
+impl NullaryFnOnce for SumsOf<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn call(self) -> Sums {
+        let Self { levels, directions: [u, v], place, common, radius_um: radius } = self;
+        let [x0, y0] = place.map(|place| place / radius);
+        let mut sums = [[0.0; LANES]; 10];
+        let whole = levels.len() - levels.len() % LANES;
+        for offset in (0..whole).step_by(LANES) {
+            let of = [load(u, offset), load(v, offset), load(levels, offset)];
+            add(&mut sums, of, [place[0], place[1], x0, y0], common, radius);
         }
-    };
-    let whole = levels.len() - levels.len() % LANES;
-    for offset in (0..whole).step_by(LANES) {
-        add(load(u, offset), load(v, offset), load(levels, offset));
+        let rest = |column: &[f64], missing: f64| -> [f64; LANES] {
+            std::array::from_fn(|lane| column.get(whole + lane).copied().unwrap_or(missing))
+        };
+        let of = [rest(u, 0.0), rest(v, 0.0), rest(levels, f64::NAN)];
+        add(&mut sums, of, [place[0], place[1], x0, y0], common, radius);
+        sums.map(|lanes| lanes.iter().sum())
     }
-    let rest = |column: &[f64], missing: f64| -> [f64; LANES] {
-        std::array::from_fn(|lane| column.get(whole + lane).copied().unwrap_or(missing))
-    };
-    add(rest(u, 0.0), rest(v, 0.0), rest(levels, f64::NAN));
-    sums.map(|lanes| lanes.iter().sum())
+}
+
+/// Adds the terms of points (u, v, w).
+#[inline(always)]
+fn add(
+    sums: &mut [[f64; LANES]; 10],
+    [u, v, w]: [[f64; LANES]; 3],
+    [place_x, place_y, x0, y0]: [f64; 4],
+    common: f64,
+    radius: f64,
+) {
+    let (mut there, mut d, mut x, mut y) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        let lifted = w[l] - u[l] * place_x - v[l] * place_y + common;
+        there[l] = if lifted.is_nan() { 0.0 } else { 1.0 };
+        let lifted = if lifted.is_nan() { 0.0 } else { lifted };
+        let stretch = (1.0 + 2.0 * lifted / radius).max(f64::MIN_POSITIVE).sqrt();
+        d[l] = 2.0 * lifted / (1.0 + stretch);
+        let share = there[l] / stretch;
+        x[l] = share * (u[l] - x0);
+        y[l] = share * (v[l] - y0);
+    }
+    for l in 0..LANES {
+        sums[0][l] += there[l];
+        sums[1][l] += x[l];
+        sums[2][l] += y[l];
+        sums[3][l] += x[l] * x[l];
+        sums[4][l] += x[l] * y[l];
+        sums[5][l] += y[l] * y[l];
+        sums[6][l] += d[l];
+        sums[7][l] += d[l] * x[l];
+        sums[8][l] += d[l] * y[l];
+        sums[9][l] += d[l] * d[l];
+    }
+}
+
+/// Sum of squared deviations of some points from a circle, and how many are there.
+pub(super) struct Squares<'a> {
+    pub levels: &'a [f64],
+    pub directions: [&'a [f64]; 2],
+    pub place: [f64; 2],
+    pub common: f64,
+    pub radius_um: f64,
+    pub deviation_um: f64,
+}
+
+impl NullaryFnOnce for Squares<'_> {
+    type Output = (f64, usize);
+
+    #[inline(always)]
+    fn call(self) -> (f64, usize) {
+        let Self { levels, directions: [u, v], place, common, radius_um: radius, deviation_um } = self;
+        let (mut squares, mut points) = ([0.0; LANES], [0.0; LANES]);
+        let mut add = |[u, v, w]: [[f64; LANES]; 3]| {
+            for l in 0..LANES {
+                let lifted = w[l] - u[l] * place[0] - v[l] * place[1] + common;
+                let stretch = (1.0 + 2.0 * lifted / radius).max(0.0).sqrt();
+                let deviation = 2.0 * lifted / (1.0 + stretch) - deviation_um;
+                let there = !lifted.is_nan();
+                squares[l] += if there { deviation * deviation } else { 0.0 };
+                points[l] += if there { 1.0 } else { 0.0 };
+            }
+        };
+        let whole = levels.len() - levels.len() % LANES;
+        for offset in (0..whole).step_by(LANES) {
+            add([load(u, offset), load(v, offset), load(levels, offset)]);
+        }
+        let rest = |column: &[f64], missing: f64| -> [f64; LANES] {
+            std::array::from_fn(|lane| column.get(whole + lane).copied().unwrap_or(missing))
+        };
+        add([rest(u, 0.0), rest(v, 0.0), rest(levels, f64::NAN)]);
+        (squares.iter().sum(), points.iter().sum::<f64>() as usize)
+    }
 }
 
 /// Centre of the algebraic least-squares circle of some of the points: least Σ (ρᵢ² − r²)², linear in the centre (Kåsa,

@@ -26,7 +26,7 @@ use super::near::Course;
 pub use super::reference::{Reference, Undetermined};
 pub use disturbed::Disturbed;
 pub use points::{Angles, Points};
-pub use series::between_angles;
+pub use series::{Series, between_angles};
 
 /// A reference circle.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,26 @@
 //! The points of a profile, and what they are about a circle.
 
-use std::f64::consts::TAU;
+#![allow(clippy::inline_always, reason = "see crate::numerics::lanes")]
+
+use std::{cell::RefCell, f64::consts::TAU, rc::Rc};
 
 use super::{Circle, Reference, Undetermined, Values, circumscribed, least_squares, search};
-use crate::{evaluate::near::Course, numerics::cloud::Cloud};
+use crate::{
+    evaluate::near::Course,
+    numerics::{
+        chebyshev::Chebyshev,
+        cloud::Cloud,
+        lanes::{NullaryFnOnce, vectorised},
+    },
+};
+
+/// Sets of equal angles that are kept: those of the filters of one section.
+const MOST_SHARED: usize = 8;
+
+thread_local! {
+    /// Profiles of one recording mostly ask for the same.
+    static SHARED: RefCell<Vec<Rc<Angles>>> = const { RefCell::new(Vec::new()) };
+}
 
 /// Directions of a profile's points, to be kept and used for many profiles.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +39,20 @@ impl Angles {
     /// Sine and cosine of each.
     pub fn sin_cos(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         self.sin.iter().copied().zip(self.cos.iter().copied())
+    }
+
+    /// The same as [`equal`](Self::equal), computed once and shared by all that ask on this thread.
+    #[must_use]
+    pub fn shared(count: usize) -> Rc<Self> {
+        SHARED.with_borrow_mut(|shared| {
+            if let Some(angles) = shared.iter().find(|angles| angles.len() == count) {
+                return Rc::clone(angles);
+            }
+            let angles = Rc::new(Self::equal(count));
+            shared.truncate(MOST_SHARED - 1);
+            shared.insert(0, Rc::clone(&angles));
+            angles
+        })
     }
 
     /// Number of angles.
@@ -65,22 +96,49 @@ pub struct Points {
     pub(super) span_um: f64,
 }
 
+/// Where points of a profile are put.
+struct Profile<'a> {
+    u: &'a mut [f64],
+    v: &'a mut [f64],
+    levels: &'a mut [f64],
+    form_um: &'a [f64],
+    cos: &'a [f64],
+    sin: &'a [f64],
+    radius_um: f64,
+}
+
+impl NullaryFnOnce for Profile<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { u, v, levels, form_um, cos, sin, radius_um } = self;
+        let (per_radius, half) = (radius_um.recip(), 0.5 / radius_um);
+        for (level, form) in levels.iter_mut().zip(form_um) {
+            // An infinite form is no point either.
+            *level = if form.abs() < f64::INFINITY { form + form * form * half } else { f64::NAN };
+        }
+        for (column, direction) in [(u, cos), (v, sin)] {
+            for ((feature, direction), form) in column.iter_mut().zip(direction).zip(form_um) {
+                let scale = if form.abs() < f64::INFINITY { 1.0 + form * per_radius } else { 0.0 };
+                *feature = scale * direction;
+            }
+        }
+    }
+}
+
 impl Points {
     /// Takes a profile: radial deviations `form_um` from a circle of `radius_mm` (positive), one at each angle.
     ///
     /// Deviations may be as large as the radius: for a polar plot, `radius_mm` is its base circle.
     pub fn set_profile(&mut self, angles: &Angles, form_um: &[f64], radius_mm: f64) {
-        let radius = 1e3 * radius_mm;
-        (self.radius_um, self.origin_um) = (radius, [0.0; 2]);
+        let radius_um = 1e3 * radius_mm;
+        (self.radius_um, self.origin_um) = (radius_um, [0.0; 2]);
         let ([u, v], levels) = self.cloud.columns_mut();
-        let scale = |form: &f64| if form.is_finite() { 1.0 + form / radius } else { 0.0 };
-        let level = |form: &f64| if form.is_finite() { form + form * form / (2.0 * radius) } else { f64::NAN };
-        u.clear();
-        u.extend(form_um.iter().zip(&angles.cos).map(|(form, cos)| scale(form) * cos));
-        v.clear();
-        v.extend(form_um.iter().zip(&angles.sin).map(|(form, sin)| scale(form) * sin));
-        levels.clear();
-        levels.extend(form_um.iter().zip(&angles.cos).map(|(form, _)| level(form)));
+        let count = form_um.len().min(angles.len());
+        [&mut *u, &mut *v, &mut *levels].into_iter().for_each(|column| column.resize(count, 0.0));
+        let form_um = &form_um[..count];
+        vectorised(Profile { u, v, levels, form_um, cos: &angles.cos[..count], sin: &angles.sin[..count], radius_um });
         self.measure();
     }
 
@@ -103,6 +161,14 @@ impl Points {
             }
         }
         self.measure();
+    }
+
+    /// Adds a point of a profile.
+    pub(super) fn push(&mut self, angle_rad: f64, form_um: f64) {
+        let ((sin, cos), scale) = (angle_rad.sin_cos(), 1.0 + form_um / self.radius_um);
+        let level = form_um + form_um * form_um / (2.0 * self.radius_um);
+        self.cloud.push([scale * cos, scale * sin], level);
+        self.span_um = self.span_um.max(level.abs());
     }
 
     fn measure(&mut self) {
@@ -169,6 +235,28 @@ impl Points {
         }
     }
 
+    /// Values about the minimum zone's centre, the centre, and lowest and highest deviation from the nominal radius. `near` is
+    /// a place near to it: the heights' shares in the zone are those there, which errs by deviation²/R times what the place
+    /// moves; for profiles that are drawn.
+    pub(super) fn zone_near(
+        &self,
+        near: [f64; 2],
+        chebyshev: &mut Chebyshev<2, 4>,
+    ) -> Option<(Values, [f64; 2], [f64; 2])> {
+        let cost = search::zone_slopes(self, &near);
+        let reach = self.radius_um + self.span_um;
+        let limits = near.map(|near| (near - reach, near + reach));
+        let optimum = chebyshev.solve(&self.cloud, &cost, &limits, self.tolerance())?;
+        let place = optimum.place;
+        let (low, high) = self.cloud.extremes(0..self.len(), &place);
+        let common = self.common(&place);
+        let [low, high] = [low, high].map(|height| self.deviation(height + common));
+        let half = 0.5 * (high - low);
+        let values =
+            Values { ront_um: high - low, ronp_um: half, ronv_um: half, ronq_um: f64::NAN, points: self.len() };
+        Some((values, place, [low, high]))
+    }
+
     /// Deviation of each point from a circle, outward positive; NaN where it is missing.
     pub fn deviations_um<'a>(&'a self, circle: &Circle) -> impl Iterator<Item = f64> + 'a {
         let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
@@ -182,6 +270,25 @@ impl Points {
     #[must_use]
     pub fn values(&self, circle: &Circle) -> Values {
         Course::of(self.deviations_um(circle)).into()
+    }
+
+    /// The same of the first `count` points for RONq, and of all for the others.
+    pub(super) fn values_of_first(&self, circle: &Circle, count: usize) -> Values {
+        let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
+        let common = self.common(&place);
+        let (low, high) = self.cloud.extremes(0..self.len(), &place);
+        let [low, high] = [low, high].map(|height| self.deviation(height + common) - circle.deviation_um);
+        let [u, v] = [self.cloud.column(0), self.cloud.column(1)].map(|column| &column[..count]);
+        let squares = least_squares::Squares {
+            levels: &self.cloud.levels()[..count],
+            directions: [u, v],
+            place,
+            common,
+            radius_um: self.radius_um,
+            deviation_um: circle.deviation_um,
+        };
+        let (squares, points) = vectorised(squares);
+        if points == 0 { Course::of([].into_iter()).into() } else { Course { low, high, squares, points }.into() }
     }
 
     /// |c|²/2R, which all heights over a centre lack to (ρ² − R²)/2R.

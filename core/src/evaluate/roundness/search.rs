@@ -96,18 +96,8 @@ impl<'a, const N: usize> Search<'a, N> {
         }
     }
 
-    /// Derivatives of the merit by place, upper and lower bound of the heights.
     fn slopes(&self, place: &[f64; 2], low: f64, high: f64) -> [f64; N] {
-        let (common, radius) = (self.points.common(place), self.points.radius_um());
-        let [outer, inner] = match self.goal {
-            Goal::Zone => [high, low].map(|level| self.points.stretch(level + common).max(f64::EPSILON).recip()),
-            Goal::Inscribed => [0.0, 1.0],
-        };
-        let mut slopes = [0.0; N];
-        slopes[..2].copy_from_slice(&place.map(|place| (outer - inner) * place / radius));
-        slopes[2] = outer;
-        slopes[N - 1] = -inner;
-        slopes
+        slopes(self.points, self.goal, place, low, high)
     }
 
     /// Downhill from `start`.
@@ -241,6 +231,26 @@ impl<'a, const N: usize> Search<'a, N> {
         }
         Some(found)
     }
+}
+
+/// Derivatives of the merit by place, upper and lower bound of the heights.
+fn slopes<const N: usize>(points: &Points, goal: Goal, place: &[f64; 2], low: f64, high: f64) -> [f64; N] {
+    let (common, radius) = (points.common(place), points.radius_um());
+    let [outer, inner] = match goal {
+        Goal::Zone => [high, low].map(|level| points.stretch(level + common).max(f64::EPSILON).recip()),
+        Goal::Inscribed => [0.0, 1.0],
+    };
+    let mut slopes = [0.0; N];
+    slopes[..2].copy_from_slice(&place.map(|place| (outer - inner) * place / radius));
+    slopes[2] = outer;
+    slopes[N - 1] = -inner;
+    slopes
+}
+
+/// The same of a zone about a place.
+pub(super) fn zone_slopes(points: &Points, place: &[f64; 2]) -> [f64; 4] {
+    let (low, high) = points.cloud.extremes(0..points.len(), place);
+    slopes(points, Goal::Zone, place, low, high)
 }
 
 /// MZCI: the centre with the least difference between the largest and the smallest distance.

@@ -1,9 +1,9 @@
 //! Reference circles of a profile that is a finite sum of harmonics: contacts between the angles.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, rc::Rc};
 
 use super::{Angles, Circle, Points, Reference, Undetermined, Values};
-use crate::{Complex64, evaluate::near::Course};
+use crate::{Complex64, numerics::interpolation::Curve};
 
 /// Looks at all angles before giving up; two or three are usual.
 const MOST_LOOKS: usize = 20;
@@ -13,12 +13,7 @@ const MOST_NEWTON: usize = 8;
 const MARGIN: f64 = 0.5;
 
 /// The reference circle and the values about it of the profile Re Σ cₙ e^{inθ} (`harmonics`, from order 0, in µm) about a circle of
-/// `radius_mm`. `profile_um` is the same profile on equal angles from 0, at least some to a wave of the highest order; where it
-/// is NaN, there is none.
-///
-/// Between two angles that are there, the distance from a centre has its extremes where its derivative, which the series gives,
-/// is 0: they join the points until no extreme lies outside the circle's bounds. LSCI, and RONq about each circle, are those of
-/// the equal angles. Contacts of the circle from `profile_um.len()` on lie between angles.
+/// `radius_mm`, as [`Series::about`] finds them.
 ///
 /// # Errors
 /// As [`Points::determine`].
@@ -28,120 +23,152 @@ pub fn between_angles(
     radius_mm: f64,
     reference: Reference,
 ) -> Result<(Circle, Values), Undetermined> {
-    let count = profile_um.len();
-    let mut at_rad: Vec<f64> = (0..count).map(|index| TAU * index as f64 / count as f64).collect();
-    let mut form_um = profile_um.to_vec();
-    let mut points = Points::default();
-    let equal = Angles::equal(count);
-    points.set_profile(&equal, profile_um, radius_mm);
-    let mut circle = points.determine(reference)?;
-    let squares = Course::of(points.deviations_um(&circle)).rms();
-    let tolerance = points.tolerance();
-    for _ in 0..MOST_LOOKS {
-        let deviations: Vec<f64> = points.deviations_um(&circle).collect();
-        let Course { low, high, .. } = Course::of(deviations.iter().copied());
-        let mut grown = false;
-        for (angle, outward) in extremes(&deviations[..count], low, high) {
-            let angle = stationary(harmonics, 1e3 * radius_mm, &circle, angle, TAU / count as f64);
-            let form = at(harmonics, angle)[0];
-            let deviation = deviation(1e3 * radius_mm + form, angle, &circle) - 1e3 * radius_mm - circle.deviation_um;
-            let beyond = if outward { deviation > high + tolerance } else { deviation < low - tolerance };
-            if beyond {
-                at_rad.push(angle);
-                form_um.push(form);
-                grown = true;
+    Series::new(harmonics, profile_um, radius_mm).about(reference)
+}
+
+/// A profile Re Σ cₙ e^{inθ} about a circle, for several of its reference circles.
+pub struct Series<'a> {
+    curve: Curve<'a>,
+    profile_um: &'a [f64],
+    angles: Rc<Angles>,
+    points: Points,
+    /// Of the profile's own points, the largest |w|.
+    span_um: f64,
+    heights: Vec<f64>,
+}
+
+/// An extreme between angles.
+struct Extreme {
+    angle_rad: f64,
+    outward: bool,
+}
+
+impl<'a> Series<'a> {
+    /// From harmonics by order from 0, in µm, and the profile itself on equal angles from 0, at least some to a wave of the
+    /// highest order; where it is NaN, there is none.
+    #[must_use]
+    pub fn new(harmonics: &'a [Complex64], profile_um: &'a [f64], radius_mm: f64) -> Self {
+        let angles = Angles::shared(profile_um.len());
+        let mut points = Points::default();
+        points.set_profile(&angles, profile_um, radius_mm);
+        let (curve, span_um) = (Curve::new(harmonics, profile_um), points.span_um);
+        Self { curve, profile_um, angles, points, span_um, heights: vec![0.0; profile_um.len()] }
+    }
+
+    /// A reference circle and the values about it.
+    ///
+    /// Between two angles that are there, the distance from a centre has its extremes where its derivative is 0: they join the
+    /// points until no extreme lies outside the circle's bounds. LSCI, and RONq about each circle, are those of the equal
+    /// angles. Contacts of the circle from the number of angles on lie between angles.
+    ///
+    /// # Errors
+    /// As [`Points::determine`].
+    pub fn about(&mut self, reference: Reference) -> Result<(Circle, Values), Undetermined> {
+        let found = self.search(reference);
+        self.points.cloud.truncate(self.profile_um.len());
+        self.points.span_um = self.span_um;
+        found
+    }
+
+    fn search(&mut self, reference: Reference) -> Result<(Circle, Values), Undetermined> {
+        let mut circle = self.points.determine(reference)?;
+        let tolerance = self.points.tolerance();
+        for _ in 0..MOST_LOOKS {
+            let place = [circle.x_um, circle.y_um];
+            let (low, high) = self.points.cloud.extremes(0..self.points.len(), &place);
+            let before = self.points.len();
+            for extreme in self.extremes(place, low, high) {
+                let angle = self.stationary(place, extreme.angle_rad);
+                let [form, ..] = self.curve.at(angle);
+                self.points.push(angle, form);
+                let last = self.points.len() - 1;
+                let height = self.points.cloud.height(last, &place);
+                if !(if extreme.outward { height > high + tolerance } else { height < low - tolerance }) {
+                    self.points.cloud.truncate(last);
+                }
+            }
+            if self.points.len() == before {
+                break;
+            }
+            // LSCI stays that of the equal angles.
+            if reference == Reference::LeastSquares {
+                break;
+            }
+            circle = self.points.determine(reference)?;
+        }
+        let values = self.points.values_of_first(&circle, self.profile_um.len());
+        Ok((circle, values))
+    }
+
+    /// Extremes of the distance from a place that may exceed the highest or the lowest.
+    fn extremes(&mut self, place: [f64; 2], low: f64, high: f64) -> Vec<Extreme> {
+        let count = self.heights.len();
+        self.points.cloud.heights(&place, &mut self.heights);
+        let heights = &self.heights;
+        // No parabola through three heights rises above their middle by more than an eighth of their bend.
+        let rise = 0.125 * largest_bend(heights);
+        let [above, below] = [high - (1.0 + MARGIN) * rise, low + (1.0 + MARGIN) * rise];
+        let mut found = Vec::new();
+        for (index, here) in heights.iter().enumerate().filter(|(_, here)| **here > above || **here < below) {
+            let [before, after] = [(index + count - 1) % count, (index + 1) % count].map(|index| heights[index]);
+            let (ahead, behind) = (here - after, here - before);
+            let is_top = ahead >= 0.0 && behind > 0.0;
+            let is_bottom = ahead <= 0.0 && behind < 0.0;
+            if is_top || is_bottom {
+                // The parabola through three points.
+                let bend = ahead + behind;
+                let (aside, top) = (0.5 * (behind - ahead) / bend, here + (behind - ahead).powi(2) / (8.0 * bend));
+                if if is_top { top > high - MARGIN * rise } else { top < low + MARGIN * rise } {
+                    let angle_rad = (index as f64 + aside) * TAU / count as f64;
+                    found.push(Extreme { angle_rad, outward: is_top });
+                }
             }
         }
-        if !grown {
-            break;
-        }
-        points.set_profile(&at_rad.iter().copied().collect::<Angles>(), &form_um, radius_mm);
-        if reference != Reference::LeastSquares {
-            circle = points.determine(reference)?;
-        }
+        found
     }
-    let values = Values { points: count, ..points.values(&circle) };
-    let ronq_um = if reference == Reference::LeastSquares {
-        squares
-    } else {
-        points.set_profile(&equal, profile_um, radius_mm);
-        points.values(&circle).ronq_um
+
+    /// Where the squared distance from a place is stationary, by Newton's method from an angle, within a step of it.
+    fn stationary(&self, [x_um, y_um]: [f64; 2], start: f64) -> f64 {
+        let step = TAU / self.angles.len() as f64;
+        let mut angle = start;
+        for _ in 0..MOST_NEWTON {
+            let [form, slope, bend] = self.curve.at(angle);
+            let (rho, (sin, cos)) = (self.points.radius_um() + form, angle.sin_cos());
+            let (along, across) = (x_um * cos + y_um * sin, y_um * cos - x_um * sin);
+            // Derivatives of ½(ρ² − 2ρ c·e + c²).
+            let first = rho * slope - slope * along - rho * across;
+            let second = slope * slope + rho * bend - bend * along - 2.0 * slope * across + rho * along;
+            let moved = first / second;
+            if !moved.is_finite() {
+                break;
+            }
+            angle = (angle - moved).clamp(start - step, start + step);
+            if moved.abs() < 1e-9 * step {
+                break;
+            }
+        }
+        angle
+    }
+}
+
+/// The largest |second difference| of heights around a turn.
+fn largest_bend(heights: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let [first, second, .., before, last] = *heights else { return f64::INFINITY };
+    let mut largest = [0.0; LANES];
+    let mut look = |lane: usize, bend: f64| {
+        // Comparisons with NaN are false: what is not there changes nothing.
+        largest[lane] = if bend.abs() > largest[lane] { bend.abs() } else { largest[lane] };
     };
-    let points = profile_um.iter().filter(|form| form.is_finite()).count();
-    Ok((circle, Values { ronq_um, points, ..values }))
-}
-
-/// Angles in rad near which deviations on equal angles have an extreme that may reach the highest (true) or the lowest.
-fn extremes(deviations: &[f64], low: f64, high: f64) -> Vec<(f64, bool)> {
-    let count = deviations.len();
-    let mut found = Vec::new();
-    let mut largest: f64 = 0.0;
-    for index in 0..count {
-        let [before, here, after] =
-            [(index + count - 1) % count, index, (index + 1) % count].map(|index| deviations[index]);
-        let (ahead, behind) = (here - after, here - before);
-        let is_top = ahead >= 0.0 && behind > 0.0;
-        let is_bottom = ahead <= 0.0 && behind < 0.0;
-        if is_top || is_bottom {
-            // The parabola through three points.
-            let bend = ahead + behind;
-            let (aside, rise) = (0.5 * (behind - ahead) / bend, (behind - ahead).powi(2) / (8.0 * bend));
-            largest = largest.max(rise.abs());
-            found.push((index as f64 + aside, here + rise, is_top));
+    let inner = heights[1..].chunks(LANES).zip(heights.chunks(LANES)).zip(heights[2..].chunks(LANES));
+    for ((here, before), after) in inner {
+        for (lane, ((here, before), after)) in here.iter().zip(before).zip(after).enumerate() {
+            look(lane, 2.0 * here - before - after);
         }
     }
-    let reaches = |(_, value, top): &(f64, f64, bool)| {
-        if *top { *value > high - MARGIN * largest } else { *value < low + MARGIN * largest }
-    };
-    let near = found.into_iter().filter(reaches);
-    near.map(|(place, _, top)| (place * TAU / count as f64, top)).collect()
-}
-
-/// Where the squared distance from the circle's centre is stationary, by Newton's method from an angle, within a step of it.
-fn stationary(harmonics: &[Complex64], radius_um: f64, circle: &Circle, start: f64, step: f64) -> f64 {
-    let mut angle = start;
-    for _ in 0..MOST_NEWTON {
-        let [form, slope, bend] = at(harmonics, angle);
-        let (rho, (sin, cos)) = (radius_um + form, angle.sin_cos());
-        let (along, across) = (circle.x_um * cos + circle.y_um * sin, circle.y_um * cos - circle.x_um * sin);
-        // Derivatives of ½(ρ² − 2ρ c·e + c²).
-        let first = rho * slope - slope * along - rho * across;
-        let second = slope * slope + rho * bend - bend * along - 2.0 * slope * across + rho * along;
-        let moved = first / second;
-        if !moved.is_finite() {
-            break;
-        }
-        angle = (angle - moved).clamp(start - step, start + step);
-        if moved.abs() < 1e-9 * step {
-            break;
-        }
-    }
-    angle
-}
-
-/// Distance of a point from the circle's centre.
-fn deviation(rho: f64, angle: f64, circle: &Circle) -> f64 {
-    let (sin, cos) = angle.sin_cos();
-    (rho * cos - circle.x_um).hypot(rho * sin - circle.y_um)
-}
-
-/// The series and its first two derivatives by the angle in rad.
-fn at(harmonics: &[Complex64], angle: f64) -> [f64; 3] {
-    let turn = Complex64::cis(angle);
-    let mut wave = Complex64::ONE;
-    let mut sums = [0.0; 3];
-    for (order, harmonic) in harmonics.iter().enumerate() {
-        // Rounding of the product's powers is taken back now and then.
-        if order % 64 == 0 {
-            wave = Complex64::cis(order as f64 * angle);
-        }
-        let (n, value) = (order as f64, harmonic * wave);
-        sums[0] += value.re;
-        sums[1] -= n * value.im;
-        sums[2] -= n * n * value.re;
-        wave *= turn;
-    }
-    sums
+    look(0, 2.0 * first - last - second);
+    look(1, 2.0 * last - before - first);
+    largest.into_iter().fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -1,7 +1,12 @@
 //! Values of a filtered profile.
 
+#![allow(clippy::inline_always, reason = "see crate::numerics::lanes")]
+
 use super::{Settings, Texture, elements};
-use crate::evaluate::areal::{MaterialRatio, derivative};
+use crate::{
+    evaluate::areal::{MaterialRatio, derivative},
+    numerics::lanes::{NullaryFnOnce, load, vectorised},
+};
 
 /// Hills and dales below this share of Rp and Rv are none (ISO 21920-2).
 const LOWEST: f64 = 0.1;
@@ -82,13 +87,10 @@ impl<'a> Profile<'a> {
             let inside = |position: &f64| last || ((position - start) * scale) as usize <= section;
             let (positions, heights) = rest;
             let count = positions.partition_point(inside).min(heights.len());
-            let ends = heights[..count].iter().filter(|height| height.is_finite());
-            extremes.push(ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
-                (if *height < low { *height } else { low }, if *height > high { *height } else { high })
-            }));
+            extremes.push(vectorised(Ends(&heights[..count])));
             rest = (&positions[count..], &heights[count..]);
         }
-        let points = self.heights_um.iter().filter(|height| height.is_finite()).count();
+        let points = vectorised(There(&self.heights_um));
         // A section in which nothing was measured has no say.
         extremes.retain(|(low, _)| low.is_finite());
         let over_sections = |of: fn(&(f64, f64)) -> f64| extremes.iter().map(of).sum::<f64>() / extremes.len() as f64;
@@ -141,24 +143,17 @@ impl<'a> Profile<'a> {
             return f64::NAN;
         }
         let spacing_um = 1e3 * (self.positions_mm[1] - self.positions_mm[0]);
-        let (mut sum, mut number) = (0.0, 0_usize);
-        let mut add = |difference: f64| {
-            let square = difference * difference;
-            if square.is_finite() {
-                sum += square;
-                number += 1;
-            }
-        };
-        for window in self.heights_um.windows(7) {
-            add(derivative(|step| window[(step + 3) as usize]));
-        }
+        let (mut sum, mut number) = vectorised(Slopes(&self.heights_um));
         if self.turn_mm.is_some() {
             for point in (0..3).chain(count - 3..count) {
                 let beside = |step: isize| (point.cast_signed() + step).rem_euclid(count.cast_signed()) as usize;
-                add(derivative(|step| self.heights_um[beside(step)]));
+                let square = derivative(|step| self.heights_um[beside(step)]).powi(2);
+                if square.is_finite() {
+                    (sum, number) = (sum + square, number + 1.0);
+                }
             }
         }
-        (sum / number as f64).sqrt() / spacing_um
+        (sum / number).sqrt() / spacing_um
     }
 }
 
@@ -175,16 +170,119 @@ fn cells(positions_mm: &[f64]) -> (Vec<f64>, bool) {
 /// Sums of terms of the heights that there are, each times its cell, and of the cells: over lanes that do not wait for each
 /// other, because Monte Carlo asks for this many thousand times.
 fn sums<const N: usize>(heights: &[f64], cells: &[f64], terms: impl Fn(f64) -> [f64; N]) -> ([f64; N], f64) {
-    const LANES: usize = 8;
-    let (mut sums, mut length) = ([[0.0; LANES]; N], [0.0; LANES]);
-    for (heights, cells) in heights.chunks(LANES).zip(cells.chunks(LANES)) {
-        for (lane, (height, cell)) in heights.iter().zip(cells).enumerate() {
-            let (height, cell) = if height.is_finite() { (*height, *cell) } else { (0.0, 0.0) };
-            for (sum, term) in sums.iter_mut().zip(terms(height)) {
-                sum[lane] += cell * term;
+    vectorised(Sums { heights, cells, terms })
+}
+
+struct Sums<'a, F> {
+    heights: &'a [f64],
+    cells: &'a [f64],
+    terms: F,
+}
+
+impl<const N: usize, F: Fn(f64) -> [f64; N]> NullaryFnOnce for Sums<'_, F> {
+    type Output = ([f64; N], f64);
+
+    #[inline(always)]
+    fn call(self) -> ([f64; N], f64) {
+        let (mut sums, mut length) = ([[0.0; LANES]; N], [0.0; LANES]);
+        let mut add = |heights: [f64; LANES], cells: [f64; LANES]| {
+            for lane in 0..LANES {
+                let there = is_there(heights[lane]);
+                let height = if there { heights[lane] } else { 0.0 };
+                let cell = if there { cells[lane] } else { 0.0 };
+                let terms = (self.terms)(height);
+                for term in 0..N {
+                    sums[term][lane] += cell * terms[term];
+                }
+                length[lane] += cell;
             }
-            length[lane] += cell;
-        }
+        };
+        let count = self.heights.len().min(self.cells.len());
+        let (heights, rest) = self.heights[..count].as_chunks::<LANES>();
+        let (cells, rest_of_cells) = self.cells[..count].as_chunks::<LANES>();
+        heights.iter().zip(cells).for_each(|(heights, cells)| add(*heights, *cells));
+        add(filled(rest, f64::NAN), filled(rest_of_cells, 0.0));
+        (sums.map(|lanes| lanes.iter().sum()), length.iter().sum())
     }
-    (sums.map(|lanes| lanes.iter().sum()), length.iter().sum())
+}
+
+const LANES: usize = 8;
+
+#[inline(always)]
+fn is_there(height: f64) -> bool {
+    height.abs() < f64::INFINITY
+}
+
+/// The last values, fewer than there are lanes, and others behind them.
+#[inline(always)]
+fn filled(rest: &[f64], other: f64) -> [f64; LANES] {
+    let mut lanes = [other; LANES];
+    lanes[..rest.len()].copy_from_slice(rest);
+    lanes
+}
+
+/// Lowest and highest of the heights that are there.
+struct Ends<'a>(&'a [f64]);
+
+impl NullaryFnOnce for Ends<'_> {
+    type Output = (f64, f64);
+
+    #[inline(always)]
+    fn call(self) -> (f64, f64) {
+        let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        let mut look = |heights: [f64; LANES]| {
+            for lane in 0..LANES {
+                let (height, there) = (heights[lane], is_there(heights[lane]));
+                low[lane] = if there && height < low[lane] { height } else { low[lane] };
+                high[lane] = if there && height > high[lane] { height } else { high[lane] };
+            }
+        };
+        let (whole, rest) = self.0.as_chunks::<LANES>();
+        whole.iter().for_each(|heights| look(*heights));
+        look(filled(rest, f64::NAN));
+        (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max))
+    }
+}
+
+/// Number of heights that are there.
+struct There<'a>(&'a [f64]);
+
+impl NullaryFnOnce for There<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn call(self) -> usize {
+        self.0.iter().map(|height| usize::from(is_there(*height))).sum()
+    }
+}
+
+/// Sum of the squared derivatives at points with three neighbours on both sides, and how many there are.
+struct Slopes<'a>(&'a [f64]);
+
+impl NullaryFnOnce for Slopes<'_> {
+    type Output = (f64, f64);
+
+    #[inline(always)]
+    fn call(self) -> (f64, f64) {
+        let inner = self.0.len().saturating_sub(6);
+        let whole = inner - inner % LANES;
+        let (mut sums, mut counts) = ([0.0; LANES], [0.0; LANES]);
+        for offset in (0..whole).step_by(LANES) {
+            let beside: [[f64; LANES]; 7] = std::array::from_fn(|index| load(self.0, offset + index));
+            for lane in 0..LANES {
+                let square = derivative(|step| beside[(step + 3) as usize][lane]).powi(2);
+                let there = is_there(square);
+                sums[lane] += if there { square } else { 0.0 };
+                counts[lane] += if there { 1.0 } else { 0.0 };
+            }
+        }
+        let (mut sum, mut count): (f64, f64) = (sums.iter().sum(), counts.iter().sum());
+        for window in self.0[whole..].windows(7) {
+            let square = derivative(|step| window[(step + 3) as usize]).powi(2);
+            if is_there(square) {
+                (sum, count) = (sum + square, count + 1.0);
+            }
+        }
+        (sum, count)
+    }
 }

@@ -57,7 +57,7 @@ pub fn add_areal(
     let sections = uncertain.sections();
     let blank = blanks(sections, surface.angles);
     let prepared = Prepared::new(surface, &blank, evaluate);
-    let map = match prepared.map(&surface.deviation_um) {
+    let map = match prepared.map(surface.deviation_um.clone()) {
         Ok(map) => map,
         Err(problem) if evaluate.all => {
             part.remarks.push(format!("no areal values and no twist: {problem}"));
@@ -152,9 +152,8 @@ impl<'a> Prepared<'a> {
     }
 
     /// The map of deviations on the surface's grid, without form, filtered and without ends.
-    fn map(&self, deviation_um: &[f64]) -> Result<HeightMap<'static>> {
+    fn map(&self, mut there: Vec<f64>) -> Result<HeightMap<'static>> {
         let whole = HeightMap::unrolled(self.surface)?;
-        let mut there = deviation_um.to_vec();
         for ring in there.chunks_mut(self.surface.angles) {
             ring.iter_mut().zip(self.blank).filter(|(_, blank)| **blank).for_each(|(height, _)| *height = f64::NAN);
         }
@@ -212,7 +211,7 @@ impl<'a> Prepared<'a> {
         let rings_um = uncertain.without_noise(lowest);
         let settings = areal::Settings::default();
         let of = |rings_um: &[f64]| -> Vec<f64> {
-            let map = self.map(&uncertain.laid(rings_um));
+            let map = self.map(uncertain.laid(rings_um));
             // What the measured surface has, a drawn one has; if not, there is no uncertainty.
             map.map_or_else(
                 |_| vec![f64::NAN; areal::PARAMETERS.len()],

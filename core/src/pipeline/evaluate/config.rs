@@ -20,7 +20,8 @@ use crate::{
         twist,
     },
     numerics::filter::Kind as FilterKind,
-    pipeline::error::{Fault, Place},
+    pipeline::error::{Fault, Place, known_names},
+    rig::Rig,
 };
 
 /// `[evaluate]`: which of the standards' values a run gives, and how.
@@ -45,7 +46,7 @@ pub struct EvaluateConfig {
     pub robust_filter_upr: Option<Vec<f64>>,
     /// Window, in degrees up to 180, over which `roundness` gives the largest change of the profile, `slope`.
     pub slope_window_deg: Option<f64>,
-    /// Highest order of `harmonics`; without it 15.
+    /// Highest order of `harmonics`, from 2 on; without it 15.
     pub harmonics_upr: Option<usize>,
     /// Sections, or stations of sections, whose least-squares centres make the datum axis of eccentricity, coaxiality and run-out
     /// of the other sections (with `cylindricity`, where centres are known); one section makes an axis along z.
@@ -57,8 +58,8 @@ pub struct EvaluateConfig {
     pub lambda_s_mm: Option<f64>,
     /// Centres of polar plots that error motion values are about; without it LSC.
     pub centres: Option<Vec<CentreConfig>>,
-    /// Fixed sensitive directions of error motion besides x and y, in degrees from x towards y: where the tool stands. A
-    /// direction and its opposite are one, 0 to below 180°.
+    /// Fixed sensitive directions of error motion besides x and y, in degrees from x towards y, above -360 and below 360: where
+    /// the tool stands. A direction and its opposite are one, 0 to below 180°.
     pub directions_deg: Option<Vec<f64>>,
     /// What texture values are of, besides λs and λc.
     #[serde(default)]
@@ -402,7 +403,26 @@ impl Default for Evaluate {
 /// The cut-off where nothing is said, in undulations per revolution.
 const USUAL_UPR: f64 = 50.0;
 
+/// Lowest order of `harmonics`: those below are level and centre, no form.
+const LOWEST_HARMONIC: usize = 2;
+
 impl EvaluateConfig {
+    /// Refuses names of the datum that are no section of the rig that measures.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub(in crate::pipeline) fn check_datum(&self, rig: &Rig) -> Result<(), Fault> {
+        let unknown = |name: &&String| !rig.sections.contains(name);
+        match self.datum.iter().flatten().enumerate().find(|(_, name)| unknown(name)) {
+            Some((index, name)) => {
+                let fault = Fault::here(format!("the rig has no section `{name}`"));
+                let fault = fault.help(known_names(name, rig.sections.iter().map(String::as_str)));
+                Err(fault.under_item("datum", index))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Checks the values.
     ///
     /// # Errors
@@ -439,6 +459,10 @@ impl EvaluateConfig {
             let message = format!("the window must be above 0° and at most 180°, found {window}");
             return Err(Fault::at("slope_window_deg", message));
         }
+        if let Some(highest) = self.harmonics_upr.filter(|highest| *highest < LOWEST_HARMONIC) {
+            let message = format!("expected an order from {LOWEST_HARMONIC} on, found {highest}");
+            return Err(Fault::at("harmonics_upr", message));
+        }
         if matches!(&self.datum, Some(datum) if datum.is_empty()) {
             return Err(Fault::at("datum", "expected at least one section"));
         }
@@ -461,9 +485,10 @@ impl EvaluateConfig {
             _ => fault.under("texture"),
         })?;
         for (index, direction) in self.directions_deg.iter().flatten().enumerate() {
-            if !direction.is_finite() {
-                let fault = Fault::here(format!("the direction must be a number of degrees, found {direction}"));
-                return Err(fault.under_item("directions_deg", index));
+            // A direction and its opposite are one, but a whole turn is a slip of the pen.
+            if !(direction.abs() < 360.0) {
+                let message = format!("the direction must lie between -360 and 360 degrees, found {direction}");
+                return Err(Fault::here(message).under_item("directions_deg", index));
             }
         }
         let directions = self.directions_deg.unwrap_or_default();

@@ -149,6 +149,8 @@ fn labelled_with_reasons(
 }
 
 #[cfg(test)]
+mod cost_tests;
+#[cfg(test)]
 mod coverage_tests;
 #[cfg(test)]
 mod tests;

@@ -1,14 +1,16 @@
 //! Values of one section: roundness around the part.
 
+use std::borrow::Cow;
+
 use super::{Evaluate, Filter, Group, Held, Label, POINTS_A_WAVE, labelled};
 use crate::{
     Complex64,
     evaluate::{
         Value,
-        roundness::{Angles, Disturbed, Points, Reference, Values, between_angles},
-        slope::{largest_on_angles, steepest_um_per_rad},
+        roundness::{Angles, Disturbed, Points, Reference, Series, Values},
+        slope::{Drawn, steepest_um_per_rad},
         uncertainty::{
-            DRAWS, Errors, LARGEST, NORMAL_95, RAYLEIGH_95, Uncertainty, extreme, monte_carlo_of, seed, stand_in,
+            DRAWS, Errors, LARGEST, NORMAL_95, Noise, RAYLEIGH_95, Uncertainty, extreme, monte_carlo_of, seed, stand_in,
         },
     },
     numerics::{
@@ -83,7 +85,8 @@ pub(super) struct Form {
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
     pub(super) at: SectionAt,
-    seed: u64,
+    /// What its errors are drawn from, for all of its values.
+    noise: Noise,
 }
 
 impl Form {
@@ -106,10 +109,10 @@ impl Form {
             harmonics: from_two(separation.coefficients(unknown).collect()),
             equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),
             variance: separation.noise_variance(unknown),
-            held,
             angles: result.angles,
             radius_mm,
-            seed: seed(&[&result.station, &at.id]),
+            noise: Noise::new(held.highest + 1, seed(&[&result.station, &at.id])),
+            held,
             at,
         })
     }
@@ -117,7 +120,8 @@ impl Form {
     /// Another form of the same section, taken as exact.
     fn exactly(&self, harmonics: &[Complex64]) -> Self {
         let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
-        Self { harmonics, equivalents, variance, held: self.held.clone(), at: self.at.clone(), ..*self }
+        let (held, at, noise) = (self.held.clone(), self.at.clone(), self.noise.clone());
+        Self { harmonics, equivalents, variance, held, at, noise, ..*self }
     }
 
     fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
@@ -148,19 +152,11 @@ impl Form {
         let labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
         let smoother = Smoother::closed(self.angles, cutoff_upr, Degree::Two);
         let (angles, mut points) = (Angles::equal(self.angles), Points::default());
-        let found = self.evaluate(&Filter::low_pass(None), self.angles, DRAWS_OF_ROBUST, |profile_um, _, found| {
+        let found = self.evaluate(&Filter::low_pass(None), self.angles, DRAWS_OF_ROBUST, |profile_um, found| {
             points.set_profile(&angles, &robust_gaussian(&smoother, profile_um).low_pass, self.radius_mm);
             for reference in references {
                 let about = points.reference(*reference).map(|circle| points.values(&circle));
-                let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
-                found.push(of(|values| values.ront_um));
-                if *reference == Reference::LeastSquares {
-                    found.extend([
-                        of(|values| values.ronp_um),
-                        of(|values| values.ronv_um),
-                        of(|values| values.ronq_um),
-                    ]);
-                }
+                add_values(about, *reference, found);
             }
         });
         let found = found.into_iter().zip(&labels).map(|((value, known), label)| {
@@ -185,7 +181,7 @@ impl Form {
         }
         let waves = filter.highest(self.held.highest);
         let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
-        let found = changes.evaluate(filter, angles, DRAWS, |profile_um, _, found| {
+        let found = changes.evaluate(filter, angles, DRAWS, |profile_um, found| {
             found.push(profile_um.iter().map(|change| change.abs()).fold(f64::NAN, f64::max));
         });
         let source = "largest change of the profile over a window, no standard's symbol";
@@ -226,13 +222,13 @@ impl Form {
     }
 
     /// Everything that is computed from one filtered profile on equal angles, with what so many draws of its errors make of
-    /// it. `values` gets a profile and, of a drawn one, its largest error.
+    /// it.
     fn evaluate(
         &self,
         filter: &Filter,
         angles: usize,
         draws: usize,
-        mut values: impl FnMut(&[f64], Option<f64>, &mut Vec<f64>),
+        mut values: impl FnMut(&[f64], &mut Vec<f64>),
     ) -> Vec<(f64, Option<Uncertainty>)> {
         let mut fourier = Fourier::new(angles);
         let form_um = self.profile(filter, &mut fourier);
@@ -240,12 +236,10 @@ impl Form {
         let draws = if errors.is_some() { draws } else { 0 };
         let mut drawn = form_um.clone();
         monte_carlo_of(draws, |disturbed, found| {
-            let mut largest = None;
             if let (true, Some(errors)) = (disturbed, &mut errors) {
                 errors.draw(&mut fourier, &form_um, &mut drawn);
-                largest = Some(errors.largest_um());
             }
-            values(&drawn, largest, found);
+            values(&drawn, found);
         })
     }
 
@@ -256,7 +250,7 @@ impl Form {
     }
 
     pub(super) fn errors(&self, filter: &Filter) -> Option<Errors> {
-        Errors::new(&filter.variance(&self.variance), 2, self.seed)
+        Errors::sharing(&filter.variance(&self.variance), 2, &self.noise)
     }
 
     fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {
@@ -268,21 +262,11 @@ impl Form {
         if labels.is_empty() {
             return Vec::new();
         }
-        let on_angles = |angles: usize, draws: usize| {
-            let at = Angles::equal(angles);
-            let mut circles = Circles::new(self, filter, &at, references, draws > 0);
-            self.evaluate(filter, angles, draws, |profile_um, largest_um, found| {
-                circles.values(profile_um, largest_um, found);
-            })
-        };
-        let waves = filter.highest(self.held.highest);
-        let fewer = (DRAWN_POINTS_A_WAVE * waves).next_power_of_two().min(self.angles);
-        // The given angles and others between them, so that no crest is far from one.
-        let finer = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
-        let drawn = on_angles(fewer, DRAWS);
-        let found = on_angles(finer, 0).into_iter().zip(drawn);
-        let found = found.zip(&labels).map(|(((value, _), (about, known)), label)| {
-            let known = known.map(|known| known.moved(value - about));
+        let drawn = self.drawn_about(filter, references);
+        let drawn = drawn.into_iter().map(Some).chain(std::iter::repeat(None));
+        let found = self.about(filter, references).into_iter().zip(drawn);
+        let found = found.zip(&labels).map(|((value, drawn), label)| {
+            let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
             (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
         });
         let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
@@ -295,39 +279,74 @@ impl Form {
         self.labelled(labels, found, filter)
     }
 
+    /// Values about reference circles, of the profile between the angles too.
+    fn about(&self, filter: &Filter, references: &[Reference]) -> Vec<f64> {
+        let waves = filter.highest(self.held.highest);
+        // The given angles and others between them, so that no crest is far from one.
+        let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
+        let harmonics = filter.harmonics(&self.harmonics);
+        let mut fourier = Fourier::new(angles);
+        let mut profile_um = Cow::Borrowed(fourier.synthesise(harmonics.iter().copied()));
+        if !self.at.gaps.is_empty() {
+            self.at.gaps.blank(profile_um.to_mut());
+        }
+        let mut series = Series::new(&harmonics, &profile_um, self.radius_mm);
+        let mut found = Vec::new();
+        for reference in references {
+            let about = series.about(*reference).ok().map(|found| found.1);
+            add_values(about, *reference, &mut found);
+        }
+        found
+    }
+
+    /// The same of the profile at fewer angles, with what draws of its errors make of them; nothing where no errors are known.
+    fn drawn_about(&self, filter: &Filter, references: &[Reference]) -> Vec<(f64, Option<Uncertainty>)> {
+        let Some(mut errors) = self.errors(filter) else { return Vec::new() };
+        let waves = filter.highest(self.held.highest);
+        let angles = Angles::shared((DRAWN_POINTS_A_WAVE * waves).next_power_of_two().min(self.angles));
+        let mut fourier = Fourier::new(angles.len());
+        let profile_um = self.profile(filter, &mut fourier);
+        let usual_um = LARGEST * errors.std_um();
+        let about = |reference: &Reference| {
+            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um))
+        };
+        let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
+        monte_carlo_of(DRAWS, |disturbed, found| {
+            let drawn = disturbed.then(|| errors.turned(&mut fourier));
+            for (reference, circle) in &mut circles {
+                let values = match (circle, &drawn) {
+                    (Some(circle), Some(drawn)) => circle.values(drawn),
+                    (Some(circle), None) => Some(circle.about()),
+                    (None, _) => None,
+                };
+                add_values(values, *reference, found);
+            }
+        })
+    }
+
     /// The steepest slope, µm/°, from the harmonics. High orders count by their number, and noise with them: it is drawn
     /// about a profile that stands for the truth.
     fn steepest(&self, filter: &Filter) -> (f64, Option<Uncertainty>) {
         let harmonics = filter.harmonics(&self.harmonics);
         let value = steepest_um_per_rad(&harmonics, &self.at.gaps).to_radians();
         let variance = filter.variance(&self.variance);
-        let slopes = |harmonics: &[Complex64]| -> Vec<Complex64> {
-            harmonics
-                .iter()
-                .enumerate()
-                .map(|(order, value)| Complex64::I * (order as f64).to_radians() * value)
-                .collect()
-        };
         let of_slopes: Vec<f64> = (variance.iter().enumerate())
             .map(|(order, variance)| variance * (order as f64).to_radians().powi(2))
             .collect();
-        let Some(mut errors) = Errors::new(&of_slopes, 2, self.seed) else { return (value, None) };
+        let Some(mut errors) = Errors::sharing(&of_slopes, 2, &self.noise) else { return (value, None) };
         let weights = stand_in(&harmonics, &variance, 2);
-        let likely: Vec<Complex64> = harmonics.iter().zip(weights).map(|(value, weight)| value * weight).collect();
+        let likely = harmonics.iter().zip(weights).enumerate();
+        let likely = likely.map(|(order, (value, weight))| Complex64::I * (order as f64).to_radians() * value * weight);
         let waves = filter.highest(self.held.highest).max(2);
         let mut fourier = Fourier::new((DRAWN_POINTS_A_WAVE * waves).next_power_of_two());
-        let likely = fourier.synthesise(slopes(&likely)).to_vec();
-        let mut drawn = likely.clone();
-        let largest = |drawn: &mut Vec<f64>| {
-            self.at.gaps.blank(drawn);
-            largest_on_angles(drawn)
-        };
-        let about = largest(&mut drawn);
+        let mut likely = fourier.synthesise(likely).to_vec();
+        self.at.gaps.blank(&mut likely);
+        let about = Drawn::about(&likely);
         let draws = (0..DRAWS).map(|_| {
-            errors.draw(&mut fourier, &likely, &mut drawn);
-            largest(&mut drawn)
+            let drawn = errors.turned(&mut fourier);
+            about.steepest(drawn.errors_um, drawn.largest_um)
         });
-        let known = extreme(value, about, draws.collect()).map(|(_, known)| known);
+        let known = extreme(value, about.undisturbed(), draws.collect()).map(|(_, known)| known);
         (value, known)
     }
 }
@@ -337,18 +356,6 @@ const DRAWS_OF_ROBUST: usize = 64;
 
 /// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
 const DRAWN_POINTS_A_WAVE: usize = 6;
-
-/// One section's values about its reference circles.
-struct Circles<'a> {
-    angles: &'a Angles,
-    radius_mm: f64,
-    references: &'a [Reference],
-    points: Points,
-    /// Of each reference, where its errors are drawn.
-    disturbed: Vec<Option<Disturbed<'a>>>,
-    /// Harmonics of the profile itself, where no errors are drawn: contacts are then sought between the angles.
-    series: Option<Vec<Complex64>>,
-}
 
 /// RONt, and about LSCI RONp, RONv and RONq.
 fn roundness_labels(reference: Reference) -> Vec<Label> {
@@ -369,47 +376,11 @@ fn has_kinks(label: &Label) -> bool {
     label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
 }
 
-impl<'a> Circles<'a> {
-    fn new(form: &Form, filter: &Filter, angles: &'a Angles, references: &'a [Reference], drawn: bool) -> Self {
-        let errors = form.errors(filter).filter(|_| drawn);
-        let disturbed = errors.iter().flat_map(|errors| {
-            let profile_um = form.profile(filter, &mut Fourier::new(angles.len()));
-            let usual_um = LARGEST * errors.std_um();
-            let about =
-                move |reference: &Reference| Disturbed::new(*reference, angles, &profile_um, form.radius_mm, usual_um);
-            references.iter().map(about)
-        });
-        Self {
-            angles,
-            radius_mm: form.radius_mm,
-            references,
-            points: Points::default(),
-            disturbed: disturbed.collect(),
-            series: (!drawn).then(|| filter.harmonics(&form.harmonics)),
-        }
-    }
-
-    fn values(&mut self, profile_um: &[f64], largest_um: Option<f64>, found: &mut Vec<f64>) {
-        if largest_um.is_none() && !self.references.is_empty() {
-            self.points.set_profile(self.angles, profile_um, self.radius_mm);
-        }
-        for (index, reference) in self.references.iter().enumerate() {
-            let about = match (largest_um, self.disturbed.get_mut(index)) {
-                (Some(largest_um), Some(disturbed)) => {
-                    disturbed.as_mut().and_then(|disturbed| disturbed.values(profile_um, largest_um))
-                }
-                _ => match &self.series {
-                    Some(series) => {
-                        between_angles(series, profile_um, self.radius_mm, *reference).ok().map(|found| found.1)
-                    }
-                    None => self.points.reference(*reference).map(|circle| self.points.values(&circle)),
-                },
-            };
-            let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
-            found.push(of(|values| values.ront_um));
-            if *reference == Reference::LeastSquares {
-                found.extend([of(|values| values.ronp_um), of(|values| values.ronv_um), of(|values| values.ronq_um)]);
-            }
-        }
+/// The values of [`roundness_labels`]; NaN where there is no such circle.
+fn add_values(about: Option<Values>, reference: Reference, found: &mut Vec<f64>) {
+    let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+    found.push(of(|values| values.ront_um));
+    if reference == Reference::LeastSquares {
+        found.extend([of(|values| values.ronp_um), of(|values| values.ronv_um), of(|values| values.ronq_um)]);
     }
 }

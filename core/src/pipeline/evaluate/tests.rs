@@ -823,6 +823,9 @@ fn what_cannot_be_evaluated_is_refused_at_its_place() {
         ),
         ("texture = { rdc_percent = [80, 20] }", vec![key("texture"), key("rdc_percent")], "ascending"),
         ("directions_deg = [30, inf]", vec![key("directions_deg"), Step::Index(1)], "degrees"),
+        ("directions_deg = [400]", vec![key("directions_deg"), Step::Index(0)], "-360 and 360"),
+        ("directions_deg = [0, -360]", vec![key("directions_deg"), Step::Index(1)], "-360 and 360"),
+        ("harmonics_upr = 0", vec![key("harmonics_upr")], "from 2 on"),
     ] {
         let fault = evaluate(text).unwrap_err();
         assert!(fault.message.contains(words), "{fault}");
@@ -850,4 +853,16 @@ fn what_cannot_be_evaluated_is_refused_at_its_place() {
     }
     let none: Limit = toml::from_str("symbol = 'RONt'\nunit = 'um'").unwrap();
     assert!(none.check(&Evaluate::default(), None).unwrap_err().message.contains("`upper`, `lower` or both"));
+}
+
+/// Sections are known of a rig; measured points bring their own.
+#[test]
+fn a_datum_that_the_rig_does_not_have_is_refused_at_its_name() {
+    let text = "part_radius_mm = 30\nsetups = [{ id = 'a', part_deg = 0 }]\n[[sensors]]\nid = 'p'\nangle_deg = 0\nsection = 'A'";
+    let rig = toml::from_str::<crate::rig::RigConfig>(text).unwrap().check().unwrap();
+    let config = |text: &str| toml::from_str::<EvaluateConfig>(text).unwrap();
+    let fault = config("datum = ['A', 'B']").check_datum(&rig).unwrap_err();
+    assert_eq!(fault.place, Place::Path(vec![Step::Key("datum".into()), Step::Index(1)]));
+    assert!(fault.message.contains("no section `B`") && fault.help.clone().unwrap().contains("`A`"), "{fault}");
+    assert!(config("datum = ['A']").check_datum(&rig).is_ok() && config("").check_datum(&rig).is_ok());
 }
