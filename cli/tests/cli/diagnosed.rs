@@ -78,8 +78,15 @@ fn corrected_results_are_recognisable() {
     let mut outputs: Vec<&str> =
         diagnosis["outputs"].as_array().unwrap().iter().map(|path| path.as_str().unwrap()).collect();
     outputs.sort_unstable();
-    let names =
-        ["diagnosis.json", "form.parquet", "harmonics.parquet", "motion.parquet", "summary.json", "values.parquet"];
+    let names = [
+        "corrections.parquet",
+        "diagnosis.json",
+        "form.parquet",
+        "harmonics.parquet",
+        "motion.parquet",
+        "summary.json",
+        "values.parquet",
+    ];
     let mut expected: Vec<String> = names.map(|name| format!("out/diagnosed/{name}")).into();
     expected.extend(["diagnosed/result.h5".into(), "mesh/diagnosed/shaft.obj".into()]);
     expected.sort_unstable();

@@ -1,0 +1,250 @@
+//! The closed loop: what a declared model leaves of the data, traced to what it lacks.
+//!
+//! A [`Model`] fits everything that it declares and says what is left; it knows *effects* that it could have besides, each
+//! with parameters and a signature, the derivative of what is left by each parameter. [`closed_loop::diagnose`] finds which
+//! of them the data ask for, adds them, and says what it cannot know. Nothing here knows what is measured.
+
+pub mod closed_loop;
+mod confounded;
+pub mod diagnosis;
+pub mod evidence;
+pub mod fit;
+pub mod foresight;
+pub mod linear_terms;
+mod mistakes;
+mod parts;
+
+use self::diagnosis::{Estimated, Unexplained};
+use runout_error::Result;
+
+/// A declared model of a measurement, and what it could lack.
+pub trait Model {
+    /// A fit of it.
+    type Fit: Fit;
+
+    /// What it could lack, one entry an effect and target.
+    fn effects(&self) -> &[Effect];
+
+    /// Fits everything that is declared, with some effects applied: fully, not only to first order.
+    ///
+    /// # Errors
+    /// When the data do not fit the model, or a parameter is beyond all bounds.
+    fn fit(&self, applied: &[Setting]) -> Result<Self::Fit>;
+
+    /// When an effect's turn comes: those of a higher rank are asked only where none of a lower one earns its place. A part's
+    /// place comes before its size, and its size before its form, which counts from them.
+    fn rank(&self, _effect: usize) -> usize {
+        0
+    }
+
+    /// Whether an effect can have these values: a low-pass cannot amplify.
+    fn is_possible(&self, _effect: usize, _values: &[f64]) -> bool {
+        true
+    }
+
+    /// What ends a list of effects (orders, lines) of which this one is the last, in words: "order 8 is the highest".
+    fn last_of_list(&self, _effect: usize) -> Option<String> {
+        None
+    }
+
+    /// Values of an effect that its search begins at, beside what is applied; all 0 without them. A model that is far from
+    /// linear in an effect searches them itself.
+    fn start(&self, _effect: usize, _applied: &[Setting]) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// The same model on all data, for the final results: what the loop holds out is part of them.
+    fn whole(&self) -> &Self {
+        self
+    }
+
+    /// What would declare an effect at the values that are `applied`: lines of TOML, a key of the measurement's declaration
+    /// and the value to put there each (`setups.1.part_deg = 100.184`). Nothing where there is no key for it.
+    fn changes(&self, _effect: usize, _applied: &[Setting]) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Whether data beside those of the residual's rms show an effect: single turns beside their average.
+    fn is_seen_besides(&self, _effect: usize) -> bool {
+        false
+    }
+
+    /// Whether an effect is a mistake in the declaration: it is there or not, and is looked for before any other.
+    fn is_mistake(&self, _effect: usize) -> bool {
+        false
+    }
+
+    /// Mistakes in the declaration that may explain what is left with some effects applied, the likeliest first: each entry is
+    /// one mistake, or several that were made together. Asked for only where far more than noise is left.
+    fn suspected_mistakes(&self, _applied: &[Setting]) -> Vec<Vec<usize>> {
+        Vec::new()
+    }
+
+    /// Effects that take the place of one that acts on the whole, where it is not the same in all its parts: one a part.
+    fn parts(&self, _effect: usize) -> Vec<usize> {
+        Vec::new()
+    }
+
+    /// An effect's parameters as people say them.
+    fn present(&self, _effect: usize, estimated: Vec<Estimated>) -> Vec<Estimated> {
+        estimated
+    }
+}
+
+/// A model fitted to its data.
+pub trait Fit {
+    /// What is left.
+    fn remainder(&self) -> &Remainder;
+
+    /// How what is left changes with each parameter of an effect (an index into [`Model::effects`]), at the values that are
+    /// applied, or at none: `[parameter][residual]`, per unit of the parameter. Everything that the model fits anyway is
+    /// already taken out of it.
+    fn signature(&self, effect: usize) -> Vec<Vec<f64>>;
+
+    /// How the results (form, motion) change with each parameter of an effect: root mean square, per unit of it.
+    fn bias(&self, effect: usize) -> Vec<Bias>;
+
+    /// The result that counts most (form), in one unit, NaN where it is not observable; always of one length. Where the data
+    /// do not decide between effects, it stays as near as possible to that of the declared model.
+    fn results(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Replaces all results by their weighted mean over equivalent fits, between which the data do not decide, and adds to
+    /// their uncertainty how far these are from it. `weights` are this fit's and then those of `others`; their sum is 1.
+    fn mix(&mut self, _weights: &[f64], _others: Vec<Self>)
+    where
+        Self: Sized,
+    {
+    }
+
+    /// Values that people look at, with their standard uncertainty where it is known.
+    fn values(&self) -> Vec<Outcome>;
+
+    /// Takes into its results' uncertainty what is not known of the parameters of these effects, one after the other:
+    /// their covariance `[parameter][parameter]`.
+    fn widen(&mut self, _effects: &[usize], _covariance: &[Vec<f64>]) {}
+
+    /// Groups of the data (circles, blocks, captures) of which far more is left than of the others, whether or not the noise is
+    /// known ([`evidence::far_worse`]).
+    fn far_worse(&self) -> Vec<Unexplained> {
+        Vec::new()
+    }
+
+    /// Where something is left that the noise does not explain.
+    fn unexplained(&self) -> Vec<Unexplained> {
+        Vec::new()
+    }
+
+    /// What measurement would tell effects of a confounded set apart.
+    fn told_apart_by(&self, _effects: &[usize]) -> Option<String> {
+        None
+    }
+}
+
+/// Something that a declared model may lack, at one target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Its id, in kebab-case.
+    pub id: String,
+    /// Where it acts: the id of a sensor or a setup, or of two; nothing for the whole.
+    pub targets: Vec<String>,
+    /// What it is described by.
+    pub parameters: Vec<Parameter>,
+}
+
+/// A number that describes an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// What could usually be expected of it, in its unit: the standard deviation of its prior.
+    pub tolerance: f64,
+}
+
+/// An effect with values of its parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// Index into [`Model::effects`].
+    pub effect: usize,
+    /// One value a parameter.
+    pub values: Vec<f64>,
+}
+
+/// What a fit leaves of the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remainder {
+    /// In standard deviations of its noise, projected to where nothing that is fitted can reach; of mean square 1 for each
+    /// degree of freedom where only noise is left.
+    pub residual: Vec<f64>,
+    /// Lengths of the stretches of `residual` that come from independent data (stations), one after the other; nothing where it
+    /// is one.
+    pub stretches: Vec<usize>,
+    /// Its degrees of freedom.
+    pub dof: usize,
+    /// Root mean square of what is left, in the data's unit.
+    pub rms: f64,
+    /// What the noise lets expect of it, in the data's unit; NaN where the noise is not known from elsewhere: then
+    /// `residual` is in the data's unit.
+    pub noise_floor: f64,
+    /// Root mean square of what the fit leaves of data that it has not seen, in the data's unit.
+    pub held_out_rms: f64,
+    /// Its value expected from noise, in the data's unit: the noise of the held-out data and that of their prediction from the
+    /// data fitted. NaN where the noise is not known.
+    pub held_out_expected_rms: f64,
+    /// Weighted sum of squares of the residual on held-out data.
+    pub held_out_chi2: f64,
+    /// Share of χ² that is expected from disturbances which the model knows to be in the data beyond noise, and whose course it
+    /// does not know: an effect that explains no more than this may be one of them. 0 without any.
+    pub disturbed_chi2: f64,
+    /// Unit of the data.
+    pub unit: String,
+}
+
+impl Remainder {
+    /// Sum of squares of the residual.
+    #[must_use]
+    pub fn chi2(&self) -> f64 {
+        self.residual.iter().map(|value| value * value).sum()
+    }
+
+    /// χ² per degree of freedom.
+    #[must_use]
+    pub fn chi2_per_dof(&self) -> f64 {
+        self.chi2() / self.dof.max(1) as f64
+    }
+
+    /// Whether the noise is known from elsewhere than from the fit.
+    #[must_use]
+    pub fn noise_is_known(&self) -> bool {
+        self.noise_floor.is_finite()
+    }
+}
+
+/// What one unit of a parameter does to a result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bias {
+    /// Which result: "form", "motion".
+    pub on: String,
+    /// Root mean square.
+    pub value: f64,
+    /// Of the result per that of the parameter: "um/mm".
+    pub unit: String,
+}
+
+/// A value that people look at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Its symbol or name.
+    pub value: String,
+    /// The section, where it has one.
+    pub section: Option<String>,
+    /// The number.
+    pub number: f64,
+    /// Its standard uncertainty; NaN where not known.
+    pub std: f64,
+    /// Its unit.
+    pub unit: String,
+}

@@ -1,0 +1,273 @@
+//! Files that appear whole or not at all.
+
+use std::{
+    fs,
+    path::{Component, Path, PathBuf},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+use runout_error::{Error, Result};
+
+/// What this process has begun and not finished.
+static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new() });
+
+struct UnderWay {
+    /// Temporary files.
+    files: Vec<PathBuf>,
+    /// Folders that were made.
+    folders: Vec<PathBuf>,
+}
+
+impl UnderWay {
+    fn now() -> MutexGuard<'static, Self> {
+        UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Removes a temporary file, and the folders made for it where nothing else came into them.
+    fn remove(&mut self, temporary: &Path) {
+        self.files.retain(|file| file != temporary);
+        // Nothing more can be done about a temporary file that will not go.
+        let _ = fs::remove_file(temporary);
+        let made = temporary.ancestors().skip(1).take_while(|folder| self.folders.iter().any(|made| made == folder));
+        // Folders with something in them do not go.
+        let _ = made.map(fs::remove_dir).take_while(std::result::Result::is_ok).count();
+    }
+
+    /// Gives a file its final name.
+    fn finish(&mut self, file: &mut PendingFile) -> Result<PathBuf> {
+        fs::rename(&file.temporary, &file.destination).map_err(|error| file.failure(error))?;
+        self.files.retain(|pending| *pending != file.temporary);
+        file.committed = true;
+        Ok(file.destination.clone())
+    }
+}
+
+/// Removes all that was begun and not finished, for a program that ends now: nothing can be begun or finished afterwards.
+pub fn abandon_all() {
+    let mut under_way = UnderWay::now();
+    while let Some(file) = under_way.files.pop() {
+        under_way.remove(&file);
+    }
+    // Whoever is still at work waits for the end.
+    std::mem::forget(under_way);
+}
+
+/// A file being written under a temporary name beside its final one.
+///
+/// [`commit`](Self::commit) renames it; dropped without, it is removed, and with it the folders that were made for it, where
+/// nothing else came into them. Whatever was there before stays until then.
+#[derive(Debug)]
+pub struct PendingFile {
+    temporary: PathBuf,
+    destination: PathBuf,
+    committed: bool,
+}
+
+impl PendingFile {
+    /// Reserves a temporary name beside `destination`, creating its folder.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or `destination` is a folder.
+    pub fn new(destination: impl Into<PathBuf>) -> Result<Self> {
+        static SERIAL: AtomicU64 = AtomicU64::new(0);
+        let destination = destination.into();
+        let shown = destination.display().to_string();
+        // A rename would put a file in the place of a folder, a device or a pipe.
+        if fs::metadata(&destination).is_ok_and(|found| !found.is_file()) {
+            return Err(Error::new("write", shown, "what is there is no file").help("name a file"));
+        }
+        let name = destination
+            .file_name()
+            .ok_or_else(|| Error::new("write", &shown, "the path ends in no file name"))?
+            .to_string_lossy()
+            .into_owned();
+        let folder = match destination.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        make(folder).map_err(|error| {
+            let file = folder.ancestors().find(|above| above.is_file());
+            let failure = Error::new("create the folder", folder.display().to_string(), error);
+            match file {
+                Some(file) => failure.help(format!("{} is a file; name another folder", file.display())),
+                None => failure,
+            }
+        })?;
+        remove_stale(folder, &name);
+        let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
+        let temporary = folder.join(format!(".{name}.{}-{serial}.partial", std::process::id()));
+        UnderWay::now().files.push(temporary.clone());
+        Ok(Self { temporary, destination, committed: false })
+    }
+
+    /// Where to write now.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Where the file will appear.
+    #[must_use]
+    pub fn destination(&self) -> &Path {
+        &self.destination
+    }
+
+    /// Creates the temporary file for writing.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn create(&self) -> Result<fs::File> {
+        fs::File::create(&self.temporary).map_err(|error| self.failure(error))
+    }
+
+    /// Refuses to begin what may not fit: a library that the disk fails in the middle of a file may not survive it.
+    ///
+    /// # Errors
+    /// When fewer bytes are free where it will lie.
+    pub fn room_for(&self, bytes: u64) -> Result<()> {
+        let folder = self.temporary.parent().filter(|folder| !folder.as_os_str().is_empty());
+        match fs4::available_space(folder.unwrap_or(Path::new("."))) {
+            Ok(free) if free < bytes => {
+                let [wanted, free] = [bytes, free].map(|bytes| bytes as f64 / 1e6);
+                let problem = format!("it may take {wanted:.1} MB, and {free:.1} MB are free there");
+                Err(self.failure(problem).help("make room, or write elsewhere"))
+            }
+            // Where the system does not tell, the attempt will.
+            _ => Ok(()),
+        }
+    }
+
+    /// An error about this file, named by its final name.
+    pub fn failure(&self, problem: impl ToString) -> Error {
+        Error::new("write", self.destination.display().to_string(), problem)
+    }
+
+    /// Gives the file its final name, replacing what was there.
+    ///
+    /// # Errors
+    /// When the file system refuses the rename.
+    pub fn commit(mut self) -> Result<PathBuf> {
+        UnderWay::now().finish(&mut self)
+    }
+}
+
+impl Drop for PendingFile {
+    fn drop(&mut self) {
+        if !self.committed {
+            UnderWay::now().remove(&self.temporary);
+        }
+    }
+}
+
+/// Makes a folder, and remembers which of those on the way to it are new.
+fn make(folder: &Path) -> std::io::Result<()> {
+    let missing = folder.ancestors().take_while(|above| !above.as_os_str().is_empty() && !above.exists());
+    let missing: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
+    fs::create_dir_all(folder)?;
+    UnderWay::now().folders.extend(missing);
+    Ok(())
+}
+
+/// Removes what runs that were killed left of the same file: temporary files of processes that are no more. Where the
+/// system does not tell (no /proc), they stay.
+fn remove_stale(folder: &Path, name: &str) {
+    let (Ok(entries), true) = (fs::read_dir(folder), Path::new("/proc/self").exists()) else { return };
+    for entry in entries.flatten() {
+        let found = entry.file_name();
+        let process = found
+            .to_str()
+            .and_then(|found| found.strip_prefix('.')?.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(".partial"))
+            .and_then(|rest| rest.split_once('-')?.0.parse::<u32>().ok());
+        if process.is_some_and(|process| !Path::new(&format!("/proc/{process}")).exists()) {
+            // Another run may have removed it just now.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Gives finished files their names, one right after the other.
+///
+/// # Errors
+/// When the file system refuses a rename.
+pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
+    let mut under_way = UnderWay::now();
+    let finished = files.iter_mut().map(|file| under_way.finish(file)).collect();
+    // Files that are left need it for their removal.
+    drop(under_way);
+    finished
+}
+
+/// One spelling of a path, by which two paths to the same file can be told to be so, whether or not it exists yet.
+#[must_use]
+pub fn resolved(path: &Path) -> PathBuf {
+    if let Ok(found) = path.canonicalize() {
+        return found;
+    }
+    let mut spelled = PathBuf::new();
+    for component in std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).components() {
+        match component {
+            Component::ParentDir => {
+                spelled.pop();
+            }
+            other => spelled.push(other),
+        }
+    }
+    // Links are followed as far as there is something.
+    match (spelled.parent().and_then(|parent| parent.canonicalize().ok()), spelled.file_name()) {
+        (Some(parent), Some(name)) => parent.join(name),
+        _ => spelled,
+    }
+}
+
+/// Writes `contents` whole or not at all.
+///
+/// # Errors
+/// When the folder or the file cannot be written.
+pub fn write(destination: impl Into<PathBuf>, contents: &[u8]) -> Result<PathBuf> {
+    let pending = PendingFile::new(destination)?;
+    fs::write(pending.path(), contents).map_err(|error| pending.failure(error))?;
+    pending.commit()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    #[test]
+    fn what_cannot_fit_is_refused_and_a_file_in_a_folder_s_place_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let pending = PendingFile::new(folder.path().join("big.h5")).unwrap();
+        assert!(pending.room_for(1).is_ok());
+        let error = pending.room_for(u64::MAX).unwrap_err();
+        assert!(error.to_string().contains("MB are free there") && error.advice().is_some(), "{error}");
+        fs::write(folder.path().join("file"), "").unwrap();
+        let error = PendingFile::new(folder.path().join("file/deeper/x.csv")).unwrap_err();
+        assert!(error.advice().is_some_and(|advice| advice.contains("file is a file")), "{error:?}");
+    }
+
+    #[test]
+    fn folders_made_for_nothing_go_again() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("old")).unwrap();
+        let reserve = |name: &str| PendingFile::new(folder.path().join(name)).unwrap();
+        let files = ["old/a", "new/deep/b", "new/c", "new/kept/d"].map(reserve);
+        for file in &files {
+            file.create().unwrap();
+        }
+        let [old, deep, new, kept] = files;
+        drop(old);
+        drop(new);
+        kept.commit().unwrap();
+        assert!(folder.path().join("new/deep").exists());
+        drop(deep);
+        assert!(!folder.path().join("new/deep").exists() && folder.path().join("new/kept/d").exists());
+        assert!(folder.path().join("old").exists(), "somebody else made it");
+        drop(reserve("other/e"));
+        assert!(!folder.path().join("other").exists());
+    }
+}

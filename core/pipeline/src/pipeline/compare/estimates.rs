@@ -1,0 +1,140 @@
+//! One method's estimates at one station, with how they follow from the readings.
+
+use crate::stage::Station;
+use runout_numerics::Complex64;
+use runout_turning::{
+    profile::{Profile, smooth},
+    separation::{Quantity, Sensitivity, Separation, UM_PER_MM_URAD},
+};
+
+/// Planes nearer than this are the same, in mm: far below what any sensor's place is known to.
+const SAME_PLANE_MM: f64 = 1e-6;
+
+/// Covariance of a station's averaged readings: captures are independent of each other.
+pub(super) struct Scatter {
+    /// Channels of each capture, and their covariance `[order][channel][channel]` smoothed over orders.
+    captures: Vec<(usize, Option<Vec<Complex64>>)>,
+}
+
+impl Scatter {
+    pub fn of(station: &Station) -> Self {
+        let capture = |profile: &Profile| {
+            let channels = profile.channels();
+            let mut covariance = profile.covariance.clone();
+            if let Some(covariance) = &mut covariance {
+                smooth(covariance, channels * channels);
+            }
+            (channels, covariance)
+        };
+        Self { captures: station.profiles.iter().map(capture).collect() }
+    }
+
+    /// row · Σ · rowᴴ at an order; NaN where a reading that counts has no covariance.
+    pub fn variance(&self, order: usize, row: &[Complex64]) -> f64 {
+        let mut rest = row;
+        let mut sum = 0.0;
+        for (channels, covariance) in &self.captures {
+            let (own, others) = rest.split_at((*channels).min(rest.len()));
+            rest = others;
+            if own.iter().all(|entry| *entry == Complex64::ZERO) {
+                continue;
+            }
+            let size = channels * channels;
+            let Some(matrix) = covariance.as_ref().and_then(|all| all.get(order * size..(order + 1) * size)) else {
+                return f64::NAN;
+            };
+            for (left, line) in own.iter().zip(matrix.chunks_exact(*channels)) {
+                sum += line.iter().zip(own).map(|(entry, right)| (left * entry * right.conj()).re).sum::<f64>();
+            }
+        }
+        sum.max(0.0)
+    }
+}
+
+/// Estimates, variances and operators of all orders.
+#[derive(Clone)]
+pub(super) struct Estimates {
+    pub unknowns: Vec<Quantity>,
+    /// Where x and y are told.
+    pub motion_z_mm: f64,
+    /// `[order][unknown]`, NaN where lost.
+    values: Vec<Complex64>,
+    variance: Vec<f64>,
+    told: Vec<bool>,
+    sensitivity: Sensitivity,
+}
+
+impl Estimates {
+    pub fn new(separation: &Separation, sensitivity: Sensitivity) -> Self {
+        Self {
+            unknowns: separation.unknowns.clone(),
+            motion_z_mm: separation.motion_z_mm,
+            values: separation.estimate.clone(),
+            variance: separation.variance.clone(),
+            told: separation.observable.clone(),
+            sensitivity,
+        }
+    }
+
+    pub fn max_order(&self) -> usize {
+        (self.values.len() / self.unknowns.len().max(1)).saturating_sub(1)
+    }
+
+    pub fn position(&self, quantity: Quantity) -> Option<usize> {
+        self.unknowns.iter().position(|unknown| *unknown == quantity)
+    }
+
+    /// The estimate and its variance, where the order is told.
+    pub fn told(&self, order: usize, unknown: usize) -> Option<(Complex64, f64)> {
+        let index = order * self.unknowns.len() + unknown;
+        (*self.told.get(index)?).then(|| (self.values[index], self.variance[index]))
+    }
+
+    pub fn row(&self, order: usize, unknown: usize) -> &[Complex64] {
+        let start = (order * self.unknowns.len() + unknown) * self.sensitivity.readings;
+        &self.sensitivity.operator[start..start + self.sensitivity.readings]
+    }
+
+    pub fn tells_motion(&self) -> bool {
+        self.unknowns.iter().any(|unknown| !unknown.is_form())
+    }
+
+    pub fn tells_tilt(&self) -> bool {
+        self.unknowns.iter().any(|unknown| unknown.is_tilt())
+    }
+
+    pub fn in_plane(&self, z_mm: f64) -> bool {
+        (self.motion_z_mm - z_mm).abs() <= SAME_PLANE_MM
+    }
+
+    /// The same with x and y at another z: x(z) = X + z·E_y, y(z) = Y − z·E_x; lost where the tilt is. `None` where
+    /// no tilt is told.
+    pub fn moved_to(&self, z_mm: f64, scatter: &Scatter) -> Option<Self> {
+        if self.in_plane(z_mm) {
+            return Some(self.clone());
+        }
+        if !self.tells_tilt() {
+            return None;
+        }
+        let distance = (z_mm - self.motion_z_mm) * UM_PER_MM_URAD;
+        let mut moved = Self { motion_z_mm: z_mm, ..self.clone() };
+        let (width, readings) = (self.unknowns.len(), self.sensitivity.readings);
+        for (shift, quantity) in self.unknowns.iter().enumerate() {
+            let Some((tilt, factor)) = quantity.moved_by_tilt() else { continue };
+            let (tilt, lever) = (self.position(tilt), factor * distance);
+            for order in 0..=self.max_order() {
+                let index = order * width + shift;
+                let turned = tilt.and_then(|tilt| Some((self.told(order, tilt)?.0, self.row(order, tilt))));
+                let (Some((value, row)), true) = (turned, self.told[index]) else {
+                    moved.told[index] = false;
+                    continue;
+                };
+                moved.values[index] += value * lever;
+                let own = &mut moved.sensitivity.operator[index * readings..(index + 1) * readings];
+                own.iter_mut().zip(row).for_each(|(entry, tilt)| *entry += tilt * lever);
+                moved.variance[index] = scatter.variance(order, own);
+            }
+        }
+        Some(moved)
+    }
+}

@@ -1,0 +1,163 @@
+//! What a comparison found, for people and programs.
+
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::methods::Refusal;
+use crate::pipeline::summary::LostOrders;
+use runout_turning::provenance::Provenance;
+
+/// What a comparison found.
+///
+/// Form counts from order 2, motion from 1. Arrays by order begin at order 1; null where an order is lost or not known,
+/// and never 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Comparison {
+    /// The pipeline's title.
+    pub title: String,
+    /// Enough to repeat the comparison.
+    pub provenance: Provenance,
+    /// The pipeline's own separator, with which the others are compared.
+    pub reference: String,
+    /// All methods that fit the rig, the reference first.
+    pub methods: Vec<MethodSummary>,
+    /// Separators that cannot take the rig.
+    pub refused: Vec<Refusal>,
+    /// One entry a station.
+    pub stations: Vec<StationComparison>,
+    /// Files written.
+    pub outputs: Vec<PathBuf>,
+    /// What the user should know of the recording.
+    pub warnings: Vec<String>,
+}
+
+/// What a method can tell with the rig.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MethodSummary {
+    /// The plugin's name, with a number where several are compared.
+    pub method: String,
+    /// Ids of the sensors and setups that it does not use.
+    pub unused: Vec<String>,
+    /// Orders at which one of its unknowns cannot be told.
+    pub lost_orders: LostOrders,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// One station of a [`Comparison`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StationComparison {
+    /// Its name.
+    pub station: String,
+    /// Carriage position, in mm.
+    pub z_mm: f64,
+    /// Form of each section, then motion.
+    pub quantities: Vec<QuantityComparison>,
+    /// What the user should know of this station.
+    pub warnings: Vec<String>,
+}
+
+impl StationComparison {
+    /// The same without what is told order by order.
+    #[must_use]
+    pub fn without_orders(mut self) -> Self {
+        for quantity in &mut self.quantities {
+            quantity.values.iter_mut().for_each(|value| value.harmonics = Harmonics::default());
+            quantity.differences.iter_mut().for_each(|one| one.by_order = DifferenceOrders::default());
+        }
+        self
+    }
+}
+
+/// One unknown, by every method that tells it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct QuantityComparison {
+    /// "form", "x", "y", "tilt_x", "tilt_y".
+    pub quantity: String,
+    /// The section whose form it is; null for motion.
+    pub section: Option<String>,
+    /// "um" or "urad".
+    pub unit: String,
+    /// By method.
+    pub values: Vec<MethodValue>,
+    /// Each other method minus the reference.
+    pub differences: Vec<Difference>,
+}
+
+/// What one method says of an unknown.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MethodValue {
+    /// The method.
+    pub method: String,
+    /// Place of the section, or of the plane whose displacement x and y are, in mm; null for tilt. Methods that tell
+    /// tilt give x and y in the plane of the first method that does not.
+    pub z_mm: Option<f64>,
+    /// Root mean square over the angles, of the orders that are told.
+    pub rms: f64,
+    /// Standard uncertainty at any one angle, from the covariance of the averages; null without one.
+    pub std: Option<f64>,
+    /// Peak-to-valley roundness deviation about the least-squares circle, of a form, in µm.
+    pub ront_um: Option<f64>,
+    /// True error of a form (root mean square over orders from 2 that are told), where the recording carries the truth.
+    pub truth_rms_error_um: Option<f64>,
+    /// Orders that cannot be told.
+    pub lost_orders: Vec<usize>,
+    /// Order by order.
+    pub harmonics: Harmonics,
+}
+
+/// Coefficients by order from 1: form is Re Σ c e^{+inα}, motion Re Σ c e^{−inΦ}.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Harmonics {
+    /// Real part of c; null where the order is lost.
+    pub re: Vec<Option<f64>>,
+    /// Imaginary part of c; null where the order is lost.
+    pub im: Vec<Option<f64>>,
+    /// Root of E|error of c|², both parts together; null where not known.
+    pub std: Vec<Option<f64>>,
+}
+
+/// A method against the reference.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Difference {
+    /// The method.
+    pub method: String,
+    /// Why there is no difference; the numbers are null then.
+    pub not_compared: Option<String>,
+    /// Plane in which x and y were compared, in mm.
+    pub z_mm: Option<f64>,
+    /// How many orders both tell.
+    pub orders_compared: usize,
+    /// Root mean square of the difference over the angles, of the orders that both tell.
+    pub rms: Option<f64>,
+    /// What the covariance of the averages lets expect of it, from the joint covariance; null without one.
+    pub expected_rms: Option<f64>,
+    /// Share of the orders compared with E_n ≤ 1: 0.982 is what scatter alone gives. Null without a covariance.
+    pub share_within: Option<f64>,
+    /// The largest E_n.
+    pub worst: Option<Worst>,
+    /// Order by order.
+    pub by_order: DifferenceOrders,
+}
+
+/// The order with the largest E_n.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Worst {
+    /// Undulations per revolution.
+    pub order: usize,
+    /// |difference| / (2 · its standard uncertainty).
+    pub e_n: f64,
+}
+
+/// Differences by order from 1; null where one of the two cannot tell the order.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DifferenceOrders {
+    /// |c of the method − c of the reference|.
+    pub difference: Vec<Option<f64>>,
+    /// Root of E|error of that difference|², from the joint covariance; null without one.
+    pub std: Vec<Option<f64>>,
+    /// difference / (2 std); 0 where both are equal to rounding, null where std is not known.
+    pub e_n: Vec<Option<f64>>,
+}

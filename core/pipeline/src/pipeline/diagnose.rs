@@ -1,0 +1,212 @@
+//! The closed loop on a pipeline: load → fit → find what the model lacks → export the final model.
+
+pub mod config;
+mod corrected_rig;
+mod moved;
+
+use std::{num::NonZeroUsize, path::PathBuf};
+
+use corrected_rig::Change;
+
+use super::{
+    config::{Pipeline, Route},
+    line::Line,
+    point_run::PointResult,
+    result::{Evaluation, complete, true_error},
+    result_writer::{Finished, ResultWriter},
+    run::{Observer, spare_inputs},
+};
+use crate::{
+    atomic_file::PendingFile,
+    points::Points,
+    stage::{PointModel, Source, Station, StationModel, StationSeparator},
+};
+use runout_closed_loop::{
+    Effect, Setting, closed_loop,
+    diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
+};
+use runout_error::{Error, Result};
+use runout_turning::separation::Quantity;
+
+/// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form. These do not
+/// replace those of a run: they go below `diagnosed/`, or where `[diagnose] out` says.
+///
+/// # Errors
+/// When the data or a file fails, or the separator has no model for the loop. Exports that had begun leave nothing behind.
+pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Diagnosis> {
+    let source = pipeline.loader.open(&pipeline.request())?;
+    let no_model = |separator: &str| {
+        Error::new("diagnose", &pipeline.title, format!("`{separator}` has no model of effects for the closed loop"))
+    };
+    match (&source, &pipeline.route) {
+        (Source::Points(points), Route::Points { separator, .. }) => {
+            let model = separator.model().ok_or_else(|| no_model(&pipeline.separator))?;
+            diagnose_points(pipeline, points, model, observer)
+        }
+        (Source::Turns(recording), Route::Turns { conditioners, averager, separator, model: Some(model) }) => {
+            let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
+            let hold_out = Some(pipeline.diagnose.hold_out.unwrap_or(HOLD_OUT));
+            let line = Line {
+                rig,
+                recording: &**recording,
+                conditioners,
+                averager: &**averager,
+                hold_out,
+                projections: Vec::new(),
+            };
+            diagnose_turns(pipeline, &line, threads, (&**separator, &**model), observer)
+        }
+        _ => Err(no_model(&pipeline.separator)),
+    }
+}
+
+/// Share of the turns that is held out where the pipeline says nothing.
+const HOLD_OUT: f64 = 0.2;
+
+fn diagnose_turns(
+    pipeline: &Pipeline,
+    line: &Line,
+    threads: Option<NonZeroUsize>,
+    (separator, model): (&dyn StationSeparator, &dyn StationModel),
+    observer: &dyn Observer,
+) -> Result<Diagnosis> {
+    let recording = line.recording;
+    spare_inputs(&pipeline.diagnosed_outputs(), &recording.inputs())?;
+    let mut stations: Vec<Station> = Vec::new();
+    let inputs = line.run(
+        threads,
+        observer,
+        |_, station| Ok(station),
+        |station| {
+            stations.push(station);
+            Ok(())
+        },
+    )?;
+    let settings = &pipeline.diagnose.settings;
+    let found = model.diagnose(&stations, settings)?;
+    let mut diagnosis = found.diagnosis;
+    diagnosis.moved.clear();
+    let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
+    let known = known(model.effects(), &settings.known, |effect| model.changes(effect, &settings.known));
+    let changes = changes(known, &diagnosis);
+    writer.corrected_for(corrections(&changes));
+    let rig = pipeline.diagnose.write_rig.clone();
+    diagnosis.warnings.extend(rig.as_ref().and_then(|path| corrected_rig::left_out(&changes, path)));
+    let mut errors = [Vec::new(), Vec::new()];
+    let (radius_mm, several) = (line.rig.part_radius_mm, stations.len() > 1);
+    let looked_at = pipeline.evaluate.first_ront();
+    for (index, (station, (before, after))) in
+        stations.into_iter().zip(found.before.into_iter().zip(found.after)).enumerate()
+    {
+        // Before is what a run gives, which leaves known effects alone.
+        let before = if settings.known.is_empty() { separator.separate(&station)? } else { before };
+        let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
+        let truth = recording.truth(index)?;
+        let complete = |separation, profiles, evaluate| {
+            let evaluation = Evaluation { evaluate, radius_mm, rig: Some(line.rig) };
+            complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone(), evaluation)
+        };
+        let declared = complete(before, Vec::new(), &looked_at);
+        let result = complete(after, station.profiles, &pipeline.evaluate);
+        diagnosis.moved.extend(moved::moved(&declared, &result, &looked_at, radius_mm, several));
+        for (errors, result) in errors.iter_mut().zip([&declared, &result]) {
+            let forms = (0..result.separation.sections.len()).map(Quantity::Form);
+            errors.extend(forms.filter_map(|form| true_error(result, form)));
+        }
+        writer.take(&result, pipeline.rig.as_ref())?;
+    }
+    let rms = |errors: &Vec<f64>| {
+        let squares: f64 = errors.iter().map(|error| error * error).sum();
+        (!errors.is_empty()).then(|| (squares / errors.len() as f64).sqrt())
+    };
+    if !errors[0].is_empty() {
+        diagnosis.truth = Some(Truth { form_rms_error_um: Step { before: rms(&errors[0]), after: rms(&errors[1]) } });
+    }
+    let surface = writer.build_surface(radius_mm)?;
+    let mut remarks = recording.remarks();
+    remarks.extend(diagnosis.warnings.iter().cloned());
+    let mut finished = writer.finish(inputs, remarks, surface.as_ref())?;
+    if let Some(path) = rig {
+        finished.add(corrected_rig::pending(path, pipeline, &changes)?);
+    }
+    commit(finished, pipeline.diagnosis_path(), diagnosis)
+}
+
+/// More than any model of points has effects that earn their place.
+const MOST_ADDED: usize = 40;
+
+fn diagnose_points(
+    pipeline: &Pipeline,
+    points: &Points,
+    model: &dyn PointModel,
+    observer: &dyn Observer,
+) -> Result<Diagnosis> {
+    spare_inputs(&pipeline.diagnosed_outputs(), std::slice::from_ref(&points.input))?;
+    let effects = model.effects_of(points)?;
+    let settings = if model.points_name_targets() {
+        let settings = pipeline.diagnose.settings_for(&effects);
+        settings.map_err(|fault| Error::new("diagnose", &pipeline.title, fault))?
+    } else {
+        pipeline.diagnose.settings.clone()
+    };
+    let known = known(&effects, &settings.known, |_| Vec::new());
+    let found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
+    let effects = corrections(&changes(known, &found.diagnosis));
+    let mut outcome = found.after;
+    outcome.remarks.splice(0..0, found.diagnosis.warnings.iter().cloned());
+    let result = PointResult { outcome, remarks: None, effects };
+    let finished = result.write(pipeline, &pipeline.diagnosed, points, observer)?;
+    commit(finished, pipeline.diagnosis_path(), found.diagnosis)
+}
+
+/// Effects that are declared as known, each with the lines that declare it in a rig.
+fn known(effects: &[Effect], known: &[Setting], lines: impl Fn(usize) -> Vec<String>) -> Vec<Change> {
+    let known = known.iter().filter_map(|setting| {
+        let effect = effects.get(setting.effect)?;
+        let parameters = effect.parameters.iter().zip(&setting.values).map(|(parameter, value)| Estimated {
+            name: parameter.name.clone(),
+            value: *value,
+            std: None,
+            unit: parameter.unit.clone(),
+        });
+        let effect = Correction {
+            effect: effect.id.clone(),
+            targets: effect.targets.clone(),
+            confounded_with: Vec::new(),
+            parameters: parameters.collect(),
+            known: true,
+        };
+        Some(Change { effect, lines: lines(setting.effect) })
+    });
+    known.collect()
+}
+
+/// Everything that results are corrected for: known effects, then those that were added.
+fn changes(mut known: Vec<Change>, diagnosis: &Diagnosis) -> Vec<Change> {
+    known.extend(diagnosis.added.iter().map(|added| Change {
+        effect: added.into(),
+        lines: added.change.iter().flat_map(|change| change.lines()).map(str::to_owned).collect(),
+    }));
+    known
+}
+
+fn corrections(changes: &[Change]) -> Vec<Correction> {
+    changes.iter().map(|change| change.effect.clone()).collect()
+}
+
+/// Gives the exports their names, and the diagnosis, which lists them, with them.
+fn commit(exports: Finished, path: Option<PathBuf>, mut diagnosis: Diagnosis) -> Result<Diagnosis> {
+    diagnosis.outputs = exports.outputs();
+    diagnosis.outputs.extend(path.clone());
+    let written = path.map(|path| pending(path, &diagnosis)).transpose()?;
+    exports.commit(written)?;
+    Ok(diagnosis)
+}
+
+/// `diagnosis.json`, written and waiting for its name.
+fn pending(path: PathBuf, diagnosis: &Diagnosis) -> Result<PendingFile> {
+    let file = PendingFile::new(path)?;
+    let text = serde_json::to_vec_pretty(diagnosis).map_err(|error| file.failure(error))?;
+    std::fs::write(file.path(), text).map_err(|error| file.failure(error))?;
+    Ok(file)
+}

@@ -1,0 +1,60 @@
+//! Values with the declared model and with the final one, computed by what computes those of a run.
+
+use crate::pipeline::evaluate::{Evaluate, section_values};
+use runout_closed_loop::diagnosis::Moved;
+use runout_standards::Value;
+use runout_turning::station::StationResult;
+
+/// RONt, as a run's first one of a section, and the root mean square of form, of every section of a station. `looked_at` gives
+/// that RONt alone; the names of sections get the station's where there are `several`.
+pub(super) fn moved(
+    before: &StationResult,
+    after: &StationResult,
+    looked_at: &Evaluate,
+    radius_mm: f64,
+    several: bool,
+) -> Vec<Moved> {
+    let mut moved = Vec::new();
+    for (section, at) in after.separation.sections.iter().enumerate() {
+        let place = if several { format!("{}@{}", at.id, after.station) } else { at.id.clone() };
+        let of = |value: &str, before, after, std: f64| Moved {
+            value: value.into(),
+            section: Some(place.clone()),
+            before,
+            after,
+            std: std.is_finite().then_some(std),
+            unit: "um".into(),
+            reference: None,
+            filter: None,
+            lost_orders: Vec::new(),
+        };
+        let evaluated;
+        let found = if let Some(found) = ront(after, section) {
+            Some(found)
+        } else {
+            // The pipeline asks for no roundness.
+            evaluated = section_values(after, section, looked_at, radius_mm);
+            evaluated.first()
+        };
+        let lost = found.map_or_else(Vec::new, |value| value.lost_orders.clone());
+        if let (Some(declared), Some(value)) = (ront(before, section), found) {
+            let std = value.uncertainty.as_ref().map_or(f64::NAN, |uncertainty| uncertainty.std);
+            moved.push(Moved {
+                reference: Some(value.reference.clone()),
+                filter: Some(value.filter.clone()),
+                lost_orders: lost.clone(),
+                ..of(&value.symbol, declared.value, value.value, std)
+            });
+        }
+        if let (Some((declared_um, _)), Some((rms_um, std_um))) =
+            (before.form_rms_um(section), after.form_rms_um(section))
+        {
+            moved.push(Moved { lost_orders: lost, ..of("form rms", declared_um, rms_um, std_um) });
+        }
+    }
+    moved
+}
+
+fn ront(result: &StationResult, section: usize) -> Option<&Value> {
+    result.values.get(section)?.iter().find(|value| value.symbol == "RONt")
+}

@@ -1,0 +1,397 @@
+//! TOML text with places: a file, the files that it includes and overrides, read as one document.
+
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+use serde::de::DeserializeOwned;
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue, ValueDeserializer},
+};
+
+use super::{
+    error::{Diagnostic, Fault, Place, Step, known_names},
+    pinpoint::pinpoint,
+};
+use runout_error::Error;
+
+/// A table whose every key and value knows its place.
+pub type Table<'a> = Spanned<DeTable<'a>>;
+
+/// The texts that a configuration is read from.
+#[derive(Debug, Clone)]
+pub struct Sources {
+    parts: Vec<Part>,
+    folder: PathBuf,
+}
+
+/// One text, behind as many blanks as the texts before it are long: a byte's place then names its text too.
+#[derive(Debug, Clone)]
+struct Part {
+    name: String,
+    role: Role,
+    padded: String,
+    start: usize,
+}
+
+/// What a text is there for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Role {
+    Main,
+    /// A file that stands for the table at a top-level key.
+    Include(String),
+    /// `value = …` for a path of keys.
+    Override(String),
+}
+
+/// Why a configuration could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// A file cannot be read.
+    #[error(transparent)]
+    File(#[from] Error),
+    /// The text is not what it should be.
+    #[error(transparent)]
+    Text(Box<Diagnostic>),
+}
+
+impl From<Diagnostic> for ConfigError {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::Text(Box::new(diagnostic))
+    }
+}
+
+impl Sources {
+    /// Reads a file, with overrides of the form `key.path=value`. Where the top-level `include_key` holds a string, it
+    /// names a file (relative to this one) that stands for the table.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or is not TOML where it has to be looked into.
+    pub fn read(path: &Path, overrides: &[String], include_key: &str) -> Result<Self, ConfigError> {
+        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Self::from_text(&path.display().to_string(), &read_text(path)?, folder, overrides, include_key)
+    }
+
+    /// The same from a text; paths in it are relative to `folder`.
+    ///
+    /// # Errors
+    /// When the text is not TOML or an included file cannot be read.
+    pub fn from_text(
+        name: &str,
+        text: &str,
+        folder: PathBuf,
+        overrides: &[String],
+        include_key: &str,
+    ) -> Result<Self, ConfigError> {
+        let mut sources = Self { parts: Vec::new(), folder };
+        sources.add(name, Role::Main, text);
+        for assignment in overrides {
+            let (path, value) = assignment.split_once('=').unwrap_or((assignment, ""));
+            let (path, value) = (path.trim(), value.trim());
+            if path.is_empty() || value.is_empty() {
+                let message = "expected KEY=VALUE".into();
+                let (source_name, source_text) = ("--set".into(), assignment.clone());
+                return Err(
+                    Diagnostic { message, help: None, source_name, source_text, span: 0..assignment.len() }.into()
+                );
+            }
+            // Quotes rarely survive a shell: what is no TOML value is meant as a string.
+            let bare = DeValue::parse(value).is_err();
+            let line = if bare { format!("value = {value:?}") } else { format!("value = {value}") };
+            sources.add(&format!("--set {assignment}"), Role::Override(path.to_owned()), &line);
+        }
+        if let Some(included) = sources.included(include_key)? {
+            let path = sources.folder.join(&included);
+            sources.add(&path.display().to_string(), Role::Include(include_key.to_owned()), &read_text(&path)?);
+        }
+        Ok(sources)
+    }
+
+    /// The folder that relative paths start from.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The files among the texts.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let files = self.parts.iter().filter(|part| !matches!(part.role, Role::Override(_)));
+        files.map(|part| Path::new(&part.name))
+    }
+
+    fn add(&mut self, name: &str, role: Role, text: &str) {
+        let start = self.parts.last().map_or(0, |part| part.padded.len() + 1);
+        self.parts.push(Part { name: name.into(), role, padded: " ".repeat(start) + text, start });
+    }
+
+    fn included(&self, key: &str) -> Result<Option<String>, ConfigError> {
+        let string = |table: &Table, key: &str| {
+            table.get_ref().get(key).and_then(|value| value.get_ref().as_str().map(str::to_owned))
+        };
+        let mut found = None;
+        for part in &self.parts {
+            match &part.role {
+                Role::Main => found = string(&self.parse(part)?, key),
+                Role::Override(path) if path == key => found = string(&self.parse(part)?, "value"),
+                _ => {}
+            }
+        }
+        Ok(found)
+    }
+
+    fn parse<'a>(&self, part: &'a Part) -> Result<Table<'a>, Diagnostic> {
+        DeTable::parse(&part.padded).map_err(|error| {
+            self.locate_span(Fault::span(error.span().unwrap_or(part.start..part.start), error.message()))
+        })
+    }
+
+    fn locate_span(&self, fault: Fault) -> Diagnostic {
+        let Place::Span(span) = fault.place else {
+            return self.locate_span(Fault { place: Place::Span(0..0), ..fault });
+        };
+        let part = self.parts.iter().rev().find(|part| part.start <= span.start);
+        let (name, text, start) = part.map_or(("", "", 0), |part| (&*part.name, part.text(), part.start));
+        let within = |byte: usize| byte.saturating_sub(start).min(text.len());
+        Diagnostic {
+            message: fault.message,
+            help: fault.help,
+            source_name: name.into(),
+            source_text: text.into(),
+            span: within(span.start)..within(span.end),
+        }
+    }
+}
+
+impl Part {
+    fn text(&self) -> &str {
+        &self.padded[self.start..]
+    }
+}
+
+/// A configuration as one table, with includes and overrides in their places.
+#[derive(Debug, Clone)]
+pub struct Document<'a> {
+    sources: &'a Sources,
+    root: Table<'a>,
+}
+
+impl<'a> Document<'a> {
+    /// Parses and joins all texts.
+    ///
+    /// # Errors
+    /// When one is not TOML, or an override names a place that cannot be.
+    pub fn parse(sources: &'a Sources) -> Result<Self, Diagnostic> {
+        let mut root = Spanned::new(0..0, DeTable::new());
+        for part in sources.parts.iter().filter(|part| part.role == Role::Main) {
+            root = sources.parse(part)?;
+        }
+        for part in &sources.parts {
+            if let Role::Include(key) = &part.role {
+                let table = sources.parse(part)?;
+                let span =
+                    root.get_ref().get_key_value(key.as_str()).map_or(part.start..part.start, |(key, _)| key.span());
+                let value = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
+                insert(root.get_mut(), key, span, value);
+            }
+        }
+        for part in &sources.parts {
+            if let Role::Override(path) = &part.role {
+                let mut table = sources.parse(part)?;
+                // The table's own span begins before the blanks.
+                let span = part.start..part.start + part.text().len();
+                let refuse = |message: String| sources.locate_span(Fault::span(span.clone(), message));
+                let value = table.get_mut().remove("value").ok_or_else(|| refuse("expected key=value".into()))?;
+                let names_included = |part: &Part| part.role == Role::Include(path.clone());
+                if value.get_ref().as_str().is_some() && sources.parts.iter().any(names_included) {
+                    // What the file holds stands there already.
+                    continue;
+                }
+                let steps: Vec<&str> = path.split('.').map(str::trim).collect();
+                assign(root.get_mut(), &steps, value).map_err(refuse)?;
+            }
+        }
+        Ok(Self { sources, root })
+    }
+
+    /// The root table.
+    #[must_use]
+    pub fn root(&self) -> &Table<'a> {
+        &self.root
+    }
+
+    /// Gives a fault its place in the text.
+    #[must_use]
+    pub fn diagnose(&self, fault: Fault) -> Diagnostic {
+        self.sources.locate_span(resolve(fault, &self.root))
+    }
+}
+
+fn insert<'a>(table: &mut DeTable<'a>, key: &str, span: Range<usize>, value: Spanned<DeValue<'a>>) {
+    table.remove(key);
+    table.insert(Spanned::new(span, key.to_owned().into()), value);
+}
+
+/// Puts `value` at a path of keys and array indices, making tables on the way.
+fn assign<'a>(table: &mut DeTable<'a>, steps: &[&str], value: Spanned<DeValue<'a>>) -> Result<(), String> {
+    let Some((step, rest)) = steps.split_first() else { return Err("expected a key before `=`".into()) };
+    if step.is_empty() {
+        return Err("expected a key before `=`".into());
+    }
+    let span = value.span();
+    let Some((next, after)) = rest.split_first() else {
+        insert(table, step, span, value);
+        return Ok(());
+    };
+    if !table.contains_key(*step) {
+        insert(table, step, span.clone(), Spanned::new(span, DeValue::Table(DeTable::new())));
+    }
+    match table.get_mut(*step).map(Spanned::get_mut) {
+        Some(DeValue::Table(inner)) => assign(inner, rest, value),
+        Some(DeValue::Array(items)) => {
+            let count = items.len();
+            let item = next.parse().ok().and_then(|index: usize| items.get_mut(index));
+            let item = item.ok_or_else(|| {
+                let items = if count == 1 { "item" } else { "items" };
+                format!("`{step}` has {count} {items}, counted from 0; there is no `{next}`")
+            })?;
+            match item.get_mut() {
+                _ if after.is_empty() => {
+                    *item = value;
+                    Ok(())
+                }
+                DeValue::Table(inner) => assign(inner, after, value),
+                _ => Err(format!("`{step}.{next}` is not a table")),
+            }
+        }
+        _ => Err(format!("`{step}` is not a table")),
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, Error> {
+    let shown = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|error| Error::new("read", &shown, error))?;
+    String::from_utf8(bytes).map_err(|error| {
+        Error::new("read", &shown, format!("expected UTF-8, found {}", error.utf8_error()))
+            .help("save the file as UTF-8")
+    })
+}
+
+/// Reads a table into a type; unknown keys and wrong types come back as faults with their place.
+///
+/// # Errors
+/// When the table does not fit the type.
+pub fn read<T: DeserializeOwned>(table: &Table) -> Result<T, Fault> {
+    read_besides(table, &[])
+}
+
+/// The same, of a table in which these keys stood besides: what is misspelt may have been meant for one of them.
+///
+/// # Errors
+/// When the table does not fit the type.
+pub fn read_besides<T: DeserializeOwned>(table: &Table, besides: &[&str]) -> Result<T, Fault> {
+    let value = Spanned::new(table.span(), DeValue::Table(table.get_ref().clone()));
+    T::deserialize(ValueDeserializer::from(value)).map_err(|error| {
+        let span = error.span().filter(|span| *span != table.span());
+        let exact = pinpoint(table.get_ref(), span.as_ref(), error.message());
+        explain(exact.or(span).unwrap_or_else(|| head(table.span())), error.message(), besides)
+    })
+}
+
+/// The document as one TOML text that reads as it does: the file itself, or, where other files or overrides went into
+/// it, all of it written anew.
+///
+/// # Errors
+/// When a value cannot be written.
+pub fn resolved_text(root: &Table, sources: &Sources) -> Result<String, Fault> {
+    match &sources.parts[..] {
+        [only] => Ok(only.text().to_owned()),
+        parts => {
+            let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+            let text = table_text(root)?;
+            Ok(format!("# joined from {}; paths are relative to the first\n\n{text}", names.join(", ")))
+        }
+    }
+}
+
+/// A table as a TOML text of its own.
+///
+/// # Errors
+/// When a value cannot be written.
+pub fn table_text(table: &Table) -> Result<String, Fault> {
+    let table: toml::Table = read(table)?;
+    toml::to_string(&table).map_err(|error| Fault::here(error.to_string()))
+}
+
+/// A table's own span may cover many lines; its beginning is where a reader looks.
+fn head(span: Range<usize>) -> Range<usize> {
+    span.start..span.end.min(span.start + 1)
+}
+
+/// Adds near names to serde's "unknown field `x`, expected one of `a`, `b`".
+fn explain(span: Range<usize>, message: &str, besides: &[&str]) -> Fault {
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let noun = match message {
+        _ if message.starts_with("unknown field") => "key",
+        _ if message.starts_with("unknown variant") => "value",
+        _ => return Fault::span(span, plain(message)),
+    };
+    match quoted.split_first() {
+        Some((name, known)) => {
+            let besides = besides.iter().filter(|_| noun == "key");
+            let known = known.iter().chain(besides).copied();
+            Fault::span(span, format!("unknown {noun} `{name}`")).help(known_names(name, known))
+        }
+        None => Fault::span(span, message),
+    }
+}
+
+/// Serde's words without Rust's types.
+fn plain(message: &str) -> String {
+    let mismatch = message.strip_prefix("invalid type: ").or_else(|| message.strip_prefix("invalid value: "));
+    let Some((found, expected)) = mismatch.and_then(|rest| rest.rsplit_once(", expected ")) else {
+        return message.replace("missing field", "missing key");
+    };
+    let expected = match expected {
+        "usize" | "u8" | "u16" | "u32" | "u64" => "a whole number from 0",
+        "isize" | "i8" | "i16" | "i32" | "i64" => "a whole number",
+        "f32" | "f64" => "a number",
+        "a string" | "path string" => "a string",
+        "a boolean" => "true or false",
+        "a sequence" => "a list",
+        other if other.starts_with("struct ") => "a table",
+        other => other,
+    };
+    format!("expected {expected}, found {found}")
+}
+
+/// Resolves a fault's path against the table that was checked, so that it can travel on by itself.
+#[must_use]
+pub fn resolve(fault: Fault, table: &Table) -> Fault {
+    match &fault.place {
+        Place::Span(_) => fault,
+        Place::Path(path) => Fault { place: Place::Span(locate(table.get_ref(), table.span(), path)), ..fault },
+    }
+}
+
+/// The place of a path below a table, or of the deepest part of it that there is.
+fn locate(table: &DeTable, span: Range<usize>, path: &[Step]) -> Range<usize> {
+    let Some((Step::Key(key), rest)) = path.split_first() else { return head(span) };
+    let Some((name, value)) = table.get_key_value(key.as_str()) else { return head(span) };
+    match value.get_ref() {
+        DeValue::Table(_) | DeValue::Array(_) if rest.is_empty() => name.span(),
+        _ => descend(value, rest),
+    }
+}
+
+fn descend(value: &Spanned<DeValue>, path: &[Step]) -> Range<usize> {
+    match (value.get_ref(), path.split_first()) {
+        (DeValue::Table(inner), Some(_)) => locate(inner, value.span(), path),
+        (DeValue::Array(items), Some((Step::Index(index), rest))) => {
+            items.get(*index).map_or_else(|| value.span(), |item| descend(item, rest))
+        }
+        (DeValue::Table(_), None) => head(value.span()),
+        _ => value.span(),
+    }
+}

@@ -1,0 +1,156 @@
+//! The standards' values of a run: which (`[evaluate]`), of what, and the limits that they have to keep (`[[limit]]`).
+
+mod areal;
+mod config;
+mod filter;
+mod generatrix;
+mod limit;
+mod part;
+mod section;
+mod texture;
+
+pub(super) use areal::add_areal;
+pub use config::{ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FormRemoval, Group, Groups, TextureConfig};
+pub(super) use generatrix::add_generatrices;
+pub(super) use limit::decide;
+pub use limit::{Decision, Limit, LimitSummary, LimitValue};
+pub use part::PartSummary;
+pub(super) use part::part_summary;
+pub(super) use section::{missing_circles, section_values, steepest_um_per_deg};
+
+use super::summary::StationSummary;
+use filter::Filter;
+use runout_standards::{Value, uncertainty::Uncertainty};
+
+/// A value and where it belongs.
+#[derive(Debug, Clone, Copy)]
+pub struct PlacedValue<'a> {
+    /// The station; none for a value of the whole part.
+    pub station: Option<&'a str>,
+    /// The section; none for a value of a station or the whole part.
+    pub section: Option<&'a str>,
+    /// Place of the section, or of the carriage, along the axis.
+    pub z_mm: Option<f64>,
+    /// The value.
+    pub value: &'a Value,
+}
+
+/// Values of sections, then of their station, station by station; the whole part's last.
+pub(super) fn placed<'a>(stations: &'a [StationSummary], part: Option<&'a PartSummary>) -> Vec<PlacedValue<'a>> {
+    let mut all = Vec::new();
+    for station in stations {
+        let name = Some(station.station.as_str());
+        for section in &station.sections {
+            let (id, z_mm) = (Some(section.section.as_str()), Some(section.z_mm));
+            all.extend(section.values.iter().map(|value| PlacedValue { station: name, section: id, z_mm, value }));
+        }
+        let z_mm = Some(station.z_mm);
+        all.extend(station.motion_values.iter().map(|value| PlacedValue { station: name, section: None, z_mm, value }));
+    }
+    let of_part = part.iter().flat_map(|part| &part.values);
+    all.extend(of_part.map(|value| PlacedValue { station: None, section: None, z_mm: None, value }));
+    all
+}
+
+/// What a number is, before it is known.
+#[derive(Debug, Clone)]
+struct Label {
+    symbol: &'static str,
+    unit: &'static str,
+    source: String,
+    reference: String,
+}
+
+impl Label {
+    fn new(symbol: &'static str, unit: &'static str, source: impl Into<String>, reference: impl Into<String>) -> Self {
+        Self { symbol, unit, source: source.into(), reference: reference.into() }
+    }
+}
+
+/// Angles on which a form is evaluated, per wave of the highest order, at least: its crests are then missed by less than a
+/// fiftieth of that wave's amplitude, 1 − cos(π/16).
+const POINTS_A_WAVE: usize = 16;
+
+/// What a profile holds.
+#[derive(Debug, Clone, Default)]
+struct Held {
+    /// Highest order.
+    highest: usize,
+    /// Highest order that every part of it has.
+    all_to: usize,
+    /// Orders that the layout cannot tell.
+    lost: Vec<usize>,
+    /// Order of which filters before the average pass half.
+    half_power_upr: Option<f64>,
+}
+
+impl Held {
+    /// Highest order of which at least half is there.
+    fn highest_passed(&self) -> usize {
+        self.half_power_upr.map_or(self.highest, |half| self.highest.min(half as usize))
+    }
+}
+
+/// Units as files write them: "um", "um/deg". Micro is a sign of its own and a Greek letter.
+fn ascii_unit(unit: &str) -> String {
+    unit.replace(['\u{b5}', '\u{3bc}'], "u").replace('°', "deg")
+}
+
+/// A number, and what is known of its error.
+#[derive(Debug, Clone)]
+struct Found {
+    value: f64,
+    uncertainty: Option<Uncertainty>,
+    /// Why there is none, where the errors are known.
+    no_uncertainty: Option<String>,
+}
+
+/// Numbers under their labels; what is no number is left out: the profile or the wall does not have that value.
+fn labelled(
+    labels: Vec<Label>,
+    found: Vec<(f64, Option<Uncertainty>)>,
+    filter: &Filter,
+    held: &Held,
+    coverage: f64,
+) -> Vec<Value> {
+    let found = found.into_iter().map(|(value, uncertainty)| Found { value, uncertainty, no_uncertainty: None });
+    labelled_with_reasons(labels, found.collect(), filter, held, coverage)
+}
+
+/// The same of numbers that say why they have no uncertainty.
+fn labelled_with_reasons(
+    labels: Vec<Label>,
+    found: Vec<Found>,
+    filter: &Filter,
+    held: &Held,
+    coverage: f64,
+) -> Vec<Value> {
+    let lost_orders = filter.lost(&held.lost);
+    let weakened_above_upr = held.half_power_upr.filter(|half| filter.asks_for_more_than(*half));
+    let absent_above_upr = Some(held.all_to).filter(|order| filter.reaches_above(*order));
+    let known = labels.into_iter().zip(found).filter(|(_, found)| found.value.is_finite());
+    known
+        .map(|(label, Found { value, uncertainty, no_uncertainty })| Value {
+            symbol: label.symbol.into(),
+            unit: ascii_unit(label.unit),
+            value,
+            source: label.source,
+            band_upr: filter.band_upr(held.highest_passed()),
+            lost_orders: lost_orders.clone(),
+            weakened_above_upr,
+            absent_above_upr,
+            no_uncertainty,
+            filter: filter.name.clone(),
+            reference: label.reference,
+            coverage,
+            uncertainty,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod cost_tests;
+#[cfg(test)]
+mod coverage_tests;
+#[cfg(test)]
+mod tests;

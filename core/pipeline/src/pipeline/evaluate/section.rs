@@ -1,0 +1,386 @@
+//! Values of one section: roundness around the part.
+
+use std::borrow::Cow;
+
+use super::{Evaluate, Filter, Group, Held, Label, POINTS_A_WAVE, labelled};
+use runout_numerics::{
+    Complex64,
+    filter::{Degree, Smoother, robust_gaussian},
+    fourier::Fourier,
+};
+use runout_standards::{
+    Value,
+    roundness::{Angles, Disturbed, Points, Reference, Series, Values},
+    slope::{Drawn, steepest_um_per_rad},
+    uncertainty::{
+        DRAWS, Errors, LARGEST, NORMAL_95, Noise, RAYLEIGH_95, Uncertainty, extreme, monte_carlo_of, seed, stand_in,
+    },
+};
+use runout_turning::{
+    separation::{Quantity, SectionAt},
+    station::StationResult,
+};
+
+/// The values of a section whose nominal radius is known.
+pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<Value> {
+    let Some(form) = Form::of(result, section, radius_mm) else { return Vec::new() };
+    let mut values = form.values(evaluate);
+    let equivalents: Vec<Vec<Value>> =
+        form.equivalents.iter().map(|harmonics| form.exactly(harmonics).values(evaluate)).collect();
+    for value in &mut values {
+        let key = |value: &Value| {
+            let Value { symbol, filter, reference, band_upr, .. } = value;
+            (symbol.clone(), filter.clone(), reference.clone(), *band_upr)
+        };
+        let same = |other: &&Value| key(other) == key(value);
+        let others: Vec<f64> =
+            equivalents.iter().filter_map(|all| all.iter().find(same)).map(|other| other.value).collect();
+        value.uncertainty = value.uncertainty.take().map(|known| known.with_equivalents(value.value, &others));
+    }
+    values
+}
+
+/// Why a section does not have the reference circles that are asked for, each with its reason: an interruption may leave an arc.
+pub fn missing_circles(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<String> {
+    let form = Form::of(result, section, radius_mm).filter(|form| !form.at.gaps.is_empty());
+    let Some(form) = form.filter(|_| evaluate.has(Group::Roundness)) else { return Vec::new() };
+    let profile_um = form.profile(&Filter::low_pass(None), &mut Fourier::new(form.angles));
+    let mut points = Points::default();
+    points.set_profile(&Angles::equal(form.angles), &profile_um, radius_mm);
+    let missing = evaluate.references.iter().filter_map(|reference| {
+        let reason = points.determine(*reference).err()?;
+        Some(format!("section {}: no RONt about {}: {reason}", form.at.id, reference.symbol()))
+    });
+    missing.collect()
+}
+
+/// The largest |dr/dθ| of a profile on equal angles, by central differences over three points; NaN where no point has
+/// both neighbours.
+pub(crate) fn steepest_um_per_deg(profile_um: &[f64]) -> f64 {
+    let count = profile_um.len();
+    let [first, second, .., before, last] = *profile_um else { return f64::NAN };
+    // Lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
+    let mut steepest = [f64::NAN; 8];
+    let mut look = |lane: usize, difference: f64| {
+        let slope = difference.abs();
+        // Comparisons with NaN are false: the first slope that is a number is taken.
+        steepest[lane] = if slope <= steepest[lane] || slope.is_nan() { steepest[lane] } else { slope };
+    };
+    for (ahead, behind) in profile_um[2..].chunks(8).zip(profile_um[..count - 2].chunks(8)) {
+        ahead.iter().zip(behind).enumerate().for_each(|(lane, (ahead, behind))| look(lane, ahead - behind));
+    }
+    look(0, second - last);
+    look(1, first - before);
+    steepest.into_iter().fold(f64::NAN, f64::max) * count as f64 / 720.0
+}
+
+/// One section's form without level and centring, which are no form deviation also where the method knows them.
+pub(super) struct Form {
+    pub(super) harmonics: Vec<Complex64>,
+    /// Those of the solutions between which the data do not decide, and this is the mean of.
+    equivalents: Vec<Vec<Complex64>>,
+    /// Of noise.
+    pub(super) variance: Vec<f64>,
+    pub(super) held: Held,
+    pub(super) angles: usize,
+    pub(super) radius_mm: f64,
+    pub(super) at: SectionAt,
+    /// What its errors are drawn from, for all of its values.
+    noise: Noise,
+}
+
+impl Form {
+    fn of(result: &StationResult, section: usize, radius_mm: f64) -> Option<Self> {
+        let separation = &result.separation;
+        let unknown = separation.position(Quantity::Form(section))?;
+        let from_two = |harmonics: Vec<Complex64>| {
+            let each = harmonics.into_iter().enumerate();
+            each.map(|(order, value)| if order < 2 { Complex64::ZERO } else { value }).collect()
+        };
+        let at = separation.sections.get(section)?.clone();
+        let held = Held {
+            highest: separation.max_order(),
+            all_to: separation.max_order(),
+            lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
+            half_power_upr: result.half_power_upr(),
+        };
+        // Of a form of which nothing can be told, nothing is a value.
+        (result.angles > 1 && held.lost.len() < held.highest.saturating_sub(1)).then(|| Self {
+            harmonics: from_two(separation.coefficients(unknown).collect()),
+            equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),
+            variance: separation.noise_variance(unknown),
+            angles: result.angles,
+            radius_mm,
+            noise: Noise::new(held.highest + 1, seed(&[&result.station, &at.id])),
+            held,
+            at,
+        })
+    }
+
+    /// Another form of the same section, taken as exact.
+    fn exactly(&self, harmonics: &[Complex64]) -> Self {
+        let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
+        let (held, at, noise) = (self.held.clone(), self.at.clone(), self.noise.clone());
+        Self { harmonics, equivalents, variance, held, at, noise, ..*self }
+    }
+
+    fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
+        let mut values = Vec::new();
+        for cutoff in evaluate.cutoffs_upr(self.held.highest) {
+            let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
+            values.extend(self.round(&evaluate.low_pass(cutoff), references));
+            if cutoff.is_none() && evaluate.has(Group::Texture) {
+                values.extend(self.papers_ra());
+            }
+            if let (true, Some(window_deg)) = (evaluate.has(Group::Roundness), evaluate.slope_window_deg) {
+                values.extend(self.slope(&evaluate.low_pass(cutoff), window_deg));
+            }
+        }
+        for cutoff in evaluate.robust_filter_upr.iter().filter(|_| evaluate.has(Group::Roundness)) {
+            values.extend(self.robust(*cutoff, &evaluate.references));
+        }
+        if evaluate.has(Group::Harmonics) {
+            values.extend(self.harmonics(evaluate.harmonics_upr));
+        }
+        values.extend(self.texture(evaluate));
+        values
+    }
+
+    /// Roundness behind the robust Gaussian (ISO 16610-31), which is applied to each drawn profile.
+    fn robust(&self, cutoff_upr: f64, references: &[Reference]) -> Vec<Value> {
+        let filter = Filter::robust(cutoff_upr);
+        let labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
+        let smoother = Smoother::closed(self.angles, cutoff_upr, Degree::Two);
+        let (angles, mut points) = (Angles::equal(self.angles), Points::default());
+        let found = self.evaluate(&Filter::low_pass(None), self.angles, DRAWS_OF_ROBUST, |profile_um, found| {
+            points.set_profile(&angles, &robust_gaussian(&smoother, profile_um).low_pass, self.radius_mm);
+            for reference in references {
+                let about = points.reference(*reference).map(|circle| points.values(&circle));
+                add_values(about, *reference, found);
+            }
+        });
+        let found = found.into_iter().zip(&labels).map(|((value, known), label)| {
+            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
+        });
+        let found = found.collect();
+        self.labelled(labels, found, &filter)
+    }
+
+    /// The largest change of the profile over a window of angles, r(α + w) − r(α): a profile of its own, with the harmonics
+    /// cₙ (e^{inw} − 1).
+    fn slope(&self, filter: &Filter, window_deg: f64) -> Vec<Value> {
+        let window_rad = window_deg.to_radians();
+        let change = |order: usize| Complex64::cis(order as f64 * window_rad) - 1.0;
+        let harmonics: Vec<Complex64> =
+            self.harmonics.iter().enumerate().map(|(order, harmonic)| harmonic * change(order)).collect();
+        let mut changes = self.exactly(&harmonics);
+        changes.variance =
+            self.variance.iter().enumerate().map(|(order, variance)| variance * change(order).norm_sqr()).collect();
+        for [from, length] in self.at.gaps.stretches() {
+            changes.at.gaps.add(from - window_rad, length);
+        }
+        let waves = filter.highest(self.held.highest);
+        let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
+        let found = changes.evaluate(filter, angles, DRAWS, |profile_um, found| {
+            found.push(profile_um.iter().map(|change| change.abs()).fold(f64::NAN, f64::max));
+        });
+        let source = "largest change of the profile over a window, no standard's symbol";
+        let label = Label::new("slope", "µm", source, format!("LSCI, window {window_deg}°"));
+        changes.labelled(vec![label], found, filter)
+    }
+
+    /// Amplitude and phase of each order from 2 to at most `highest`.
+    ///
+    /// Half of an order's variance is along its amplitude and half across it. The phase of an amplitude that may be noise
+    /// alone has no uncertainty.
+    fn harmonics(&self, highest: usize) -> Vec<Value> {
+        let mut values = Vec::new();
+        let known = |order: &usize| !self.held.lost.contains(order);
+        for order in (2..=highest.min(self.held.highest)).filter(known) {
+            let (value, turns) = (self.harmonics[order], order as f64);
+            let amplitude = value.norm();
+            // The first crest of A cos(n α + φ).
+            let phase = (-value.arg().to_degrees() / turns).rem_euclid(360.0 / turns);
+            let variance = self.variance.get(order).copied().filter(|variance| variance.is_finite());
+            let std = variance.map(|variance| (0.5 * variance).sqrt());
+            let of_amplitude = std.map(|std| Uncertainty::of_amplitude(amplitude, std));
+            let of_phase = std.filter(|std| amplitude >= RAYLEIGH_95 * std).map(|std| {
+                let std = (std / (amplitude * turns)).to_degrees();
+                Uncertainty { std, interval_95: [phase - NORMAL_95 * std, phase + NORMAL_95 * std], draws: 0 }
+            });
+            let labels = vec![
+                Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),
+                Label::new("phase", "°", "part's angle of the order's first crest", "LSCI"),
+            ];
+            let found = vec![(amplitude, of_amplitude), (phase, of_phase)];
+            let both = self.labelled(labels, found, &Filter::low_pass(None));
+            let weakened_above_upr = self.held.half_power_upr.filter(|half| turns > *half);
+            let of_order = |value| Value { band_upr: [order; 2], lost_orders: Vec::new(), weakened_above_upr, ..value };
+            values.extend(both.into_iter().map(of_order));
+        }
+        values
+    }
+
+    /// Everything that is computed from one filtered profile on equal angles, with what so many draws of its errors make of
+    /// it.
+    fn evaluate(
+        &self,
+        filter: &Filter,
+        angles: usize,
+        draws: usize,
+        mut values: impl FnMut(&[f64], &mut Vec<f64>),
+    ) -> Vec<(f64, Option<Uncertainty>)> {
+        let mut fourier = Fourier::new(angles);
+        let form_um = self.profile(filter, &mut fourier);
+        let mut errors = self.errors(filter);
+        let draws = if errors.is_some() { draws } else { 0 };
+        let mut drawn = form_um.clone();
+        monte_carlo_of(draws, |disturbed, found| {
+            if let (true, Some(errors)) = (disturbed, &mut errors) {
+                errors.draw(&mut fourier, &form_um, &mut drawn);
+            }
+            values(&drawn, found);
+        })
+    }
+
+    pub(super) fn profile(&self, filter: &Filter, fourier: &mut Fourier) -> Vec<f64> {
+        let mut form_um = fourier.synthesise(filter.harmonics(&self.harmonics)).to_vec();
+        self.at.gaps.blank(&mut form_um);
+        form_um
+    }
+
+    pub(super) fn errors(&self, filter: &Filter) -> Option<Errors> {
+        Errors::sharing(&filter.variance(&self.variance), 2, &self.noise)
+    }
+
+    fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {
+        labelled(labels, found, filter, &self.held, self.at.coverage(self.angles))
+    }
+
+    fn round(&self, filter: &Filter, references: &[Reference]) -> Vec<Value> {
+        let mut labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
+        if labels.is_empty() {
+            return Vec::new();
+        }
+        let drawn = self.drawn_about(filter, references);
+        let drawn = drawn.into_iter().map(Some).chain(std::iter::repeat(None));
+        let found = self.about(filter, references).into_iter().zip(drawn);
+        let found = found.zip(&labels).map(|((value, drawn), label)| {
+            let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
+            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
+        });
+        let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
+        if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
+            let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
+            let reference = Reference::LeastSquares.symbol();
+            labels.insert(last + 1, Label::new("dr/dtheta", "µm/°", steepest, reference));
+            found.insert(last + 1, self.steepest(filter));
+        }
+        self.labelled(labels, found, filter)
+    }
+
+    /// Values about reference circles, of the profile between the angles too.
+    fn about(&self, filter: &Filter, references: &[Reference]) -> Vec<f64> {
+        let waves = filter.highest(self.held.highest);
+        // The given angles and others between them, so that no crest is far from one.
+        let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
+        let harmonics = filter.harmonics(&self.harmonics);
+        let mut fourier = Fourier::new(angles);
+        let mut profile_um = Cow::Borrowed(fourier.synthesise(harmonics.iter().copied()));
+        if !self.at.gaps.is_empty() {
+            self.at.gaps.blank(profile_um.to_mut());
+        }
+        let mut series = Series::new(&harmonics, &profile_um, self.radius_mm);
+        let mut found = Vec::new();
+        for reference in references {
+            let about = series.about(*reference).ok().map(|found| found.1);
+            add_values(about, *reference, &mut found);
+        }
+        found
+    }
+
+    /// The same of the profile at fewer angles, with what draws of its errors make of them; nothing where no errors are known.
+    fn drawn_about(&self, filter: &Filter, references: &[Reference]) -> Vec<(f64, Option<Uncertainty>)> {
+        let Some(mut errors) = self.errors(filter) else { return Vec::new() };
+        let waves = filter.highest(self.held.highest);
+        let angles = Angles::shared((DRAWN_POINTS_A_WAVE * waves).next_power_of_two().min(self.angles));
+        let mut fourier = Fourier::new(angles.len());
+        let profile_um = self.profile(filter, &mut fourier);
+        let usual_um = LARGEST * errors.std_um();
+        let about = |reference: &Reference| {
+            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um))
+        };
+        let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
+        monte_carlo_of(DRAWS, |disturbed, found| {
+            let drawn = disturbed.then(|| errors.turned(&mut fourier));
+            for (reference, circle) in &mut circles {
+                let values = match (circle, &drawn) {
+                    (Some(circle), Some(drawn)) => circle.values(drawn),
+                    (Some(circle), None) => Some(circle.about()),
+                    (None, _) => None,
+                };
+                add_values(values, *reference, found);
+            }
+        })
+    }
+
+    /// The steepest slope, µm/°, from the harmonics. High orders count by their number, and noise with them: it is drawn
+    /// about a profile that stands for the truth.
+    fn steepest(&self, filter: &Filter) -> (f64, Option<Uncertainty>) {
+        let harmonics = filter.harmonics(&self.harmonics);
+        let value = steepest_um_per_rad(&harmonics, &self.at.gaps).to_radians();
+        let variance = filter.variance(&self.variance);
+        let of_slopes: Vec<f64> = (variance.iter().enumerate())
+            .map(|(order, variance)| variance * (order as f64).to_radians().powi(2))
+            .collect();
+        let Some(mut errors) = Errors::sharing(&of_slopes, 2, &self.noise) else { return (value, None) };
+        let weights = stand_in(&harmonics, &variance, 2);
+        let likely = harmonics.iter().zip(weights).enumerate();
+        let likely = likely.map(|(order, (value, weight))| Complex64::I * (order as f64).to_radians() * value * weight);
+        let waves = filter.highest(self.held.highest).max(2);
+        let mut fourier = Fourier::new((DRAWN_POINTS_A_WAVE * waves).next_power_of_two());
+        let mut likely = fourier.synthesise(likely).to_vec();
+        self.at.gaps.blank(&mut likely);
+        let about = Drawn::about(&likely);
+        let draws = (0..DRAWS).map(|_| {
+            let drawn = errors.turned(&mut fourier);
+            about.steepest(drawn.errors_um, drawn.largest_um)
+        });
+        let known = extreme(value, about.undisturbed(), draws.collect()).map(|(_, known)| known);
+        (value, known)
+    }
+}
+
+/// Draws of what is filtered robustly, point by point and some times over.
+const DRAWS_OF_ROBUST: usize = 64;
+
+/// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
+const DRAWN_POINTS_A_WAVE: usize = 6;
+
+/// RONt, and about LSCI RONp, RONv and RONq.
+fn roundness_labels(reference: Reference) -> Vec<Label> {
+    let ron = |symbol, meaning: &str| {
+        Label::new(symbol, "µm", format!("ISO 12181-1:2011, {meaning} roundness deviation"), reference.symbol())
+    };
+    let mut labels = vec![ron("RONt", "peak-to-valley")];
+    if reference == Reference::LeastSquares {
+        labels.extend([ron("RONp", "peak-to-reference"), ron("RONv", "reference-to-valley")]);
+        labels.push(ron("RONq", "root mean square"));
+    }
+    labels
+}
+
+/// Whether errors change which contacts hold the circle that a value is about, and with them the value's slopes.
+fn has_kinks(label: &Label) -> bool {
+    let about = [Reference::MaximumInscribed, Reference::MinimumCircumscribed];
+    label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
+}
+
+/// The values of [`roundness_labels`]; NaN where there is no such circle.
+fn add_values(about: Option<Values>, reference: Reference, found: &mut Vec<f64>) {
+    let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+    found.push(of(|values| values.ront_um));
+    if reference == Reference::LeastSquares {
+        found.extend([of(|values| values.ronp_um), of(|values| values.ronv_um), of(|values| values.ronq_um)]);
+    }
+}

@@ -1,0 +1,206 @@
+//! Recorded turns on their way to profiles, station by station, threads across stations.
+
+use std::{
+    num::NonZeroUsize,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+};
+
+use super::{
+    overlap::{Captures, read_ahead, read_along},
+    run::Observer,
+    turnstile::Turnstile,
+};
+use crate::stage::{Averager, Conditioner, Station, StationSeparator, Wanted};
+use runout_error::{Error, Result};
+use runout_turning::{
+    calibrated::calibrated,
+    inspection::{Inspection, Spike},
+    measurement::{Capture, Recording, SampleStream, StationKey},
+    profile::{Profile, RejectedTurn},
+    provenance::Input,
+    rig::Rig,
+    separation::{Quantity, Separation},
+    spread::Projection,
+};
+
+/// From recorded turns to the profiles of one station after the other.
+pub struct Line<'a> {
+    pub rig: &'a Rig,
+    pub recording: &'a dyn Recording,
+    pub conditioners: &'a [Box<dyn Conditioner>],
+    pub averager: &'a dyn Averager,
+    /// Share of the turns that are averaged by themselves besides.
+    pub hold_out: Option<f64>,
+    /// How motion follows from the readings of each setup, where the spread over the turns is wanted.
+    pub projections: Vec<Option<Projection>>,
+}
+
+impl Line<'_> {
+    /// Does `work` on every station (its index and its profiles), and the inputs' checksums meanwhile; `take` gets
+    /// what comes of it, in the order of the stations.
+    ///
+    /// Each worker takes the next station, and waits only where it is too far ahead of the others: few results exist at a
+    /// time.
+    pub fn run<T: Send>(
+        &self,
+        threads: Option<NonZeroUsize>,
+        observer: &dyn Observer,
+        work: impl Fn(usize, Station) -> Result<T> + Sync,
+        mut take: impl FnMut(T) -> Result<()> + Send,
+    ) -> Result<Vec<Input>> {
+        let stations = self.recording.stations();
+        observer.begin(stations.len());
+        let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let threads = threads.map_or(processors, NonZeroUsize::get);
+        let workers = threads.clamp(1, stations.len().max(1));
+        // Where there are fewer stations than threads, some can help to read.
+        let readers = NonZeroUsize::new(threads / workers).unwrap_or(NonZeroUsize::MIN);
+        let next = AtomicUsize::new(0);
+        let failed = AtomicBool::new(false);
+        let turnstile = Turnstile::new(|index: usize, result| {
+            take(result)?;
+            observer.station(&stations[index].name);
+            Ok(())
+        });
+        let setups = self.rig.setups.len();
+        // What is far from all other readings of a capture, `[station][setup]`.
+        let spikes: Vec<Mutex<Vec<Spike>>> = (0..stations.len() * setups).map(|_| Mutex::default()).collect();
+        let worker = || {
+            let claimed = std::iter::from_fn(|| {
+                let more = !failed.load(Ordering::Relaxed);
+                more.then(|| next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < stations.len())
+            });
+            let captures =
+                claimed.flat_map(|station| (0..setups).map(move |setup| (station, setup))).map(|(station, setup)| {
+                    let told = &spikes[station * setups + setup];
+                    (station, self.recorded(readers, station, setup, told))
+                });
+            let work_on = |captures: &mut dyn Captures<usize>| {
+                while let Some(index) = captures.coming() {
+                    let told = &spikes[index * setups..(index + 1) * setups];
+                    let result =
+                        self.station(&stations[index], captures, told).and_then(|station| work(index, station));
+                    if !turnstile.pass(index, result) {
+                        failed.store(true, Ordering::Relaxed);
+                    }
+                }
+            };
+            if workers < processors { read_ahead(captures, work_on) } else { read_along(captures, work_on) }
+        };
+        let along = self.recording.checksum();
+        if let Some(checksum) = along {
+            checksum.begin();
+        }
+        let inputs = std::thread::scope(|scope| {
+            let apart = || self.recording.inputs().iter().map(|path| Input::of(path)).collect::<Result<Vec<_>>>();
+            let checksums = scope.spawn(move || if along.is_some() { Ok(Vec::new()) } else { apart() });
+            for _ in 1..workers {
+                scope.spawn(worker);
+            }
+            worker();
+            checksums.join()
+        });
+        turnstile.outcome()?;
+        if let Some(checksum) = along {
+            return Ok(vec![checksum.finish()?]);
+        }
+        inputs.unwrap_or_else(|_| Err(Error::new("checksum", "the inputs", "the thread that read them stopped")))
+    }
+
+    /// A capture as it is read and conditioned; every sample is looked at before anything else touches it.
+    fn recorded<'b>(
+        &'b self,
+        threads: NonZeroUsize,
+        station: usize,
+        setup: usize,
+        spikes: &'b Mutex<Vec<Spike>>,
+    ) -> Result<Box<dyn SampleStream + 'b>> {
+        let opened = calibrated(self.recording.open_with(threads, station, setup)?, self.rig);
+        let tell = |found| *spikes.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::telling(opened, tell));
+        self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))
+    }
+
+    /// Takes all of a station's captures, also behind one that failed.
+    fn station(
+        &self,
+        key: &StationKey,
+        captures: &mut dyn Captures<usize>,
+        spikes: &[Mutex<Vec<Spike>>],
+    ) -> Result<Station> {
+        let mut profiles = Ok(Vec::with_capacity(self.rig.setups.len()));
+        for (setup, spikes) in spikes.iter().enumerate() {
+            let capture = captures.open();
+            let projection = self.projections.get(setup).and_then(Option::as_ref);
+            let wanted = Wanted { hold_out: self.hold_out, projection };
+            profiles = profiles.and_then(|mut profiles: Vec<Profile>| {
+                let stream = capture?;
+                let capture = stream.capture().clone();
+                let mut profile = self.averager.average_wanting(stream, wanted)?;
+                let spikes = std::mem::take(&mut *spikes.lock().unwrap_or_else(PoisonError::into_inner));
+                profile.warnings.extend(unusual(&spikes, &capture, &profile));
+                profiles.push(profile);
+                Ok(profiles)
+            });
+        }
+        Ok(Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? })
+    }
+}
+
+/// Says which readings, far from all others, are in an average.
+fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String> {
+    let turn_samples = capture.median_turn_samples().unwrap_or(0.0);
+    let left_out = |spike: &Spike| {
+        let (sample, within) = (spike.near_sample as f64, spike.within_samples as f64);
+        let rejected = |turn: &RejectedTurn| {
+            let start = turn.start_sample as f64 - within;
+            (start..start + turn_samples + 2.0 * within).contains(&sample)
+        };
+        let marks = capture.marks.first().zip(capture.marks.last());
+        profile.turns.rejected.iter().any(rejected)
+            || marks.is_none_or(|(first, last)| !(*first..*last).contains(&sample))
+    };
+    let in_average = spikes.iter().filter(|spike| !left_out(spike));
+    let told = in_average.map(|spike| {
+        let Spike { channel, near_sample, reading_um, usual_um, stretches, .. } = spike;
+        let sensor = capture.sensor_ids.get(*channel).map_or("", String::as_str);
+        let times = if *stretches > 1 { format!(" ({stretches} turns or so have such readings)") } else { String::new() };
+        let usually = if reading_um > usual_um { "at most" } else { "at least" };
+        format!(
+            "{}: {sensor} reads {reading_um:.4} µm near sample {near_sample}{times}, in other turns {usually} {usual_um:.4} µm; if that is \
+             a disturbance, `outlier_sigma` of the synchronous average leaves such turns out",
+            capture.object
+        )
+    });
+    told.collect()
+}
+
+/// Separates a station, and refuses what is not a number where the layout could tell one, and a form that no part of
+/// `radius_mm` has.
+pub fn separate(separator: &dyn StationSeparator, station: &Station, radius_mm: f64) -> Result<Separation> {
+    let separation = separator.separate(station)?;
+    let width = separation.unknowns.len().max(1);
+    let told = separation.estimate.iter().zip(&separation.observable);
+    let number = told.enumerate().find(|(_, (value, told))| **told && !value.is_finite());
+    let problem = match number {
+        Some((index, _)) => {
+            let quantity = separation.unknowns[index % width].id();
+            Some(format!("{quantity} of order {} comes out as no number", index / width))
+        }
+        None => separation.sections.iter().enumerate().find_map(|(section, at)| {
+            let unknown = separation.position(Quantity::Form(section))?;
+            let squares: f64 = separation.coefficients(unknown).skip(1).map(|value| value.norm_sqr()).sum();
+            let rms_mm = 1e-3 * (0.5 * squares).sqrt();
+            let problem =
+                format!("the form of section {} comes out as {rms_mm:.3e} mm rms on {radius_mm} mm radius", at.id);
+            (rms_mm > radius_mm).then_some(problem)
+        }),
+    };
+    problem.map_or(Ok(separation), |problem| {
+        Err(Error::new("separate", format!("station {}", station.name), problem)
+            .help("look for absurd readings, and check the rig's radius and positions"))
+    })
+}

@@ -1,0 +1,27 @@
+//! The pipeline: configuration, what is registered, and the run.
+
+pub mod compare;
+pub mod config;
+pub mod diagnose;
+pub mod document;
+pub mod effects;
+pub mod evaluate;
+mod line;
+mod outdated;
+mod overlap;
+mod pinpoint;
+mod point_run;
+pub mod registry;
+pub mod result;
+mod result_writer;
+pub mod run;
+mod steadiness;
+pub mod summary;
+pub mod tables;
+mod turnstile;
+
+pub use config::Pipeline;
+pub use registry::Registry;
+
+/// Faults of a configuration.
+pub use runout_error::fault as error;

@@ -1,0 +1,73 @@
+//! The run and the diagnosis of measured points: load → separate → evaluate → export, all at once.
+
+use super::{
+    config::Pipeline,
+    result::{Evaluation, complete},
+    result_writer::{Finished, ResultWriter},
+    run::{Observer, spare_inputs},
+    summary::Summary,
+};
+use crate::{
+    points::Points,
+    stage::{Exporter, Form, Outcome, PointSeparator},
+};
+use runout_closed_loop::diagnosis::Correction;
+use runout_error::Result;
+use runout_turning::provenance::Input;
+
+pub(super) fn run(
+    pipeline: &Pipeline,
+    points: &Points,
+    separator: &dyn PointSeparator,
+    observer: &dyn Observer,
+) -> Result<Summary> {
+    spare_inputs(&pipeline.outputs(), std::slice::from_ref(&points.input))?;
+    let outcome = separator.separate(points)?;
+    let result = PointResult { outcome, remarks: Some(separator), effects: Vec::new() };
+    result.write(pipeline, &pipeline.exporters, points, observer)?.commit(None)
+}
+
+/// A result of points, to be written.
+pub(super) struct PointResult<'a> {
+    pub outcome: Outcome,
+    /// Who has something to say of the surface.
+    pub remarks: Option<&'a dyn PointSeparator>,
+    /// Effects that the result is corrected for.
+    pub effects: Vec<Correction>,
+}
+
+impl PointResult<'_> {
+    pub(super) fn write(
+        self,
+        pipeline: &Pipeline,
+        exporters: &[Box<dyn Exporter>],
+        points: &Points,
+        observer: &dyn Observer,
+    ) -> Result<Finished> {
+        let Outcome { convention, tables, values, form, mut remarks } = self.outcome;
+        let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
+        writer.corrected_for(self.effects);
+        writer.take_values(values, convention);
+        writer.write(&tables)?;
+        let mut surface = None;
+        if let Some(Form { sections, radius_mm }) = form {
+            observer.begin(sections.len());
+            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None };
+            for separation in sections {
+                // As many angles as the surface has, or a multiple of them that the highest order fits on.
+                let angles = pipeline.surface.angles;
+                let angles = angles * (2 * separation.max_order() + 1).div_ceil(angles);
+                let at = separation.sections.first();
+                let (name, z_mm) = at.map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));
+                let result = complete(name, z_mm, angles, separation, Vec::new(), None, evaluation);
+                writer.take(&result, None)?;
+                observer.station(&result.station);
+            }
+            surface = writer.build_surface(radius_mm)?;
+        }
+        if let Some(separator) = self.remarks {
+            remarks.extend(separator.remarks(points, surface.as_ref())?);
+        }
+        writer.finish(vec![Input::of(&points.input)?], remarks, surface.as_ref())
+    }
+}

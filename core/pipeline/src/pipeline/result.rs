@@ -1,0 +1,127 @@
+//! Values of one station, and its error where the truth is known.
+
+use super::evaluate::{Evaluate, missing_circles, section_values};
+use runout_numerics::{Complex64, fourier::Fourier};
+use runout_turning::station::StationResult;
+use runout_turning::{
+    measurement::StationTruth,
+    profile::Profile,
+    rig::Rig,
+    separation::{Quantity, Separation, UM_PER_MM_URAD},
+};
+
+/// Which of the standards' values a part of some nominal radius gets, and the rig that tells where it is interrupted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Evaluation<'a> {
+    pub evaluate: &'a Evaluate,
+    pub radius_mm: f64,
+    pub rig: Option<&'a Rig>,
+}
+
+/// Adds the standards' values to a separation.
+pub(super) fn complete(
+    station: String,
+    z_mm: f64,
+    angles: usize,
+    mut separation: Separation,
+    profiles: Vec<Profile>,
+    truth: Option<StationTruth>,
+    evaluation: Evaluation,
+) -> StationResult {
+    let (values, motion_values) = (Vec::new(), Vec::new());
+    let Evaluation { evaluate, radius_mm, rig } = evaluation;
+    if let Some(rig) = rig {
+        let beyond_rad = profiles.iter().map(|profile| profile.bridged_beyond_rad).fold(0.0, f64::max);
+        separation.sections.iter_mut().for_each(|section| section.gaps = rig.gaps_of(&section.id).widened(beyond_rad));
+    }
+    let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
+    let sections = 0..result.separation.sections.len();
+    result.values = sections.clone().map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
+    let missing = sections.flat_map(|section| missing_circles(&result, section, evaluate, radius_mm));
+    let missing: Vec<String> = missing.collect();
+    result.separation.warnings.extend(missing);
+    result
+}
+
+/// True motion [x, y, tilt about x, about y] as a separation reports it at a place along the spindle: x + z·ε_y, y − z·ε_x;
+/// a curve that is not given is 0.
+fn true_motion(motion: &[Vec<f64>; 4], quantity: Quantity, z_mm: f64) -> Vec<f64> {
+    let parts = |quantity: Quantity| motion.iter().zip(quantity.cartesian()).filter(|(_, share)| *share != 0.0);
+    let mut sum = vec![0.0; parts(quantity).map(|(curve, _)| curve.len()).max().unwrap_or(0)];
+    let mut add = |quantity: Quantity, factor: f64| {
+        for (curve, share) in parts(quantity) {
+            sum.iter_mut().zip(curve).for_each(|(sum, value)| *sum += factor * share * value);
+        }
+    };
+    add(quantity, 1.0);
+    if let Some((tilt, factor)) = quantity.moved_by_tilt() {
+        add(tilt, factor * z_mm * UM_PER_MM_URAD);
+    }
+    sum
+}
+
+/// Root mean square of estimate minus truth over the orders from 2 that could be told.
+pub(super) fn true_error(result: &StationResult, quantity: Quantity) -> Option<f64> {
+    let truth = result.truth.as_ref()?;
+    let curve = match quantity {
+        Quantity::Form(section) => truth.form_um.get(section)?.clone(),
+        motion => true_motion(truth.motion.as_ref()?, motion, result.separation.motion_z_mm),
+    };
+    let unknown = result.separation.position(quantity)?;
+    if curve.len() < 2 {
+        return None;
+    }
+    let mut fourier = Fourier::new(curve.len());
+    let mut harmonics = vec![Complex64::ZERO; fourier.max_order() + 1];
+    fourier.analyse(curve.iter().copied(), &mut harmonics);
+    let width = result.separation.unknowns.len();
+    let told = result.separation.observable.iter().skip(unknown).step_by(width);
+    let squares =
+        result.separation.coefficients(unknown).zip(told).enumerate().skip(2).filter(|(_, (_, told))| **told).map(
+            |(order, (value, _))| {
+                let truth = harmonics.get(order).copied().unwrap_or_default();
+                let truth = if quantity.is_form() { truth } else { truth.conj() };
+                (value - truth).norm_sqr()
+            },
+        );
+    Some((0.5 * squares.sum::<f64>()).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+    use runout_turning::separation::{Residual, SectionAt};
+
+    /// Sensors in one plane tell the motion of that plane: 2 µm at the reference and 5 µrad 100 mm further are 2.5 µm.
+    #[test]
+    fn motion_is_compared_where_it_is_told() {
+        let cosine = |amplitude: f64| -> Vec<f64> {
+            (0..32).map(|step| amplitude * (3.0 * std::f64::consts::TAU * f64::from(step) / 32.0).cos()).collect()
+        };
+        let mut estimate = vec![Complex64::ZERO; 8];
+        estimate[3 * 2] = Complex64::from(2.5);
+        estimate[3 * 2 + 1] = Complex64::from(-0.7);
+        let separation = Separation {
+            sections: vec![SectionAt::whole("a", 100.0)],
+            unknowns: vec![Quantity::X, Quantity::Y],
+            estimate,
+            variance: vec![0.0; 8],
+            observable: vec![true; 8],
+            motion_covariance: None,
+            equivalents: Vec::new(),
+            motion_z_mm: 100.0,
+            residual: Residual::default(),
+            warnings: Vec::new(),
+        };
+        let truth = StationTruth { form_um: Vec::new(), motion: Some([2.0, -0.5, 2.0, 5.0].map(cosine)) };
+        let evaluation = Evaluation { evaluate: &Evaluate::nothing(), radius_mm: 30.0, rig: None };
+        let result = complete("s1".into(), 0.0, 32, separation, Vec::new(), Some(truth), evaluation);
+        for quantity in [Quantity::X, Quantity::Y] {
+            // Rounding of transforms of values near 1.
+            assert!(true_error(&result, quantity).unwrap() < 1e-14, "{quantity:?}");
+        }
+        assert!(true_error(&result, Quantity::TiltX).is_none(), "tilt was not told");
+    }
+}

@@ -1,0 +1,278 @@
+//! A result on its way to the exporters.
+
+use std::path::PathBuf;
+
+use super::{
+    config::{Pipeline, summary_path},
+    evaluate::{Evaluate, Group, PartSummary, add_areal, add_generatrices, decide, part_summary},
+    steadiness::inflated,
+    summary::{LostOrders, StationSummary, Summary, SurfaceSummary, summarise},
+    tables::{StationTables, correction_rows, named_value_rows},
+};
+use crate::{
+    atomic_file::{PendingFile, commit_all},
+    stage::{About, Completed, Export, Exporter, NamedValue, ResultInfo, Takes},
+};
+use runout_closed_loop::diagnosis::Correction;
+use runout_error::{Error, Result};
+use runout_table::{TableRows, TableSpec};
+use runout_turning::station::StationResult;
+use runout_turning::{
+    measurement::StationKey,
+    provenance::{Input, Provenance, VERSION},
+    rig::Rig,
+    surface::{Surface, SurfaceBuilder},
+};
+
+/// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.
+const MISFIT_CHI2: f64 = 4.0;
+
+/// What a surface over all sections is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum SurfaceUse {
+    /// Nothing.
+    Unused,
+    /// Tested where there is one: sections at one height have none.
+    WhereThere,
+    /// An export or a value needs it.
+    Needed,
+}
+
+/// Gives a result to the exporters piece by piece, and keeps what its summary needs.
+pub(super) struct ResultWriter {
+    exports: Vec<Box<dyn Export>>,
+    /// Whether an exporter takes tables.
+    tables_wanted: bool,
+    specs: Vec<TableSpec>,
+    station_tables: StationTables,
+    /// Whether the result has form.
+    of_form: bool,
+    /// Sections for a surface, or for values of all of them.
+    sections: Option<SurfaceBuilder>,
+    surface: SurfaceUse,
+    angles: usize,
+    evaluate: Evaluate,
+    /// Whether the sections' centres and mean radii are known.
+    placed: bool,
+    /// Whether the part's surface is interrupted somewhere.
+    interrupted: bool,
+    /// Signs and references of a domain's own tables.
+    convention: String,
+    summary: Summary,
+    summary_path: Option<PathBuf>,
+}
+
+impl ResultWriter {
+    /// Begins the exports of these exporters; `stations` are those that will come, where they are known.
+    pub(super) fn begin(pipeline: &Pipeline, exporters: &[Box<dyn Exporter>], stations: &[StationKey]) -> Result<Self> {
+        let info = ResultInfo {
+            title: pipeline.title.clone(),
+            tables: pipeline.tables.clone(),
+            longest_name: longest_name(pipeline.rig.as_ref(), stations),
+        };
+        let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(&info)).collect();
+        let tested = pipeline.route.point_separator().is_some_and(|separator| separator.needs_surface());
+        let takes = |takes| exporters.iter().any(|exporter| exporter.takes() == takes);
+        let evaluate = pipeline.evaluate.clone();
+        let needed = takes(Takes::Surface) || (evaluate.needs_surface() && !evaluate.all);
+        let surface = match (needed, tested || evaluate.all) {
+            (true, _) => SurfaceUse::Needed,
+            (false, true) => SurfaceUse::WhereThere,
+            (false, false) => SurfaceUse::Unused,
+        };
+        let gathered = surface != SurfaceUse::Unused || evaluate.has(Group::Cylindricity);
+        Ok(Self {
+            exports: exports?,
+            tables_wanted: takes(Takes::Tables),
+            specs: pipeline.tables.clone(),
+            station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref()),
+            of_form: pipeline.route.gives_form(),
+            sections: (gathered && pipeline.route.gives_form()).then(|| SurfaceBuilder::new(&pipeline.surface)),
+            surface,
+            angles: pipeline.surface.angles,
+            evaluate,
+            placed: pipeline.route.point_separator().is_some(),
+            interrupted: false,
+            convention: String::new(),
+            summary: begun(pipeline),
+            summary_path: summary_path(exporters, &pipeline.tables),
+        })
+    }
+
+    /// Takes a station's form and motion.
+    pub(super) fn take(&mut self, result: &StationResult, rig: Option<&Rig>) -> Result<()> {
+        self.interrupted |= result.separation.sections.iter().any(|section| !section.gaps.is_empty());
+        let tables = self.station_tables.rows(result, self.tables_wanted)?;
+        self.write(&tables)?;
+        if let Some(sections) = &mut self.sections {
+            sections.add(result);
+        }
+        self.summary.stations.push(summarise(result, rig));
+        Ok(())
+    }
+
+    /// Takes rows of tables.
+    pub(super) fn write(&mut self, tables: &[TableRows]) -> Result<()> {
+        for TableRows { table, rows } in tables {
+            let spec = self.specs.iter().find(|spec| spec.name == *table).ok_or_else(|| {
+                Error::new("export", format!("the table {table}"), "the separator did not declare it")
+            })?;
+            for export in &mut self.exports {
+                export.rows(spec, rows)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a domain's own values, and the convention of its tables.
+    pub(super) fn take_values(&mut self, values: Vec<NamedValue>, convention: String) {
+        self.summary.values = values;
+        self.convention = convention;
+    }
+
+    /// The surface, where someone takes it; and the values of all sections together.
+    pub(super) fn build_surface(&mut self, radius_mm: f64) -> Result<Option<Surface>> {
+        let Some(builder) = self.sections.take() else { return Ok(None) };
+        let evaluate = &self.evaluate;
+        if evaluate.has(Group::Cylindricity) || evaluate.needs_surface() {
+            self.summary.part = part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
+        }
+        match self.surface {
+            SurfaceUse::Unused => return Ok(None),
+            SurfaceUse::WhereThere if builder.is_flat() => return Ok(None),
+            SurfaceUse::WhereThere | SurfaceUse::Needed => {}
+        }
+        let (surface, uncertain) = builder.build(radius_mm)?;
+        if evaluate.needs_surface() {
+            let part = self.summary.part.get_or_insert_with(PartSummary::default);
+            add_generatrices(part, &uncertain, radius_mm, self.placed, evaluate);
+            add_areal(part, &surface, &uncertain, if self.placed { 0 } else { 2 }, evaluate)?;
+        }
+        self.summary.surface = Some(SurfaceSummary {
+            angles: surface.angles,
+            rings: surface.z_mm.len(),
+            z_mm: [surface.z_mm.first().copied().unwrap_or(f64::NAN), surface.z_mm.last().copied().unwrap_or(f64::NAN)],
+            interpolation: surface.interpolation.to_owned(),
+            meetings: surface.meetings.clone(),
+        });
+        Ok(Some(surface))
+    }
+
+    /// Says which effects the results are corrected for.
+    pub(super) fn corrected_for(&mut self, effects: Vec<Correction>) {
+        self.summary.effects = effects;
+    }
+
+    /// Completes the exports.
+    pub(super) fn finish(
+        mut self,
+        inputs: Vec<Input>,
+        remarks: Vec<String>,
+        surface: Option<&Surface>,
+    ) -> Result<Finished> {
+        self.summary.provenance.inputs = inputs;
+        self.summary.warnings.extend(remarks);
+        self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
+        self.summary.warnings.extend(inflated(&self.summary.stations));
+        let (limits, unmatched) = decide(self.evaluate.limits(), &self.summary.placed_values());
+        self.summary.limits = limits;
+        self.summary.warnings.extend(unmatched);
+        let values = if self.of_form {
+            self.station_tables.value_rows(&self.summary)?
+        } else {
+            named_value_rows(&self.summary.values)?
+        };
+        let last: Vec<TableRows> = std::iter::once(values).chain(correction_rows(&self.summary.effects)?).collect();
+        self.write(&last)?;
+        let about = if self.of_form {
+            self.station_tables.about(&self.summary)
+        } else {
+            About { convention: std::mem::take(&mut self.convention), ..About::default() }
+        };
+        let completed = Completed { summary: &self.summary, about: &about, surface };
+        let mut complete = Vec::new();
+        for export in self.exports {
+            complete.extend(export.finish(&completed)?);
+        }
+        Ok(Finished { summary: self.summary, complete, summary_path: self.summary_path })
+    }
+}
+
+/// Bytes of the longest name that a result can hold; without stations they are not known before.
+fn longest_name(rig: Option<&Rig>, stations: &[StationKey]) -> Option<usize> {
+    let rig = rig.filter(|_| !stations.is_empty())?;
+    let setups = rig.setups.iter().map(|setup| &setup.id);
+    let sensors = rig.sensors.iter().map(|sensor| &sensor.id);
+    let names = rig.sections.iter().chain(setups).chain(sensors).chain(stations.iter().map(|station| &station.name));
+    names.map(String::len).max()
+}
+
+/// Exports that are complete and wait for their names.
+pub(super) struct Finished {
+    summary: Summary,
+    complete: Vec<PendingFile>,
+    summary_path: Option<PathBuf>,
+}
+
+impl Finished {
+    /// The files that will have their names, the summary's among them.
+    pub(super) fn outputs(&self) -> Vec<PathBuf> {
+        let complete = self.complete.iter().map(PendingFile::destination);
+        complete.chain(self.summary_path.as_deref()).map(Into::into).collect()
+    }
+
+    /// Adds a file.
+    pub(super) fn add(&mut self, file: PendingFile) {
+        self.complete.push(file);
+    }
+
+    /// Writes the summary and gives all files their names, one more among them where there is one.
+    pub(super) fn commit(mut self, besides: Option<PendingFile>) -> Result<Summary> {
+        self.complete.extend(besides);
+        self.summary.outputs = self.outputs();
+        if let Some(path) = self.summary_path {
+            let file = PendingFile::new(path)?;
+            let text = serde_json::to_vec_pretty(&self.summary).map_err(|error| file.failure(error))?;
+            std::fs::write(file.path(), text).map_err(|error| file.failure(error))?;
+            self.complete.push(file);
+        }
+        commit_all(self.complete)?;
+        Ok(self.summary)
+    }
+}
+
+/// A summary of nothing yet.
+fn begun(pipeline: &Pipeline) -> Summary {
+    let notes = pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default();
+    let of_points = pipeline.route.point_separator().map(|separator| separator.notes()).unwrap_or_default();
+    Summary {
+        title: pipeline.title.clone(),
+        provenance: Provenance {
+            program: format!("runout {VERSION}"),
+            configuration: pipeline.configuration.clone(),
+            inputs: Vec::new(),
+        },
+        lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
+        warnings: notes.into_iter().chain(of_points).collect(),
+        ..Summary::default()
+    }
+}
+
+/// What a rig that is not as declared looks like: a residual far above what the noise lets expect.
+fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
+    let beyond = stations.iter().filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > MISFIT_CHI2));
+    let count = beyond.clone().count();
+    let worst =
+        beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;
+    let left = worst.residual_rms_um.unwrap_or(f64::NAN);
+    let expected = worst.expected_residual_rms_um.unwrap_or(f64::NAN);
+    let bridged =
+        if interrupted { " (or readings go astray where its interruptions are bridged: make them wider)" } else { "" };
+    Some(format!(
+        "at {count} of {} stations the readings contradict each other: the fit leaves up to {left:.4} µm rms ({}), where \
+         the noise measured over the turns lets expect {expected:.4}; something is not as the rig declares it{bridged}, and the stated \
+         uncertainties, which come from that noise alone, do not cover it",
+        stations.len(),
+        worst.station,
+    ))
+}

@@ -1,0 +1,134 @@
+//! The run: load → preprocess → separate → evaluate → export, station by station, threads across stations.
+
+use std::{num::NonZeroUsize, path::PathBuf};
+
+use super::{
+    config::{Pipeline, Route},
+    evaluate::{Group, steepest_um_per_deg},
+    line::{Line, separate},
+    outdated,
+    overlap::write_behind,
+    point_run,
+    result::{Evaluation, complete},
+    result_writer::ResultWriter,
+    steadiness::Steadiness,
+};
+pub use runout_turning::station::StationResult;
+
+pub use super::{
+    evaluate::{Decision, Limit, LimitSummary, LimitValue, PartSummary, PlacedValue},
+    summary::{
+        CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
+        SurfaceSummary,
+    },
+    tables::StationTables,
+};
+use crate::{
+    atomic_file::resolved,
+    stage::{Averager, Conditioner, Source, Station, StationSeparator},
+};
+use runout_error::{Error, Result};
+use runout_standards::Value;
+use runout_turning::{
+    error_motion::{Centre, ErrorMotion},
+    measurement::Recording,
+};
+
+/// Watches a run, for a progress bar.
+pub trait Observer: Sync {
+    /// The run begins.
+    fn begin(&self, _stations: usize) {}
+    /// A station is done.
+    fn station(&self, _name: &str) {}
+}
+
+/// Watches nothing.
+pub struct Silent;
+
+impl Observer for Silent {}
+
+/// Runs a pipeline.
+///
+/// # Errors
+/// When the data or a file fails. Exports that had begun leave nothing behind.
+pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Summary> {
+    let source = pipeline.loader.open(&pipeline.request())?;
+    let summary = match (&source, &pipeline.route) {
+        (Source::Turns(recording), Route::Turns { conditioners, averager, separator, .. }) => {
+            run_turns(pipeline, &**recording, (conditioners, &**averager, &**separator), threads, observer)?
+        }
+        (Source::Points(points), Route::Points { separator, .. }) => {
+            point_run::run(pipeline, points, &**separator, observer)?
+        }
+        _ => return Err(Error::new("run", &pipeline.title, "the loader gave what it did not declare")),
+    };
+    outdated::remove(pipeline)?;
+    Ok(summary)
+}
+
+fn run_turns(
+    pipeline: &Pipeline,
+    recording: &dyn Recording,
+    (conditioners, averager, separator): (&[Box<dyn Conditioner>], &dyn Averager, &dyn StationSeparator),
+    threads: Option<NonZeroUsize>,
+    observer: &dyn Observer,
+) -> Result<Summary> {
+    spare_inputs(&pipeline.outputs(), &recording.inputs())?;
+    let rig = pipeline.rig.as_ref().ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
+    let mut writer = ResultWriter::begin(pipeline, &pipeline.exporters, recording.stations())?;
+    let wanted = pipeline.evaluate.has(Group::ErrorMotion);
+    let directions = &pipeline.evaluate.directions;
+    let projection = |setup| separator.projection(setup).filter(|_| wanted).map(|found| found.with_lines(directions));
+    let line = Line {
+        rig,
+        recording,
+        conditioners,
+        averager,
+        hold_out: None,
+        projections: (0..rig.setups.len()).map(projection).collect(),
+    };
+    let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
+    let work = |index, station: Station| {
+        let separation = separate(separator, &station, rig.part_radius_mm)?;
+        let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
+        let truth = recording.truth(index)?;
+        let profiles = station.profiles;
+        let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
+        let motion_values = error_motion_values(&result, &pipeline.evaluate.centres, rig.part_radius_mm);
+        Ok(StationResult { motion_values, ..result })
+    };
+    let mut steadiness = Steadiness::default();
+    let inputs = write_behind(
+        |result: StationResult| {
+            steadiness.take(&result.station, &result.profiles, rig);
+            writer.take(&result, Some(rig))
+        },
+        |take| line.run(threads, observer, work, take),
+    )?;
+    let remarks = recording.remarks().into_iter().chain(steadiness.warning(rig)).collect();
+    let surface = writer.build_surface(rig.part_radius_mm)?;
+    writer.finish(inputs, remarks, surface.as_ref())?.commit(None)
+}
+
+fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f64) -> Vec<Value> {
+    let StationResult { station, z_mm, angles, separation, profiles, .. } = result;
+    if profiles.iter().all(|profile| profile.spread.is_none()) {
+        return Vec::new();
+    }
+    let forms = separation.unknowns.iter().enumerate().filter(|(_, quantity)| quantity.is_form());
+    let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
+    let slope = steepest.to_degrees() / (1e3 * radius_mm);
+    ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres)
+}
+
+/// Refuses to write over what the run reads.
+pub(super) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<()> {
+    let read: Vec<PathBuf> = inputs.iter().map(|input| resolved(input)).collect();
+    for output in outputs {
+        if read.contains(&resolved(output)) {
+            let problem = "it is what the run reads";
+            return Err(Error::new("write", output.display().to_string(), problem).help("export to another path"));
+        }
+    }
+    Ok(())
+}

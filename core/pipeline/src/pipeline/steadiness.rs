@@ -1,0 +1,161 @@
+//! Whether the turns of a run are steady: levels that creep, and noise that is estimated too high.
+
+use super::summary::StationSummary;
+use runout_turning::{
+    creep::{Creep, Levels, creeps},
+    profile::Profile,
+    rig::Rig,
+};
+
+/// χ² per degree of freedom below which the noise is estimated too high: covariances of few turns stay above it.
+const INFLATED_CHI2: f64 = 0.2;
+/// Orders that the residual has at least for that: χ² of ten orders is as low once in 10⁵ times by chance, of one order in 18 %.
+const ORDERS_ENOUGH: usize = 10;
+/// Of many stations, this share must show a creep: chance has more opportunities there.
+const SHARE: f64 = 0.1;
+
+/// What the levels of the turns show, station by station.
+#[derive(Debug, Default)]
+pub(super) struct Steadiness {
+    stations: usize,
+    /// Of each sensor of the rig.
+    sensors: Vec<Seen>,
+}
+
+/// Creep of one sensor.
+#[derive(Debug, Default, Clone)]
+struct Seen {
+    /// Stations at which it is certain.
+    stations: usize,
+    /// The largest over a capture, in µm.
+    largest_um: f64,
+    place: String,
+}
+
+impl Steadiness {
+    /// Looks at the levels of a station's turns.
+    pub fn take(&mut self, station: &str, profiles: &[Profile], rig: &Rig) {
+        self.stations += 1;
+        self.sensors.resize(rig.sensors.len(), Seen::default());
+        let levels = |sensor: usize| -> Vec<Levels> {
+            let of = |profile: &Profile| {
+                let channel = profile.sensors.iter().position(|known| *known == sensor)?;
+                Some(profile.levels.of(channel, profile.channels()))
+            };
+            profiles.iter().filter_map(of).collect()
+        };
+        let all: Vec<Vec<Levels>> = (0..rig.sensors.len()).map(levels).collect();
+        for (seen, creep) in self.sensors.iter_mut().zip(creeps(&all)) {
+            let Some(creep) = creep.filter(|creep| creep.certain) else { continue };
+            seen.stations += 1;
+            let largest = creep.largest();
+            let size_um = creep.over_capture(largest);
+            if size_um.abs() > seen.largest_um.abs() {
+                seen.largest_um = size_um;
+                seen.place = place(&creep, station, profiles.get(largest), rig);
+            }
+        }
+    }
+
+    /// What is to be said of it.
+    pub fn warning(&self, rig: &Rig) -> Option<String> {
+        let enough = (SHARE * self.stations as f64).max(1.0);
+        let creeping = rig.sensors.iter().zip(&self.sensors).filter(|(_, seen)| seen.stations as f64 >= enough);
+        let each: Vec<String> = creeping
+            .map(|(sensor, seen)| format!("{} by {:+.2} µm over {}", sensor.id, seen.largest_um, seen.place))
+            .collect();
+        (!each.is_empty()).then(|| {
+            format!(
+                "the levels of the turns creep beyond their noise: {}. A creep leaves a saw-tooth in the averaged turn, in all \
+                 orders, and inflates the noise measured over the turns; the stated uncertainties are not valid. \
+                 `runout diagnose` takes a drift out",
+                each.join(", ")
+            )
+        })
+    }
+}
+
+fn place(creep: &Creep, station: &str, profile: Option<&Profile>, rig: &Rig) -> String {
+    if creep.shared {
+        return "each capture".into();
+    }
+    let setup = profile.and_then(|profile| rig.setups.get(profile.setup));
+    format!("the capture {}/{station}", setup.map_or("", |setup| &setup.id))
+}
+
+/// Warns where the residual is far below what the noise measured over the turns lets expect.
+pub(super) fn inflated(stations: &[StationSummary]) -> Option<String> {
+    let is_low = |station: &&StationSummary| station.chi2_per_dof.is_some_and(|chi2| chi2 < INFLATED_CHI2);
+    let has_orders = |station: &&StationSummary| {
+        station.residual_orders.is_none_or(|[lowest, highest]| highest + 1 >= lowest + ORDERS_ENOUGH)
+    };
+    let below: Vec<&StationSummary> = stations.iter().filter(is_low).filter(has_orders).collect();
+    let lowest = below.iter().min_by(|a, b| a.chi2_per_dof.unwrap_or(1.0).total_cmp(&b.chi2_per_dof.unwrap_or(1.0)))?;
+    Some(format!(
+        "at {} of {} stations the residual is far below the noise measured over the turns: χ² per degree of freedom is down to \
+         {:.3} ({}), expected 1. Something that changes from turn to turn inflates the noise estimate, for example a drift \
+         or asynchronous motion that all sensors see; the stated uncertainties are not valid",
+        below.len(),
+        stations.len(),
+        lowest.chi2_per_dof.unwrap_or(f64::NAN),
+        lowest.station,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+    use runout_turning::{
+        profile::TurnLevels,
+        rig::{RigConfig, Rotation, SensorConfig, SetupConfig},
+    };
+
+    fn rig() -> Rig {
+        let sensor = |id: &str, angle_deg: f64| SensorConfig {
+            id: id.into(),
+            angle_deg,
+            z_mm: 100.0,
+            section: "a".into(),
+            ..SensorConfig::default()
+        };
+        let setup = |id: &str, part_deg: f64| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
+        let config = RigConfig {
+            interruptions: Vec::new(),
+            part_radius_mm: 30.0,
+            rotation: Rotation::Ccw,
+            sensors: vec![sensor("S1", 0.0), sensor("S2", 90.0)],
+            setups: vec![setup("initial", 0.0), setup("turned", 180.0)],
+        };
+        config.check().unwrap()
+    }
+
+    /// Levels of 60 turns that S2 creeps in some setups, beside a wander of 0.05 µm.
+    fn profiles(creep_um: [f64; 2]) -> Vec<Profile> {
+        let profile = |(setup, creep_um): (usize, f64)| {
+            let numbers: Vec<usize> = (0..60).collect();
+            let wander = |turn: usize, channel: usize| 0.05 * ((turn * (channel + 2) * (setup + 3)) as f64).sin();
+            let of_turn = |turn: &usize| [wander(*turn, 0), wander(*turn, 1) + creep_um * *turn as f64 / 60.0];
+            let levels_um = numbers.iter().flat_map(of_turn).collect();
+            Profile { setup, sensors: vec![0, 1], levels: TurnLevels { numbers, levels_um }, ..Profile::default() }
+        };
+        creep_um.into_iter().enumerate().map(profile).collect()
+    }
+
+    #[test]
+    fn a_creep_is_named_with_its_sensor_and_capture() {
+        let rig = rig();
+        let warning = |creep_um| {
+            let mut steadiness = Steadiness::default();
+            steadiness.take("s1", &profiles(creep_um), &rig);
+            steadiness.warning(&rig)
+        };
+        assert_eq!(warning([0.0, 0.0]), None);
+        let shared = warning([24.0, 24.0]).unwrap();
+        assert!(shared.contains("S2 by +24.0") && shared.contains("over each capture"), "{shared}");
+        assert!(!shared.contains("S1"), "{shared}");
+        let single = warning([0.0, -24.0]).unwrap();
+        assert!(single.contains("S2 by -24.0") && single.contains("over the capture turned/s1"), "{single}");
+    }
+}

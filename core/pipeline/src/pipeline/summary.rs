@@ -1,0 +1,308 @@
+//! What a run found, for people and programs.
+
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    evaluate::{LimitSummary, PartSummary, PlacedValue, placed},
+    result::true_error,
+};
+use crate::stage::NamedValue;
+use runout_closed_loop::diagnosis::Correction;
+use runout_standards::Value;
+use runout_turning::station::StationResult;
+use runout_turning::{
+    azimuth::Azimuth,
+    profile::{Profile, Rejection, TurnLength},
+    provenance::Provenance,
+    reading::ReadingValues,
+    rig::Rig,
+    separation::{Assessment, Quantity},
+    surface::Meeting,
+};
+
+/// What a run found, for people and programs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Summary {
+    /// The pipeline's title.
+    pub title: String,
+    /// Enough to repeat the run.
+    pub provenance: Provenance,
+    /// Effects that the results are corrected for: what `diagnose` added, and what `[diagnose] known` declares. Those of a run
+    /// have none.
+    #[serde(default)]
+    pub effects: Vec<Correction>,
+    /// Orders that the layout cannot separate.
+    pub lost_orders: LostOrders,
+    /// One entry a station.
+    pub stations: Vec<StationSummary>,
+    /// Values of all sections together, where they were asked for and there are two sections or more.
+    pub part: Option<PartSummary>,
+    /// The limits of the pipeline, in their order, with what was found.
+    pub limits: Vec<LimitSummary>,
+    /// The surface, where one was built.
+    pub surface: Option<SurfaceSummary>,
+    /// Values of a domain that are not those of a form: of measured points.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub values: Vec<NamedValue>,
+    /// Files written.
+    pub outputs: Vec<PathBuf>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Summary {
+    /// Every value of form and motion: of sections, then of their station, station by station; the whole part's last.
+    #[must_use]
+    pub fn placed_values(&self) -> Vec<PlacedValue<'_>> {
+        placed(&self.stations, self.part.as_ref())
+    }
+
+    /// The run's warnings, then each station's behind its name.
+    pub fn all_warnings(&self) -> impl Iterator<Item = String> + '_ {
+        let of_station = |station: &'_ StationSummary| -> Vec<String> {
+            station.warnings.iter().map(|warning| format!("{}: {warning}", station.station)).collect()
+        };
+        self.warnings.iter().cloned().chain(self.stations.iter().flat_map(of_station))
+    }
+}
+
+/// Orders that cannot be separated.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LostOrders {
+    /// At which a section's form cannot be told.
+    pub form: Vec<usize>,
+    /// At which a motion cannot be told.
+    pub motion: Vec<usize>,
+}
+
+impl From<&Assessment> for LostOrders {
+    fn from(assessment: &Assessment) -> Self {
+        Self { form: assessment.lost_form_orders(), motion: assessment.lost_motion_orders() }
+    }
+}
+
+/// One station of a [`Summary`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StationSummary {
+    /// Its name.
+    pub station: String,
+    /// Carriage position, in mm.
+    pub z_mm: f64,
+    /// What became of the turns, one entry a setup.
+    pub captures: Vec<CaptureSummary>,
+    /// Form, section by section.
+    pub sections: Vec<SectionSummary>,
+    /// The line along which all motion of this station is, where that is neither x nor y: its angle from x towards y, in
+    /// degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion_along_deg: Option<f64>,
+    /// What the readings themselves have, one entry a setup and sensor: where no order of form is observable, and nothing else is
+    /// known. Empty where form is separated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<ReadingValues>,
+    /// Error motion values of the axis; empty where no spread over the turns is known.
+    pub motion_values: Vec<Value>,
+    /// Root mean square that the fit leaves of the readings, in µm; absent where nothing is redundant.
+    pub residual_rms_um: Option<f64>,
+    /// What the covariance of the averages lets expect of it, in µm.
+    pub expected_residual_rms_um: Option<f64>,
+    /// Weighted residual per degree of freedom.
+    pub chi2_per_dof: Option<f64>,
+    /// Lowest and highest order at which a reading is redundant: those that the residual and chi squared are of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_orders: Option<[usize; 2]>,
+    /// True error of the motions, where the recording carries the truth.
+    pub truth: Option<MotionTruth>,
+    /// What the user should know of this station.
+    pub warnings: Vec<String>,
+}
+
+/// What became of one capture's turns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CaptureSummary {
+    /// Id of the setup.
+    pub setup: String,
+    /// Whole turns between the first and the last mark.
+    pub turns_recorded: usize,
+    /// Turns in the average.
+    pub turns_used: usize,
+    /// "3 turns: start-up".
+    pub trimmed: Vec<String>,
+    /// Turns left out of the average, each with its reason.
+    pub rejected: Vec<RejectedTurnSummary>,
+    /// Mean speed of the turns used.
+    pub speed_rpm: Option<f64>,
+    /// Filters that the signal went through.
+    pub filters: Vec<String>,
+}
+
+/// A turn that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RejectedTurnSummary {
+    /// Counted from 0 at the capture's first mark.
+    pub turn: usize,
+    /// Sample at which it begins.
+    pub start_sample: u64,
+    /// Why.
+    pub reason: String,
+}
+
+/// One section's form.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SectionSummary {
+    /// Its id in the rig.
+    pub section: String,
+    /// Its place, in mm.
+    pub z_mm: f64,
+    /// Root mean square of the form, in µm.
+    pub form_rms_um: f64,
+    /// Standard uncertainty of the form at any one angle, from the covariance of the averages, in µm.
+    pub form_std_um: Option<f64>,
+    /// The standards' values.
+    pub values: Vec<Value>,
+    /// True error of the form (root mean square over orders from 2 that could be told), where the truth is known.
+    pub truth_form_rms_error_um: Option<f64>,
+}
+
+/// True errors of the motion: root mean square over orders from 2 that could be told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MotionTruth {
+    /// Of x, in µm.
+    pub x_rms_error_um: Option<f64>,
+    /// Of y, in µm.
+    pub y_rms_error_um: Option<f64>,
+    /// Of the tilt about x, in µrad.
+    pub tilt_x_rms_error_urad: Option<f64>,
+    /// Of the tilt about y, in µrad.
+    pub tilt_y_rms_error_urad: Option<f64>,
+    /// Of motion along `motion_along_deg`, in µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along_rms_error_um: Option<f64>,
+    /// Of the tilt towards `motion_along_deg`, in µrad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tilt_along_rms_error_urad: Option<f64>,
+}
+
+/// The surface of a [`Summary`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SurfaceSummary {
+    /// Angles around the part.
+    pub angles: usize,
+    /// Rings along z.
+    pub rings: usize,
+    /// First and last ring, in mm.
+    pub z_mm: [f64; 2],
+    /// How it was filled between the sections.
+    pub interpolation: String,
+    /// Where sections of different sensors meet, and how well they agree.
+    pub meetings: Vec<Meeting>,
+}
+
+pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSummary {
+    let separation = &result.separation;
+    let known = |value: f64| value.is_finite().then_some(value);
+    let nothing = separation.tells_no_form();
+    let sections = separation.sections.iter().enumerate().map(|(section, at)| {
+        let unknown = separation.position(Quantity::Form(section));
+        SectionSummary {
+            section: at.id.clone(),
+            z_mm: at.z_mm,
+            form_rms_um: result.form_rms_um(section).filter(|_| !nothing).map_or(f64::NAN, |(rms_um, _)| rms_um),
+            form_std_um: unknown.filter(|_| !nothing).and_then(|unknown| known(separation.angle_std(unknown))),
+            values: result.values.get(section).cloned().unwrap_or_default(),
+            truth_form_rms_error_um: true_error(result, Quantity::Form(section)),
+        }
+    });
+    let sections: Vec<_> = sections.collect();
+    let azimuth = separation.azimuth();
+    let has_motion = result.truth.as_ref().is_some_and(|truth| truth.motion.is_some());
+    StationSummary {
+        station: result.station.clone(),
+        z_mm: result.z_mm,
+        captures: result.profiles.iter().map(|profile| capture_summary(profile, rig)).collect(),
+        sections,
+        motion_along_deg: azimuth.map(Azimuth::degrees),
+        readings: if nothing { readings(&result.profiles, rig) } else { Vec::new() },
+        motion_values: result.motion_values.clone(),
+        residual_rms_um: known(separation.residual.rms_um),
+        expected_residual_rms_um: known(separation.residual.expected_rms_um),
+        chi2_per_dof: known(separation.residual.chi2_per_dof),
+        residual_orders: separation.residual.orders,
+        truth: has_motion.then(|| MotionTruth {
+            x_rms_error_um: true_error(result, Quantity::X),
+            y_rms_error_um: true_error(result, Quantity::Y),
+            tilt_x_rms_error_urad: true_error(result, Quantity::TiltX),
+            tilt_y_rms_error_urad: true_error(result, Quantity::TiltY),
+            along_rms_error_um: azimuth.and_then(|azimuth| true_error(result, Quantity::Along(azimuth))),
+            tilt_along_rms_error_urad: azimuth.and_then(|azimuth| true_error(result, Quantity::TiltAlong(azimuth))),
+        }),
+        warnings: separation
+            .warnings
+            .iter()
+            .chain(result.profiles.iter().flat_map(|profile| &profile.warnings))
+            .cloned()
+            .collect(),
+    }
+}
+
+pub(super) fn setup_id(profile: &Profile, rig: Option<&Rig>) -> String {
+    rig.and_then(|rig| rig.setups.get(profile.setup)).map_or_else(String::new, |setup| setup.id.clone())
+}
+
+pub(super) fn sensor_id(index: usize, rig: Option<&Rig>) -> String {
+    rig.and_then(|rig| rig.sensors.get(index)).map_or_else(|| format!("sensor {index}"), |sensor| sensor.id.clone())
+}
+
+/// Every channel of every capture.
+fn readings(profiles: &[Profile], rig: Option<&Rig>) -> Vec<ReadingValues> {
+    let of = |profile: &Profile| -> Vec<ReadingValues> {
+        let setup = setup_id(profile, rig);
+        let channels = profile.sensors.iter().enumerate();
+        channels
+            .filter_map(|(channel, sensor)| ReadingValues::of(profile, channel, &setup, &sensor_id(*sensor, rig)))
+            .collect()
+    };
+    profiles.iter().flat_map(of).collect()
+}
+
+fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
+    let setup = setup_id(profile, rig);
+    let sensor = |index: usize| sensor_id(index, rig);
+    let length =
+        |turn: &TurnLength| format!("{:.1} samples long, the median turn has {:.1}", turn.samples, turn.median_samples);
+    let reason = |rejection: &Rejection| match rejection {
+        Rejection::MissingMark(turn) => format!("a mark is missing: {}", length(turn)),
+        Rejection::DoubledMark(turn) if turn.samples > 0.9 * turn.median_samples => {
+            "next to a mark that was counted twice: where it begins or ends is open".into()
+        }
+        Rejection::DoubledMark(turn) => format!("a mark was counted twice: {}", length(turn)),
+        Rejection::Speed(turn) => format!("off speed: {}", length(turn)),
+        Rejection::Defect { sensor: index, kind } => format!("{}: {kind}", sensor(*index)),
+        Rejection::Outlier { sensor: index, distance_um } => {
+            format!("{}: {distance_um:.3} µm rms from the other turns", sensor(*index))
+        }
+        Rejection::Incomplete => "not wholly covered by samples".into(),
+        Rejection::Angle => "the encoder's angle does not grow steadily by one turn".into(),
+    };
+    CaptureSummary {
+        setup,
+        turns_recorded: profile.turns.recorded,
+        turns_used: profile.turns.used,
+        trimmed: profile.turns.trimmed.iter().map(|trim| format!("{} turns: {}", trim.turns, trim.reason)).collect(),
+        rejected: profile
+            .turns
+            .rejected
+            .iter()
+            .map(|turn| RejectedTurnSummary {
+                turn: turn.turn,
+                start_sample: turn.start_sample,
+                reason: reason(&turn.reason),
+            })
+            .collect(),
+        speed_rpm: profile.speed_rpm,
+        filters: profile.responses.iter().map(|response| response.description.clone()).collect(),
+    }
+}

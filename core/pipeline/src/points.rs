@@ -1,0 +1,110 @@
+//! Measured points that belong to no turn: a coordinate measuring machine's circles, an R-test's ball positions.
+
+use std::{ops::Range, path::PathBuf};
+
+use runout_error::{Error, Result};
+
+/// Points in named columns, grouped into traces.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Points {
+    /// The file behind them.
+    pub input: PathBuf,
+    /// Columns of equal length; the unit is part of the name (`angle_deg`).
+    pub columns: Vec<Column>,
+    /// Columns of texts: names of balls, of setups.
+    pub labels: Vec<Labels>,
+    /// Consecutive points that were measured in one go.
+    pub traces: Vec<Trace>,
+}
+
+/// One named column of texts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Labels {
+    /// Its name.
+    pub name: String,
+    /// One text a point.
+    pub values: Vec<String>,
+}
+
+/// A column that a method needs of points, or can use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PointColumn {
+    /// Its name, with the unit where it has one.
+    pub name: &'static str,
+    /// Its unit; empty for what has none.
+    pub unit: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// What it holds.
+    pub kind: PointKind,
+    /// Whether points may lack it.
+    pub optional: bool,
+}
+
+/// What a column of points holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PointKind {
+    /// Finite numbers.
+    Number,
+    /// 0 (used) and 1 (left out).
+    Flag,
+    /// Texts, which become [`Labels`].
+    Label,
+    /// The id of the [`Trace`] that a point belongs to; the points of a trace follow one another.
+    Trace,
+    /// What is the same along a trace, and becomes its [`kind`](Trace::kind).
+    TraceKind,
+}
+
+impl PointColumn {
+    /// A column that the method needs.
+    #[must_use]
+    pub const fn needed(name: &'static str, kind: PointKind, unit: &'static str, about: &'static str) -> Self {
+        Self { name, unit, about, kind, optional: false }
+    }
+
+    /// A column that the method can use.
+    #[must_use]
+    pub const fn optional(name: &'static str, kind: PointKind, unit: &'static str, about: &'static str) -> Self {
+        Self { name, unit, about, kind, optional: true }
+    }
+}
+
+/// One named column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name with unit.
+    pub name: String,
+    /// One value a point.
+    pub values: Vec<f64>,
+}
+
+/// A run of points measured in one go.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// Its name in the file.
+    pub id: String,
+    /// What it runs along ("circle", "generatrix"), or the setup that it was measured in ("initial").
+    pub kind: String,
+    /// Its points.
+    pub points: Range<usize>,
+}
+
+impl Points {
+    /// A column by name.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    pub fn column(&self, name: &str) -> Result<&[f64]> {
+        self.columns.iter().find(|column| column.name == name).map(|column| column.values.as_slice()).ok_or_else(|| {
+            let known: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
+            Error::new("find the column", name, format!("{} has {}", self.input.display(), known.join(", ")))
+        })
+    }
+
+    /// A column of texts by name; `None` where there is none.
+    #[must_use]
+    pub fn labels(&self, name: &str) -> Option<&[String]> {
+        self.labels.iter().find(|labels| labels.name == name).map(|labels| labels.values.as_slice())
+    }
+}

@@ -1,0 +1,237 @@
+//! Separation of measured points, of any domain: points in; tables, values and form out.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::points::{PointColumn, Points};
+use runout_closed_loop::{
+    Effect, Model,
+    closed_loop::{self, Settings},
+    diagnosis::Diagnosis,
+    linear_terms::{LinearFit, LinearTerms},
+};
+use runout_error::Result;
+use runout_table::{ColumnSpec, TableRows, TableSpec, counts, numbers, texts};
+use runout_turning::{separation::Separation, surface::Surface};
+
+/// Separates measured points as a whole.
+pub trait PointSeparator: Send + Sync {
+    /// The columns that it needs of the points, and those that it can use.
+    fn columns(&self) -> Vec<PointColumn>;
+
+    /// The tables of its result, but for those that follow from form.
+    fn tables(&self) -> Vec<TableSpec>;
+
+    /// What the points say.
+    ///
+    /// # Errors
+    /// When they do not hold what the method needs.
+    fn separate(&self, points: &Points) -> Result<Outcome>;
+
+    /// Whether its result has form: closed profiles, from which the standards' values and a surface are computed.
+    fn gives_form(&self) -> bool {
+        false
+    }
+
+    /// Whether [`remarks`](Self::remarks) needs the surface.
+    fn needs_surface(&self) -> bool {
+        false
+    }
+
+    /// What the user should know of the whole, once its surface is there.
+    ///
+    /// # Errors
+    /// When the points do not hold what it needs.
+    fn remarks(&self, _points: &Points, _surface: Option<&Surface>) -> Result<Vec<String>> {
+        Ok(Vec::new())
+    }
+
+    /// What holds whatever the points are: what the method cannot observe.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Its model for the closed loop, where it has one.
+    fn model(&self) -> Option<&dyn PointModel> {
+        None
+    }
+}
+
+/// A model of measured points for the closed loop.
+pub trait PointModel: Send + Sync {
+    /// What it may lack; where only the points name the targets, without targets.
+    fn effects(&self) -> Vec<Effect>;
+
+    /// Whether only the points name the targets of its effects: traces, setups.
+    fn points_name_targets(&self) -> bool {
+        false
+    }
+
+    /// What it may lack with these points, at each target.
+    ///
+    /// # Errors
+    /// When the points do not hold what the model needs.
+    fn effects_of(&self, _points: &Points) -> Result<Vec<Effect>> {
+        Ok(self.effects())
+    }
+
+    /// Runs the loop; `settings` count effects as [`effects_of`](Self::effects_of) does.
+    ///
+    /// # Errors
+    /// When the points do not hold what the model needs.
+    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis>;
+}
+
+/// What the closed loop found, with the result of the final model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointDiagnosis {
+    /// What was found.
+    pub diagnosis: Diagnosis,
+    /// The result with the effects added.
+    pub after: Outcome,
+}
+
+/// What a separator makes of points.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Outcome {
+    /// Signs and references of its numbers.
+    pub convention: String,
+    /// Rows of its tables.
+    pub tables: Vec<TableRows>,
+    /// Values.
+    pub values: Vec<NamedValue>,
+    /// Form, where there is one.
+    pub form: Option<Form>,
+    /// What the user should know.
+    pub remarks: Vec<String>,
+}
+
+/// A value of a result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NamedValue {
+    /// The standard's symbol, or a short name.
+    pub symbol: String,
+    /// What it is of, where the result has several: a part, a section, an axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// The number; null where it is not observable.
+    pub value: Option<f64>,
+    /// Its standard uncertainty; null where it is not known.
+    pub std: Option<f64>,
+    /// Its unit; empty for a number without one.
+    pub unit: String,
+    /// What it is, with standard and clause.
+    pub about: String,
+}
+
+/// Closed profiles of a part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Form {
+    /// One separation a section, in the order of z, named by the section's id.
+    pub sections: Vec<Separation>,
+    /// Radius of the cylinder that deviations count from, in mm.
+    pub radius_mm: f64,
+}
+
+/// A domain whose declared model and effects are linear in their parameters.
+pub trait LinearModel: Send + Sync {
+    /// What it may lack, in the order of the terms; what is usual of a parameter may depend on the points.
+    fn candidates(&self) -> Vec<Effect>;
+
+    /// What is declared of these points, and the effects that this may lack.
+    ///
+    /// # Errors
+    /// When the points do not hold what the model needs.
+    fn terms(&self, points: &Points) -> Result<LinearTerms>;
+
+    /// What a fit says.
+    ///
+    /// # Errors
+    /// When the points do not hold what it needs.
+    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome>;
+}
+
+impl<M: LinearModel> PointModel for M {
+    fn effects(&self) -> Vec<Effect> {
+        self.candidates()
+    }
+
+    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
+        let terms = self.terms(points)?.with_known(&settings.known).considering(settings.effects.as_deref());
+        let closed = closed_loop::diagnose(&terms, settings)?;
+        let mut after = self.conclude(points, &closed.after)?;
+        after.tables.push(residual_rows(&terms, &closed.before, &closed.after)?);
+        let mut diagnosis = closed.diagnosis;
+        diagnosis.warnings.append(&mut after.remarks);
+        Ok(PointDiagnosis { diagnosis, after })
+    }
+}
+
+/// The result of a linear model as it is declared.
+///
+/// # Errors
+/// When the points do not hold what the model needs.
+pub fn separate_declared(model: &impl LinearModel, points: &Points) -> Result<Outcome> {
+    let terms = model.terms(points)?;
+    let fit = terms.fit(&[])?;
+    let mut outcome = model.conclude(points, &fit)?;
+    outcome.tables.push(residual_rows(&terms, &fit, &fit)?);
+    Ok(outcome)
+}
+
+/// The residual of a linear model, reading by reading.
+#[must_use]
+pub fn residual_table(unit: &str) -> TableSpec {
+    let residual = |name: &str, of: &str| ColumnSpec::number(name, unit, format!("reading less {of}"));
+    TableSpec::new(
+        "residual",
+        "residual of each reading",
+        vec![
+            ColumnSpec::count("reading", "", "number of the reading, from 0"),
+            ColumnSpec::name("group", "what is held out together"),
+            ColumnSpec::number("value", unit, "the reading"),
+            residual("before", "the declared model"),
+            residual("after", "the final model; that of a run is the declared one"),
+        ],
+    )
+}
+
+fn residual_rows(terms: &LinearTerms, before: &LinearFit, after: &LinearFit) -> Result<TableRows> {
+    let observations = terms.observations();
+    // Rows are in the order in which they were measured.
+    let mut order: Vec<usize> = (0..observations.values.len()).collect();
+    order.sort_unstable_by_key(|index| terms.places()[*index]);
+    let column = |values: &[f64]| numbers(order.iter().map(|index| values[*index]));
+    let groups = order.iter().map(|index| observations.group[*index]);
+    let spec = residual_table(&observations.unit);
+    let rows = spec.rows(vec![
+        counts(0..order.len()),
+        texts(groups.map(|group| observations.groups.get(group).map_or("", String::as_str))),
+        column(&observations.values),
+        column(&before.residual()),
+        column(&after.residual()),
+    ])?;
+    Ok(TableRows { table: spec.name, rows })
+}
+
+/// A value that needs no more than a name, a number and a unit.
+#[must_use]
+pub fn value(symbol: &str, value: f64, std: f64, unit: &str, about: &str) -> NamedValue {
+    let known = |number: f64| number.is_finite().then_some(number);
+    NamedValue {
+        symbol: symbol.into(),
+        of: None,
+        value: known(value),
+        std: known(std),
+        unit: unit.into(),
+        about: about.into(),
+    }
+}
+
+impl NamedValue {
+    /// The same of one of several parts.
+    #[must_use]
+    pub fn of(self, of: impl Into<String>) -> Self {
+        Self { of: Some(of.into()), ..self }
+    }
+}

@@ -1,0 +1,193 @@
+//! The points of a wall, and what they are about an axis.
+
+use super::{Cylinder, Reference, Undetermined, Values, least_squares, search};
+use crate::{near::Course, roundness::Angles};
+
+/// One circle of a wall.
+#[derive(Debug, Clone, Copy)]
+pub struct Section<'a> {
+    /// Its height.
+    pub z_mm: f64,
+    /// Directions of its points.
+    pub angles: &'a Angles,
+    /// Radial deviations from the nominal radius, one at each angle; what is not finite is missing.
+    pub form_um: &'a [f64],
+}
+
+/// Points of a wall.
+///
+/// A point p at height z is held as f = p/R, w = (|p|² − R²)/2R and ζ, which is −1 and 1 at the ends of the wall. About
+/// the axis (x, y) + (a, b)·z its squared distance is |q|² − (a·q₁ + b·q₂)²/(1 + a² + b²) with q = p − (x, y) − (a, b)·z:
+/// what the plane knows, less a term for the tilt.
+#[derive(Debug, Clone)]
+pub struct Points {
+    pub(super) radius_um: f64,
+    middle_mm: f64,
+    half_um: f64,
+    /// f, w and ζ; w is NaN where the point is missing.
+    held: Vec<[f64; 4]>,
+    /// The largest |w|.
+    pub(super) span_um: f64,
+}
+
+/// An axis inside: x and y midway and how far it leans until the end, in µm.
+pub(super) type Axis = [f64; 4];
+
+impl Points {
+    /// Points (angle in rad, z in mm, radial deviation in µm) about a nominal radius (positive).
+    #[must_use]
+    pub fn new(radius_mm: f64, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
+        let points = points.into_iter().map(|(angle, z, form)| (angle.sin_cos(), z, form));
+        Self::of(radius_mm, points.collect())
+    }
+
+    /// The points of sections, one after the other.
+    #[must_use]
+    pub fn of_sections(radius_mm: f64, sections: &[Section]) -> Self {
+        let mut points = Vec::new();
+        for section in sections {
+            let directions = section.angles.sin_cos();
+            points.extend(directions.zip(section.form_um).map(|(direction, form)| (direction, section.z_mm, *form)));
+        }
+        Self::of(radius_mm, points)
+    }
+
+    pub(super) fn of(radius_mm: f64, points: Vec<((f64, f64), f64, f64)>) -> Self {
+        let radius = 1e3 * radius_mm;
+        let there = |z: f64, form: f64| z.is_finite() && form.is_finite();
+        let heights = points.iter().filter(|(_, z, form)| there(*z, *form)).map(|(_, z, _)| *z);
+        let (bottom, top) =
+            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+        let (middle_mm, half_mm) = (0.5 * (bottom + top), 0.5 * (top - bottom));
+        let held = points.into_iter().map(|((sin, cos), z, form)| {
+            let scale = 1.0 + form / radius;
+            let level = form + form * form / (2.0 * radius);
+            if there(z, form) {
+                [scale * cos, scale * sin, level, (z - middle_mm) / half_mm]
+            } else {
+                [0.0, 0.0, f64::NAN, 0.0]
+            }
+        });
+        let held: Vec<[f64; 4]> = held.collect();
+        let span_um = held.iter().map(|held| held[2].abs()).fold(0.0, f64::max);
+        Self { radius_um: radius, middle_mm, half_um: 1e3 * half_mm, held, span_um }
+    }
+
+    /// Points, those that are missing included.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.held.len()
+    }
+
+    /// Whether there is no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.held.is_empty()
+    }
+
+    /// Share of the points that are there.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        self.there().count() as f64 / self.len() as f64
+    }
+
+    pub(super) fn there(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.len()).filter(|point| !self.held[*point][2].is_nan())
+    }
+
+    /// The reference cylinder as [`determine`](Self::determine) finds it, without the reason where there is none.
+    #[must_use]
+    pub fn reference(&self, reference: Reference) -> Option<Cylinder> {
+        self.determine(reference).ok()
+    }
+
+    /// The reference cylinder. MZCY, MICY and MCCY are the local optimum that is reached downhill from LSCY; none is worse
+    /// than LSCY by its own criterion.
+    ///
+    /// The largest inscribed and the smallest circumscribed cylinder often leave their axis free: contacts at one height do
+    /// not fix the tilt. The zone (CYLt) then decides, with a small weight in what is minimised: MCCY is the axis with the
+    /// least `high` + 10⁻³ (`high` − `low`), MICY that with the least 10⁻³ (`high` − `low`) − `low`, of the highest and the
+    /// lowest distance of a point. The radius is the extreme one to 10⁻³ of the zone; it is exactly that wherever
+    /// the contacts fix the axis.
+    ///
+    /// # Errors
+    /// Fewer than five points, all at one height, points that do not surround an axis (not for MCCY), or deviations as large
+    /// as the radius, beside which they are taken to be small.
+    pub fn determine(&self, reference: Reference) -> Result<Cylinder, Undetermined> {
+        if self.there().count() < 5 {
+            return Err(Undetermined::TooFewPoints);
+        }
+        if !(self.half_um > 0.0 && self.half_um.is_finite()) {
+            return Err(Undetermined::OneHeight);
+        }
+        if !(self.radius_um > 0.0 && self.span_um < self.radius_um) {
+            return Err(Undetermined::Radius);
+        }
+        let (axis, deviation) = least_squares::axis(self).ok_or(Undetermined::NotFound)?;
+        match reference {
+            Reference::LeastSquares => Ok(self.about(axis, deviation, vec![])),
+            _ => search::search(self, axis, reference),
+        }
+    }
+
+    /// MZCY, MICY or MCCY, reached downhill from the axis of a cylinder nearby.
+    pub(super) fn reference_near(&self, reference: Reference, near: &Cylinder) -> Option<Cylinder> {
+        let lean = [near.slope_x_urad, near.slope_y_urad].map(|slope| 1e-6 * slope * self.half_um);
+        let up = 1e-3 * (self.middle_mm - near.z_mm);
+        let at = [near.x_um + near.slope_x_urad * up, near.y_um + near.slope_y_urad * up];
+        let determined = self.half_um > 0.0 && self.half_um.is_finite();
+        determined.then(|| search::search(self, [at[0], at[1], lean[0], lean[1]], reference).ok())?
+    }
+
+    /// Deviation of each point from a cylinder, at right angles to its axis, outward positive; NaN where it is missing.
+    pub fn deviations_um<'a>(&'a self, cylinder: &Cylinder) -> impl Iterator<Item = f64> + 'a {
+        let lean = 1e-6 * self.half_um;
+        let moved = 1e3 * (self.middle_mm - cylinder.z_mm) * 1e-6;
+        let [x, y] = [(cylinder.x_um, cylinder.slope_x_urad), (cylinder.y_um, cylinder.slope_y_urad)]
+            .map(|(at, slope)| at + slope * moved);
+        let axis = [x, y, cylinder.slope_x_urad * lean, cylinder.slope_y_urad * lean];
+        let deviation = cylinder.deviation_um;
+        (0..self.len()).map(move |point| self.deviation(point, &axis) - deviation)
+    }
+
+    /// CYLt, CYLp, CYLv and CYLq about a cylinder; NaN where no point is there.
+    #[must_use]
+    pub fn values(&self, cylinder: &Cylinder) -> Values {
+        Course::of(self.deviations_um(cylinder)).into()
+    }
+
+    /// Distance from an axis less R.
+    pub(super) fn deviation(&self, point: usize, axis: &Axis) -> f64 {
+        self.with_slopes(point, axis).0
+    }
+
+    /// Distance from an axis less R, and its derivatives by the axis.
+    pub(super) fn with_slopes(&self, point: usize, axis: &Axis) -> (f64, Axis) {
+        let [u, v, level, zeta] = self.held[point];
+        let radius = self.radius_um;
+        let [a, b] = [axis[2] / self.half_um, axis[3] / self.half_um];
+        let length = 1.0 + a * a + b * b;
+        let [x, y] = [axis[0] + axis[2] * zeta, axis[1] + axis[3] * zeta];
+        let [q_x, q_y] = [radius * u - x, radius * v - y];
+        let along = a * q_x + b * q_y;
+        let lifted = level - x * u - y * v + (x * x + y * y - along * along / length) / (2.0 * radius);
+        let stretch = (1.0 + 2.0 * lifted / radius).max(f64::MIN_POSITIVE).sqrt();
+        let across = |q: f64, slope: f64| (slope * along / length - q) / (radius * stretch);
+        let turned =
+            |q: f64, slope: f64| along * (slope * along / length - q) / (radius * stretch * length * self.half_um);
+        let [s_x, s_y] = [across(q_x, a), across(q_y, b)];
+        let slopes = [s_x, s_y, s_x * zeta + turned(q_x, a), s_y * zeta + turned(q_y, b)];
+        (2.0 * lifted / (1.0 + stretch), slopes)
+    }
+
+    /// Deviations that differ by less are equal: rounding of coordinates.
+    pub(super) fn tolerance(&self) -> f64 {
+        4.0 * f64::EPSILON * (self.radius_um + self.span_um)
+    }
+
+    pub(super) fn about(&self, axis: Axis, deviation_um: f64, touches: Vec<super::Touch>) -> Cylinder {
+        let [x_um, y_um, ..] = axis;
+        let [slope_x_urad, slope_y_urad] = [axis[2], axis[3]].map(|lean| 1e6 * lean / self.half_um);
+        Cylinder { z_mm: self.middle_mm, x_um, y_um, slope_x_urad, slope_y_urad, deviation_um, touches }
+    }
+}

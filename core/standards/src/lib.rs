@@ -1,0 +1,55 @@
+//! The standards' values: of closed and open profiles, walls and height maps.
+
+pub mod areal;
+pub mod cylindricity;
+pub mod drawn;
+pub mod gaps;
+mod near;
+pub mod parameter;
+pub mod position;
+pub mod reference;
+pub mod roundness;
+pub mod slope;
+pub mod straightness;
+pub mod texture;
+pub mod twist;
+pub mod uncertainty;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One value of a section, of a station or of the whole part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Value {
+    /// The standard's symbol.
+    pub symbol: String,
+    /// Its unit; empty for a number without one.
+    pub unit: String,
+    /// The number.
+    pub value: f64,
+    /// Standard and clause, or paper and equation.
+    pub source: String,
+    /// Undulations per revolution over which it was computed, both ends included; a filter's end is where half passes.
+    pub band_upr: [usize; 2],
+    /// Orders that the layout cannot tell, of which the filter would pass a hundredth or more: they are not in the value.
+    pub lost_orders: Vec<usize>,
+    /// Undulations per revolution from which on a filter before the average passes less than half of the power, where the
+    /// value's own filter passes a hundredth or more: what is above is not in the value; null where nothing is missing.
+    #[serde(default)]
+    pub weakened_above_upr: Option<f64>,
+    /// Highest order that there is, where the value's own filter passes a thousandth or more of those above: they are not in
+    /// the value; null where nothing is missing.
+    #[serde(default)]
+    pub absent_above_upr: Option<usize>,
+    /// The filter applied.
+    pub filter: String,
+    /// What the profile was referred to.
+    pub reference: String,
+    /// Share of the profile or surface that was there; gaps are left out.
+    pub coverage: f64,
+    /// From the covariance of the separation; null where none is known.
+    pub uncertainty: Option<uncertainty::Uncertainty>,
+    /// Why no uncertainty is stated, where the errors are known and intervals by them do not hold; null otherwise.
+    #[serde(default)]
+    pub no_uncertainty: Option<String>,
+}

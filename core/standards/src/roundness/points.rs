@@ -1,0 +1,317 @@
+//! The points of a profile, and what they are about a circle.
+
+#![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
+
+use std::{cell::RefCell, f64::consts::TAU, rc::Rc};
+
+use super::{Circle, Reference, Undetermined, Values, circumscribed, least_squares, search};
+use crate::near::Course;
+use runout_numerics::{
+    chebyshev::Chebyshev,
+    cloud::Cloud,
+    lanes::{NullaryFnOnce, vectorised},
+};
+
+/// Sets of equal angles that are kept: those of the filters of one section.
+const MOST_SHARED: usize = 8;
+
+thread_local! {
+    /// Profiles of one recording mostly ask for the same.
+    static SHARED: RefCell<Vec<Rc<Angles>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Directions of a profile's points, to be kept and used for many profiles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Angles {
+    cos: Vec<f64>,
+    sin: Vec<f64>,
+}
+
+impl Angles {
+    /// `count` equal steps from 0 on.
+    #[must_use]
+    pub fn equal(count: usize) -> Self {
+        (0..count).map(|index| TAU * index as f64 / count as f64).collect()
+    }
+
+    /// Sine and cosine of each.
+    pub fn sin_cos(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.sin.iter().copied().zip(self.cos.iter().copied())
+    }
+
+    /// The same as [`equal`](Self::equal), computed once and shared by all that ask on this thread.
+    #[must_use]
+    pub fn shared(count: usize) -> Rc<Self> {
+        SHARED.with_borrow_mut(|shared| {
+            if let Some(angles) = shared.iter().find(|angles| angles.len() == count) {
+                return Rc::clone(angles);
+            }
+            let angles = Rc::new(Self::equal(count));
+            shared.truncate(MOST_SHARED - 1);
+            shared.insert(0, Rc::clone(&angles));
+            angles
+        })
+    }
+
+    /// Number of angles.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.cos.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.cos.is_empty()
+    }
+
+    /// Those of some points.
+    pub(super) fn select(&self, points: &[usize]) -> Self {
+        let [cos, sin] = [&self.cos, &self.sin].map(|all| points.iter().map(|point| all[*point]).collect());
+        Self { cos, sin }
+    }
+}
+
+/// From angles in rad.
+impl FromIterator<f64> for Angles {
+    fn from_iter<T: IntoIterator<Item = f64>>(angles: T) -> Self {
+        let (sin, cos) = angles.into_iter().map(f64::sin_cos).unzip();
+        Self { cos, sin }
+    }
+}
+
+/// Points of a profile; memory is reused from one profile to the next.
+///
+/// A point p is held as f = p/R and w = (|p|² − R²)/2R. Its squared distance ρ² from a centre c is then
+/// R² + 2R·(w − f·c + |c|²/2R): linear in c up to a term that all points share, without cancellation, and exact. A
+/// deviation that is not a finite number is a point that is missing (a lost angle, a keyway).
+#[derive(Debug, Clone, Default)]
+pub struct Points {
+    pub(super) cloud: Cloud<2>,
+    radius_um: f64,
+    origin_um: [f64; 2],
+    /// The largest |w|.
+    pub(super) span_um: f64,
+}
+
+/// Where points of a profile are put.
+struct Profile<'a> {
+    u: &'a mut [f64],
+    v: &'a mut [f64],
+    levels: &'a mut [f64],
+    form_um: &'a [f64],
+    cos: &'a [f64],
+    sin: &'a [f64],
+    radius_um: f64,
+}
+
+impl NullaryFnOnce for Profile<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { u, v, levels, form_um, cos, sin, radius_um } = self;
+        let (per_radius, half) = (radius_um.recip(), 0.5 / radius_um);
+        for (level, form) in levels.iter_mut().zip(form_um) {
+            // An infinite form is no point either.
+            *level = if form.abs() < f64::INFINITY { form + form * form * half } else { f64::NAN };
+        }
+        for (column, direction) in [(u, cos), (v, sin)] {
+            for ((feature, direction), form) in column.iter_mut().zip(direction).zip(form_um) {
+                let scale = if form.abs() < f64::INFINITY { 1.0 + form * per_radius } else { 0.0 };
+                *feature = scale * direction;
+            }
+        }
+    }
+}
+
+impl Points {
+    /// Takes a profile: radial deviations `form_um` from a circle of `radius_mm` (positive), one at each angle.
+    ///
+    /// Deviations may be as large as the radius: for a polar plot, `radius_mm` is its base circle.
+    pub fn set_profile(&mut self, angles: &Angles, form_um: &[f64], radius_mm: f64) {
+        let radius_um = 1e3 * radius_mm;
+        (self.radius_um, self.origin_um) = (radius_um, [0.0; 2]);
+        let ([u, v], levels) = self.cloud.columns_mut();
+        let count = form_um.len().min(angles.len());
+        [&mut *u, &mut *v, &mut *levels].into_iter().for_each(|column| column.resize(count, 0.0));
+        let form_um = &form_um[..count];
+        vectorised(Profile { u, v, levels, form_um, cos: &angles.cos[..count], sin: &angles.sin[..count], radius_um });
+        self.measure();
+    }
+
+    /// Takes points of the plane, in any order; the mean distance from their centroid serves as nominal radius.
+    pub fn set_plane(&mut self, x_um: &[f64], y_um: &[f64]) {
+        let there = || x_um.iter().zip(y_um).filter(|(x, y)| x.is_finite() && y.is_finite());
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / there().count().max(1) as f64;
+        let [x0, y0] = [mean(&mut there().map(|(x, _)| *x)), mean(&mut there().map(|(_, y)| *y))];
+        let radius = mean(&mut there().map(|(x, y)| (x - x0).hypot(y - y0)));
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        (self.radius_um, self.origin_um) = (radius, [x0, y0]);
+        self.cloud.clear();
+        for (x, y) in x_um.iter().zip(y_um) {
+            let distance = (x - x0).hypot(y - y0);
+            if distance.is_finite() {
+                let level = (distance - radius) * (distance + radius) / (2.0 * radius);
+                self.cloud.push([(x - x0) / radius, (y - y0) / radius], level);
+            } else {
+                self.cloud.push([0.0; 2], f64::NAN);
+            }
+        }
+        self.measure();
+    }
+
+    /// Adds a point of a profile.
+    pub(super) fn push(&mut self, angle_rad: f64, form_um: f64) {
+        let ((sin, cos), scale) = (angle_rad.sin_cos(), 1.0 + form_um / self.radius_um);
+        let level = form_um + form_um * form_um / (2.0 * self.radius_um);
+        self.cloud.push([scale * cos, scale * sin], level);
+        self.span_um = self.span_um.max(level.abs());
+    }
+
+    fn measure(&mut self) {
+        let (low, high) = self.cloud.extremes(0..self.cloud.len(), &[0.0; 2]);
+        self.span_um = if high < low { 0.0 } else { high.abs().max(low.abs()) };
+    }
+
+    /// The nominal radius R.
+    #[must_use]
+    pub fn radius_um(&self) -> f64 {
+        self.radius_um
+    }
+
+    /// Points, those that are missing included.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.cloud.len()
+    }
+
+    /// Whether there is no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.cloud.is_empty()
+    }
+
+    /// Share of the points that are there.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        self.there() as f64 / self.len() as f64
+    }
+
+    pub(super) fn there(&self) -> usize {
+        self.cloud.levels().iter().filter(|level| !level.is_nan()).count()
+    }
+
+    /// The reference circle as [`determine`](Self::determine) finds it, without the reason where there is none.
+    #[must_use]
+    pub fn reference(&self, reference: Reference) -> Option<Circle> {
+        self.determine(reference).ok()
+    }
+
+    /// The reference circle.
+    ///
+    /// MZCI and MICI are those whose centre is reached downhill (uphill) from that of the algebraic least-squares circle
+    /// (Kåsa). Where deviations are small beside the radius there is no better one. A profile that is far from a circle
+    /// (a polar plot with the base circle's size) may have several of them, as a kidney has several inscribed circles: from
+    /// deviations of 2 % of the radius on, the search also starts at the best places of a grid, and the best circle is taken.
+    ///
+    /// # Errors
+    /// Fewer than three points (two for MCCI); a nominal radius that is not a positive number; points that do not surround a
+    /// centre, of which the inscribed circle or the zone grows without bound.
+    pub fn determine(&self, reference: Reference) -> Result<Circle, Undetermined> {
+        if !(self.radius_um > 0.0 && self.radius_um.is_finite()) {
+            return Err(Undetermined::Radius);
+        }
+        if self.there() < if reference == Reference::MinimumCircumscribed { 2 } else { 3 } {
+            return Err(Undetermined::TooFewPoints);
+        }
+        match reference {
+            Reference::LeastSquares => least_squares::circle(self).ok_or(Undetermined::NotFound),
+            Reference::MinimumZone => search::minimum_zone(self),
+            Reference::MaximumInscribed => search::maximum_inscribed(self),
+            Reference::MinimumCircumscribed => circumscribed::circle(self).ok_or(Undetermined::NotFound),
+        }
+    }
+
+    /// Values about the minimum zone's centre, the centre, and lowest and highest deviation from the nominal radius. `near` is
+    /// a place near to it: the heights' shares in the zone are those there, which errs by deviation²/R times what the place
+    /// moves; for profiles that are drawn.
+    pub(super) fn zone_near(
+        &self,
+        near: [f64; 2],
+        chebyshev: &mut Chebyshev<2, 4>,
+    ) -> Option<(Values, [f64; 2], [f64; 2])> {
+        let cost = search::zone_slopes(self, &near);
+        let reach = self.radius_um + self.span_um;
+        let limits = near.map(|near| (near - reach, near + reach));
+        let optimum = chebyshev.solve(&self.cloud, &cost, &limits, self.tolerance())?;
+        let place = optimum.place;
+        let (low, high) = self.cloud.extremes(0..self.len(), &place);
+        let common = self.common(&place);
+        let [low, high] = [low, high].map(|height| self.deviation(height + common));
+        let half = 0.5 * (high - low);
+        let values =
+            Values { ront_um: high - low, ronp_um: half, ronv_um: half, ronq_um: f64::NAN, points: self.len() };
+        Some((values, place, [low, high]))
+    }
+
+    /// Deviation of each point from a circle, outward positive; NaN where it is missing.
+    pub fn deviations_um<'a>(&'a self, circle: &Circle) -> impl Iterator<Item = f64> + 'a {
+        let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
+        let (common, deviation) = (self.common(&place), circle.deviation_um);
+        let [u, v] = [self.cloud.column(0), self.cloud.column(1)];
+        let points = self.cloud.levels().iter().zip(u.iter().zip(v));
+        points.map(move |(w, (u, v))| self.deviation(w - u * place[0] - v * place[1] + common) - deviation)
+    }
+
+    /// RONt, RONp, RONv and RONq about a circle; NaN where no point is there.
+    #[must_use]
+    pub fn values(&self, circle: &Circle) -> Values {
+        Course::of(self.deviations_um(circle)).into()
+    }
+
+    /// The same of the first `count` points for RONq, and of all for the others.
+    pub(super) fn values_of_first(&self, circle: &Circle, count: usize) -> Values {
+        let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
+        let common = self.common(&place);
+        let (low, high) = self.cloud.extremes(0..self.len(), &place);
+        let [low, high] = [low, high].map(|height| self.deviation(height + common) - circle.deviation_um);
+        let [u, v] = [self.cloud.column(0), self.cloud.column(1)].map(|column| &column[..count]);
+        let squares = least_squares::Squares {
+            levels: &self.cloud.levels()[..count],
+            directions: [u, v],
+            place,
+            common,
+            radius_um: self.radius_um,
+            deviation_um: circle.deviation_um,
+        };
+        let (squares, points) = vectorised(squares);
+        if points == 0 { Course::of([].into_iter()).into() } else { Course { low, high, squares, points }.into() }
+    }
+
+    /// |c|²/2R, which all heights over a centre lack to (ρ² − R²)/2R.
+    pub(super) fn common(&self, place: &[f64; 2]) -> f64 {
+        (place[0] * place[0] + place[1] * place[1]) / (2.0 * self.radius_um)
+    }
+
+    /// ρ/R of (ρ² − R²)/2R.
+    pub(super) fn stretch(&self, lifted: f64) -> f64 {
+        (1.0 + 2.0 * lifted / self.radius_um).max(0.0).sqrt()
+    }
+
+    /// ρ − R of (ρ² − R²)/2R.
+    pub(super) fn deviation(&self, lifted: f64) -> f64 {
+        2.0 * lifted / (1.0 + self.stretch(lifted))
+    }
+
+    /// Heights that differ by less are equal: rounding of coordinates.
+    pub(super) fn tolerance(&self) -> f64 {
+        4.0 * f64::EPSILON * (self.radius_um + self.span_um)
+    }
+
+    /// A circle about a place of the cloud.
+    pub(super) fn about(&self, place: [f64; 2], deviation_um: f64, [outer, inner]: [Vec<usize>; 2]) -> Circle {
+        let [x_um, y_um] = [place[0] + self.origin_um[0], place[1] + self.origin_um[1]];
+        Circle { x_um, y_um, deviation_um, outer, inner }
+    }
+}

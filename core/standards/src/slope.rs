@@ -1,0 +1,212 @@
+//! The steepest slope of a closed profile, from its harmonics.
+
+use std::{borrow::Cow, f64::consts::TAU};
+
+use super::near::Ranked;
+use crate::gaps::Gaps;
+use runout_numerics::{Complex64, fourier::Fourier, interpolation::Curve};
+
+/// Angles a wave of the highest order at which the slope is looked at first.
+const POINTS_A_WAVE: usize = 16;
+/// Peaks nearer to the largest than this share of it are refined: the largest slope between two of those angles exceeds both by
+/// less, 1 − cos(π/16).
+const NEAR: f64 = 0.02;
+/// Orders whose amplitudes together are below this share of all are rounding.
+const ROUNDING: f64 = 1e-15;
+/// Newton's steps from the nearest angle: each doubles the digits.
+const STEPS: usize = 6;
+
+/// The largest |dr/dα| of Re Σ cₙ e^{inα} outside the gaps, in µm/rad: the largest over equal angles, refined by Newton's method on the
+/// series, and both ends of each gap. NaN where nothing is outside.
+#[must_use]
+pub fn steepest_um_per_rad(harmonics: &[Complex64], gaps: &Gaps) -> f64 {
+    let slopes: Vec<Complex64> =
+        harmonics.iter().enumerate().map(|(order, value)| Complex64::I * order as f64 * value).collect();
+    let highest = highest_that_counts(&slopes);
+    let count = smooth(POINTS_A_WAVE * highest.max(1));
+    let mut fourier = Fourier::new(count);
+    let on_angles = fourier.synthesise(slopes.iter().copied());
+    let curve = Curve::new(&slopes, on_angles);
+    let mut blanked = Cow::Borrowed(on_angles);
+    if !gaps.is_empty() {
+        gaps.blank(blanked.to_mut());
+    }
+    let largest = largest_of(&blanked);
+    let step = TAU / count as f64;
+    let mut steepest = largest;
+    for (index, slope) in blanked.iter().enumerate().filter(|(_, slope)| slope.abs() >= (1.0 - NEAR) * largest) {
+        let beside = [blanked[(index + count - 1) % count], blanked[(index + 1) % count]];
+        if beside.iter().all(|other| slope.abs() >= other.abs()) {
+            let found = peak_near(&curve, index as f64 * step, step);
+            if !gaps.hold(found) {
+                steepest = steepest.max(curve.at(found)[0].abs());
+            }
+        }
+    }
+    let ends = gaps.stretches().flat_map(|[from, length]| [from, from + length]);
+    ends.map(|end| curve.at(end)[0].abs()).fold(steepest, f64::max)
+}
+
+/// The highest order that is no rounding beside the others.
+fn highest_that_counts(series: &[Complex64]) -> usize {
+    let size = |value: &Complex64| value.norm_sqr().sqrt();
+    let all: f64 = series.iter().map(size).sum();
+    let above = series.iter().rev().scan(0.0, |sum, value| {
+        *sum += size(value);
+        Some(*sum)
+    });
+    let below = above.take_while(|above| *above <= ROUNDING * all).count();
+    series.len().saturating_sub(below + 1)
+}
+
+/// A number of angles, at least so many, for a quick transform.
+fn smooth(at_least: usize) -> usize {
+    let power = at_least.next_power_of_two().max(8);
+    [5 * (power / 8), 3 * (power / 4), power].into_iter().find(|count| *count >= at_least).unwrap_or(power)
+}
+
+/// The largest of some numbers, without sign; NaN of nothing but NaN.
+fn largest_of(values: &[f64]) -> f64 {
+    // Lanes that do not wait for each other.
+    let mut largest = [f64::NEG_INFINITY; 8];
+    for chunk in values.chunks(8) {
+        for (largest, value) in largest.iter_mut().zip(chunk) {
+            // Comparisons with NaN are false.
+            *largest = if value.abs() > *largest { value.abs() } else { *largest };
+        }
+    }
+    let largest = largest.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    if largest >= 0.0 { largest } else { f64::NAN }
+}
+
+/// Where the slope of a curve is 0 within a step of an angle; the angle itself where there is none.
+fn peak_near(curve: &Curve, start: f64, step: f64) -> f64 {
+    let mut angle = start;
+    for _ in 0..STEPS {
+        let [_, first, second] = curve.at(angle);
+        let next = angle - first / second;
+        if next.is_nan() || (next - start).abs() > step {
+            break;
+        }
+        angle = next;
+    }
+    angle
+}
+
+/// Slopes on equal angles to which errors are added: of each draw the largest |dr/dα|, with a parabola through the three angles
+/// about it.
+pub struct Drawn<'a> {
+    slopes: &'a [f64],
+    ranked: Ranked,
+}
+
+impl<'a> Drawn<'a> {
+    /// About slopes, of which missing ones are NaN.
+    #[must_use]
+    pub fn about(slopes: &'a [f64]) -> Self {
+        Self { slopes, ranked: Ranked::new(slopes.iter().map(|slope| slope.abs())) }
+    }
+
+    /// Of the slopes with errors of at most `largest` added.
+    #[must_use]
+    pub fn steepest(&self, errors: &[f64], largest: f64) -> f64 {
+        let size = |point: usize| (self.slopes[point] + errors[point]).abs();
+        match self.ranked.highest(largest, size) {
+            Some((peak, place)) => with_parabola(place, peak, self.slopes.len(), size),
+            None => with_errors(self.slopes, size),
+        }
+    }
+
+    /// Of the slopes themselves.
+    #[must_use]
+    pub fn undisturbed(&self) -> f64 {
+        with_errors(self.slopes, |point| self.slopes[point].abs())
+    }
+}
+
+/// The largest of all sizes, with its parabola.
+fn with_errors(slopes: &[f64], size: impl Fn(usize) -> f64) -> f64 {
+    let (index, peak) = (0..slopes.len()).fold((0, f64::NAN), |best, index| {
+        let size = size(index);
+        if size > best.1 || (best.1.is_nan() && !size.is_nan()) { (index, size) } else { best }
+    });
+    with_parabola(index, peak, slopes.len(), size)
+}
+
+/// The top of the parabola through a peak and both of its neighbours.
+fn with_parabola(index: usize, peak: f64, count: usize, size: impl Fn(usize) -> f64) -> f64 {
+    let beside = |step: usize| size((index + step) % count);
+    if count < 3 || peak.is_nan() {
+        return peak;
+    }
+    let [before, after] = [beside(count - 1), beside(1)];
+    let bend = 2.0 * peak - before - after;
+    // At a gap's end there is no parabola.
+    if bend > 0.0 { peak + (after - before).powi(2) / (8.0 * bend) } else { peak }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(waves: &[(usize, f64, f64)], highest: usize) -> Vec<Complex64> {
+        let mut harmonics = vec![Complex64::ZERO; highest + 1];
+        for (order, amplitude, phase) in waves {
+            harmonics[*order] += Complex64::from_polar(*amplitude, *phase);
+        }
+        harmonics
+    }
+
+    /// n·A of one wave, and brute force on a million angles of three.
+    #[test]
+    fn the_steepest_slope_is_that_of_the_series() {
+        let whole = Gaps::default();
+        for order in [2, 3, 17, 200] {
+            let found = steepest_um_per_rad(&series(&[(order, 2.0, 0.7)], 255), &whole);
+            assert!((found / (2.0 * order as f64) - 1.0).abs() < 1e-12, "{order}: {found}");
+        }
+        let waves = [(3, 2.0, 0.1), (50, 0.21, 1.3), (131, 0.11, -0.4)];
+        let slope = |angle: f64| -> f64 {
+            waves.iter().map(|(order, size, phase)| -size * *order as f64 * (*order as f64 * angle + phase).sin()).sum()
+        };
+        let mut gaps = Gaps::default();
+        gaps.add(1.0, 3.0);
+        for gaps in [&whole, &gaps] {
+            let angles = (0..1_000_000).map(|step| TAU * f64::from(step) * 1e-6).filter(|angle| !gaps.hold(*angle));
+            let expected = angles.map(|angle| slope(angle).abs()).fold(0.0, f64::max);
+            let found = steepest_um_per_rad(&series(&waves, 255), gaps);
+            // Between two of a million angles at 131 waves: (π·131·1e-6)²/2.
+            assert!((found / expected - 1.0).abs() < 1e-6, "{found}, not {expected}");
+        }
+        let mut all = Gaps::default();
+        all.add(0.0, TAU);
+        assert!(steepest_um_per_rad(&series(&waves, 255), &all).is_finite(), "its two ends");
+        assert!(steepest_um_per_rad(&series(&[], 5), &whole).abs() < 1e-300);
+    }
+
+    #[test]
+    fn a_parabola_meets_a_peak_between_angles() {
+        let slopes: Vec<f64> = (0..16).map(|step| (TAU * (f64::from(step) - 0.4) / 16.0).cos()).collect();
+        assert!((Drawn::about(&slopes).undisturbed() - 1.0).abs() < 1e-3);
+        assert!(Drawn::about(&[f64::NAN; 4]).undisturbed().is_nan());
+        assert!((Drawn::about(&[f64::NAN, -2.0, 1.0]).undisturbed() - 2.0).abs() < 1e-15);
+    }
+
+    /// Ranks leave nothing out, however large errors are beside the slopes.
+    #[test]
+    #[allow(clippy::float_cmp, reason = "the same operations")]
+    fn ranked_slopes_give_the_largest_of_all() {
+        let wave = |point: usize, phase: f64| (0.37 * point as f64 + phase).sin() + (1.7 * point as f64 * phase).cos();
+        for count in [50, 2000] {
+            let mut slopes: Vec<f64> = (0..count).map(|point| wave(point, 0.3)).collect();
+            slopes[10..20].fill(f64::NAN);
+            let drawn = Drawn::about(&slopes);
+            for (draw, size) in (1..60).zip([1e-3, 0.1, 1.0, 30.0].into_iter().cycle()) {
+                let errors: Vec<f64> = (0..count).map(|point| size * wave(point, 0.7 * f64::from(draw))).collect();
+                let both: Vec<f64> = slopes.iter().zip(&errors).map(|(slope, error)| slope + error).collect();
+                let expected = Drawn::about(&both).undisturbed();
+                assert_eq!(drawn.steepest(&errors, largest_of(&errors)), expected, "{count} {draw}");
+            }
+        }
+    }
+}

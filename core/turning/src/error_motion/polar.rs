@@ -1,0 +1,225 @@
+//! Polar plots of error motion: what repeats from turn to turn, over the spindle's angle, and the centres of such plots.
+
+use crate::{
+    separation::{Quantity, Separation, UM_PER_MM_URAD},
+    spread::{Direction, Projection},
+};
+use runout_numerics::{Complex64, fourier::Fourier};
+use runout_standards::roundness::{Angles, Points, Reference};
+
+/// What the values of a polar plot are referred to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Centre {
+    /// PC: the centre of the polar chart.
+    PolarChart,
+    /// LSC, MZC (the standards' MRS), MIC or MCC of the synchronous plot.
+    Plot(Reference),
+}
+
+/// Radius of the polar chart's base circle: so large that what is drawn on it has the same value on any larger one.
+const BASE_CIRCLE_MM: f64 = 1000.0;
+
+impl Centre {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::PolarChart,
+        Self::Plot(Reference::LeastSquares),
+        Self::Plot(Reference::MinimumZone),
+        Self::Plot(Reference::MaximumInscribed),
+        Self::Plot(Reference::MinimumCircumscribed),
+    ];
+
+    /// Its usual abbreviation.
+    #[must_use]
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::PolarChart => "PC",
+            Self::Plot(Reference::LeastSquares) => "LSC",
+            Self::Plot(Reference::MinimumZone) => "MZC",
+            Self::Plot(Reference::MaximumInscribed) => "MIC",
+            Self::Plot(Reference::MinimumCircumscribed) => "MCC",
+        }
+    }
+
+    /// Whether adding orders from 2 leaves it where it is.
+    pub(super) fn is_linear(self) -> bool {
+        matches!(self, Self::PolarChart | Self::Plot(Reference::LeastSquares))
+    }
+
+    /// Where it is in a plot on equal angles; `None` where it is not determined.
+    pub(super) fn of(self, angles: &Angles, plot: &[f64], points: &mut Points) -> Option<[f64; 2]> {
+        match self {
+            Self::PolarChart => Some([0.0; 2]),
+            Self::Plot(Reference::LeastSquares) => {
+                let scale = 2.0 / plot.len() as f64;
+                let (sine, cosine) = (angles.sin_cos().zip(plot))
+                    .fold((0.0, 0.0), |sums, ((sin, cos), value)| (sums.0 + sin * value, sums.1 + cos * value));
+                Some([scale * cosine, scale * sine])
+            }
+            Self::Plot(reference) => {
+                points.set_profile(angles, plot, BASE_CIRCLE_MM);
+                points.reference(reference).map(|circle| [circle.x_um, circle.y_um])
+            }
+        }
+    }
+}
+
+/// A plot as it is seen from a centre.
+pub(super) fn seen_from([x, y]: [f64; 2], angles: &Angles, plot: &[f64]) -> Vec<f64> {
+    angles.sin_cos().zip(plot).map(|((sin, cos), value)| value - x * cos - y * sin).collect()
+}
+
+/// Synchronous motion in a direction, from the separated harmonics.
+pub(super) struct Synchronous {
+    /// Coefficients of Re Σ cₙ e^{−inΦ} of the motion that counts, from order 0.
+    first: Vec<Complex64>,
+    /// Factor of sin Φ and coefficients of the second motion, in a direction that turns.
+    second: Option<(f64, Vec<Complex64>)>,
+    /// Variance E|δ|² of the plot's harmonics, by order from 0; 0 where none is known.
+    pub variance: Vec<f64>,
+    /// Orders of the motion that count, both ends included.
+    pub band: [usize; 2],
+    /// Orders of that band that the layout cannot tell.
+    pub lost: Vec<usize>,
+}
+
+impl Synchronous {
+    /// Motion at `z_mm` along the spindle; `None` where the separation does not know it.
+    ///
+    /// In a fixed direction 1/rev is centring and left out. In a radial one that turns, what is left of 1/rev (the part that
+    /// turns against the spindle) is a 2/rev of the plot, and belongs to it. Tilt is residual: the fundamental is no part of
+    /// it.
+    pub fn new(separation: &Separation, projection: &Projection, direction: Direction, z_mm: f64) -> Option<Self> {
+        let lowest = if direction.rotates() && !direction.is_tilt() { 1 } else { 2 };
+        Self::from_order(lowest, separation, projection, direction, z_mm)
+    }
+
+    /// The same, of orders from this one on: from 1, with the part of 1/rev that turns against the spindle.
+    pub fn from_order(
+        lowest: usize,
+        separation: &Separation,
+        projection: &Projection,
+        direction: Direction,
+        z_mm: f64,
+    ) -> Option<Self> {
+        let (first, second) = direction.parts();
+        let first = Motion::new(separation, first, z_mm)?;
+        let second = match second {
+            Some((quantity, factor)) => Some((factor * projection.rotation, Motion::new(separation, quantity, z_mm)?)),
+            None => None,
+        };
+        let band = [lowest, separation.max_order()];
+        let motions = || std::iter::once(&first).chain(second.iter().map(|(_, motion)| motion));
+        let mut lost: Vec<usize> = motions().flat_map(|motion| motion.lost_orders(separation)).collect();
+        lost.retain(|order| *order >= band[0]);
+        lost.sort_unstable();
+        lost.dedup();
+        let coefficients = |motion: &Motion| -> Vec<Complex64> {
+            let all = motion.coefficients(separation).into_iter().enumerate();
+            all.map(|(order, value)| {
+                let counts = order >= band[0] && lost.binary_search(&order).is_err();
+                if counts { value } else { Complex64::ZERO }
+            })
+            .collect()
+        };
+        // cos Φ and sin Φ take an order n to n − 1 and n + 1.
+        let mut variance = vec![0.0; band[1] + 2];
+        for order in (band[0]..=band[1]).filter(|order| lost.binary_search(order).is_err()) {
+            match &second {
+                None => variance[order] = first.variance(separation, order, None),
+                Some((factor, motion)) => {
+                    for (to, sign) in [(order - 1, -1.0), (order + 1, 1.0)] {
+                        let quarter = Complex64::new(0.0, sign * factor);
+                        variance[to] += 0.25 * first.variance(separation, order, Some((quarter, motion)));
+                    }
+                }
+            }
+        }
+        Some(Self {
+            first: coefficients(&first),
+            second: second.as_ref().map(|(factor, motion)| (*factor, coefficients(motion))),
+            variance,
+            band,
+            lost,
+        })
+    }
+
+    /// Whether no order of the band can be told.
+    pub fn is_lost(&self) -> bool {
+        self.lost.len() > self.band[1].saturating_sub(self.band[0])
+    }
+
+    /// The plot on equal angles of the spindle from 0.
+    pub fn over_angle(&self, angles: &Angles) -> Vec<f64> {
+        let mut fourier = Fourier::new(angles.len());
+        let mut plot = fourier.synthesise(self.first.iter().map(Complex64::conj)).to_vec();
+        if let Some((factor, second)) = &self.second {
+            let second = fourier.synthesise(second.iter().map(Complex64::conj));
+            for ((value, second), (sin, cos)) in plot.iter_mut().zip(second).zip(angles.sin_cos()) {
+                *value = cos * *value + factor * sin * second;
+            }
+        }
+        plot
+    }
+}
+
+/// One motion at a place along the spindle, as a sum of what was separated.
+pub(super) struct Motion {
+    /// Place among the unknowns, place among the motions, factor.
+    terms: Vec<(usize, usize, f64)>,
+}
+
+impl Motion {
+    /// x + z·ε_y, y − z·ε_x, or a tilt; along a line that was not separated, the sum of what was along x and y.
+    pub fn new(separation: &Separation, quantity: Quantity, z_mm: f64) -> Option<Self> {
+        if separation.position(quantity).is_none() && quantity.azimuth().is_some() {
+            let mut terms = Vec::new();
+            let each =
+                [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY].into_iter().zip(quantity.cartesian());
+            for (part, share) in each.filter(|(_, share)| *share != 0.0) {
+                let part = Self::new(separation, part, z_mm)?;
+                terms.extend(part.terms.into_iter().map(|(unknown, before, factor)| (unknown, before, share * factor)));
+            }
+            return Some(Self { terms });
+        }
+        let lever = (z_mm - separation.motion_z_mm) * UM_PER_MM_URAD;
+        let term = |quantity: Quantity, factor: f64| {
+            let unknown = separation.position(quantity)?;
+            let before = separation.unknowns.iter().take(unknown).filter(|other| !other.is_form()).count();
+            Some((unknown, before, factor))
+        };
+        let tilt = quantity.moved_by_tilt().and_then(|(tilt, factor)| term(tilt, factor * lever));
+        Some(Self { terms: std::iter::once(term(quantity, 1.0)?).chain(tilt).collect() })
+    }
+
+    pub fn lost_orders<'a>(&'a self, separation: &'a Separation) -> impl Iterator<Item = usize> + 'a {
+        self.terms.iter().flat_map(|(unknown, ..)| separation.lost_orders(*unknown))
+    }
+
+    /// By order from 0.
+    pub fn coefficients(&self, separation: &Separation) -> Vec<Complex64> {
+        let mut sum = vec![Complex64::ZERO; separation.max_order() + 1];
+        for (unknown, _, factor) in &self.terms {
+            let values = separation.coefficients(*unknown);
+            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * *factor);
+        }
+        sum
+    }
+
+    /// E|δ|² of an order, of this motion or of it and a multiple of another one; 0 where it is not known.
+    pub fn variance(&self, separation: &Separation, order: usize, other: Option<(Complex64, &Self)>) -> f64 {
+        let Some(covariance) = &separation.motion_covariance else { return 0.0 };
+        let motions = separation.unknowns.iter().filter(|unknown| !unknown.is_form()).count();
+        let others = other.iter().flat_map(|(multiple, motion)| {
+            motion.terms.iter().map(move |(_, place, factor)| (*place, multiple * *factor))
+        });
+        let terms: Vec<(usize, Complex64)> =
+            self.terms.iter().map(|(_, place, factor)| (*place, Complex64::from(*factor))).chain(others).collect();
+        let entry = |row: usize, column: usize| {
+            covariance.get((order * motions + row) * motions + column).copied().unwrap_or_default()
+        };
+        let products =
+            terms.iter().flat_map(|(row, a)| terms.iter().map(move |(column, b)| (*row, *column, a * b.conj())));
+        products.map(|(row, column, product)| (product * entry(row, column)).re).sum::<f64>().max(0.0)
+    }
+}

@@ -1,0 +1,365 @@
+//! The synchronous average of one capture, one harmonic at a time, with its covariance over the turns.
+
+use std::f64::consts::TAU;
+
+use crate::{
+    creep::Levels,
+    measurement::{DefectKind, Response, Trim},
+    spread::Spread,
+};
+use runout_numerics::Complex64;
+
+/// What the turns of one capture say together: Re Σ cₙ e^{−inΦ} for each channel, Φ the spindle angle.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Profile {
+    /// Where it came from, for messages.
+    pub object: String,
+    /// Index into the rig's setups.
+    pub setup: usize,
+    /// The rig's sensor behind each channel.
+    pub sensors: Vec<usize>,
+    /// Equal angles per turn on which the turns were averaged.
+    pub samples_per_rev: usize,
+    /// Equal angles on which each turn was taken apart into harmonics: what does not close over the turn folds at half of
+    /// them.
+    pub turn_angles: usize,
+    /// Mean over the turns, µm, `[order][channel]`, orders 0..=`max_order`.
+    pub mean: Vec<Complex64>,
+    /// Covariance of that mean across channels, µm², `[order][channel][channel]`, E[δ δᴴ]; `None` below two turns. It
+    /// holds for turns that depend on each other, as those of a spindle do.
+    pub covariance: Option<Vec<Complex64>>,
+    /// The covariance of single turns over their number, likewise: what the covariance of the mean would be if turns
+    /// were independent. It is the better known of the two, and serves for weights.
+    pub scatter: Option<Vec<Complex64>>,
+    /// Mean level of each turn used.
+    pub levels: TurnLevels,
+    /// The same turns in parts, where asked for.
+    pub split: Option<Split>,
+    /// How far the turns lie apart, where asked for and there are two.
+    pub spread: Option<Spread>,
+    /// How many turns there were, and what became of them.
+    pub turns: TurnCount,
+    /// Mean speed over the turns used, where the sampling rate is known.
+    pub speed_rpm: Option<f64>,
+    /// Samples a second, where known.
+    pub sample_rate_hz: Option<f64>,
+    /// Filters that the signal went through.
+    pub responses: Vec<Response>,
+    /// By how much interruptions of the part's surface are bridged beyond what the rig declares, at each end, in rad.
+    pub bridged_beyond_rad: f64,
+    /// What the user should know of this capture.
+    pub warnings: Vec<String>,
+}
+
+/// Mean levels of turns, as far as they are in an average.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TurnLevels {
+    /// Each turn's number in the capture: those left out are missing.
+    pub numbers: Vec<usize>,
+    /// In µm, `[turn][channel]`.
+    pub levels_um: Vec<f64>,
+}
+
+impl TurnLevels {
+    /// Those of one of so many channels.
+    #[must_use]
+    pub fn of(&self, channel: usize, channels: usize) -> Levels {
+        let levels = self.levels_um.iter().skip(channel).step_by(channels.max(1)).copied();
+        Levels::new(self.numbers.iter().copied().zip(levels))
+    }
+}
+
+/// The turns of a capture in parts: what a model is fitted to, and what it has not seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Split {
+    /// The first turns.
+    pub fit: Part,
+    /// The last ones.
+    pub held_out: Part,
+    /// What the covariance of the mean over all turns is taken from; nothing below three turns.
+    pub neighbours: Option<Neighbours>,
+    /// Each turn by itself.
+    pub turns: Turns,
+}
+
+/// Orders, from 0, that are kept of every turn: enough to see what changes from turn to turn.
+pub const TURN_ORDERS: usize = 41;
+
+/// The low harmonics of each turn used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Turns {
+    /// Each turn's number in the capture: those left out are missing.
+    pub numbers: Vec<usize>,
+    /// Orders of each turn, from 0: [`TURN_ORDERS`] or what the average holds.
+    pub orders: usize,
+    /// Channels.
+    pub channels: usize,
+    /// Sample positions at which each turn begins and ends.
+    pub spans: Vec<[f64; 2]>,
+    /// Coefficients of Re Σ cₙ e^{−inΦ} in µm, `[turn][order][channel]`.
+    pub harmonics: Vec<Complex64>,
+}
+
+impl Turns {
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.numbers.len()
+    }
+
+    /// The coefficient of a turn (by position), order and channel.
+    #[must_use]
+    pub fn at(&self, turn: usize, order: usize, channel: usize) -> Complex64 {
+        self.harmonics[(turn * self.orders + order) * self.channels + channel]
+    }
+
+    /// Mean level of a channel in each turn, in µm.
+    pub fn levels(&self, channel: usize) -> impl Iterator<Item = f64> + '_ {
+        (0..self.count()).map(move |turn| self.at(turn, 0, channel).re)
+    }
+}
+
+/// Consecutive turns, averaged: fields as in [`Profile`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Mean over the turns.
+    pub mean: Vec<Complex64>,
+    /// Covariance of that mean.
+    pub covariance: Option<Vec<Complex64>>,
+    /// The same with independent turns.
+    pub scatter: Option<Vec<Complex64>>,
+    /// What that covariance is taken from; nothing below three turns.
+    pub neighbours: Option<Neighbours>,
+    /// First turn and number of turns, among those used.
+    pub turns: std::ops::Range<usize>,
+}
+
+/// Coefficients of a record of turns beside a whole order n, at n ± k/P: the power that the mean takes at n from what is not
+/// synchronous. Their mean square is the covariance of the mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Neighbours {
+    /// P, in turns.
+    pub period: usize,
+    /// Channels.
+    pub channels: usize,
+    /// Equal angles of a turn.
+    pub angles: usize,
+    /// Of e^{−2πikm/P} over the turns at n and −n, k = 1, 2, …: `[k][side][order][channel]`, in µm.
+    pub coefficients: Vec<Vec<Complex64>>,
+}
+
+impl Neighbours {
+    /// Covariance of the mean across channels, `[order][channel][channel]`.
+    #[must_use]
+    pub fn covariance(&self) -> Vec<Complex64> {
+        let channels = self.channels;
+        let orders = self.coefficients.first().map_or(0, |side| side.len() / channels.max(1));
+        let mut covariance = vec![Complex64::ZERO; orders * channels * channels];
+        let scale = 1.0 / self.coefficients.len() as f64;
+        for side in &self.coefficients {
+            let each = side.chunks_exact(channels).zip(covariance.chunks_exact_mut(channels * channels));
+            for (values, covariance) in each {
+                for (place, (row, target)) in values.iter().zip(covariance.chunks_exact_mut(channels)).enumerate() {
+                    let row = row * scale;
+                    target.iter_mut().zip(&values[..=place]).for_each(|(to, column)| *to += row * column.conj());
+                }
+            }
+        }
+        for covariance in covariance.chunks_exact_mut(channels * channels) {
+            for row in 0..channels {
+                covariance[row * channels + row].im = 0.0;
+                for column in 0..row {
+                    covariance[column * channels + row] = covariance[row * channels + column].conj();
+                }
+            }
+        }
+        covariance
+    }
+
+    /// Takes out what a channel creeps: `course` gives each turn's mean level and its rise over the turn, in µm.
+    pub fn take_out(&mut self, channel: usize, course: &[[f64; 2]]) {
+        let count = course.len().max(1) as f64;
+        let [level, rise] = [0, 1].map(|which| course.iter().map(|turn| turn[which]).sum::<f64>() / count);
+        for (index, values) in self.coefficients.iter_mut().enumerate() {
+            let (beside, side) = (index / 2 + 1, index % 2);
+            let (mut levels, mut rises) = (Complex64::ZERO, Complex64::ZERO);
+            for (turn, [of_level, of_rise]) in course.iter().enumerate() {
+                let phase = Complex64::cis(-TAU * ((beside * turn % self.period) as f64 / self.period as f64)) / count;
+                levels += phase * (of_level - level);
+                rises += phase * (of_rise - rise);
+            }
+            let share = beside as f64 / self.period as f64;
+            for order in 0..values.len() / self.channels {
+                let at = if side == 0 { order as f64 } else { -(order as f64) } - share;
+                let [flat, ramp] = ramp(at, self.angles);
+                let found = (levels * flat + rises * ramp) * if order == 0 { 1.0 } else { 2.0 };
+                values[order * self.channels + channel] -= if side == 0 { found } else { found.conj() };
+            }
+        }
+    }
+}
+
+/// Means of e^{iνφ} and of (φ/2π − ½)·e^{iνφ} over L equal angles from 0, ν not whole.
+fn ramp(nu: f64, angles: usize) -> [Complex64; 2] {
+    let count = angles as f64;
+    let step = Complex64::cis(TAU * nu / count);
+    let whole = Complex64::cis(TAU * nu);
+    // Sums of a geometric series and of its terms times their number.
+    let flat = (whole - 1.0) / (step - 1.0);
+    let ramp = (whole * count - step * flat) / (step - 1.0);
+    [flat / count, ramp / (count * count) - flat / (2.0 * count)]
+}
+
+impl Split {
+    /// A profile of one part only.
+    #[must_use]
+    pub fn profile(&self, whole: &Profile, part: &Part) -> Profile {
+        Profile {
+            mean: part.mean.clone(),
+            covariance: part.covariance.clone(),
+            scatter: part.scatter.clone(),
+            split: None,
+            spread: None,
+            turns: TurnCount { used: part.turns.len(), ..whole.turns.clone() },
+            ..whole.clone()
+        }
+    }
+}
+
+impl Profile {
+    /// Number of channels.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.sensors.len()
+    }
+
+    /// Highest order that the average holds.
+    #[must_use]
+    pub fn max_order(&self) -> usize {
+        (self.mean.len() / self.channels().max(1)).saturating_sub(1)
+    }
+
+    /// The mean of one order, one coefficient a channel.
+    #[must_use]
+    pub fn order(&self, order: usize) -> &[Complex64] {
+        let channels = self.channels();
+        &self.mean[order * channels..(order + 1) * channels]
+    }
+
+    /// The covariance of one order's mean, `[channel][channel]`.
+    #[must_use]
+    pub fn order_covariance(&self, order: usize) -> Option<&[Complex64]> {
+        let size = self.channels() * self.channels();
+        self.covariance.as_ref().map(|covariance| &covariance[order * size..(order + 1) * size])
+    }
+}
+
+/// Orders to each side over which [`smooth`] averages: the scatter's spectrum is smooth, its estimate is not.
+pub const SMOOTHING: usize = 2;
+
+/// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over its neighbours. Order 1
+/// stays by itself: what shakes the eccentricity shakes no other order.
+pub fn smooth(covariance: &mut [Complex64], size: usize) {
+    const WINDOW: usize = 2 * SMOOTHING + 1;
+    let raw = covariance.to_vec();
+    let max_order = (raw.len() / size.max(1)).saturating_sub(1);
+    for order in 2..=max_order {
+        let window = order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order);
+        let count = window.end() + 1 - window.start();
+        let near = &raw[window.start() * size..(window.end() + 1) * size];
+        let target = &mut covariance[order * size..(order + 1) * size];
+        // Where all are there, their sums need not be kept in memory.
+        if count == WINDOW {
+            let near: [&[Complex64]; WINDOW] = std::array::from_fn(|index| &near[index * size..(index + 1) * size]);
+            for (entry, target) in target.iter_mut().enumerate() {
+                *target = near.iter().map(|near| near[entry]).sum::<Complex64>() / WINDOW as f64;
+            }
+        } else {
+            for (entry, target) in target.iter_mut().enumerate() {
+                *target = near.iter().skip(entry).step_by(size).sum::<Complex64>() / count as f64;
+            }
+        }
+    }
+}
+
+/// Every turn of a capture is either used or listed here.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TurnCount {
+    /// Whole turns between the first and the last mark.
+    pub recorded: usize,
+    /// Turns in the average.
+    pub used: usize,
+    /// Turns set aside at the ends.
+    pub trimmed: Vec<Trim>,
+    /// Turns left out of the average.
+    pub rejected: Vec<RejectedTurn>,
+}
+
+/// A turn that was left out, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RejectedTurn {
+    /// Counted from 0 at the capture's first mark.
+    pub turn: usize,
+    /// Sample at which it begins.
+    pub start_sample: u64,
+    /// Why.
+    pub reason: Rejection,
+}
+
+/// Why a turn was left out.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Rejection {
+    /// About twice as long as the others: a mark is missing.
+    MissingMark(TurnLength),
+    /// A piece of a turn, or next to one: a mark was counted twice.
+    DoubledMark(TurnLength),
+    /// Its length is off by more than the tolerance.
+    Speed(TurnLength),
+    /// A channel holds samples that cannot be trusted.
+    Defect {
+        /// The rig's sensor.
+        sensor: usize,
+        /// What is wrong with them.
+        kind: DefectKind,
+    },
+    /// A channel is far from the other turns.
+    Outlier {
+        /// The rig's sensor.
+        sensor: usize,
+        /// Root mean square distance from the other turns, in µm.
+        distance_um: f64,
+    },
+    /// The turn is not wholly covered by samples.
+    Incomplete,
+    /// The encoder's angle does not grow steadily by one turn.
+    Angle,
+}
+
+/// A turn's length beside the others'.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnLength {
+    /// Its own, in samples.
+    pub samples: f64,
+    /// The capture's median, in samples.
+    pub median_samples: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_is_the_sum_that_it_is() {
+        for (nu, angles) in [(3.0 - 1.0 / 60.0, 512), (-2.0 - 2.0 / 48.0, 90), (-1.0 / 60.0, 64)] {
+            let terms = (0..angles).map(|angle| {
+                let phase = Complex64::cis(TAU * nu * angle as f64 / angles as f64) / angles as f64;
+                [phase, phase * (angle as f64 / angles as f64 - 0.5)]
+            });
+            let sums = terms.fold([Complex64::ZERO; 2], |sum, term| [sum[0] + term[0], sum[1] + term[1]]);
+            for (found, sum) in ramp(nu, angles).iter().zip(sums) {
+                // Rounding of differences of numbers near 1 over 2π/60/512.
+                assert!((found - sum).norm() < 1e-9, "{nu} {angles}: {found} {sum}");
+            }
+        }
+    }
+}

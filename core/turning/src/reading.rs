@@ -1,0 +1,211 @@
+//! What one sensor's reading in one setup has by itself.
+//!
+//! A layout that separates nothing (one sensor, one clamping) reads form, eccentricity and error motion as one sum. Run-out
+//! (ISO 1101, as a dial gauge shows it) and harmonics are then those of the reading, and of neither the part nor the axis.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::profile::Profile;
+use runout_numerics::{Complex64, fourier::Fourier};
+use runout_standards::uncertainty::{DRAWS, Errors, monte_carlo_of, seed};
+
+/// Points a wave of the highest order: a crest between two of them is at most 2 % of that order's amplitude higher.
+const POINTS_A_WAVE: usize = 16;
+/// Harmonics from 2 that are listed; tables have all.
+const LISTED: usize = 15;
+
+/// What the averaged reading of one sensor in one setup has. All of it is of form and motion together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReadingValues {
+    /// Id of the setup.
+    pub setup: String,
+    /// Id of the sensor.
+    pub sensor: String,
+    /// Turns averaged.
+    pub turns: usize,
+    /// Run-out: highest less lowest reading of the averaged turn (TIR), in µm.
+    pub tir_um: f64,
+    /// Its standard uncertainty, from the scatter of the turns; null below two turns.
+    pub tir_std_um: Option<f64>,
+    /// Once per revolution: eccentricity of the part and motion of the axis.
+    pub once_per_rev: ReadingHarmonic,
+    /// Orders from 2 to 15, as far as the average holds them.
+    pub harmonics: Vec<ReadingHarmonic>,
+    /// Standard deviation of single turns about their mean at one angle (root mean square over the turn), in µm; null below two
+    /// turns.
+    pub turns_std_um: Option<f64>,
+}
+
+/// amplitude · cos(order · angle − phase) over the spindle's angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReadingHarmonic {
+    /// Waves a turn.
+    pub order: usize,
+    /// In µm.
+    pub amplitude_um: f64,
+    /// In degrees: at order 1 the spindle's angle at which the reading is highest.
+    pub phase_deg: f64,
+    /// Standard uncertainty of the amplitude, in µm; null below two turns.
+    pub std_um: Option<f64>,
+}
+
+impl ReadingHarmonic {
+    fn of(order: usize, value: Complex64, variance: Option<f64>) -> Self {
+        Self {
+            order,
+            amplitude_um: value.norm(),
+            phase_deg: value.arg().to_degrees().rem_euclid(360.0),
+            // Of a complex error, half is along the amplitude.
+            std_um: variance.map(|variance| (0.5 * variance).sqrt()),
+        }
+    }
+}
+
+impl ReadingValues {
+    /// Of one channel of a profile. Nothing where the average holds no order 1.
+    #[must_use]
+    pub fn of(profile: &Profile, channel: usize, setup: &str, sensor: &str) -> Option<Self> {
+        let (mean, variance) = (coefficients(profile, channel), variances(profile, channel));
+        let of = |order: usize| {
+            Some(ReadingHarmonic::of(
+                order,
+                *mean.get(order)?,
+                variance.as_ref().and_then(|all| all.get(order).copied()),
+            ))
+        };
+        let once_per_rev = of(1)?;
+        let scatter = profile.scatter.as_ref().map(|all| diagonal(all, profile.channels(), channel));
+        let turns = profile.turns.used;
+        let turns_std_um = scatter.map(|scatter| {
+            let level = scatter.first().copied().unwrap_or_default();
+            (turns as f64 * (level + 0.5 * scatter.iter().skip(1).sum::<f64>())).sqrt()
+        });
+        let (tir_um, tir_std_um) = run_out(&mean, variance.as_deref(), seed(&[&profile.object, setup, sensor]));
+        Some(Self {
+            setup: setup.to_owned(),
+            sensor: sensor.to_owned(),
+            turns,
+            tir_um,
+            tir_std_um,
+            once_per_rev,
+            harmonics: (2..=LISTED).map_while(of).collect(),
+            turns_std_um,
+        })
+    }
+}
+
+/// Coefficients of one channel of the mean, by order from 0.
+#[must_use]
+pub fn coefficients(profile: &Profile, channel: usize) -> Vec<Complex64> {
+    profile.mean.iter().skip(channel).step_by(profile.channels().max(1)).copied().collect()
+}
+
+/// Variances E|δ|² of the same; `None` where the turns' scatter is not known.
+#[must_use]
+pub fn variances(profile: &Profile, channel: usize) -> Option<Vec<f64>> {
+    profile.covariance.as_ref().map(|all| diagonal(all, profile.channels(), channel))
+}
+
+/// One channel's variances of matrices `[order][channel][channel]`.
+fn diagonal(matrices: &[Complex64], channels: usize, channel: usize) -> Vec<f64> {
+    let own = matrices.iter().skip(channel * (channels + 1)).step_by(channels * channels);
+    own.map(|entry| entry.re.max(0.0)).collect()
+}
+
+/// Peak-to-valley of Re Σ cₙ e^{−inΦ} over the turn without its level, with its standard uncertainty.
+fn run_out(mean: &[Complex64], variance: Option<&[f64]>, seed: u64) -> (f64, Option<f64>) {
+    let points = (POINTS_A_WAVE * mean.len()).next_power_of_two();
+    let mut fourier = Fourier::new(points);
+    let without_level =
+        mean.iter().enumerate().map(|(order, value)| if order == 0 { Complex64::ZERO } else { value.conj() });
+    let turn = fourier.synthesise(without_level.collect::<Vec<_>>()).to_vec();
+    let mut errors = variance.and_then(|variance| Errors::new(variance, 1, seed));
+    let mut drawn = turn.clone();
+    let draws = if errors.is_some() { DRAWS } else { 0 };
+    let found = monte_carlo_of(draws, |disturbed, found| {
+        if let (true, Some(errors)) = (disturbed, &mut errors) {
+            errors.draw(&mut fourier, &turn, &mut drawn);
+        }
+        let [low, high] = drawn
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
+        found.push(high - low);
+    });
+    let first = found.into_iter().next();
+    first.map_or((f64::NAN, None), |(value, uncertainty)| (value, uncertainty.map(|uncertainty| uncertainty.std)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::profile::TurnCount;
+
+    /// Two channels of turns sampled directly: 5 cos(Φ − 40°) + 0.5 cos(3Φ − 100°) µm and noise of 0.2 µm in the second one.
+    #[test]
+    fn a_reading_has_what_was_put_into_it() {
+        let (angles, turns, orders) = (128, 400, 20);
+        let mut seed = 5_u64;
+        let mut normal = || {
+            let mut uniform = || {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+            };
+            (0..12).map(|_| uniform()).sum::<f64>()
+        };
+        let truth =
+            |angle: f64| 5.0 * (angle - 40_f64.to_radians()).cos() + 0.5 * (3.0 * angle - 100_f64.to_radians()).cos();
+        let mut fourier = Fourier::new(angles);
+        let each: Vec<Vec<Complex64>> = (0..turns)
+            .map(|_| {
+                let mut found = vec![Complex64::ZERO; orders];
+                let noisy = (0..angles).map(|step| truth(TAU * step as f64 / angles as f64) + 0.2 * normal());
+                fourier.analyse(noisy.collect::<Vec<_>>(), &mut found);
+                found.iter().map(Complex64::conj).collect()
+            })
+            .collect();
+        let mean = |order: usize| each.iter().map(|turn| turn[order]).sum::<Complex64>() / f64::from(turns);
+        let scatter: Vec<f64> = (0..orders)
+            .map(|order| {
+                let squares: f64 = each.iter().map(|turn| (turn[order] - mean(order)).norm_sqr()).sum();
+                squares / f64::from(turns - 1) / f64::from(turns)
+            })
+            .collect();
+        let matrices: Vec<Complex64> =
+            scatter.iter().flat_map(|value| [0.0, 0.0, 0.0, *value]).map(Complex64::from).collect();
+        let profile = Profile {
+            sensors: vec![0, 1],
+            mean: (0..orders).flat_map(|order| [Complex64::ZERO, mean(order)]).collect(),
+            covariance: Some(matrices.clone()),
+            scatter: Some(matrices),
+            turns: TurnCount { used: 400, ..TurnCount::default() },
+            ..Profile::default()
+        };
+        let found = ReadingValues::of(&profile, 1, "a", "S2").unwrap();
+        let fine = (0..100_000).map(|step| truth(TAU * f64::from(step) / 1e5));
+        let [low, high] = fine.fold([f64::MAX, f64::MIN], |[low, high], value| [low.min(value), high.max(value)]);
+        // 0.2 µm over √400 turns, and its share in 19 of 64 orders: 5.6 nm at one angle, about √2 of it for two.
+        let std = found.tir_std_um.unwrap();
+        assert!((0.004..0.012).contains(&std), "{std}");
+        assert!((found.tir_um - (high - low)).abs() < 5.0 * std, "{} for {}", found.tir_um, high - low);
+        let once = found.once_per_rev;
+        // 0.2 µm over √(400·128/2): five of them.
+        assert!((once.amplitude_um - 5.0).abs() < 5.0 * 0.00125 && (once.phase_deg - 40.0).abs() < 0.08, "{once:?}");
+        assert!((once.std_um.unwrap() / 0.00125 - 1.0).abs() < 0.2, "{once:?}");
+        let third = found.harmonics[1];
+        assert!(third.order == 3 && (third.amplitude_um - 0.5).abs() < 5.0 * 0.00125, "{third:?}");
+        assert!((third.phase_deg - 100.0).abs() < 1.0, "{third:?}");
+        assert_eq!(found.harmonics.last().unwrap().order, 15);
+        // 1 + 2·19 of 128 degrees of freedom are in the orders kept.
+        let expected = 0.2 * (39.0_f64 / 128.0).sqrt();
+        assert!((found.turns_std_um.unwrap() / expected - 1.0).abs() < 0.05, "{:?}", found.turns_std_um);
+        // A channel without any scatter is known as it is; without turns to compare, nothing is stated.
+        let silent = ReadingValues::of(&profile, 0, "a", "S1").unwrap();
+        assert_eq!((silent.tir_um, silent.tir_std_um, silent.turns_std_um), (0.0, None, Some(0.0)));
+        let single = Profile { covariance: None, scatter: None, ..profile };
+        let single = ReadingValues::of(&single, 1, "a", "S2").unwrap();
+        assert_eq!((single.tir_std_um, single.turns_std_um, single.once_per_rev.std_um), (None, None, None));
+    }
+}

@@ -1,0 +1,378 @@
+//! The rig: where the sensors look, and how part and sensors stand in each setup.
+
+mod calibration;
+
+use std::collections::HashSet;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use calibration::{Calibration, Unit, straightened};
+pub use runout_standards::gaps::Gaps;
+
+use runout_error::Fault;
+
+/// Which way the part turns, seen against +z.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rotation {
+    /// Counter-clockwise about +z.
+    #[default]
+    Ccw,
+    /// Clockwise about +z.
+    Cw,
+}
+
+impl Rotation {
+    /// +1 for counter-clockwise, −1 for clockwise: part angle α = θ' − direction·Φ − β.
+    #[must_use]
+    pub fn direction(self) -> f64 {
+        match self {
+            Self::Ccw => 1.0,
+            Self::Cw => -1.0,
+        }
+    }
+}
+
+/// `[rig]` as it stands in a file.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RigConfig {
+    /// Nominal radius of the part at the sensors, in mm.
+    pub part_radius_mm: f64,
+    /// Which way the part turns about +z.
+    #[serde(default)]
+    pub rotation: Rotation,
+    /// The displacement sensors.
+    pub sensors: Vec<SensorConfig>,
+    /// The setups: how the part was clamped and where the sensors stood, one recording each.
+    pub setups: Vec<SetupConfig>,
+    /// Where the surface is interrupted: a keyway, a cross hole. Readings there are bridged, and no value is taken there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub interruptions: Vec<InterruptionConfig>,
+}
+
+/// One interruption as it stands in a file: from one part angle on, counter-clockwise, to another.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InterruptionConfig {
+    /// The part's own angle at which it begins, in degrees.
+    pub from_deg: f64,
+    /// The angle at which it ends, in degrees; with `from_deg` above, it passes through 0.
+    pub to_deg: f64,
+    /// Ids of the sections that it crosses; without it, all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sections: Option<Vec<String>>,
+}
+
+/// One sensor as it stands in a file.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorConfig {
+    /// Name of the channel in the recording.
+    pub id: String,
+    /// Angle of the sensor about +z, in degrees.
+    pub angle_deg: f64,
+    /// Axial position relative to the spindle reference, in mm; the station's position is added to it.
+    #[serde(default)]
+    pub z_mm: f64,
+    /// The section of the part that it looks at; sensors of one section see the same circle.
+    #[serde(default = "default_section")]
+    pub section: String,
+    /// +1 where the reading grows when the surface comes nearer, −1 where it shrinks.
+    #[serde(default = "default_sign")]
+    #[schemars(schema_with = "sign_schema")]
+    pub sign: i8,
+    /// Unit of the recorded numbers.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub unit: Unit,
+    /// Displacement that one volt stands for, in µm; with `unit = "V"` or `"mV"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub um_per_volt: Option<f64>,
+    /// Reading over displacement: 1.05 where the sensor reads 5 % too much. Readings are divided by it.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub gain: f64,
+    /// Characteristic: reading / gain = u + `quadratic_per_um`·u² + `cubic_per_um2`·u³ for a displacement u in µm, counted from
+    /// the sensor's zero. In 1/µm.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub quadratic_per_um: f64,
+    /// In 1/µm².
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub cubic_per_um2: f64,
+}
+
+impl Default for SensorConfig {
+    /// A sensor without a name at 0°, whose numbers are displacements in µm.
+    fn default() -> Self {
+        Self {
+            id: String::new(),
+            angle_deg: 0.0,
+            z_mm: 0.0,
+            section: default_section(),
+            sign: default_sign(),
+            unit: Unit::default(),
+            um_per_volt: None,
+            gain: one(),
+            quadratic_per_um: 0.0,
+            cubic_per_um2: 0.0,
+        }
+    }
+}
+
+/// One setup as it stands in a file.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SetupConfig {
+    /// Name of the setup in the recording.
+    pub id: String,
+    /// Angle at which the part is clamped relative to the spindle, in degrees.
+    #[serde(default)]
+    pub part_deg: f64,
+    /// Angle by which all sensors were moved, in degrees.
+    #[serde(default)]
+    pub sensors_deg: f64,
+}
+
+fn default_section() -> String {
+    "a".into()
+}
+
+fn default_sign() -> i8 {
+    1
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, clippy::float_cmp, reason = "serde's signature; 1 as it was written")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+fn sign_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    schemars::json_schema!({ "type": "integer", "enum": [1, -1] })
+}
+
+/// A checked rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rig {
+    /// Nominal radius of the part, in mm.
+    pub part_radius_mm: f64,
+    /// Which way the part turns.
+    pub rotation: Rotation,
+    /// At least one.
+    pub sensors: Vec<Sensor>,
+    /// At least one.
+    pub setups: Vec<Setup>,
+    /// Section ids in order of first appearance.
+    pub sections: Vec<String>,
+    /// Of each section, the part angles at which it is interrupted.
+    pub gaps: Vec<Gaps>,
+}
+
+/// A displacement sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Name of the channel.
+    pub id: String,
+    /// θ, in rad.
+    pub angle_rad: f64,
+    /// z relative to the spindle reference, in mm, before the station's position is added.
+    pub z_mm: f64,
+    /// Index into [`Rig::sections`].
+    pub section: usize,
+    /// +1 or −1.
+    pub sign: f64,
+    /// From its numbers to displacements. Loaders give numbers with their sign; the pipeline calibrates them.
+    pub calibration: Calibration,
+}
+
+/// One clamping of the part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setup {
+    /// Name of the setup.
+    pub id: String,
+    /// β, in rad.
+    pub part_rad: f64,
+    /// σ, in rad.
+    pub sensors_rad: f64,
+}
+
+impl RigConfig {
+    /// Checks everything that a file can get wrong.
+    ///
+    /// # Errors
+    /// The first value that cannot be, with its place.
+    pub fn check(self) -> Result<Rig, Fault> {
+        if !(self.part_radius_mm.is_finite() && self.part_radius_mm > 0.0) {
+            return Err(Fault::at("part_radius_mm", "the part's radius must be above 0 mm"));
+        }
+        if self.sensors.is_empty() {
+            return Err(Fault::at("sensors", "a rig needs at least one sensor"));
+        }
+        if self.setups.is_empty() {
+            return Err(Fault::at("setups", "a rig needs at least one setup"));
+        }
+        let mut sections: Vec<String> = Vec::new();
+        let mut sensors = Vec::with_capacity(self.sensors.len());
+        let mut ids = HashSet::new();
+        for (index, sensor) in self.sensors.into_iter().enumerate() {
+            let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("sensors", index);
+            if sensor.id.is_empty() || !ids.insert(sensor.id.clone()) {
+                return Err(fault("id", format!("sensor ids must differ and not be empty, found `{}`", sensor.id)));
+            }
+            if !sensor.angle_deg.is_finite() {
+                return Err(fault("angle_deg", "a sensor's angle must be a finite number".into()));
+            }
+            if !sensor.z_mm.is_finite() {
+                return Err(fault("z_mm", "a sensor's axial position must be a finite number".into()));
+            }
+            if sensor.section.is_empty() {
+                return Err(fault("section", "a section's id must not be empty".into()));
+            }
+            if sensor.sign.abs() != 1 {
+                return Err(fault("sign", format!("the sign must be 1 or -1, found {}", sensor.sign)));
+            }
+            let calibration = sensor.calibration().map_err(|fault| fault.under_item("sensors", index))?;
+            let section = sections.iter().position(|id| *id == sensor.section).unwrap_or_else(|| {
+                sections.push(sensor.section.clone());
+                sections.len() - 1
+            });
+            let checked = Sensor {
+                id: sensor.id,
+                angle_rad: sensor.angle_deg.to_radians(),
+                z_mm: sensor.z_mm,
+                section,
+                sign: f64::from(sensor.sign),
+                calibration,
+            };
+            if let Some(first) = sensors.iter().find(|other: &&Sensor| other.section == section)
+                && (first.z_mm - checked.z_mm).abs() > SAME_SECTION_MM
+            {
+                return Err(fault(
+                    "z_mm",
+                    format!(
+                        "sensors of section `{}` must share one z: `{}` is at {} mm, `{}` at {} mm",
+                        sections[section], first.id, first.z_mm, checked.id, checked.z_mm
+                    ),
+                )
+                .help("give the sensor a section of its own"));
+            }
+            sensors.push(checked);
+        }
+        let mut setups = Vec::with_capacity(self.setups.len());
+        let mut ids = HashSet::new();
+        for (index, setup) in self.setups.into_iter().enumerate() {
+            let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("setups", index);
+            if setup.id.is_empty() || !ids.insert(setup.id.clone()) {
+                return Err(fault("id", format!("setup ids must differ and not be empty, found `{}`", setup.id)));
+            }
+            if setup.id == "truth" || setup.id.contains('/') {
+                return Err(fault("id", format!("`{}` cannot name a setup: `truth` and `/` are reserved", setup.id)));
+            }
+            if !setup.part_deg.is_finite() {
+                return Err(fault("part_deg", "the part's angle must be a finite number".into()));
+            }
+            if !setup.sensors_deg.is_finite() {
+                return Err(fault("sensors_deg", "the sensors' angle must be a finite number".into()));
+            }
+            setups.push(Setup {
+                id: setup.id,
+                part_rad: setup.part_deg.to_radians(),
+                sensors_rad: setup.sensors_deg.to_radians(),
+            });
+        }
+        let gaps = gaps_of(&self.interruptions, &sections)?;
+        Ok(Rig { part_radius_mm: self.part_radius_mm, rotation: self.rotation, sensors, setups, sections, gaps })
+    }
+}
+
+/// Of each section, where it is interrupted.
+fn gaps_of(interruptions: &[InterruptionConfig], sections: &[String]) -> Result<Vec<Gaps>, Fault> {
+    let mut gaps = vec![Gaps::default(); sections.len()];
+    for (index, interruption) in interruptions.iter().enumerate() {
+        let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("interruptions", index);
+        let [from, to] =
+            [("from_deg", interruption.from_deg), ("to_deg", interruption.to_deg)].map(|(key, angle_deg)| {
+                let known = angle_deg.is_finite().then_some(angle_deg);
+                known.ok_or_else(|| {
+                    fault(key, format!("the angle must be a finite number of degrees, found {angle_deg}"))
+                })
+            });
+        let length_deg = (to? - from?).rem_euclid(360.0);
+        if !(length_deg > 0.0 && length_deg <= MOST_INTERRUPTED_DEG) {
+            let message = format!("expected at most {MOST_INTERRUPTED_DEG}° from `from_deg` on, found {length_deg}°");
+            return Err(fault("to_deg", message));
+        }
+        for (section, gaps) in sections.iter().zip(&mut gaps) {
+            if interruption.sections.as_ref().is_none_or(|named| named.contains(section)) {
+                gaps.add(interruption.from_deg.to_radians(), length_deg.to_radians());
+            }
+        }
+        if let Some(unknown) = interruption.sections.iter().flatten().find(|named| !sections.contains(named)) {
+            return Err(fault(
+                "sections",
+                format!("there is no section `{unknown}`; there are {}", sections.join(", ")),
+            ));
+        }
+    }
+    match gaps.iter().position(|gaps| gaps.coverage(ANGLES_LOOKED_AT) < LEAST_LEFT) {
+        None => Ok(gaps),
+        Some(section) => Err(Fault::at(
+            "interruptions",
+            format!("they leave less than half of section `{}`, too little to bridge them", sections[section]),
+        )),
+    }
+}
+
+/// Longer interruptions leave too little to bridge them by, in degrees.
+const MOST_INTERRUPTED_DEG: f64 = 120.0;
+/// Share of a circle that has to be there.
+const LEAST_LEFT: f64 = 0.5;
+const ANGLES_LOOKED_AT: usize = 3600;
+
+/// Two sensors nearer than this along z look at the same circle: a tenth of a usual spot size.
+const SAME_SECTION_MM: f64 = 0.1;
+
+impl Rig {
+    /// z of a section before the station's position is added, in mm: that of its first sensor.
+    #[must_use]
+    pub fn section_z_mm(&self, section: usize) -> f64 {
+        self.sensors.iter().find(|sensor| sensor.section == section).map_or(0.0, |sensor| sensor.z_mm)
+    }
+
+    /// Where a section is interrupted, by part angle; nowhere if there is no such section.
+    #[must_use]
+    pub fn gaps_of(&self, section: &str) -> Gaps {
+        let index = self.sections.iter().position(|id| id == section);
+        index.and_then(|index| self.gaps.get(index)).cloned().unwrap_or_default()
+    }
+
+    /// Where a sensor looks into an interruption in a setup, by the spindle's angle Φ: α = θ′ − direction·Φ − β.
+    #[must_use]
+    pub fn gaps_seen(&self, setup: usize, sensor: usize) -> Gaps {
+        let (Some(setup), Some(sensor)) = (self.setups.get(setup), self.sensors.get(sensor)) else {
+            return Gaps::default();
+        };
+        let direction = self.rotation.direction();
+        let origin = direction * (sensor.angle_rad + setup.sensors_rad - setup.part_rad);
+        self.gaps.get(sensor.section).map_or_else(Gaps::default, |gaps| gaps.seen_from(origin, -direction))
+    }
+
+    /// Index of a setup by its id.
+    #[must_use]
+    pub fn setup(&self, id: &str) -> Option<usize> {
+        self.setups.iter().position(|setup| setup.id == id)
+    }
+
+    /// Index of a sensor by its id.
+    #[must_use]
+    pub fn sensor(&self, id: &str) -> Option<usize> {
+        self.sensors.iter().position(|sensor| sensor.id == id)
+    }
+}

@@ -1,0 +1,458 @@
+//! Form and motion, one harmonic at a time: estimates, covariance, and what the layout cannot tell.
+
+use crate::azimuth::Azimuth;
+use runout_numerics::Complex64;
+use runout_standards::gaps::Gaps;
+
+/// What the numbers of form, motion and harmonics are, for files that explain themselves.
+pub const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \
+    Re sum c exp(-i n Phi) over the spindle's angle Phi. Lost orders cannot be told by the layout: NaN in the \
+    harmonics, left out of form and motion.";
+
+/// What is said where no order of form is observable.
+pub const NOTHING_SEPARATED: &str = "nothing is separated: this layout has no observable order of form. Each reading is form, \
+    eccentricity and error motion together, and nothing says how much of it is which";
+
+/// Displacement in µm at a lever of 1 mm per 1 µrad.
+pub const UM_PER_MM_URAD: f64 = 1e-3;
+
+/// Something that a separation solves for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Form of a section (its index), µm; Re Σ c e^{+inα} over the part's angle α.
+    Form(usize),
+    /// Error motion along x, µm; Re Σ c e^{−inΦ} over the spindle's angle Φ, as are all motions.
+    X,
+    /// Error motion along y, µm.
+    Y,
+    /// Tilt about x, right-handed, µrad.
+    TiltX,
+    /// Tilt about y, right-handed, µrad.
+    TiltY,
+    /// Error motion along one line that is neither x nor y, µm: all that sensors can observe which all look along it.
+    Along(Azimuth),
+    /// Tilt towards that line (right-handed about the direction a quarter turn further), µrad.
+    TiltAlong(Azimuth),
+}
+
+impl Quantity {
+    /// Its id in files.
+    #[must_use]
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Form(_) => "form",
+            Self::X => "x",
+            Self::Y => "y",
+            Self::TiltX => "tilt_x",
+            Self::TiltY => "tilt_y",
+            Self::Along(_) => "along",
+            Self::TiltAlong(_) => "tilt_along",
+        }
+    }
+
+    /// Its unit.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        if self.is_tilt() { "urad" } else { "um" }
+    }
+
+    /// Whether it belongs to the part.
+    #[must_use]
+    pub fn is_form(self) -> bool {
+        matches!(self, Self::Form(_))
+    }
+
+    /// Whether it is a tilt of the axis.
+    #[must_use]
+    pub fn is_tilt(self) -> bool {
+        matches!(self, Self::TiltX | Self::TiltY | Self::TiltAlong(_))
+    }
+
+    /// Whether it is a displacement of the axis.
+    #[must_use]
+    pub fn is_shift(self) -> bool {
+        matches!(self, Self::X | Self::Y | Self::Along(_))
+    }
+
+    /// The line along which it is, where that is neither x nor y.
+    #[must_use]
+    pub fn azimuth(self) -> Option<Azimuth> {
+        match self {
+            Self::Along(azimuth) | Self::TiltAlong(azimuth) => Some(azimuth),
+            _ => None,
+        }
+    }
+
+    /// The tilt that changes this displacement along z, and its factor: x(z) = X + z·E_y, y(z) = Y − z·E_x.
+    #[must_use]
+    pub fn moved_by_tilt(self) -> Option<(Self, f64)> {
+        match self {
+            Self::X => Some((Self::TiltY, 1.0)),
+            Self::Y => Some((Self::TiltX, -1.0)),
+            Self::Along(azimuth) => Some((Self::TiltAlong(azimuth), 1.0)),
+            _ => None,
+        }
+    }
+
+    /// What a unit of it is in [x, y, tilt about x, tilt about y]; zeros of a form.
+    #[must_use]
+    pub fn cartesian(self) -> [f64; 4] {
+        match self {
+            Self::Form(_) => [0.0; 4],
+            Self::X => [1.0, 0.0, 0.0, 0.0],
+            Self::Y => [0.0, 1.0, 0.0, 0.0],
+            Self::TiltX => [0.0, 0.0, 1.0, 0.0],
+            Self::TiltY => [0.0, 0.0, 0.0, 1.0],
+            Self::Along(azimuth) => {
+                let (sine, cosine) = azimuth.radians().sin_cos();
+                [cosine, sine, 0.0, 0.0]
+            }
+            Self::TiltAlong(azimuth) => {
+                let (sine, cosine) = azimuth.radians().sin_cos();
+                [0.0, 0.0, -sine, cosine]
+            }
+        }
+    }
+}
+
+/// A motion as tables give it, one column of values and one of their standard uncertainty, `std_…`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MotionColumn {
+    /// What it holds.
+    pub quantity: Quantity,
+    /// Name of the column.
+    pub name: &'static str,
+    /// What it is, in words.
+    pub about: String,
+}
+
+/// Name of the column that holds the line of `along_um` and `tilt_along_urad`, its unit, and what it is.
+pub const ALONG_COLUMN: (&str, &str, &str) =
+    ("along_deg", "deg", "the line of along_um and tilt_along_urad: its angle from x towards y");
+
+/// Columns of motion: those of x, y and the tilts about them always, and those along a line where motion is known there only.
+#[must_use]
+pub fn motion_columns(line: Option<Azimuth>) -> Vec<MotionColumn> {
+    let column = |quantity, name, about: &str| MotionColumn { quantity, name, about: about.into() };
+    let mut columns = vec![
+        column(Quantity::X, "x_um", "error motion along x"),
+        column(Quantity::Y, "y_um", "error motion along y"),
+        column(Quantity::TiltX, "tilt_x_urad", "tilt about x, right-handed"),
+        column(Quantity::TiltY, "tilt_y_urad", "tilt about y, right-handed"),
+    ];
+    if let Some(line) = line {
+        let along = format!("error motion along {line} from x towards y; across it no motion is observable");
+        let tilt = format!("tilt towards {line} from x towards y: points at z > 0 move along the line");
+        columns.push(column(Quantity::Along(line), "along_um", &along));
+        columns.push(column(Quantity::TiltAlong(line), "tilt_along_urad", &tilt));
+    }
+    columns
+}
+
+/// What a separator can and cannot tell with a rig, before any data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessment {
+    /// What it solves for.
+    pub unknowns: Vec<Quantity>,
+    /// One entry an order, ascending from 1.
+    pub orders: Vec<OrderAssessment>,
+    /// Ids of the rig's sensors and setups that it does not use.
+    pub unused: Vec<String>,
+    /// What the user should know: conventions, assumptions, definitions.
+    pub notes: Vec<String>,
+}
+
+/// One order of an [`Assessment`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrderAssessment {
+    /// Undulations per revolution.
+    pub order: usize,
+    /// Rank of the layout's matrix.
+    pub rank: usize,
+    /// Readings (complex) that are left over for a residual.
+    pub residual_dof: usize,
+    /// Whether each unknown can be told.
+    pub observable: Vec<bool>,
+    /// Standard deviation of each unknown per unit standard deviation of every reading; NaN where it cannot be told.
+    pub noise_gain: Vec<f64>,
+    /// Why something cannot be told.
+    pub lost_because: Option<String>,
+}
+
+impl Assessment {
+    /// Orders at which a form cannot be told.
+    #[must_use]
+    pub fn lost_form_orders(&self) -> Vec<usize> {
+        self.lost(Quantity::is_form)
+    }
+
+    /// Orders at which a motion cannot be told.
+    #[must_use]
+    pub fn lost_motion_orders(&self) -> Vec<usize> {
+        self.lost(|quantity| !quantity.is_form())
+    }
+
+    /// Whether no order (from 2) of any section's form is observable: readings are then form and motion together.
+    #[must_use]
+    pub fn tells_no_form(&self) -> bool {
+        let forms = |entry: &OrderAssessment| {
+            self.unknowns.iter().zip(&entry.observable).any(|(quantity, seen)| quantity.is_form() && *seen)
+        };
+        let mut orders = self.orders.iter().filter(|entry| entry.order > 1).peekable();
+        orders.peek().is_some() && self.unknowns.iter().any(|unknown| unknown.is_form()) && !orders.any(forms)
+    }
+
+    fn lost(&self, of: impl Fn(Quantity) -> bool) -> Vec<usize> {
+        let any_lost = |entry: &&OrderAssessment| {
+            self.unknowns.iter().zip(&entry.observable).any(|(quantity, seen)| of(*quantity) && !seen)
+        };
+        self.orders.iter().filter(any_lost).map(|entry| entry.order).collect()
+    }
+}
+
+/// Form and motion at one station.
+///
+/// Order 0 is the mean level, which displacement sensors do not share: 0 unless the method knows better.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Separation {
+    /// The sections it gives the form of.
+    pub sections: Vec<SectionAt>,
+    /// What was solved for; forms first, in the order of `sections`.
+    pub unknowns: Vec<Quantity>,
+    /// Estimates `[order][unknown]` from order 0; NaN where the layout cannot tell.
+    pub estimate: Vec<Complex64>,
+    /// Variance E|δ|² of each estimate `[order][unknown]`; NaN where not known.
+    pub variance: Vec<f64>,
+    /// Covariance E[δ δᴴ] of the motions among `unknowns`, `[order][motion][motion]` from order 0; what cannot be told means
+    /// nothing. `None` where it is not known.
+    pub motion_covariance: Option<Vec<Complex64>>,
+    /// Other estimates `[order][unknown]` that agree with the readings as well, less `estimate`: one of them is true, and
+    /// the data do not decide which. `variance` and `motion_covariance` include them; none where the data decide.
+    pub equivalents: Vec<Vec<Complex64>>,
+    /// Whether the layout can tell it, `[order][unknown]`.
+    pub observable: Vec<bool>,
+    /// Where x and y are the axis's displacement, in mm along the spindle: 0 where tilt is told, the sensors' plane
+    /// where it is not.
+    pub motion_z_mm: f64,
+    /// What the fit leaves of the readings.
+    pub residual: Residual,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// How small changes of the averaged readings move the estimates: δ estimate = operator · δ readings.
+///
+/// With it, two methods' results on the same readings can be compared: their errors are not independent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensitivity {
+    /// Readings an order: the channels of all profiles of the station, in their order.
+    pub readings: usize,
+    /// `[order][unknown][reading]` from order 0; 0 where the layout cannot tell. Forms of a clockwise part are meant
+    /// before they are conjugated.
+    pub operator: Vec<Complex64>,
+}
+
+/// A circle of the part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SectionAt {
+    /// Its id in the rig.
+    pub id: String,
+    /// Its place along the spindle, in mm.
+    pub z_mm: f64,
+    /// Where nothing is known of it: a keyway, a stretch without readings. Every value leaves these out.
+    pub gaps: Gaps,
+    /// Share of its readings that the form was computed from.
+    pub used: f64,
+}
+
+impl SectionAt {
+    /// A circle that was measured all around.
+    #[must_use]
+    pub fn whole(id: impl Into<String>, z_mm: f64) -> Self {
+        Self { id: id.into(), z_mm, gaps: Gaps::default(), used: 1.0 }
+    }
+
+    /// Share of the profile that was there: of so many equal angles, and of the readings.
+    #[must_use]
+    pub fn coverage(&self, angles: usize) -> f64 {
+        self.gaps.coverage(angles).min(self.used)
+    }
+}
+
+/// What a fit leaves of the averaged readings.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Residual {
+    /// Root mean square over all readings and angles, in µm; NaN where nothing is redundant.
+    pub rms_um: f64,
+    /// What the covariance of the averages lets expect of it, in µm; NaN without a covariance.
+    pub expected_rms_um: f64,
+    /// Weighted sum of squares per degree of freedom; NaN where not known.
+    pub chi2_per_dof: f64,
+    /// Real degrees of freedom.
+    pub dof: usize,
+    /// Lowest and highest order at which a reading is redundant; `None` where the fit is not one of single orders, and where
+    /// none is.
+    pub orders: Option<[usize; 2]>,
+}
+
+impl Separation {
+    /// The line along which all motion is, where that is neither x nor y.
+    #[must_use]
+    pub fn azimuth(&self) -> Option<Azimuth> {
+        self.unknowns.iter().find_map(|unknown| unknown.azimuth())
+    }
+
+    /// Highest order held.
+    #[must_use]
+    pub fn max_order(&self) -> usize {
+        (self.estimate.len() / self.unknowns.len().max(1)).saturating_sub(1)
+    }
+
+    /// The weighted mean of estimates that agree with the readings equally well; the rest is that of the first. The largest
+    /// squared distance from the mean is added to the variance, so that each of them lies within one standard uncertainty of
+    /// it. An order is observable where it is in all of them.
+    #[must_use]
+    pub fn mixture(weights: &[f64], equivalents: &[Self]) -> Option<Self> {
+        let mut mixture = equivalents.first()?.clone();
+        let alike = |one: &Self| one.unknowns == mixture.unknowns && one.estimate.len() == mixture.estimate.len();
+        if !equivalents.iter().all(alike) {
+            return None;
+        }
+        for index in 0..mixture.estimate.len() {
+            let each = || weights.iter().zip(equivalents);
+            mixture.observable[index] = equivalents.iter().all(|one| one.observable[index]);
+            mixture.estimate[index] = each().map(|(weight, one)| one.estimate[index] * *weight).sum();
+            mixture.variance[index] = each().map(|(weight, one)| one.variance[index] * *weight).sum();
+        }
+        let distances = equivalents.iter().map(|one| {
+            let entries = one.estimate.iter().zip(&mixture.estimate).map(|(one, mean)| one - mean);
+            entries.collect()
+        });
+        mixture.equivalents = distances.collect();
+        for (index, variance) in mixture.variance.iter_mut().enumerate() {
+            *variance += largest(mixture.equivalents.iter().map(|distance| distance[index]));
+        }
+        mixture.mix_motion_covariance(weights, equivalents);
+        Some(mixture)
+    }
+
+    /// Motions of one equivalent go together: the sum of their distances' products, scaled to the largest square of each.
+    fn mix_motion_covariance(&mut self, weights: &[f64], equivalents: &[Self]) {
+        let width = self.unknowns.len();
+        let motions: Vec<usize> = (0..width).filter(|unknown| !self.unknowns[*unknown].is_form()).collect();
+        let Some(joint) = &mut self.motion_covariance else { return };
+        for (index, entry) in joint.iter_mut().enumerate() {
+            let of = |one: &Self| one.motion_covariance.as_ref().and_then(|joint| joint.get(index)).copied();
+            *entry = weights.iter().zip(equivalents).map(|(weight, one)| of(one).unwrap_or_default() * *weight).sum();
+        }
+        let blocks = joint.chunks_exact_mut((motions.len() * motions.len()).max(1));
+        for (block, order) in blocks.zip(0..) {
+            let distances = |motion: usize| {
+                let index = order * width + motions[motion];
+                self.equivalents.iter().map(move |distance| distance[index])
+            };
+            let scale = |motion: usize| {
+                let sum: f64 = distances(motion).map(|distance| distance.norm_sqr()).sum();
+                if sum > 0.0 { (largest(distances(motion)) / sum).sqrt() } else { 0.0 }
+            };
+            for row in 0..motions.len() {
+                for column in 0..motions.len() {
+                    let products = distances(row).zip(distances(column)).map(|(a, b)| a * b.conj());
+                    let sum: Complex64 = products.sum();
+                    let factor = scale(row) * scale(column);
+                    if factor > 0.0 {
+                        block[row * motions.len() + column] += sum * factor;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Variance of the harmonics `[order]` of one unknown that comes from noise alone, without what the data do not decide.
+    #[must_use]
+    pub fn noise_variance(&self, unknown: usize) -> Vec<f64> {
+        let width = self.unknowns.len();
+        let open = |index: usize| largest(self.equivalents.iter().map(|distance| distance[index]));
+        let each = self.variance.iter().enumerate().skip(unknown).step_by(width);
+        each.map(|(index, variance)| (variance - open(index)).max(0.0)).collect()
+    }
+
+    /// Coefficients of one unknown by order from 0, in each of the equivalents; 0 where the layout cannot tell.
+    pub fn equivalent_coefficients(&self, unknown: usize) -> impl Iterator<Item = Vec<Complex64>> + '_ {
+        let width = self.unknowns.len();
+        self.equivalents.iter().map(move |distance| {
+            let distances = distance.iter().skip(unknown).step_by(width);
+            let distances = distances.map(|value| if value.is_finite() { *value } else { Complex64::ZERO });
+            self.coefficients(unknown).zip(distances).map(|(value, distance)| value + distance).collect()
+        })
+    }
+
+    /// Index of an unknown.
+    #[must_use]
+    pub fn position(&self, quantity: Quantity) -> Option<usize> {
+        self.unknowns.iter().position(|unknown| *unknown == quantity)
+    }
+
+    /// Coefficients of one unknown by order from 0, with 0 where the layout cannot tell.
+    pub fn coefficients(&self, unknown: usize) -> impl Iterator<Item = Complex64> + '_ {
+        let width = self.unknowns.len();
+        let picked = self.estimate.iter().skip(unknown).step_by(width);
+        let seen = self.observable.iter().skip(unknown).step_by(width);
+        picked.zip(seen).map(|(value, seen)| if *seen { *value } else { Complex64::ZERO })
+    }
+
+    /// Whether no order (from 1) of an unknown can be told.
+    #[must_use]
+    pub fn is_lost(&self, unknown: usize) -> bool {
+        let width = self.unknowns.len();
+        let mut seen = self.observable.iter().skip(unknown).step_by(width).skip(1);
+        self.max_order() > 0 && !seen.any(|seen| *seen)
+    }
+
+    /// Whether no order (from 2) of any section's form is observable: readings are then form and motion together.
+    #[must_use]
+    pub fn tells_no_form(&self) -> bool {
+        let width = self.unknowns.len();
+        let seen = |unknown: usize| self.observable.iter().skip(unknown).step_by(width).skip(2).any(|seen| *seen);
+        let mut forms = (0..width).filter(|unknown| self.unknowns[*unknown].is_form()).peekable();
+        self.max_order() > 1 && forms.peek().is_some() && !forms.any(seen)
+    }
+
+    /// Orders (from 1) at which one unknown cannot be told.
+    #[must_use]
+    pub fn lost_orders(&self, unknown: usize) -> Vec<usize> {
+        let width = self.unknowns.len();
+        let seen = self.observable.iter().skip(unknown).step_by(width).enumerate();
+        seen.filter(|(order, seen)| *order > 0 && !**seen).map(|(order, _)| order).collect()
+    }
+
+    /// Standard uncertainty of one unknown at any one angle, from the covariance of the averages.
+    ///
+    /// With errors that do not favour a phase and do not couple orders, Var Re Σ δₙ e^{inα} = ½ Σ E|δₙ|², the same at
+    /// every angle. NaN where no variance is known.
+    #[must_use]
+    pub fn angle_std(&self, unknown: usize) -> f64 {
+        if self.is_lost(unknown) {
+            return f64::NAN;
+        }
+        let width = self.unknowns.len();
+        let seen = self.observable.iter().skip(unknown).step_by(width);
+        let sum: f64 = self
+            .variance
+            .iter()
+            .skip(unknown)
+            .step_by(width)
+            .zip(seen)
+            .skip(1)
+            .filter(|(_, seen)| **seen)
+            .map(|(variance, _)| variance)
+            .sum();
+        (0.5 * sum).sqrt()
+    }
+}
+
+/// The largest square; NaN where one is not known.
+fn largest(distances: impl Iterator<Item = Complex64>) -> f64 {
+    let squares = distances.map(|distance| distance.norm_sqr());
+    squares.fold(0.0, |largest, square| if square <= largest { largest } else { square })
+}

@@ -1,0 +1,328 @@
+//! From sections to a surface.
+
+use super::{
+    Meeting, Surface, SurfaceConfig,
+    monotone::{STENCIL, Stencil},
+};
+use crate::{
+    separation::{Quantity, SectionAt, Separation},
+    station::StationResult,
+};
+use runout_error::{Error, Result};
+use runout_numerics::{
+    Complex64,
+    fourier::{Fourier, max_order},
+};
+use runout_standards::{drawn::remove_noise, gaps::Gaps, uncertainty::Errors};
+
+/// Sections nearer to each other than this lie at one z, in mm: a carriage's repeatability.
+const SAME_Z_MM: f64 = 1e-3;
+
+/// Points that a surface may have: 0.8 GB here, and still an index of 32 bits in a mesh.
+const MOST_POINTS: f64 = 1e8;
+
+/// Collects sections as stations come in.
+#[derive(Debug, Default)]
+pub struct SurfaceBuilder {
+    config: SurfaceConfig,
+    sections: Vec<Section>,
+    /// Whether a section had orders that do not fit on the grid.
+    band_limited: bool,
+}
+
+/// One section's form, order by order from 0; `None` where it is not known.
+#[derive(Debug)]
+pub struct Section {
+    /// Id of the section.
+    pub id: String,
+    /// Name of the station.
+    pub station: String,
+    /// Place along the axis, in mm.
+    pub z_mm: f64,
+    /// Where around it there is no surface.
+    pub gaps: Gaps,
+    /// Share of what was measured that was used.
+    pub used: f64,
+    /// Order of which filters before the average pass half.
+    pub half_power_upr: Option<f64>,
+    /// One entry an order from 0; `None` where it is lost.
+    pub orders: Vec<Option<Order>>,
+}
+
+/// One order of a form.
+#[derive(Debug, Clone, Copy)]
+pub struct Order {
+    pub value: Complex64,
+    /// E|δ|², µm²; NaN where not known.
+    pub variance: f64,
+}
+
+impl Section {
+    /// Orders from 2 that are not known, ascending.
+    pub fn lost_orders(&self) -> impl Iterator<Item = usize> + '_ {
+        let orders = self.orders.iter().enumerate().skip(2);
+        orders.filter(|(_, known)| known.is_none()).map(|(order, _)| order)
+    }
+
+    fn label(&self) -> String {
+        format!("{}@{}", self.id, self.station)
+    }
+}
+
+impl SurfaceBuilder {
+    /// For one configuration.
+    #[must_use]
+    pub fn new(config: &SurfaceConfig) -> Self {
+        Self { config: config.clone(), ..Self::default() }
+    }
+
+    /// Whether all sections that were added lie at one height: then there is no surface.
+    pub fn is_flat(&self) -> bool {
+        let heights = || self.sections.iter().map(|section| section.z_mm);
+        heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min) <= SAME_Z_MM
+    }
+
+    /// What was added.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Adds a station's sections.
+    pub fn add(&mut self, result: &StationResult) {
+        let separation = &result.separation;
+        for (index, at) in separation.sections.iter().enumerate() {
+            let Some(unknown) = separation.position(Quantity::Form(index)) else { continue };
+            let mut orders = orders(separation, unknown);
+            let fitting = max_order(self.config.angles) + 1;
+            self.band_limited |= orders.iter().skip(fitting).flatten().any(|order| order.value != Complex64::ZERO);
+            orders.truncate(fitting);
+            let SectionAt { id, z_mm, gaps, used } = at.clone();
+            let (station, half_power_upr) = (result.station.clone(), result.half_power_upr());
+            self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, orders });
+        }
+    }
+
+    /// The surface, and what is not known of it.
+    ///
+    /// Sections at one z become one ring, each order their mean, weighted by the inverse variance where all of them
+    /// know it.
+    ///
+    /// # Errors
+    /// With fewer than two sections along z, or more points than can be held.
+    pub fn build(mut self, radius_mm: f64) -> Result<(Surface, Uncertain)> {
+        let failure = |problem: String| Error::new("build", "the surface", problem);
+        if let Some(section) = self.sections.iter().find(|section| !section.z_mm.is_finite()) {
+            return Err(failure(format!("section {} has no place along z", section.label())));
+        }
+        self.sections.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm));
+        let angles = self.config.angles;
+        let mut fourier = Fourier::new(angles);
+        let mut rings = Rings { angles, z_mm: Vec::new(), deviation_um: Vec::new() };
+        let mut variance = Vec::new();
+        let mut meetings = Vec::new();
+        let mut rest = self.sections.as_slice();
+        while let Some(first) = rest.first() {
+            let (group, later) = rest.split_at(rest.partition_point(|other| other.z_mm - first.z_mm <= SAME_Z_MM));
+            for (index, section) in group.iter().enumerate() {
+                let others = group[index + 1..].iter().filter(|other| other.id != section.id);
+                meetings.extend(others.map(|other| meeting(section, other, &mut fourier)));
+            }
+            rings.z_mm.push(group.iter().map(|section| section.z_mm).sum::<f64>() / group.len() as f64);
+            rings.deviation_um.extend_from_slice(fourier.synthesise(mean(group).map(|order| order.value)));
+            variance.push(mean(group).map(|order| order.variance).collect());
+            rest = later;
+        }
+        let (start, end) = match rings.z_mm.as_slice() {
+            [] => return Err(failure("no section was measured".into())),
+            [only] => {
+                let problem = format!("all sections lie at one z ({only} mm); a surface needs two or more");
+                return Err(failure(problem).help("measure at another station, or export no mesh"));
+            }
+            [start, .., end] => (*start, *end),
+        };
+        let interpolation = describe(rings.z_mm.len(), self.band_limited);
+        if let Some(step) = self.config.step_mm {
+            let points = ((end - start) / step + 2.0) * angles as f64;
+            if points > MOST_POINTS {
+                let problem = format!("rings every {step} mm over {} mm are more than can be held", end - start);
+                return Err(failure(problem).help("enlarge step_mm or take fewer angles"));
+            }
+        }
+        let Rings { z_mm, deviation_um, .. } = rings.laid(self.config.step_mm);
+        let surface = Surface { radius_mm, angles, z_mm, deviation_um, interpolation, meetings };
+        Ok((surface, Uncertain { rings, variance, step_mm: self.config.step_mm, sections: self.sections }))
+    }
+}
+
+/// A surface's measured rings with what is not known of them, from which surfaces are drawn that could be as well.
+#[derive(Debug)]
+pub struct Uncertain {
+    rings: Rings,
+    /// Of each ring, E|δ|² by order from 0; NaN where not known.
+    variance: Vec<Vec<f64>>,
+    step_mm: Option<f64>,
+    sections: Vec<Section>,
+}
+
+impl Uncertain {
+    /// The sections that the surface was made of.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Measured rings: places in mm, ascending.
+    pub fn z_mm(&self) -> &[f64] {
+        &self.rings.z_mm
+    }
+
+    /// Harmonics of each measured ring by order from 0, with the power that their errors add taken out where `without_noise`;
+    /// errors of orders below `lowest` are taken as none.
+    pub fn harmonics(&self, lowest: usize, without_noise: bool) -> Vec<Vec<Complex64>> {
+        let angles = self.rings.angles;
+        let mut fourier = Fourier::new(angles);
+        let rings = self.rings.deviation_um.chunks(angles).map(|ring| {
+            let mut harmonics = vec![Complex64::ZERO; max_order(angles) + 1];
+            fourier.analyse(ring.iter().copied(), &mut harmonics);
+            harmonics
+        });
+        let mut harmonics: Vec<Vec<Complex64>> = rings.collect();
+        if without_noise {
+            remove_noise(&mut harmonics, &self.variance, lowest);
+        }
+        harmonics
+    }
+
+    /// The measured rings one after the other, without the power that their errors add.
+    pub fn without_noise(&self, lowest: usize) -> Vec<f64> {
+        let mut fourier = Fourier::new(self.rings.angles);
+        let rings = self.harmonics(lowest, true);
+        rings.into_iter().flat_map(|harmonics| fourier.synthesise(harmonics).to_vec()).collect()
+    }
+
+    /// Standard deviation of each measured ring's errors at any one angle, in µm; NaN where nothing is known.
+    pub fn std_um(&self, lowest: usize) -> Vec<f64> {
+        let std = |variance: &Vec<f64>| Errors::new(variance, lowest, 0).map_or(f64::NAN, |errors| errors.std_um());
+        self.variance.iter().map(std).collect()
+    }
+
+    /// Errors of all measured rings, one after the other, independent from call to call. Orders below `lowest` are taken as
+    /// exact. `None` where a ring's errors are not known.
+    pub fn errors(&self, lowest: usize, seed: u64) -> Option<impl FnMut(&mut [f64]) + '_> {
+        let each = self.variance.iter().zip(0..);
+        let errors: Option<Vec<Errors>> =
+            each.map(|(variance, ring)| Errors::new(variance, lowest, seed.wrapping_add(ring))).collect();
+        let mut errors = errors?;
+        let angles = self.rings.angles;
+        let fill = move |errors: &mut [Errors], rings_um: &mut [f64]| {
+            let mut fourier = Fourier::new(angles);
+            for (errors, ring) in errors.iter_mut().zip(rings_um.chunks_mut(angles)) {
+                errors.fresh(&mut fourier, ring);
+            }
+        };
+        Some(move |rings_um: &mut [f64]| {
+            // Rings have numbers of their own, whichever thread draws them.
+            let half = errors.len() / 2;
+            let (first, rest) = errors.split_at_mut(half);
+            let (first_um, rest_um) = rings_um.split_at_mut((half * angles).min(rings_um.len()));
+            std::thread::scope(|scope| {
+                scope.spawn(|| fill(first, first_um));
+                fill(rest, rest_um);
+            });
+        })
+    }
+
+    /// A surface's deviations from those of its measured rings.
+    pub fn laid(&self, rings_um: &[f64]) -> Vec<f64> {
+        let Rings { angles, z_mm, .. } = &self.rings;
+        let rings = Rings { angles: *angles, z_mm: z_mm.clone(), deviation_um: rings_um.to_vec() };
+        if self.step_mm.is_some() { rings.laid(self.step_mm).deviation_um } else { rings.deviation_um }
+    }
+}
+
+/// Form over (angle, z), as in [`Surface`].
+#[derive(Debug, Clone)]
+struct Rings {
+    angles: usize,
+    z_mm: Vec<f64>,
+    deviation_um: Vec<f64>,
+}
+
+impl Rings {
+    /// As they are, or at every `step_mm` from the first on, and one where the last is.
+    fn laid(&self, step_mm: Option<f64>) -> Self {
+        let (Some(step), [start, .., end]) = (step_mm, self.z_mm.as_slice()) else { return self.clone() };
+        // A last gap below a thousandth of the step is rounding, not a ring.
+        let full = ((end - start) / step - 1e-3).ceil().max(1.0) as usize;
+        let z_mm: Vec<f64> = (0..full).map(|ring| start + step * ring as f64).chain([*end]).collect();
+        let mut deviation_um = Vec::with_capacity(z_mm.len() * self.angles);
+        let ring = |index: usize| &self.deviation_um[index * self.angles..(index + 1) * self.angles];
+        for stencil in z_mm.iter().filter_map(|z| Stencil::locate(&self.z_mm, *z)) {
+            let known: [&[f64]; STENCIL] = std::array::from_fn(|knot| ring(stencil.knot(knot)));
+            deviation_um.extend((0..self.angles).map(|angle| stencil.value(known.map(|ring| ring[angle]))));
+        }
+        Self { angles: self.angles, z_mm, deviation_um }
+    }
+}
+
+fn describe(sections: usize, band_limited: bool) -> &'static str {
+    match (sections, band_limited) {
+        (2, false) => "linear along z between the two sections",
+        (2, true) => "linear along z between the two sections; orders from half the angles upwards left out",
+        (_, false) => "monotone piecewise cubic along z (Fritsch, Carlson 1980; slopes of Fritsch, Butland 1984)",
+        (_, true) => {
+            "monotone piecewise cubic along z (Fritsch, Carlson 1980; slopes of Fritsch, Butland 1984); orders from \
+             half the angles upwards left out"
+        }
+    }
+}
+
+fn orders(separation: &Separation, unknown: usize) -> Vec<Option<Order>> {
+    let width = separation.unknowns.len();
+    let seen = separation.observable.iter().skip(unknown).step_by(width);
+    let variances = separation.variance.iter().skip(unknown).step_by(width).copied().chain(std::iter::repeat(f64::NAN));
+    separation
+        .coefficients(unknown)
+        .zip(seen)
+        .zip(variances)
+        .map(|((value, seen), variance)| (*seen && value.is_finite()).then_some(Order { value, variance }))
+        .collect()
+}
+
+/// Orders of two sections side by side, where both know them.
+fn common<'a>(a: &'a Section, b: &'a Section) -> impl Iterator<Item = Option<(Order, Order)>> + 'a {
+    a.orders.iter().zip(&b.orders).map(|(a, b)| a.zip(*b))
+}
+
+fn meeting(a: &Section, b: &Section, fourier: &mut Fourier) -> Meeting {
+    let difference = common(a, b).map(|pair| pair.map_or(Complex64::ZERO, |(a, b)| a.value - b.value));
+    let difference = fourier.synthesise(difference);
+    let squares: f64 = difference.iter().map(|value| value * value).sum();
+    // As Separation::angle_std: ½ Σ E|δₙ|² from order 1.
+    let variance: f64 = common(a, b).skip(1).flatten().map(|(a, b)| a.variance + b.variance).sum();
+    let expected = (0.5 * variance).sqrt();
+    Meeting {
+        z_mm: 0.5 * (a.z_mm + b.z_mm),
+        sections: [a.label(), b.label()],
+        rms_um: (squares / difference.len() as f64).sqrt(),
+        max_um: difference.iter().fold(0.0, |largest: f64, value| largest.max(value.abs())),
+        expected_rms_um: (expected.is_finite() && expected > 0.0).then_some(expected),
+    }
+}
+
+/// The mean of sections at one z, order by order over those that know it; its variance is NaN where not known.
+fn mean(group: &[Section]) -> impl Iterator<Item = Order> + '_ {
+    let orders = group.iter().map(|section| section.orders.len()).max().unwrap_or(0);
+    (0..orders).map(move |order| {
+        let known = || group.iter().filter_map(move |section| *section.orders.get(order)?);
+        let weighted = known().all(|known| known.variance.is_finite() && known.variance > 0.0);
+        let weight = |order: &Order| if weighted { order.variance.recip() } else { 1.0 };
+        let weights: f64 = known().map(|order| weight(&order)).sum();
+        let sum: Complex64 = known().map(|order| order.value * weight(&order)).sum();
+        let spread: f64 = known().map(|order| order.variance * weight(&order).powi(2)).sum();
+        if weights > 0.0 {
+            Order { value: sum / weights, variance: spread / weights.powi(2) }
+        } else {
+            Order { value: Complex64::ZERO, variance: f64::NAN }
+        }
+    })
+}
