@@ -46,6 +46,12 @@ impl<const D: usize> Cloud<D> {
         self.levels.clear();
     }
 
+    /// Makes room for more points.
+    pub fn reserve(&mut self, more: usize) {
+        self.features.iter_mut().for_each(|column| column.reserve(more));
+        self.levels.reserve(more);
+    }
+
     /// Takes away all points but the first.
     pub fn truncate(&mut self, count: usize) {
         self.features.iter_mut().for_each(|column| column.truncate(count));

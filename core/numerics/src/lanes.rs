@@ -168,6 +168,33 @@ pub fn load<const C: usize>(frame: &[f64], offset: usize) -> [f64; C] {
     lanes
 }
 
+/// Σ a·b of two sequences, as far as both go.
+#[must_use]
+pub fn product(a: &[f64], b: &[f64]) -> f64 {
+    let count = a.len().min(b.len());
+    vectorised(Product(&a[..count], &b[..count]))
+}
+
+struct Product<'a>(&'a [f64], &'a [f64]);
+
+impl NullaryFnOnce for Product<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        const LANES: usize = 16;
+        // Lanes that do not wait for each other.
+        let mut sums = [0.0; LANES];
+        let ((whole_a, rest_a), (whole_b, rest_b)) = (self.0.as_chunks::<LANES>(), self.1.as_chunks::<LANES>());
+        for (a, b) in whole_a.iter().zip(whole_b) {
+            for lane in 0..LANES {
+                sums[lane] += a[lane] * b[lane];
+            }
+        }
+        sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,7 +10,7 @@
 //! interval, but the reason why.
 
 use super::uncertainty::Uncertainty;
-use runout_numerics::Complex64;
+use runout_numerics::{Complex64, lanes::product};
 
 /// Pairs of draws of a section's values: Student's factor is then 9 % above the normal distribution's.
 pub const PAIRS: usize = 16;
@@ -112,7 +112,7 @@ pub fn in_pairs(
     let mut squares = 0.0;
     for _ in 0..pairs {
         next(&mut errors_um);
-        squares += errors_um.iter().map(|error| error * error).sum::<f64>();
+        squares += product(&errors_um, &errors_um);
         for ((above, below), (form, error)) in above.iter_mut().zip(&mut below).zip(form_um.iter().zip(&errors_um)) {
             (*above, *below) = (form + error, form - error);
         }

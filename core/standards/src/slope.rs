@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, f64::consts::TAU};
 
-use super::near::Ranked;
+use super::{near::Ranked, uncertainty::DrawnErrors};
 use crate::gaps::Gaps;
 use runout_numerics::{Complex64, fourier::Fourier, interpolation::Curve};
 
@@ -107,11 +107,11 @@ impl<'a> Drawn<'a> {
         Self { slopes, ranked: Ranked::new(slopes.iter().map(|slope| slope.abs())) }
     }
 
-    /// Of the slopes with errors of at most `largest` added.
+    /// Of the slopes with errors added.
     #[must_use]
-    pub fn steepest(&self, errors: &[f64], largest: f64) -> f64 {
-        let size = |point: usize| (self.slopes[point] + errors[point]).abs();
-        match self.ranked.highest(largest, size) {
+    pub fn steepest(&self, errors: &DrawnErrors) -> f64 {
+        let size = |point: usize| (self.slopes[point] + errors.at(point)).abs();
+        match self.ranked.highest(errors.largest_um(), size) {
             Some((peak, place)) => with_parabola(place, peak, self.slopes.len(), size),
             None => with_errors(self.slopes, size),
         }
@@ -205,7 +205,7 @@ mod tests {
                 let errors: Vec<f64> = (0..count).map(|point| size * wave(point, 0.7 * f64::from(draw))).collect();
                 let both: Vec<f64> = slopes.iter().zip(&errors).map(|(slope, error)| slope + error).collect();
                 let expected = Drawn::about(&both).undisturbed();
-                assert_eq!(drawn.steepest(&errors, largest_of(&errors)), expected, "{count} {draw}");
+                assert_eq!(drawn.steepest(&DrawnErrors::new(&errors)), expected, "{count} {draw}");
             }
         }
     }

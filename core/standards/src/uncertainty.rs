@@ -165,7 +165,7 @@ enum Source {
 pub struct Errors {
     amplitudes: Vec<f64>,
     source: Source,
-    /// The errors last drawn twice over, before they are turned.
+    /// The errors last drawn, before they are turned.
     drawn_um: Vec<f64>,
     largest_um: f64,
     squares_um2: f64,
@@ -176,12 +176,52 @@ pub struct Errors {
 /// One draw of errors on equal angles.
 #[derive(Debug, Clone, Copy)]
 pub struct DrawnErrors<'a> {
-    /// At each angle, in µm.
-    pub errors_um: &'a [f64],
-    /// The largest of them, without sign.
-    pub largest_um: f64,
-    /// Sum of their squares.
-    pub squares_um2: f64,
+    drawn_um: &'a [f64],
+    /// Place of the first angle's error.
+    from: usize,
+    largest_um: f64,
+    squares_um2: f64,
+}
+
+impl<'a> DrawnErrors<'a> {
+    /// These, in µm.
+    #[must_use]
+    pub fn new(errors_um: &'a [f64]) -> Self {
+        let (largest_um, squares_um2) = size(errors_um);
+        Self { drawn_um: errors_um, from: 0, largest_um, squares_um2 }
+    }
+
+    /// The error at an angle by its number, in µm.
+    #[must_use]
+    pub fn at(&self, angle: usize) -> f64 {
+        let (place, count) = (angle + self.from, self.drawn_um.len());
+        self.drawn_um[if place < count { place } else { place - count }]
+    }
+
+    /// Errors at the first angles, and at the others.
+    #[must_use]
+    pub fn parts(&self) -> [&'a [f64]; 2] {
+        let (head, tail) = self.drawn_um.split_at(self.from);
+        [tail, head]
+    }
+
+    /// At all angles, in µm.
+    pub fn iter(&self) -> impl Iterator<Item = &'a f64> + use<'a> {
+        let [first, others] = self.parts();
+        first.iter().chain(others)
+    }
+
+    /// The largest of them in µm, without sign.
+    #[must_use]
+    pub fn largest_um(&self) -> f64 {
+        self.largest_um
+    }
+
+    /// Sum of their squares, in µm².
+    #[must_use]
+    pub fn squares_um2(&self) -> f64 {
+        self.squares_um2
+    }
 }
 
 impl Errors {
@@ -267,25 +307,24 @@ impl Errors {
             let (errors, mut random) = self.next(fourier);
             drawn_um.clear();
             drawn_um.extend_from_slice(errors);
-            drawn_um.extend_from_slice(errors);
             self.start = random.random_range(0..length);
             if let Source::Own(own) = &mut self.source {
                 *own = random;
             }
-            (self.largest_um, self.squares_um2) = size(&drawn_um[..length]);
+            (self.largest_um, self.squares_um2) = size(&drawn_um);
             self.drawn_um = drawn_um;
         }
         let from = (self.start + self.turn * length / TURNS_OF_A_DRAW) % length;
         self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
-        let errors_um = &self.drawn_um[from..from + length];
-        DrawnErrors { errors_um, largest_um: self.largest_um, squares_um2: self.squares_um2 }
+        let Self { drawn_um, largest_um, squares_um2, .. } = self;
+        DrawnErrors { drawn_um, from, largest_um: *largest_um, squares_um2: *squares_um2 }
     }
 
     /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
     pub fn draw(&mut self, fourier: &mut Fourier, form_um: &[f64], drawn: &mut Vec<f64>) {
-        let DrawnErrors { errors_um, .. } = self.turned(fourier);
+        let errors = self.turned(fourier);
         drawn.clear();
-        drawn.extend(form_um.iter().zip(errors_um).map(|(form, error)| form + error));
+        drawn.extend(form_um.iter().zip(errors.iter()).map(|(form, error)| form + error));
     }
 }
 
@@ -465,5 +504,27 @@ mod tests {
         assert_ne!(first, monte_carlo(&form, &[0.01; 20], 4, peak));
         assert_eq!(monte_carlo(&form, &[f64::NAN; 20], 3, peak), None);
         assert_ne!(seed(&["a", "b"]), seed(&["ab"]));
+    }
+
+    /// Shared numbers are those of the seed, for all that share them.
+    #[test]
+    #[allow(clippy::float_cmp, reason = "the same operations")]
+    fn errors_share_their_numbers() {
+        let variance = [0.01; 30];
+        let noise = Noise::new(30, 5);
+        let mut fourier = Fourier::new(64);
+        let mut own = Errors::new(&variance, 2, 5).unwrap();
+        let mut shared = Errors::sharing(&variance, 2, &noise).unwrap();
+        let mut doubled = Errors::sharing(&variance.map(|variance| 4.0 * variance), 2, &noise).unwrap();
+        for draw in 0..40 {
+            let expected: Vec<f64> = own.turned(&mut fourier).iter().copied().collect();
+            let found = shared.turned(&mut fourier);
+            assert!(found.iter().eq(&expected), "{draw}");
+            assert!((0..64).all(|angle| found.at(angle) == expected[angle]), "{draw}");
+            let twice = doubled.turned(&mut fourier);
+            assert!((0..64).all(|angle| (twice.at(angle) - 2.0 * expected[angle]).abs() < 1e-14), "{draw}");
+        }
+        let more = Errors::sharing(&[0.01; 31], 2, &noise).unwrap();
+        assert_eq!(more.amplitudes.len(), 31, "more orders than are shared have numbers of their own");
     }
 }

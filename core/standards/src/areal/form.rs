@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::HeightMap;
 use runout_error::{Error, Result};
+use runout_numerics::lanes::product;
 
 /// Highest degree of a polynomial form.
 const HIGHEST_DEGREE: usize = 8;
@@ -109,19 +110,6 @@ fn legendre(x: f64) -> [f64; HIGHEST_DEGREE + 1] {
         values[n + 1] = ((2.0 * order + 1.0) * x * values[n] - order * values[n - 1]) / (order + 1.0);
     }
     values
-}
-
-/// Σ a·b, over lanes that do not wait for each other.
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 16;
-    let mut sums = [0.0; LANES];
-    let ((whole_a, rest_a), (whole_b, rest_b)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
-    for (a, b) in whole_a.iter().zip(whole_b) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// The map without the least-squares combination of terms.

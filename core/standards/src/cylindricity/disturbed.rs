@@ -13,26 +13,28 @@ pub struct Disturbed {
     at: Vec<((f64, f64), f64, [usize; 2])>,
     /// The cylinder about the wall itself, and heights between which it is looked at.
     cylinder: Cylinder,
+    about: Values,
     heights_mm: [f64; 2],
     /// Of each section, what the form is above its deviations about LSCY; empty where errors move LSCY.
     offset_um: Vec<Vec<f64>>,
 }
 
 impl Disturbed {
-    /// `usual_um` is about the largest error of a draw. `centred` says that errors have no orders 0 and 1. `None` where the
+    /// `points` are those of the sections; `usual_um` is about the largest error of a draw. `centred` says that errors have no orders 0 and 1. `None` where the
     /// wall has no such cylinder.
     #[must_use]
     pub fn new(
         reference: Reference,
         sections: &[Section],
+        points: &Points,
         radius_mm: f64,
         usual_um: f64,
         centred: bool,
     ) -> Option<Self> {
-        let points = Points::of_sections(radius_mm, sections);
         let cylinder = points.reference(reference)?;
         let deviations: Vec<f64> = points.deviations_um(&cylinder).collect();
         let near = Near::new(&deviations, cylinder.deviation_um, usual_um);
+        let about = Course::of(deviations.iter().copied()).into();
         let whole = deviations.iter().all(|deviation| !deviation.is_nan());
         // Errors of orders from 2 on are at right angles to what moves LSCY, on whole circles.
         let stays = reference == Reference::LeastSquares && centred && whole;
@@ -50,7 +52,13 @@ impl Disturbed {
         let heights = || sections.iter().map(|section| section.z_mm);
         let at = near.points.iter().map(|point| all[*point]).collect();
         let heights_mm = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
-        Some(Self { reference, radius_mm, near, at, cylinder, heights_mm, offset_um })
+        Some(Self { reference, radius_mm, near, at, cylinder, about, heights_mm, offset_um })
+    }
+
+    /// Values of the wall itself.
+    #[must_use]
+    pub fn about(&self) -> Values {
+        self.about
     }
 
     /// Values of the wall with errors of at most `largest_um` in it. About other cylinders than LSCY, CYLq is that of the
@@ -123,7 +131,7 @@ mod tests {
         const COUNT: usize = 96;
         let angles = Angles::equal(COUNT);
         let mut random = ChaCha8Rng::seed_from_u64(6);
-        let mut wall = |amplitude: f64| -> Vec<Vec<f64>> {
+        let mut wall_of = |amplitude: f64| -> Vec<Vec<f64>> {
             let mut ring = |_| -> Vec<f64> {
                 let waves: Vec<(f64, f64)> = (2..20)
                     .map(|_| (amplitude * random.random_range(-1.0..1.0), random.random_range(0.0..TAU)))
@@ -136,11 +144,13 @@ mod tests {
             (0..5).map(&mut ring).collect()
         };
         for size in [1e-4, 0.01, 0.3] {
-            let rings = wall(1.0);
+            let rings = wall_of(1.0);
             for reference in Reference::ALL {
-                let disturbed = Disturbed::new(reference, &sections(&rings, &angles), 30.0, 8.0 * size, true).unwrap();
+                let wall = sections(&rings, &angles);
+                let points = Points::of_sections(30.0, &wall);
+                let disturbed = Disturbed::new(reference, &wall, &points, 30.0, 8.0 * size, true).unwrap();
                 for _ in 0..10 {
-                    let errors = wall(size);
+                    let errors = wall_of(size);
                     let largest = errors.iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
                     let add =
                         |(ring, errors): (&Vec<f64>, &Vec<f64>)| ring.iter().zip(errors).map(|(a, b)| a + b).collect();

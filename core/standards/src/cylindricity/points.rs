@@ -1,5 +1,7 @@
 //! The points of a wall, and what they are about an axis.
 
+use std::sync::OnceLock;
+
 use super::{Cylinder, Reference, Undetermined, Values, least_squares, search};
 use crate::{near::Course, roundness::Angles};
 
@@ -28,6 +30,8 @@ pub struct Points {
     held: Vec<[f64; 4]>,
     /// The largest |w|.
     pub(super) span_um: f64,
+    /// LSCY, from which all others are sought, once it is known: its axis and radius deviation.
+    least_squares: OnceLock<Option<(Axis, f64)>>,
 }
 
 /// An axis inside: x and y midway and how far it leans until the end, in µm.
@@ -70,7 +74,8 @@ impl Points {
         });
         let held: Vec<[f64; 4]> = held.collect();
         let span_um = held.iter().map(|held| held[2].abs()).fold(0.0, f64::max);
-        Self { radius_um: radius, middle_mm, half_um: 1e3 * half_mm, held, span_um }
+        let least_squares = OnceLock::new();
+        Self { radius_um: radius, middle_mm, half_um: 1e3 * half_mm, held, span_um, least_squares }
     }
 
     /// Points, those that are missing included.
@@ -123,7 +128,8 @@ impl Points {
         if !(self.radius_um > 0.0 && self.span_um < self.radius_um) {
             return Err(Undetermined::Radius);
         }
-        let (axis, deviation) = least_squares::axis(self).ok_or(Undetermined::NotFound)?;
+        let least_squares = self.least_squares.get_or_init(|| least_squares::axis(self));
+        let (axis, deviation) = least_squares.ok_or(Undetermined::NotFound)?;
         match reference {
             Reference::LeastSquares => Ok(self.about(axis, deviation, vec![])),
             _ => search::search(self, axis, reference),

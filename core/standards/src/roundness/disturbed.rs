@@ -5,7 +5,7 @@ use crate::{
     near::{Course, Near, Ranked},
     uncertainty::DrawnErrors,
 };
-use runout_numerics::chebyshev::Chebyshev;
+use runout_numerics::{chebyshev::Chebyshev, lanes::product};
 
 /// A profile about one reference circle. Only points that may come to touch it are looked at, where that is certain.
 #[derive(Debug, Clone)]
@@ -45,33 +45,23 @@ impl Fixed {
     }
 
     fn values(&self, drawn: &DrawnErrors) -> Values {
-        let (all, errors) = (&self.deviations[..], drawn.errors_um);
-        let high = self.highest.highest(drawn.largest_um, |point| all[point] + errors[point]);
-        let low = self.lowest.highest(drawn.largest_um, |point| -(all[point] + errors[point]));
+        let all = &self.deviations[..];
+        let high = self.highest.highest(drawn.largest_um(), |point| all[point] + drawn.at(point));
+        let low = self.lowest.highest(drawn.largest_um(), |point| -(all[point] + drawn.at(point)));
+        let [errors, others] = drawn.parts();
         let course = match (high, low) {
             (Some((high, _)), Some((low, _))) => {
-                let squares = self.squares + 2.0 * product(all, errors) + drawn.squares_um2;
+                let crossed = product(all, errors) + product(&all[errors.len()..], others);
+                let squares = self.squares + 2.0 * crossed + drawn.squares_um2();
                 Course { low: -low, high, squares, points: all.len() }
             }
-            _ => Course::with_errors(all, errors),
+            _ => {
+                let (first, rest) = all.split_at(errors.len());
+                Course::with_errors(first, errors).and(Course::with_errors(rest, others))
+            }
         };
         course.into()
     }
-}
-
-/// Σ a·b.
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 16;
-    // Lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
-    let mut sums = [0.0; LANES];
-    let (whole_a, rest_a) = a.as_chunks::<LANES>();
-    let (whole_b, rest_b) = b.as_chunks::<LANES>();
-    for (a, b) in whole_a.iter().zip(whole_b) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
 }
 
 impl<'a> Disturbed<'a> {
@@ -127,7 +117,7 @@ impl<'a> Disturbed<'a> {
     /// From the points looked at; `None` where others could touch.
     fn of_near(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         self.drawn_um.clear();
-        self.drawn_um.extend(self.near.points.iter().map(|point| self.form_um[*point] + drawn.errors_um[*point]));
+        self.drawn_um.extend(self.near.points.iter().map(|point| self.form_um[*point] + drawn.at(*point)));
         self.points.set_profile(&self.near_angles, &self.drawn_um, self.radius_mm);
         let (values, place, ends) = match self.reference {
             Reference::MinimumZone => self.points.zone_near(self.centre_um, &mut self.zone)?,
@@ -139,12 +129,12 @@ impl<'a> Disturbed<'a> {
             }
         };
         let moved = (place[0] - self.centre_um[0]).hypot(place[1] - self.centre_um[1]);
-        self.near.suffice(ends, moved, drawn.largest_um).then_some(values)
+        self.near.suffice(ends, moved, drawn.largest_um()).then_some(values)
     }
 
     fn of_all(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         self.drawn_um.clear();
-        self.drawn_um.extend(self.form_um.iter().zip(drawn.errors_um).map(|(form, error)| form + error));
+        self.drawn_um.extend(self.form_um.iter().zip(drawn.iter()).map(|(form, error)| form + error));
         self.points.set_profile(self.angles, &self.drawn_um, self.radius_mm);
         let circle = self.points.reference(self.reference)?;
         Some(self.points.values(&circle))
@@ -186,11 +176,8 @@ mod tests {
                     let mut disturbed = Disturbed::new(reference, &angles, &form, 30.0, 10.0 * size).unwrap();
                     for _ in 0..20 {
                         let errors = wave(size);
-                        let largest = errors.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
                         let drawn: Vec<f64> = form.iter().zip(&errors).map(|(form, error)| form + error).collect();
-                        let squares_um2 = errors.iter().map(|error| error * error).sum();
-                        let errors = DrawnErrors { errors_um: &errors, largest_um: largest, squares_um2 };
-                        let quick = disturbed.values(&errors).unwrap();
+                        let quick = disturbed.values(&DrawnErrors::new(&errors)).unwrap();
                         let mut points = Points::default();
                         points.set_profile(&angles, &drawn, 30.0);
                         let slow = points.values(&points.reference(reference).unwrap());

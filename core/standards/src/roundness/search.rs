@@ -33,6 +33,10 @@ impl Chosen {
     /// Adds all of few points, of many of each block the highest point above `high` and the lowest below `low` over a place; whether any was new.
     pub(super) fn grow(&mut self, points: &Points, place: &[f64; 2], low: f64, high: f64) -> bool {
         let (all, before) = (&points.cloud, self.points.len());
+        if before == 0 {
+            self.cloud.reserve(2 * BLOCKS);
+            self.points.reserve(2 * BLOCKS);
+        }
         if all.len() <= FEW && before == 0 {
             for point in (0..all.len()).filter(|point| !all.levels()[*point].is_nan()) {
                 self.cloud.push(all.features(point), all.levels()[point]);

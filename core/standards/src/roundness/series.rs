@@ -1,6 +1,6 @@
 //! Reference circles of a profile that is a finite sum of harmonics: contacts between the angles.
 
-use std::{f64::consts::TAU, rc::Rc};
+use std::{cell::RefCell, f64::consts::TAU, rc::Rc};
 
 use super::{Angles, Circle, Points, Reference, Undetermined, Values};
 use runout_numerics::{Complex64, interpolation::Curve};
@@ -37,6 +37,19 @@ pub struct Series<'a> {
     heights: Vec<f64>,
 }
 
+impl Drop for Series<'_> {
+    fn drop(&mut self) {
+        let spare = (std::mem::take(&mut self.points), std::mem::take(&mut self.heights));
+        // A thread that ends keeps nothing.
+        let _ = SPARE.try_with(|kept| kept.replace(spare));
+    }
+}
+
+thread_local! {
+    /// Memory of the last series: asking the system for it each time costs as much as a reference circle.
+    static SPARE: RefCell<(Points, Vec<f64>)> = RefCell::default();
+}
+
 /// An extreme between angles.
 struct Extreme {
     angle_rad: f64,
@@ -49,10 +62,11 @@ impl<'a> Series<'a> {
     #[must_use]
     pub fn new(harmonics: &'a [Complex64], profile_um: &'a [f64], radius_mm: f64) -> Self {
         let angles = Angles::shared(profile_um.len());
-        let mut points = Points::default();
+        let (mut points, mut heights) = SPARE.take();
         points.set_profile(&angles, profile_um, radius_mm);
+        heights.resize(profile_um.len(), 0.0);
         let (curve, span_um) = (Curve::new(harmonics, profile_um), points.span_um);
-        Self { curve, profile_um, angles, points, span_um, heights: vec![0.0; profile_um.len()] }
+        Self { curve, profile_um, angles, points, span_um, heights }
     }
 
     /// A reference circle and the values about it.

@@ -5,6 +5,8 @@
 //! Ra, Rq, Rt, Rsk and Rku are of the evaluation length; Rp, Rv and Rz are means over the section lengths, as in the edition
 //! of 2021 (ISO 4287:1997 defined them, and Ra and Rq, on one sampling length). Missing points (NaN) are left out and counted.
 
+#![allow(clippy::inline_always, reason = "see crate::numerics::lanes")]
+
 mod elements;
 mod profile;
 
@@ -13,7 +15,10 @@ use serde::Deserialize;
 
 use super::{areal::MaterialRatio, parameter::Parameter};
 use profile::Profile;
-use runout_numerics::filter::{Degree, Smoother, upr};
+use runout_numerics::{
+    filter::{Degree, Smoother, upr},
+    lanes::{NullaryFnOnce, vectorised},
+};
 
 /// Which wavelengths a profile has (ISO 21920-2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
@@ -309,13 +314,25 @@ pub fn ra_um(form_um: &[f64]) -> f64 {
 
 /// A sum over lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
 fn sum_of(values: &[f64], term: impl Fn(f64) -> f64) -> f64 {
-    let mut sums = [0.0; 8];
-    for chunk in values.chunks(8) {
-        for (sum, value) in sums.iter_mut().zip(chunk) {
-            *sum += term(*value);
+    vectorised(SumOf(values, term))
+}
+
+struct SumOf<'a, F>(&'a [f64], F);
+
+impl<F: Fn(f64) -> f64> NullaryFnOnce for SumOf<'_, F> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let mut sums = [0.0; 8];
+        let (whole, rest) = self.0.as_chunks::<8>();
+        for values in whole {
+            for lane in 0..8 {
+                sums[lane] += (self.1)(values[lane]);
+            }
         }
+        sums.iter().sum::<f64>() + rest.iter().map(|value| (self.1)(*value)).sum::<f64>()
     }
-    sums.iter().sum()
 }
 
 #[cfg(test)]

@@ -223,6 +223,10 @@ impl<'a> Prepared<'a> {
             )
         };
         let both = |[above, below]: [&[f64]; 2]| {
+            if std::ptr::eq(above, below) {
+                let of_both = of(above);
+                return [of_both.clone(), of_both];
+            }
             std::thread::scope(|scope| {
                 let other = scope.spawn(|| of(below));
                 let above = of(above);

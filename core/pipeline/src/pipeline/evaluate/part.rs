@@ -192,11 +192,15 @@ impl Wall {
             for (index, reference) in references.iter().enumerate() {
                 let about = if let (None, Some(points)) = (largest_um, &points) {
                     let prepare =
-                        |usual_um| Disturbed::new(*reference, sections, self.radius_mm, usual_um, !self.placed);
+                        |usual_um| Disturbed::new(*reference, sections, points, self.radius_mm, usual_um, !self.placed);
+                    let found = || points.reference(*reference).map(|cylinder| points.values(&cylinder));
+                    // The first wall is the one that errors are drawn about.
                     if disturbed.len() < references.len() {
                         disturbed.push(usual_um.and_then(prepare));
+                        disturbed.last().and_then(Option::as_ref).map_or_else(found, |wall| Some(wall.about()))
+                    } else {
+                        found()
                     }
-                    points.reference(*reference).map(|cylinder| points.values(&cylinder))
                 } else {
                     let prepared = disturbed.get(index).and_then(Option::as_ref);
                     prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))

@@ -342,10 +342,7 @@ impl Form {
         let mut likely = fourier.synthesise(likely).to_vec();
         self.at.gaps.blank(&mut likely);
         let about = Drawn::about(&likely);
-        let draws = (0..DRAWS).map(|_| {
-            let drawn = errors.turned(&mut fourier);
-            about.steepest(drawn.errors_um, drawn.largest_um)
-        });
+        let draws = (0..DRAWS).map(|_| about.steepest(&errors.turned(&mut fourier)));
         let known = extreme(value, about.undisturbed(), draws.collect()).map(|(_, known)| known);
         (value, known)
     }
