@@ -27,6 +27,18 @@ fn unknown_key_at_the_top() {
 }
 
 #[test]
+fn values_that_cannot_be_are_refused_at_their_key() {
+    for (line, words) in [
+        ("datum = [\"a\", \"c\"]", "the rig has no section `c`"),
+        ("harmonics_upr = 0", "from 2 on"),
+        ("directions_deg = [45, 400]", "between -360 and 360 degrees"),
+    ] {
+        let shown = check("[[export]]", &format!("[evaluate]\n{line}\n\n[[export]]"));
+        assert!(shown.starts_with("exit status: 2") && shown.contains(words) && shown.contains(line), "{shown}");
+    }
+}
+
+#[test]
 fn unknown_plugin() {
     assert_snapshot!(check("\"four-sensor-reversal\"", "\"four-senser-reversal\""));
 }

@@ -6,6 +6,8 @@ use crate::Complex64;
 
 /// Values on both sides through which a polynomial goes.
 const THROUGH: usize = 16;
+/// The same as a power.
+const POWER: i32 = 16;
 /// The polynomial serves where it errs by less than this share of the curve's amplitudes; its second derivative then errs by some
 /// ten times that of theirs.
 const SHARE: f64 = 1e-11;
@@ -27,7 +29,7 @@ impl<'a> Curve<'a> {
         // Of a wave of k per step and THROUGH nodes, kⁿ/n! · Π|t − tᵢ|, up to one step outside the middle.
         let product: f64 = (0..THROUGH).map(|node| (8.5 - node as f64).abs().max(0.5)).product();
         let factorial: f64 = (1..=THROUGH).map(|factor| factor as f64).product();
-        let error = |order: usize| (order as f64 * step).powi(THROUGH as i32) * product / factorial;
+        let error = |order: usize| (order as f64 * step).powi(POWER) * product / factorial;
         let (errors, sizes) = series.iter().enumerate().fold((0.0, 0.0), |(errors, sizes), (order, value)| {
             let size = value.norm_sqr().sqrt();
             (errors + size * error(order), sizes + size)
@@ -39,7 +41,7 @@ impl<'a> Curve<'a> {
     /// The curve and its first two derivatives by the angle in rad.
     #[must_use]
     pub fn at(&self, angle: f64) -> [f64; 3] {
-        self.near(angle).unwrap_or_else(|| self.from_series(angle))
+        self.near(angle).unwrap_or_else(|| self.by_series(angle))
     }
 
     /// By the polynomial; `None` where values are too far apart or missing.
@@ -80,7 +82,7 @@ impl<'a> Curve<'a> {
         sum.is_finite().then_some([sum, first * per_rad, second * per_rad * per_rad])
     }
 
-    fn from_series(&self, angle: f64) -> [f64; 3] {
+    fn by_series(&self, angle: f64) -> [f64; 3] {
         let turn = Complex64::cis(angle);
         let mut wave = Complex64::ONE;
         let mut sums = [0.0; 3];
@@ -109,7 +111,9 @@ mod tests {
     fn values_between_angles_are_those_of_the_waves() {
         let waves = [(2, 3.0, 0.4), (17, 0.5, 1.9), (100, 0.2, -0.7)];
         let mut series = vec![Complex64::ZERO; 101];
-        waves.iter().for_each(|(order, size, phase)| series[*order] = Complex64::from_polar(*size, *phase));
+        for (order, size, phase) in &waves {
+            series[*order] = Complex64::from_polar(*size, *phase);
+        }
         for count in [1600, 250] {
             let mut fourier = Fourier::new(count);
             let mut on_angles = fourier.synthesise(series.iter().copied()).to_vec();

@@ -117,6 +117,8 @@ pub fn without_noise(harmonics: &[Complex64], variance: &[f64]) -> Vec<Complex64
 pub struct Noise {
     seed: u64,
     orders: usize,
+    /// Whether each draw takes a start too.
+    turned: bool,
     sets: Arc<Mutex<Sets>>,
 }
 
@@ -128,11 +130,21 @@ struct Sets {
 }
 
 impl Noise {
-    /// For so many orders, from a seed.
+    /// For so many orders, from a seed, for those that all take [turned](Errors::turned) errors.
     #[must_use]
     pub fn new(orders: usize, seed: u64) -> Self {
+        Self::of(orders, seed, true)
+    }
+
+    /// The same for those that all take [fresh](Errors::fresh) errors.
+    #[must_use]
+    pub fn of_fresh(orders: usize, seed: u64) -> Self {
+        Self::of(orders, seed, false)
+    }
+
+    fn of(orders: usize, seed: u64, turned: bool) -> Self {
         let sets = Sets { random: ChaCha8Rng::seed_from_u64(seed), drawn: Vec::new() };
-        Self { seed, orders, sets: Arc::new(Mutex::new(sets)) }
+        Self { seed, orders, turned, sets: Arc::new(Mutex::new(sets)) }
     }
 
     /// Numbers of draw number `index`, and the generator behind them; the same for all that ask.
@@ -141,8 +153,9 @@ impl Noise {
         while sets.drawn.len() <= index {
             let numbers = (0..self.orders).map(|_| normal(&mut sets.random)).collect();
             let behind = sets.random.clone();
-            // What a draw takes for its start.
-            let _ = sets.random.random_range(0..self.orders.max(1));
+            if self.turned {
+                let _ = sets.random.random_range(0..self.orders.max(1));
+            }
             sets.drawn.push((numbers, behind));
         }
         sets.drawn[index].clone()
@@ -156,7 +169,7 @@ fn normal(random: &mut ChaCha8Rng) -> Complex64 {
 
 /// Where the normal numbers of errors come from.
 enum Source {
-    Own(ChaCha8Rng),
+    Own(Box<ChaCha8Rng>),
     /// And how many draws were taken.
     Shared(Noise, usize),
 }
@@ -229,7 +242,7 @@ impl Errors {
     /// `lowest`, are taken as exact. `None` where no variance is known.
     #[must_use]
     pub fn new(variance: &[f64], lowest: usize, seed: u64) -> Option<Self> {
-        Self::from_source(variance, lowest, Source::Own(ChaCha8Rng::seed_from_u64(seed)))
+        Self::from_source(variance, lowest, Source::Own(Box::new(ChaCha8Rng::seed_from_u64(seed))))
     }
 
     /// The same from numbers that others take too: draw by draw, errors of both differ by their variance only.
@@ -238,7 +251,7 @@ impl Errors {
         let source = if variance.len() <= noise.orders {
             Source::Shared(noise.clone(), 0)
         } else {
-            Source::Own(ChaCha8Rng::seed_from_u64(noise.seed))
+            Source::Own(Box::new(ChaCha8Rng::seed_from_u64(noise.seed)))
         };
         Self::from_source(variance, lowest, source)
     }
@@ -282,7 +295,7 @@ impl Errors {
             Source::Own(random) => {
                 let harmonics: Vec<Complex64> =
                     amplitudes.iter().map(|amplitude| *amplitude * normal(random)).collect();
-                (fourier.synthesise(harmonics), random.clone())
+                (fourier.synthesise(harmonics), ChaCha8Rng::clone(random))
             }
             Source::Shared(noise, taken) => {
                 let (numbers, behind) = noise.of_draw(*taken);
@@ -309,7 +322,7 @@ impl Errors {
             drawn_um.extend_from_slice(errors);
             self.start = random.random_range(0..length);
             if let Source::Own(own) = &mut self.source {
-                *own = random;
+                **own = random;
             }
             (self.largest_um, self.squares_um2) = size(&drawn_um);
             self.drawn_um = drawn_um;
@@ -523,6 +536,15 @@ mod tests {
             assert!((0..64).all(|angle| found.at(angle) == expected[angle]), "{draw}");
             let twice = doubled.turned(&mut fourier);
             assert!((0..64).all(|angle| (twice.at(angle) - 2.0 * expected[angle]).abs() < 1e-14), "{draw}");
+        }
+        let noise_of_fresh = Noise::of_fresh(30, 5);
+        let [mut own, mut shared] =
+            [Errors::new(&variance, 2, 5), Errors::sharing(&variance, 2, &noise_of_fresh)].map(Option::unwrap);
+        let (mut expected, mut found) = (vec![0.0; 64], vec![0.0; 64]);
+        for draw in 0..5 {
+            own.fresh(&mut fourier, &mut expected);
+            shared.fresh(&mut fourier, &mut found);
+            assert_eq!(found, expected, "{draw}");
         }
         let more = Errors::sharing(&[0.01; 31], 2, &noise).unwrap();
         assert_eq!(more.amplitudes.len(), 31, "more orders than are shared have numbers of their own");

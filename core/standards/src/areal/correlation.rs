@@ -40,7 +40,9 @@ impl Correlation {
             // The buffers have the plan's lengths.
             let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
             let _ = self.inverse.process_with_scratch(line, target, scratch);
-            target.iter_mut().for_each(|value| *value *= self.scale);
+            for value in &mut *target {
+                *value *= self.scale;
+            }
         }
         target
     }

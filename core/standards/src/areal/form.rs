@@ -24,8 +24,8 @@ pub fn without_cylinder(map: &HeightMap) -> Result<HeightMap<'static>> {
         return Err(Error::new("remove", "the cylinder", problem).help("remove a polynomial instead"));
     }
     let along = (0..map.rows()).map(|row| vec![1.0, middled(row, map.rows())]).collect();
-    let terms = vec![[0, 0], [1, 0], [2, 0], [1, 1], [2, 1]];
-    Ok(without(map, &Terms { across: around(map), along, terms }))
+    let products = vec![[0, 0], [1, 0], [2, 0], [1, 1], [2, 1]];
+    Ok(without(map, &Terms { across: around(map), along, products }))
 }
 
 /// A closed map without the least-squares line along the axis: mean radius and taper. It is what a plane is of a wall, which
@@ -40,7 +40,7 @@ pub fn without_taper(map: &HeightMap) -> Result<HeightMap<'static>> {
     }
     let along = (0..map.rows()).map(|row| vec![1.0, middled(row, map.rows())]).collect();
     let across = vec![vec![1.0; map.columns()]];
-    Ok(without(map, &Terms { across, along, terms: vec![[0, 0], [0, 1]] }))
+    Ok(without(map, &Terms { across, along, products: vec![[0, 0], [0, 1]] }))
 }
 
 /// A closed map without the least-squares body whose radius and centre are polynomials of a degree along the axis: 1, cos θ
@@ -57,8 +57,8 @@ pub fn without_turned_body(map: &HeightMap, degree: usize) -> Result<HeightMap<'
         return failure("only a map that goes all the way round is a turned body".into());
     }
     let along = (0..map.rows()).map(|row| legendre(middled(row, map.rows())).to_vec()).collect();
-    let terms = (0..=degree).flat_map(|power| [[0, power], [1, power], [2, power]]).collect();
-    Ok(without(map, &Terms { across: around(map), along, terms }))
+    let products = (0..=degree).flat_map(|power| [[0, power], [1, power], [2, power]]).collect();
+    Ok(without(map, &Terms { across: around(map), along, products }))
 }
 
 /// A map without the least-squares polynomial in x and y of a total degree (0 the mean, 1 a plane).
@@ -77,8 +77,8 @@ pub fn without_polynomial(map: &HeightMap, degree: usize) -> Result<HeightMap<'s
         (0..map.columns()).map(|column| legendre(middled(column, map.columns()))).collect();
     let across = (0..=degree).map(|power| points.iter().map(|point| point[power]).collect()).collect();
     let along = (0..map.rows()).map(|row| legendre(middled(row, map.rows())).to_vec()).collect();
-    let terms = (0..=degree).flat_map(|x| (0..=degree - x).map(move |y| [x, y])).collect();
-    Ok(without(map, &Terms { across, along, terms }))
+    let products = (0..=degree).flat_map(|x| (0..=degree - x).map(move |y| [x, y])).collect();
+    Ok(without(map, &Terms { across, along, products }))
 }
 
 /// 1, cosine and sine of the columns of a closed map.
@@ -94,7 +94,7 @@ struct Terms {
     /// Functions over the rows, `[row][function]`.
     along: Vec<Vec<f64>>,
     /// Of each term, its function across and its function along.
-    terms: Vec<[usize; 2]>,
+    products: Vec<[usize; 2]>,
 }
 
 /// −1 to 1 over the points of a line.
@@ -113,15 +113,15 @@ fn legendre(x: f64) -> [f64; HIGHEST_DEGREE + 1] {
 }
 
 /// The map without the least-squares combination of terms.
-fn without(map: &HeightMap, Terms { across, along, terms }: &Terms) -> HeightMap<'static> {
+fn without(map: &HeightMap, Terms { across, along, products: terms }: &Terms) -> HeightMap<'static> {
     let (columns, count, functions) = (map.columns(), terms.len(), across.len());
     let mut normal = DMatrix::<f64>::zeros(count, count);
     let mut right = DVector::<f64>::zeros(count);
     // Σ over the columns of one row, of products of two functions; the same for every row that is whole.
-    let products = |known: &[Vec<f64>]| -> Vec<f64> {
+    let sums_of = |known: &[Vec<f64>]| -> Vec<f64> {
         known.iter().flat_map(|one| across.iter().map(|other| product(one, other))).collect()
     };
-    let whole = products(across);
+    let whole = sums_of(across);
     let whole_row = |row: &[f64]| row.iter().all(|height| height.is_finite());
     for (row, along) in map.heights_um().chunks_exact(columns).zip(along) {
         let known: Vec<f64>;
@@ -132,7 +132,7 @@ fn without(map: &HeightMap, Terms { across, along, terms }: &Terms) -> HeightMap
             let masked: Vec<Vec<f64>> =
                 across.iter().map(|function| row.iter().zip(function).map(there).collect()).collect();
             known = row.iter().map(|height| if height.is_finite() { *height } else { 0.0 }).collect();
-            (&known[..], Cow::Owned(products(&masked)))
+            (&known[..], Cow::Owned(sums_of(&masked)))
         };
         let sums: Vec<f64> = across.iter().map(|function| product(function, row)).collect();
         for (column, [x, y]) in terms.iter().enumerate() {

@@ -85,7 +85,9 @@ impl NullaryFnOnce for Row<'_> {
             }
         };
         let (whole, rest) = self.0.as_chunks::<LANES>();
-        whole.iter().for_each(|heights| add(*heights));
+        for heights in whole {
+            add(*heights);
+        }
         let mut last = [f64::NAN; LANES];
         last[..rest.len()].copy_from_slice(rest);
         add(last);
@@ -123,7 +125,9 @@ impl NullaryFnOnce for Mean<'_> {
             }
         };
         let (whole, rest) = self.0.as_chunks::<LANES>();
-        whole.iter().for_each(|heights| add(*heights));
+        for heights in whole {
+            add(*heights);
+        }
         let mut last = [f64::NAN; LANES];
         last[..rest.len()].copy_from_slice(rest);
         add(last);

@@ -49,16 +49,13 @@ impl Fixed {
         let high = self.highest.highest(drawn.largest_um(), |point| all[point] + drawn.at(point));
         let low = self.lowest.highest(drawn.largest_um(), |point| -(all[point] + drawn.at(point)));
         let [errors, others] = drawn.parts();
-        let course = match (high, low) {
-            (Some((high, _)), Some((low, _))) => {
-                let crossed = product(all, errors) + product(&all[errors.len()..], others);
-                let squares = self.squares + 2.0 * crossed + drawn.squares_um2();
-                Course { low: -low, high, squares, points: all.len() }
-            }
-            _ => {
-                let (first, rest) = all.split_at(errors.len());
-                Course::with_errors(first, errors).and(Course::with_errors(rest, others))
-            }
+        let course = if let (Some((high, _)), Some((low, _))) = (high, low) {
+            let crossed = product(all, errors) + product(&all[errors.len()..], others);
+            let squares = self.squares + 2.0 * crossed + drawn.squares_um2();
+            Course { low: -low, high, squares, points: all.len() }
+        } else {
+            let (first, rest) = all.split_at(errors.len());
+            Course::with_errors(first, errors).and(Course::with_errors(rest, others))
         };
         course.into()
     }
@@ -119,14 +116,13 @@ impl<'a> Disturbed<'a> {
         self.drawn_um.clear();
         self.drawn_um.extend(self.near.points.iter().map(|point| self.form_um[*point] + drawn.at(*point)));
         self.points.set_profile(&self.near_angles, &self.drawn_um, self.radius_mm);
-        let (values, place, ends) = match self.reference {
-            Reference::MinimumZone => self.points.zone_near(self.centre_um, &mut self.zone)?,
-            _ => {
-                let circle = self.points.reference(self.reference)?;
-                let values = self.points.values(&circle);
-                let ends = [circle.deviation_um - values.ronv_um, circle.deviation_um + values.ronp_um];
-                (values, [circle.x_um, circle.y_um], ends)
-            }
+        let (values, place, ends) = if self.reference == Reference::MinimumZone {
+            self.points.zone_near(self.centre_um, &mut self.zone)?
+        } else {
+            let circle = self.points.reference(self.reference)?;
+            let values = self.points.values(&circle);
+            let ends = [circle.deviation_um - values.ronv_um, circle.deviation_um + values.ronp_um];
+            (values, [circle.x_um, circle.y_um], ends)
         };
         let moved = (place[0] - self.centre_um[0]).hypot(place[1] - self.centre_um[1]);
         self.near.suffice(ends, moved, drawn.largest_um()).then_some(values)

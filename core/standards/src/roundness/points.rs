@@ -134,7 +134,9 @@ impl Points {
         (self.radius_um, self.origin_um) = (radius_um, [0.0; 2]);
         let ([u, v], levels) = self.cloud.columns_mut();
         let count = form_um.len().min(angles.len());
-        [&mut *u, &mut *v, &mut *levels].into_iter().for_each(|column| column.resize(count, 0.0));
+        for column in [&mut *u, &mut *v, &mut *levels] {
+            column.resize(count, 0.0);
+        }
         let form_um = &form_um[..count];
         vectorised(Profile { u, v, levels, form_um, cos: &angles.cos[..count], sin: &angles.sin[..count], radius_um });
         self.measure();

@@ -236,7 +236,9 @@ impl NullaryFnOnce for Ends<'_> {
             }
         };
         let (whole, rest) = self.0.as_chunks::<LANES>();
-        whole.iter().for_each(|heights| look(*heights));
+        for heights in whole {
+            look(*heights);
+        }
         look(filled(rest, f64::NAN));
         (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max))
     }

@@ -481,7 +481,7 @@ impl EvaluateConfig {
         })?;
         for (index, direction) in self.directions_deg.iter().flatten().enumerate() {
             // A direction and its opposite are one, but a whole turn is a slip of the pen.
-            if !(direction.abs() < 360.0) {
+            if direction.is_nan() || direction.abs() >= 360.0 {
                 let message = format!("the direction must lie between -360 and 360 degrees, found {direction}");
                 return Err(Fault::here(message).under_item("directions_deg", index));
             }

@@ -36,7 +36,9 @@ fn stations(highest: usize) -> Vec<StationResult> {
 
 fn builder(stations: &[StationResult]) -> SurfaceBuilder {
     let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: ANGLES, step_mm: None });
-    stations.iter().for_each(|station| builder.add(station));
+    for station in stations {
+        builder.add(station);
+    }
     builder
 }
 
@@ -130,7 +132,9 @@ fn cost_of_one_value() {
             let name = format!("RONt about {reference}{}", if known { " with its ±" } else { "" });
             let mut stations = stations.clone();
             if !known {
-                stations.iter_mut().for_each(|station| station.separation.variance.fill(f64::NAN));
+                for station in &mut stations {
+                    station.separation.variance.fill(f64::NAN);
+                }
             }
             timed(&name, &mut || {
                 stations.iter().map(|station| section_values(station, 0, &evaluate, RADIUS_MM).len()).sum()

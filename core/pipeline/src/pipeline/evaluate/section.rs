@@ -85,8 +85,9 @@ pub(super) struct Form {
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
     pub(super) at: SectionAt,
-    /// What its errors are drawn from, for all of its values.
+    /// What its errors are drawn from, for all of its values of roundness, and for those of texture.
     noise: Noise,
+    noise_of_texture: Noise,
 }
 
 impl Form {
@@ -112,6 +113,7 @@ impl Form {
             angles: result.angles,
             radius_mm,
             noise: Noise::new(held.highest + 1, seed(&[&result.station, &at.id])),
+            noise_of_texture: Noise::of_fresh(held.highest + 1, seed(&[&result.station, &at.id])),
             held,
             at,
         })
@@ -120,8 +122,9 @@ impl Form {
     /// Another form of the same section, taken as exact.
     fn exactly(&self, harmonics: &[Complex64]) -> Self {
         let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
-        let (held, at, noise) = (self.held.clone(), self.at.clone(), self.noise.clone());
-        Self { harmonics, equivalents, variance, held, at, noise, ..*self }
+        let (held, at) = (self.held.clone(), self.at.clone());
+        let (noise, noise_of_texture) = (self.noise.clone(), self.noise_of_texture.clone());
+        Self { harmonics, equivalents, variance, held, at, noise, noise_of_texture, ..*self }
     }
 
     fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
@@ -249,8 +252,13 @@ impl Form {
         form_um
     }
 
-    pub(super) fn errors(&self, filter: &Filter) -> Option<Errors> {
+    fn errors(&self, filter: &Filter) -> Option<Errors> {
         Errors::sharing(&filter.variance(&self.variance), 2, &self.noise)
+    }
+
+    /// Errors that are all taken fresh.
+    pub(super) fn fresh_errors(&self, filter: &Filter) -> Option<Errors> {
+        Errors::sharing(&filter.variance(&self.variance), 2, &self.noise_of_texture)
     }
 
     fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {

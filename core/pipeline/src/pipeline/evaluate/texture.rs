@@ -95,7 +95,7 @@ impl Form {
 
     /// Values of the form without its noise and of draws about it; `None` where no errors are known.
     fn drawn(&self, filter: &Filter, look: impl Fn(&[f64]) -> Vec<f64>) -> Option<Drawn> {
-        let mut errors = self.errors(filter)?;
+        let mut errors = self.fresh_errors(filter)?;
         let angles = (DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).next_multiple_of(WHOLE).max(WHOLE);
         let mut fourier = Fourier::new(angles);
         let mut forms = [filter.harmonics(&self.harmonics)];
