@@ -20,8 +20,8 @@ pub struct Disturbed {
 }
 
 impl Disturbed {
-    /// `points` are those of the sections; `usual_um` is about the largest error of a draw. `centred` says that errors have no orders 0 and 1. `None` where the
-    /// wall has no such cylinder.
+    /// `points` are those of the sections; `usual_um` is about the largest error of a draw. `centred` says that errors have no
+    /// orders 0 and 1. `None` where the wall has no such cylinder.
     #[must_use]
     pub fn new(
         reference: Reference,
