@@ -66,8 +66,8 @@ impl Ranked {
         Self { first, all }
     }
 
-    /// The highest of `disturbed` heights, none of which is above its own by more than `largest`, and its place. `None` where
-    /// points that are not ranked could be higher, or there is none.
+    /// The highest of `disturbed` heights, none of which is above its own by more than `largest`, and its place. `None`
+    /// where points that are not ranked could be higher, or there is none.
     pub fn highest(&self, largest: f64, disturbed: impl Fn(usize) -> f64) -> Option<(f64, usize)> {
         let (mut best, mut place) = (f64::NEG_INFINITY, None);
         for (height, point) in &self.first {

@@ -93,8 +93,8 @@ fn peak_near(curve: &Curve, start: f64, step: f64) -> f64 {
     angle
 }
 
-/// Slopes on equal angles to which errors are added: of each draw the largest |dr/dα|, with a parabola through the three angles
-/// about it.
+/// Slopes on equal angles to which errors are added: of each draw the largest |dr/dα|, with a parabola through the three
+/// angles about it.
 pub struct Drawn<'a> {
     slopes: &'a [f64],
     ranked: Ranked,

@@ -430,8 +430,8 @@ fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
 pub fn stand_in(harmonics: &[Complex64], variance: &[f64], lowest: usize) -> Vec<f64> {
     let noise = |order: usize| variance.get(order).copied().filter(|variance| *variance > 0.0).unwrap_or(0.0);
     let count = harmonics.len();
-    // Sums from an order on, from the highest down: of two of them, the difference is the sum between, and as power falls with
-    // the order it loses few digits.
+    // Sums from an order on, from the highest down: of two of them, the difference is the sum between, and as power falls
+    // with the order it loses few digits.
     let mut above = vec![(0.0, 0.0); count + 1];
     for order in (0..count).rev() {
         let (power, noises) = above[order + 1];

@@ -235,8 +235,8 @@ impl Points {
         }
     }
 
-    /// Values about the minimum zone's centre, the centre, and lowest and highest deviation from the nominal radius. `near` is
-    /// a place near to it: the heights' shares in the zone are those there, which errs by deviation²/R times what the place
+    /// Values about the minimum zone's centre, the centre, and lowest and highest deviation from the nominal radius. `near`
+    /// is a place near to it: the heights' shares in the zone are those there, which errs by deviation²/R times what the place
     /// moves; for profiles that are drawn.
     pub(super) fn zone_near(
         &self,

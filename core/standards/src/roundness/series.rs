@@ -71,8 +71,8 @@ impl<'a> Series<'a> {
 
     /// A reference circle and the values about it.
     ///
-    /// Between two angles that are there, the distance from a centre has its extremes where its derivative is 0: they join the
-    /// points until no extreme lies outside the circle's bounds. LSCI, and RONq about each circle, are those of the equal
+    /// Between two angles that are there, the distance from a centre has its extremes where its derivative is 0: they join
+    /// the points until no extreme lies outside the circle's bounds. LSCI, and RONq about each circle, are those of the equal
     /// angles. Contacts of the circle from the number of angles on lie between angles.
     ///
     /// # Errors

@@ -53,8 +53,8 @@ pub struct EvaluateConfig {
     pub lambda_s_mm: Option<f64>,
     /// Centres of polar plots that error motion values are about; without it LSC.
     pub centres: Option<Vec<CentreConfig>>,
-    /// Fixed sensitive directions of error motion besides x and y, in degrees from x towards y, above -360 and below 360: where
-    /// the tool stands. A direction and its opposite are one, 0 to below 180°.
+    /// Fixed sensitive directions of error motion besides x and y, in degrees from x towards y, above -360 and below 360:
+    /// where the tool stands. A direction and its opposite are one, 0 to below 180°.
     pub directions_deg: Option<Vec<f64>>,
     /// What texture values are of, besides λs and λc.
     #[serde(default)]

@@ -307,7 +307,7 @@ impl Form {
         found
     }
 
-    /// The same of the profile at fewer angles, with what draws of its errors make of them; nothing where no errors are known.
+    /// The same of the profile at fewer angles, with what draws of its errors make of them; nothing without known errors.
     fn drawn_about(&self, filter: &Filter, references: &[Reference]) -> Vec<(f64, Option<Uncertainty>)> {
         let Some(mut errors) = self.errors(filter) else { return Vec::new() };
         let waves = filter.highest(self.held.highest);
