@@ -152,7 +152,7 @@ fn tables_hold_every_station() {
     let report = inspect(&path).unwrap();
     assert_eq!(report.format.as_deref(), Some("runout-result"));
     let rows: Vec<(&str, usize)> = report.tables.iter().map(|table| (table.table.as_str(), table.rows)).collect();
-    assert_eq!(rows, [("form", 16), ("motion", 16), ("harmonics", 8)]);
+    assert_eq!(rows, [("form", 16), ("harmonics", 8), ("motion", 16), ("values", 0)]);
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn a_result_explains_itself() {
     }
     for name in ["re", "im", "std"] {
         let column = file.dataset(&format!("harmonics/{name}")).unwrap();
-        assert_eq!(text(&column, "unit"), "um; urad for tilts");
+        assert_eq!(text(&column, "unit"), "um; urad for tilt");
     }
     assert!(text(&file.dataset("harmonics/std").unwrap(), "about").starts_with("sqrt(E|delta|^2)"));
     let lines = |name: &str| -> Vec<String> {

@@ -857,9 +857,11 @@ fn what_cannot_be_evaluated_is_refused_at_its_place() {
 #[test]
 fn a_datum_that_the_rig_does_not_have_is_refused_at_its_name() {
     let sensor = "{ id = 'p', angle_deg = 0, section = 'A' }";
-    let text = format!("part_radius_mm = 30
+    let text = format!(
+        "part_radius_mm = 30
 setups = [{{ id = 'a', part_deg = 0 }}]
-sensors = [{sensor}]");
+sensors = [{sensor}]"
+    );
     let rig = toml::from_str::<runout_turning::rig::RigConfig>(&text).unwrap().check().unwrap();
     let config = |text: &str| toml::from_str::<EvaluateConfig>(text).unwrap();
     let fault = config("datum = ['A', 'B']").check_datum(&rig).unwrap_err();
