@@ -23,8 +23,30 @@ const TURNS_OF_A_DRAW: usize = 16;
 const TAIL: f64 = 0.025;
 /// Half of the 95 % interval of a normal distribution, in standard deviations.
 pub const NORMAL_95: f64 = 1.96;
-/// Amplitude of noise that 5 % of all are above, in standard deviations of its real part: √(2 ln 20).
-pub const RAYLEIGH_95: f64 = 2.447_746_830_680_816;
+
+/// Half of the 95 % interval of Student's distribution, in standard deviations, from its expansion about the normal one (Abramowitz,
+/// Stegun 26.7.5; within 1 % from 3 degrees of freedom, 3 % for 2); the normal one's for 0, a standard deviation taken as exact.
+#[must_use]
+pub fn student_95(freedom: f64) -> f64 {
+    if freedom <= 0.0 {
+        return NORMAL_95;
+    }
+    let (z, square) = (NORMAL_95, NORMAL_95 * NORMAL_95);
+    let terms = [
+        (square + 1.0) / 4.0,
+        ((5.0 * square + 16.0) * square + 3.0) / 96.0,
+        (((3.0 * square + 19.0) * square + 17.0) * square - 15.0) / 384.0,
+    ];
+    z + z * terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom)
+}
+
+/// Amplitude of noise that 5 % of all are above, in standard deviations of its real part as they are known from so many real
+/// degrees of freedom: √(ν (20^{2/ν} − 1)), of Rayleigh's distribution √(2 ln 20) for 0, where they are taken as exact.
+#[must_use]
+pub fn noise_95(freedom: f64) -> f64 {
+    let tail = 20.0_f64.ln();
+    if freedom > 0.0 { (freedom * (2.0 * tail / freedom).exp_m1()).sqrt() } else { (2.0 * tail).sqrt() }
+}
 
 /// What is known of a value's error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,12 +61,27 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Of an amplitude, from the standard uncertainty of its part along the phasor. An amplitude that noise alone exceeds in
-    /// 5 % of all cases (the 95 % point of Rayleigh's distribution) may be noise: its interval begins at 0.
+    /// Of an amplitude, from the standard uncertainty of its part along the phasor, known from so many real degrees of freedom (0
+    /// where it is taken as exact). An amplitude that noise alone exceeds in more than [5 % of all cases](noise_95) may be noise: its
+    /// interval begins at 0.
     #[must_use]
-    pub fn of_amplitude(value: f64, std: f64) -> Self {
-        let low = if value < RAYLEIGH_95 * std { 0.0 } else { value - NORMAL_95 * std };
-        Self { std, interval_95: [low, value + NORMAL_95 * std], draws: 0 }
+    pub fn of_amplitude(value: f64, std: f64, freedom: usize) -> Self {
+        let reach = student_95(freedom as f64) * std;
+        let low = if value < noise_95(freedom as f64) * std { 0.0 } else { (value - reach).max(0.0) };
+        Self { std, interval_95: [low, value + reach], draws: 0 }
+    }
+
+    /// The same where its draws come from so many transforms of several draws each, which tell a standard deviation no better than
+    /// two real degrees of freedom a transform do: the interval is wider by Student's factor, about its middle.
+    #[must_use]
+    fn of_transforms(mut self, transforms: f64) -> Self {
+        let wider = student_95(2.0 * transforms) / NORMAL_95;
+        let [low, high] = self.interval_95;
+        let (middle, half) = (0.5 * (low + high), 0.5 * wider * (high - low));
+        let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        // An end at 0 stays there.
+        self.interval_95 = [if low == 0.0 { low } else { (middle - half).max(floor) }, middle + half];
+        self
     }
 
     /// The same of a value that is larger by so much; an interval from 0 on stays one.
@@ -167,17 +204,23 @@ fn normal(random: &mut ChaCha8Rng) -> Complex64 {
     Complex64::new(StandardNormal.sample(random), StandardNormal.sample(random))
 }
 
-/// Where the normal numbers of errors come from.
-enum Source {
+/// Where the normal numbers of a source of noise come from.
+enum Numbers {
     Own(Box<ChaCha8Rng>),
     /// And how many draws were taken.
     Shared(Noise, usize),
 }
 
+/// A source of noise, the same for all profiles that have a part of it.
+struct Source {
+    numbers: Numbers,
+    /// What it adds to each order, by order from 0.
+    amplitudes: Vec<Complex64>,
+}
+
 /// Draws of the errors of a profile on equal angles.
 pub struct Errors {
-    amplitudes: Vec<f64>,
-    source: Source,
+    sources: Vec<Source>,
     /// The errors last drawn, before they are turned.
     drawn_um: Vec<f64>,
     largest_um: f64,
@@ -242,44 +285,51 @@ impl Errors {
     /// `lowest`, are taken as exact. `None` where no variance is known.
     #[must_use]
     pub fn new(variance: &[f64], lowest: usize, seed: u64) -> Option<Self> {
-        Self::from_source(variance, lowest, Source::Own(Box::new(ChaCha8Rng::seed_from_u64(seed))))
+        let amplitudes = variance.iter().map(|variance| Complex64::from(variance.sqrt())).collect();
+        Self::of_sources([(seed, amplitudes)], lowest)
     }
 
     /// The same from numbers that others take too: draw by draw, errors of both differ by their variance only.
     #[must_use]
     pub fn sharing(variance: &[f64], lowest: usize, noise: &Noise) -> Option<Self> {
-        let source = if variance.len() <= noise.orders {
-            Source::Shared(noise.clone(), 0)
+        let amplitudes: Vec<Complex64> = variance.iter().map(|variance| Complex64::from(variance.sqrt())).collect();
+        let numbers = if variance.len() <= noise.orders {
+            Numbers::Shared(noise.clone(), 0)
         } else {
-            Source::Own(Box::new(ChaCha8Rng::seed_from_u64(noise.seed)))
+            Numbers::Own(Box::new(ChaCha8Rng::seed_from_u64(noise.seed)))
         };
-        Self::from_source(variance, lowest, source)
+        Self::of_numbers([(numbers, amplitudes)], lowest)
     }
 
-    fn from_source(variance: &[f64], lowest: usize, source: Source) -> Option<Self> {
+    /// From independent sources of noise, each with its seed and what its noise of E|g|² = 1 makes of each order: profiles that
+    /// have a source in common have its noise in common. All draws are turned as the first source says.
+    #[must_use]
+    pub fn of_sources(sources: impl IntoIterator<Item = (u64, Vec<Complex64>)>, lowest: usize) -> Option<Self> {
+        let own = |seed| Numbers::Own(Box::new(ChaCha8Rng::seed_from_u64(seed)));
+        Self::of_numbers(sources.into_iter().map(|(seed, amplitudes)| (own(seed), amplitudes)), lowest)
+    }
+
+    fn of_numbers(sources: impl IntoIterator<Item = (Numbers, Vec<Complex64>)>, lowest: usize) -> Option<Self> {
         // A coefficient's real and imaginary part have half of its variance each; a level is real.
-        let share = |order: usize| if order == 0 { 1.0 } else { 0.5 };
-        let known = |order: usize, variance: f64| order >= lowest && variance.is_finite() && variance > 0.0;
-        let amplitude = |(order, variance): (usize, &f64)| {
-            if known(order, *variance) { (share(order) * variance).sqrt() } else { 0.0 }
+        let share = |order: usize| if order == 0 { 1.0 } else { 0.5_f64.sqrt() };
+        let amplitude = |(order, amplitude): (usize, Complex64)| {
+            if order >= lowest && amplitude.is_finite() { share(order) * amplitude } else { Complex64::ZERO }
         };
-        let amplitudes: Vec<f64> = variance.iter().enumerate().map(amplitude).collect();
-        let some = amplitudes.iter().any(|amplitude| *amplitude > 0.0);
-        some.then(|| Self {
-            amplitudes,
-            source,
-            drawn_um: Vec::new(),
-            largest_um: 0.0,
-            squares_um2: 0.0,
-            start: 0,
-            turn: 0,
-        })
+        let source = |(numbers, amplitudes): (Numbers, Vec<Complex64>)| Source {
+            numbers,
+            amplitudes: amplitudes.into_iter().enumerate().map(amplitude).collect(),
+        };
+        let sources: Vec<Source> = sources.into_iter().map(source).collect();
+        let some = sources.iter().flat_map(|source| &source.amplitudes).any(|amplitude| *amplitude != Complex64::ZERO);
+        let (drawn_um, start, turn) = (Vec::new(), 0, 0);
+        some.then(|| Self { sources, drawn_um, largest_um: 0.0, squares_um2: 0.0, start, turn })
     }
 
     /// The standard deviation of an error at any one angle.
     #[must_use]
     pub fn std_um(&self) -> f64 {
-        self.amplitudes.iter().map(|amplitude| amplitude * amplitude).sum::<f64>().sqrt()
+        let amplitudes = self.sources.iter().flat_map(|source| &source.amplitudes);
+        amplitudes.map(Complex64::norm_sqr).sum::<f64>().sqrt()
     }
 
     /// The largest error of the last draw.
@@ -288,44 +338,52 @@ impl Errors {
         self.largest_um
     }
 
-    /// The next errors on the equal angles that `fourier` has, independent of all before, and the generator behind them.
-    fn next<'a>(&mut self, fourier: &'a mut Fourier) -> (&'a [f64], ChaCha8Rng) {
-        let amplitudes = &self.amplitudes;
-        match &mut self.source {
-            Source::Own(random) => {
-                let harmonics: Vec<Complex64> =
-                    amplitudes.iter().map(|amplitude| *amplitude * normal(random)).collect();
-                (fourier.synthesise(harmonics), ChaCha8Rng::clone(random))
-            }
-            Source::Shared(noise, taken) => {
-                let (numbers, behind) = noise.of_draw(*taken);
-                *taken += 1;
-                let harmonics = amplitudes.iter().zip(&*numbers).map(|(amplitude, number)| *amplitude * number);
-                (fourier.synthesise(harmonics), behind)
+    /// Harmonics of the next errors, independent of all before, by order from 0, and the generator behind shared numbers.
+    fn harmonics(&mut self) -> (Vec<Complex64>, Option<ChaCha8Rng>) {
+        let (mut sum, mut behind) = (Vec::new(), None);
+        for Source { numbers, amplitudes } in &mut self.sources {
+            sum.resize(amplitudes.len().max(sum.len()), Complex64::ZERO);
+            let each = sum.iter_mut().zip(&*amplitudes);
+            match numbers {
+                Numbers::Own(random) => each.for_each(|(sum, amplitude)| *sum += *amplitude * normal(random)),
+                Numbers::Shared(noise, taken) => {
+                    let (numbers, generator) = noise.of_draw(*taken);
+                    *taken += 1;
+                    each.zip(&*numbers).for_each(|((sum, amplitude), number)| *sum += *amplitude * number);
+                    behind = Some(generator);
+                }
             }
         }
+        (sum, behind)
+    }
+
+    /// Where the next errors are turned to: as the first source says. Each goes on as in other profiles that have it.
+    fn next_start(&mut self, behind: Option<ChaCha8Rng>, length: usize) -> usize {
+        let mut start = behind.map(|mut random| random.random_range(0..length));
+        for source in &mut self.sources {
+            if let Numbers::Own(random) = &mut source.numbers {
+                let own = random.random_range(0..length);
+                start.get_or_insert(own);
+            }
+        }
+        start.unwrap_or(0)
     }
 
     /// Fills `errors_um` with the next errors on the equal angles that `fourier` has, independent of all before.
     pub fn fresh(&mut self, fourier: &mut Fourier, errors_um: &mut [f64]) {
-        let (errors, _) = self.next(fourier);
-        errors_um.iter_mut().zip(errors).for_each(|(target, error)| *target = *error);
+        let (harmonics, _) = self.harmonics();
+        errors_um.iter_mut().zip(fourier.synthesise(harmonics)).for_each(|(target, error)| *target = *error);
     }
 
     /// The next errors; all draws are of the one length that `fourier` has.
     pub fn turned(&mut self, fourier: &mut Fourier) -> DrawnErrors<'_> {
         let length = fourier.length();
         if self.turn == 0 {
-            let mut drawn_um = std::mem::take(&mut self.drawn_um);
-            let (errors, mut random) = self.next(fourier);
-            drawn_um.clear();
-            drawn_um.extend_from_slice(errors);
-            self.start = random.random_range(0..length);
-            if let Source::Own(own) = &mut self.source {
-                **own = random;
-            }
-            (self.largest_um, self.squares_um2) = size(&drawn_um);
-            self.drawn_um = drawn_um;
+            let (harmonics, behind) = self.harmonics();
+            self.drawn_um.clear();
+            self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
+            self.start = self.next_start(behind, length);
+            (self.largest_um, self.squares_um2) = size(&self.drawn_um);
         }
         let from = (self.start + self.turn * length / TURNS_OF_A_DRAW) % length;
         self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
@@ -359,8 +417,14 @@ fn size(errors: &[f64]) -> (f64, f64) {
 /// Values with their uncertainty: `draw` computes them once from what was found (given false) and then `draws` times from
 /// what was drawn (given true), always the same ones in the same order. The interval is 2v − (the draws' 97.5 % point) to
 /// 2v − (their 2.5 % point) for a value v: the error of v about the truth is that of a draw about v. It ends at 0 for a
-/// value that no draw has below 0. A value that is not a number, or not in every draw, has no uncertainty.
-pub fn monte_carlo_of(draws: usize, mut draw: impl FnMut(bool, &mut Vec<f64>)) -> Vec<(f64, Option<Uncertainty>)> {
+/// value that no draw has below 0. A value that is not a number, or not in every draw, has no uncertainty. Each draw is of so many
+/// independent `profiles`.
+pub fn monte_carlo_of(
+    draws: usize,
+    profiles: usize,
+    mut draw: impl FnMut(bool, &mut Vec<f64>),
+) -> Vec<(f64, Option<Uncertainty>)> {
+    let transforms = (draws.div_ceil(TURNS_OF_A_DRAW) * profiles.max(1)) as f64;
     let mut found = Vec::new();
     draw(false, &mut found);
     let mut results: Vec<Vec<f64>> = found.iter().map(|_| Vec::with_capacity(draws)).collect();
@@ -373,7 +437,9 @@ pub fn monte_carlo_of(draws: usize, mut draw: impl FnMut(bool, &mut Vec<f64>)) -
     let known =
         |value: f64, drawn: &[f64]| value.is_finite() && drawn.len() > 1 && drawn.iter().all(|draw| draw.is_finite());
     let pairs = found.into_iter().zip(results);
-    pairs.map(|(value, mut drawn)| (value, known(value, &drawn).then(|| summed_up(&mut drawn, value)))).collect()
+    let uncertainty =
+        |value: f64, drawn: &mut [f64]| known(value, drawn).then(|| summed_up(drawn, value).of_transforms(transforms));
+    pairs.map(|(value, mut drawn)| (value, uncertainty(value, &mut drawn))).collect()
 }
 
 /// The uncertainty of values of a profile on equal angles, from the variance of its harmonics by order from 0; those
@@ -390,7 +456,7 @@ pub fn monte_carlo<const N: usize>(
     }
     let (mut errors, mut fourier) = (Errors::new(variance, 2, seed)?, Fourier::new(form_um.len()));
     let mut drawn = form_um.to_vec();
-    let found = monte_carlo_of(DRAWS, |disturbed, found| {
+    let found = monte_carlo_of(DRAWS, 1, |disturbed, found| {
         if disturbed {
             errors.draw(&mut fourier, form_um, &mut drawn);
         }
@@ -506,6 +572,70 @@ mod tests {
         for (end, sign) in found.interval_95.iter().zip([-1.0, 1.0]) {
             assert!((end - (1.0 + sign * 1.96 * expected)).abs() < 0.5 * expected, "{:?}", found.interval_95);
         }
+    }
+
+    #[test]
+    fn students_quantiles_are_those_of_tables() {
+        for (freedom, expected, tolerance) in
+            [(2.0, 4.303, 0.04), (3.0, 3.182, 0.01), (5.0, 2.571, 2e-3), (16.0, 2.120, 1e-3), (40.0, 2.021, 1e-3)]
+        {
+            let found = student_95(freedom);
+            assert!((found / expected - 1.0).abs() < tolerance, "{freedom}: {found} instead of {expected}");
+        }
+        assert!((student_95(0.0) - student_95(1e9)).abs() < 1e-8 && (noise_95(0.0) - noise_95(1e9)).abs() < 1e-6);
+    }
+
+    /// Amplitudes of noise over a standard deviation from 2, 16 and 24 squares.
+    #[test]
+    fn noise_is_above_its_limit_in_one_of_twenty_cases() {
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        let mut square = || -> f64 { Distribution::<f64>::sample(&StandardNormal, &mut random).powi(2) };
+        for freedom in [2_u32, 16, 24] {
+            let limit = noise_95(f64::from(freedom));
+            let mut above = 0;
+            for _ in 0..20_000 {
+                let variance = (0..freedom).map(|_| square()).sum::<f64>() / f64::from(freedom);
+                above += u32::from(square() + square() > limit * limit * variance);
+            }
+            // 1000 ± 31.
+            assert!((880..=1120).contains(&above), "{freedom}: {above} of 20000");
+        }
+    }
+
+    /// Two profiles of one station: the second has 0.6i of the first one's noise, and 0.8 of its own.
+    #[test]
+    fn profiles_share_the_noise_of_their_sources() {
+        let (orders, length, order) = (12, 64, 5);
+        let of = |share: Complex64| vec![share; orders];
+        let own = (1, of(Complex64::ONE));
+        let mut first = Errors::of_sources([own.clone()], 2).unwrap();
+        let mut second =
+            Errors::of_sources([(1, of(Complex64::new(0.0, 0.6))), (2, of(Complex64::from(0.8)))], 2).unwrap();
+        assert!((first.std_um() - second.std_um()).abs() < 1e-12);
+        let (mut fourier, level) = (Fourier::new(length), vec![0.0; length]);
+        let (mut squares, mut product) = ([0.0; 2], Complex64::ZERO);
+        for _ in 0..16 * 2000 {
+            let mut drawn = [Vec::new(), Vec::new()];
+            first.draw(&mut fourier, &level, &mut drawn[0]);
+            second.draw(&mut fourier, &level, &mut drawn[1]);
+            let [a, b] = drawn.map(|profile| {
+                let mut harmonics = vec![Complex64::ZERO; length / 2];
+                Fourier::new(length).analyse(profile.into_iter(), &mut harmonics);
+                harmonics[order]
+            });
+            squares = [squares[0] + a.norm_sqr(), squares[1] + b.norm_sqr()];
+            product += b * a.conj();
+        }
+        let product = product / (squares[0] * squares[1]).sqrt();
+        // 2000 independent draws.
+        assert!((squares[0] / squares[1] - 1.0).abs() < 0.1 && (product - Complex64::new(0.0, 0.6)).norm() < 0.06);
+        // The first source alone draws what it drew before there were several.
+        let mut alone = Errors::new(&vec![1.0; orders], 2, 1).unwrap();
+        let mut again = Errors::of_sources([own], 2).unwrap();
+        let mut drawn = [Vec::new(), Vec::new()];
+        alone.draw(&mut fourier, &level, &mut drawn[0]);
+        again.draw(&mut fourier, &level, &mut drawn[1]);
+        assert_eq!(drawn[0], drawn[1]);
     }
 
     #[test]

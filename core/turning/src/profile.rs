@@ -31,6 +31,9 @@ pub struct Profile {
     /// The covariance of single turns over their number, likewise: what the covariance of the mean would be if turns
     /// were independent. It is the better known of the two, and serves for weights.
     pub scatter: Option<Vec<Complex64>>,
+    /// The scatter without what `covariance` is taken from, likewise. A covariance does not show what weights from the same
+    /// readings gain by fitting their noise; with these weights it is without bias. `None` where it is not known apart.
+    pub scatter_beside: Option<Vec<Complex64>>,
     /// Mean level of each turn used.
     pub levels: TurnLevels,
     /// The same turns in parts, where asked for.
@@ -218,6 +221,7 @@ impl Split {
             mean: part.mean.clone(),
             covariance: part.covariance.clone(),
             scatter: part.scatter.clone(),
+            scatter_beside: None,
             split: None,
             spread: None,
             turns: TurnCount { used: part.turns.len(), ..whole.turns.clone() },
@@ -254,17 +258,49 @@ impl Profile {
     }
 }
 
+/// Neighbours to each side of an order that the covariance of a mean is taken from. With covariances averaged over five orders
+/// they make 20 complex degrees of freedom.
+pub const NEIGHBOURS: usize = 2;
+
 /// Orders to each side over which [`smooth`] averages: the scatter's spectrum is smooth, its estimate is not.
 pub const SMOOTHING: usize = 2;
 
 /// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over its neighbours. Order 1
 /// stays by itself: what shakes the eccentricity shakes no other order.
 pub fn smooth(covariance: &mut [Complex64], size: usize) {
+    smooth_over(covariance, size, |order, max_order| {
+        order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order)
+    });
+}
+
+/// The same over [`orders_beside`] to each side: what the variance of a result is taken from.
+///
+/// At low orders the density of asynchronous motion differs from order to order, by slow motion and by single tones: there an
+/// order is looked at by itself.
+pub fn smooth_by_order(covariance: &mut [Complex64], size: usize) {
+    smooth_over(covariance, size, |order, max_order| {
+        let beside = orders_beside(order);
+        order - beside..=(order + beside).min(max_order)
+    });
+}
+
+/// Orders to each side over which [`smooth_by_order`] averages: a quarter of the order, [`SMOOTHING`] at most.
+#[must_use]
+pub fn orders_beside(order: usize) -> usize {
+    (order / 4).min(SMOOTHING)
+}
+
+/// Means over windows of orders, by order and highest order.
+fn smooth_over(
+    covariance: &mut [Complex64],
+    size: usize,
+    window: impl Fn(usize, usize) -> std::ops::RangeInclusive<usize>,
+) {
     const WINDOW: usize = 2 * SMOOTHING + 1;
     let raw = covariance.to_vec();
     let max_order = (raw.len() / size.max(1)).saturating_sub(1);
     for order in 2..=max_order {
-        let window = order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order);
+        let window = window(order, max_order);
         let count = window.end() + 1 - window.start();
         let near = &raw[window.start() * size..(window.end() + 1) * size];
         let target = &mut covariance[order * size..(order + 1) * size];
@@ -347,6 +383,20 @@ pub struct TurnLength {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn low_orders_are_looked_at_by_themselves() {
+        // A line at order 2 of a spectrum that is 1 elsewhere.
+        let mut covariance: Vec<Complex64> =
+            (0..20).map(|order| Complex64::from(if order == 2 { 61.0 } else { 1.0 })).collect();
+        let mut over_five = covariance.clone();
+        smooth_by_order(&mut covariance, 1);
+        smooth(&mut over_five, 1);
+        let rounded = |all: &[Complex64]| all[..8].iter().map(|entry| entry.re.round() as i64).collect::<Vec<_>>();
+        assert_eq!(rounded(&covariance), [1, 1, 61, 1, 1, 1, 1, 1]);
+        assert_eq!(rounded(&over_five), [1, 1, 21, 16, 13, 1, 1, 1]);
+        assert_eq!([1, 3, 4, 7, 8, 100].map(orders_beside), [0, 0, 1, 1, 2, 2]);
+    }
 
     #[test]
     fn a_ramp_is_the_sum_that_it_is() {

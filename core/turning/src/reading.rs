@@ -123,7 +123,7 @@ fn run_out(mean: &[Complex64], variance: Option<&[f64]>, seed: u64) -> (f64, Opt
     let mut errors = variance.and_then(|variance| Errors::new(variance, 1, seed));
     let mut drawn = turn.clone();
     let draws = if errors.is_some() { DRAWS } else { 0 };
-    let found = monte_carlo_of(draws, |disturbed, found| {
+    let found = monte_carlo_of(draws, 1, |disturbed, found| {
         if let (true, Some(errors)) = (disturbed, &mut errors) {
             errors.draw(&mut fourier, &turn, &mut drawn);
         }

@@ -1,8 +1,11 @@
 //! Form and motion, one harmonic at a time: estimates, covariance, and what the layout cannot tell.
 
-use crate::azimuth::Azimuth;
+use crate::{azimuth::Azimuth, profile::orders_beside};
 use runout_numerics::Complex64;
-use runout_standards::gaps::Gaps;
+use runout_standards::{
+    gaps::Gaps,
+    uncertainty::{NORMAL_95, student_95},
+};
 
 /// What the numbers of form, motion and harmonics are, for files that explain themselves.
 pub const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \
@@ -226,6 +229,12 @@ pub struct Separation {
     /// Covariance E[δ δᴴ] of the motions among `unknowns`, `[order][motion][motion]` from order 0; what cannot be told means
     /// nothing. `None` where it is not known.
     pub motion_covariance: Option<Vec<Complex64>>,
+    /// Covariance E[δ δᴴ] of the forms among `unknowns`, `[order][form][form]` from order 0: sections of a station share the errors
+    /// of its motion. What cannot be told means nothing. `None` where it is not known.
+    pub form_covariance: Option<Vec<Complex64>>,
+    /// Real degrees of freedom behind `variance` at an order that was looked at by itself; 0 where it is taken as exact.
+    /// [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
+    pub freedom: usize,
     /// Other estimates `[order][unknown]` that agree with the readings as well, less `estimate`: one of them is true, and
     /// the data do not decide which. `variance` and `motion_covariance` include them; none where the data decide.
     pub equivalents: Vec<Vec<Complex64>>,
@@ -333,7 +342,22 @@ impl Separation {
             *variance += largest(mixture.equivalents.iter().map(|distance| distance[index]));
         }
         mixture.mix_motion_covariance(weights, equivalents);
+        // What the data do not decide is no error that sections share.
+        mixture.form_covariance = mixture.form_covariance.filter(|_| equivalents.len() < 2);
         Some(mixture)
+    }
+
+    /// Real degrees of freedom behind the variance of an order; 0 where it is taken as exact.
+    #[must_use]
+    pub fn degrees_of_freedom(&self, order: usize) -> usize {
+        self.freedom * (2 * orders_beside(order) + 1)
+    }
+
+    /// Factors by order that make errors with the stated variance as wide as the variance is badly known: Student's 95 % quantile
+    /// over that of a normal distribution.
+    #[must_use]
+    pub fn widening(&self) -> Vec<f64> {
+        (0..=self.max_order()).map(|order| student_95(self.degrees_of_freedom(order) as f64) / NORMAL_95).collect()
     }
 
     /// Motions of one equivalent go together: the sum of their distances' products, scaled to the largest square of each.

@@ -43,6 +43,8 @@ pub fn station(name: &str) -> StationResult {
             variance: vec![0.0, 0.0, f64::NAN, 0.01, 0.04, 0.09],
             observable: vec![true, true, false, true, true, true],
             motion_covariance: None,
+            form_covariance: None,
+            freedom: 0,
             equivalents: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual::default(),

@@ -54,6 +54,8 @@ fn station(index: usize, motion: bool) -> StationResult {
         observable: places().map(|(order, _)| !lost(order)).collect(),
         unknowns,
         motion_covariance: None,
+        form_covariance: None,
+        freedom: 0,
         equivalents: Vec::new(),
         motion_z_mm: 0.0,
         residual: Residual::default(),

@@ -246,6 +246,8 @@ impl LeastSquaresCylinder {
             estimate,
             variance,
             motion_covariance: None,
+            form_covariance: None,
+            freedom: 0,
             equivalents: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual {

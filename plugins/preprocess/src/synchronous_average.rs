@@ -241,7 +241,9 @@ impl Averager for SynchronousAverage {
             // What the recording cannot hold is not found to be 0: it is not there.
             let (orders, channels) = (orders_held(turn) + 1, capture.channels());
             outcome.mean.truncate(orders * channels);
-            for matrices in [&mut outcome.covariance, &mut outcome.scatter].into_iter().flatten() {
+            for matrices in
+                [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten()
+            {
                 matrices.truncate(orders * channels * channels);
             }
             if let Some(split) = &mut outcome.split {
@@ -264,6 +266,7 @@ impl Averager for SynchronousAverage {
             mean: outcome.mean,
             covariance: outcome.covariance,
             scatter: outcome.scatter,
+            scatter_beside: outcome.scatter_beside,
             levels: outcome.levels,
             split: outcome.split,
             spread: outcome.spread,

@@ -110,6 +110,8 @@ mod tests {
             variance: vec![0.0; 8],
             observable: vec![true; 8],
             motion_covariance: None,
+            form_covariance: None,
+            freedom: 0,
             equivalents: Vec::new(),
             motion_z_mm: 100.0,
             residual: Residual::default(),

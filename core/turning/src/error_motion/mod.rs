@@ -78,9 +78,6 @@ pub fn symbols(lines: &[Azimuth]) -> Vec<(String, &'static str)> {
     symbols
 }
 
-/// Why tilt at 1/rev has no ±: 78 to 83 % of its intervals held the truth (`studies value-coverage`).
-const TILT_AT_ONCE_A_TURN: &str = "tilt at 1/rev scatters more than the covariance of the separation states";
-
 /// Kind of the synchronous values of tilt.
 const RESIDUAL: &str = "residual-synchronous";
 /// End of the symbols of total values with 1/rev. Their centre is that of the polar chart: any other moves with 1/rev.
@@ -340,11 +337,12 @@ impl ErrorMotion<'_> {
             lost_orders: Vec::new(),
             weakened_above_upr: None,
             absent_above_upr: None,
-            no_uncertainty: direction.is_tilt().then(|| TILT_AT_ONCE_A_TURN.to_owned()),
+            no_uncertainty: None,
             filter: "none".into(),
             reference: "PC".into(),
             coverage: 1.0,
-            uncertainty: (std > 0.0 && !direction.is_tilt()).then(|| Uncertainty::of_amplitude(value, std)),
+            uncertainty: (std > 0.0)
+                .then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1))),
         })
     }
 }

@@ -47,6 +47,17 @@ pub struct Section {
     pub half_power_upr: Option<f64>,
     /// One entry an order from 0; `None` where it is lost.
     pub orders: Vec<Option<Order>>,
+    /// What noise its errors are made of, as wide as their variance is badly known.
+    pub noise: Vec<Noise>,
+}
+
+/// A source of noise of a station, shared by its sections.
+#[derive(Debug, Clone)]
+pub struct Noise {
+    /// The section whose own noise it is, by its place in the station.
+    pub of: usize,
+    /// What noise of E|g|² = 1 makes of each order, by order from 0; 0 where it is not known.
+    pub amplitudes: Vec<Complex64>,
 }
 
 /// One order of a form.
@@ -90,7 +101,9 @@ impl SurfaceBuilder {
     /// Adds a station's sections.
     pub fn add(&mut self, result: &StationResult) {
         let separation = &result.separation;
+        let mut noise = noise(separation, max_order(self.config.angles) + 1).into_iter();
         for (index, at) in separation.sections.iter().enumerate() {
+            let noise = noise.next().unwrap_or_default();
             let Some(unknown) = separation.position(Quantity::Form(index)) else { continue };
             let mut orders = orders(separation, unknown);
             let fitting = max_order(self.config.angles) + 1;
@@ -98,7 +111,7 @@ impl SurfaceBuilder {
             orders.truncate(fitting);
             let SectionAt { id, z_mm, gaps, used } = at.clone();
             let (station, half_power_upr) = (result.station.clone(), result.half_power_upr());
-            self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, orders });
+            self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, orders, noise });
         }
     }
 
@@ -274,6 +287,47 @@ fn describe(sections: usize, band_limited: bool) -> &'static str {
              half the angles upwards left out"
         }
     }
+}
+
+/// Of each section, the noise that its errors are made of: own noise, and where covariances are known a part of that of the
+/// sections before it (Cholesky's factor of the covariance, order by order).
+fn noise(separation: &Separation, orders: usize) -> Vec<Vec<Noise>> {
+    let (width, sections) = (separation.unknowns.len(), separation.sections.len());
+    let forms: Vec<Option<usize>> = (0..sections).map(|index| separation.position(Quantity::Form(index))).collect();
+    let count = forms.iter().flatten().count();
+    let joint = separation.form_covariance.as_ref().filter(|_| count == sections);
+    let widening = separation.widening();
+    let orders = orders.min(widening.len());
+    let shared = |index: usize| if joint.is_some() { 0..=index } else { index..=index };
+    let mut noise: Vec<Vec<Noise>> = (0..sections)
+        .map(|index| shared(index).map(|of| Noise { of, amplitudes: vec![Complex64::ZERO; orders] }).collect())
+        .collect();
+    let mut factor = vec![Complex64::ZERO; sections * sections];
+    for order in 0..orders {
+        for row in 0..sections {
+            let variance = forms[row].and_then(|form| separation.variance.get(order * width + form).copied());
+            // Of what is not known, nothing is drawn.
+            let variance = variance.filter(|variance| variance.is_finite() && *variance > 0.0).unwrap_or(0.0);
+            let mut left = variance;
+            for column in 0..row {
+                let before: Complex64 =
+                    (0..column).map(|k| factor[row * sections + k] * factor[column * sections + k].conj()).sum();
+                let own = factor[column * sections + column].re;
+                let entry = joint.and_then(|joint| joint.get((order * sections + row) * sections + column));
+                let entry = entry.filter(|entry| entry.is_finite() && own > 0.0 && variance > 0.0);
+                let share = entry.map_or(Complex64::ZERO, |entry| (entry - before) / own);
+                // Never more than there is, whatever rounding says.
+                let share = if share.norm_sqr() > left { Complex64::ZERO } else { share };
+                left -= share.norm_sqr();
+                factor[row * sections + column] = share;
+            }
+            factor[row * sections + row] = Complex64::from(left.sqrt());
+            for noise in &mut noise[row] {
+                noise.amplitudes[order] = factor[row * sections + noise.of] * widening[order];
+            }
+        }
+    }
+    noise
 }
 
 fn orders(separation: &Separation, unknown: usize) -> Vec<Option<Order>> {

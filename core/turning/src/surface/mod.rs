@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use builder::{Section, SurfaceBuilder, Uncertain};
+pub use builder::{Noise, Section, SurfaceBuilder, Uncertain};
 use monotone::{STENCIL, Stencil};
 use runout_error::Fault;
 use runout_numerics::height_map::HeightMap;

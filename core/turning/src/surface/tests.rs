@@ -27,6 +27,8 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
             variance: vec![variance; width * orders],
             observable: entries().map(|value| !value.re.is_nan()).collect(),
             motion_covariance: None,
+            form_covariance: None,
+            freedom: 0,
             equivalents: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual::default(),

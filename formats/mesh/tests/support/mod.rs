@@ -108,6 +108,8 @@ fn station() -> StationResult {
             observable: vec![true; estimate.len()],
             estimate,
             motion_covariance: None,
+            form_covariance: None,
+            freedom: 0,
             equivalents: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual::default(),

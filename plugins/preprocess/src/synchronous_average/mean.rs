@@ -13,6 +13,9 @@ use runout_core::{
 
 use super::{scatter::Scatter, slow::Slow};
 
+/// Turns from which on the neighbours hold a tenth of the scatter or less: it is known well enough without them.
+const MANY_TURNS: usize = 40;
+
 /// What a turn is made of.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Size {
@@ -109,6 +112,33 @@ impl Mean {
         let mut covariance = self.scatter.covariance()?;
         for entry in &mut covariance {
             *entry /= self.turns as f64;
+        }
+        Some(covariance)
+    }
+
+    /// The [scatter](Self::scatter) without the neighbours that [`covariance`](Self::covariance) is taken from; `None` below
+    /// [`MANY_TURNS`], and where not all turns are looked at.
+    ///
+    /// (T − 1) S = T Σ Cₖ Cₖᴴ over the T − 1 transforms Cₖ of the turns' harmonics, of which the neighbours are left out.
+    pub(super) fn scatter_beside(&self) -> Option<Vec<Complex64>> {
+        if self.scatter.turns() < self.turns.max(MANY_TURNS) {
+            return None;
+        }
+        let mut covariance = self.scatter()?;
+        let neighbours = self.slow.of_turns(&self.sum, self.turns, self.size)?;
+        let (channels, turns) = (self.size.channels, self.turns as f64);
+        let left = turns - 1.0 - neighbours.len() as f64;
+        for (order, matrix) in covariance.chunks_exact_mut(channels * channels).enumerate() {
+            matrix.iter_mut().for_each(|entry| *entry *= (turns - 1.0) / left);
+            for side in &neighbours {
+                let values = &side[order * channels..(order + 1) * channels];
+                for (row, value) in matrix.chunks_exact_mut(channels).zip(values) {
+                    let scaled = value / left;
+                    row.iter_mut().zip(values).for_each(|(entry, other)| *entry -= scaled * other.conj());
+                }
+            }
+            // Rounding.
+            matrix.iter_mut().step_by(channels + 1).for_each(|entry| *entry = Complex64::from(entry.re.max(0.0)));
         }
         Some(covariance)
     }

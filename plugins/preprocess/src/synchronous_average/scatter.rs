@@ -46,6 +46,11 @@ impl Scatter {
         }
     }
 
+    /// Turns taken.
+    pub(super) fn turns(&self) -> usize {
+        self.turns
+    }
+
     /// Takes one turn's harmonics, `[channel][order]`.
     pub(super) fn add(&mut self, turn: &[Complex64]) {
         self.turns += 1;

@@ -14,14 +14,11 @@ use std::{cell::RefCell, f64::consts::TAU};
 use runout_core::{
     Complex64,
     numerics::lanes::{Arithmetic, load},
-    profile::Neighbours,
+    profile::{NEIGHBOURS, Neighbours},
 };
 use rustfft::FftPlanner;
 
 use super::mean::Size;
-
-/// Neighbours to each side. With covariances averaged over five orders they make 20 complex degrees of freedom.
-const NEIGHBOURS: usize = 2;
 
 /// cos and sin for each of them.
 pub(super) const PHASES: usize = 2 * NEIGHBOURS;
@@ -99,6 +96,19 @@ impl Slow {
     /// Between the marks the phase goes on: with Uₖ(Φ) = Σ e^{−2πikm/T} u_m(Φ), the record's transforms at n + k/T and
     /// n − k/T are those of Uₖ e^{−ikΦ/T} at n and −n, as u real makes U₋ₖ its conjugate.
     pub(super) fn neighbours(&self, sum: &[f64], turns: usize, size: Size) -> Option<Neighbours> {
+        let coefficients = self.transforms(sum, turns, size, 1.0)?;
+        Some(Neighbours { period: self.planned, channels: size.channels, angles: size.angles, coefficients })
+    }
+
+    /// What these neighbours are of the turns' own harmonics c_m: Σ e^{∓2πikm/T} c_m / T, as [`Neighbours::coefficients`] are
+    /// laid out. With all T planned turns they are at right angles to each other and to the rest of the turns' scatter;
+    /// `None` with fewer turns.
+    pub(super) fn of_turns(&self, sum: &[f64], turns: usize, size: Size) -> Option<Vec<Vec<Complex64>>> {
+        if turns < self.planned { None } else { self.transforms(sum, turns, size, 0.0) }
+    }
+
+    /// Transforms of Uₖ e^{−isk Φ/T} over the turns, s being `within` a turn: 1 where the phase goes on, 0 where each turn has one.
+    fn transforms(&self, sum: &[f64], turns: usize, size: Size, within: f64) -> Option<Vec<Vec<Complex64>>> {
         if self.neighbours == 0 || turns < 3 {
             return None;
         }
@@ -109,7 +119,7 @@ impl Slow {
         let mut coefficients = Vec::with_capacity(2 * self.neighbours);
         for neighbour in 0..self.neighbours {
             let [cosine, sine] = [2 * neighbour, 2 * neighbour + 1];
-            let step = Complex64::cis(-TAU * (neighbour + 1) as f64 / (self.planned * angles) as f64);
+            let step = Complex64::cis(-TAU * within * (neighbour + 1) as f64 / (self.planned * angles) as f64);
             // Both neighbours, `[side][order × channel]`.
             let mut sides = [vec![Complex64::ZERO; orders * channels], vec![Complex64::ZERO; orders * channels]];
             for channel in 0..channels {
@@ -131,7 +141,7 @@ impl Slow {
             }
             coefficients.extend(sides);
         }
-        Some(Neighbours { period: self.planned, channels, angles, coefficients })
+        Some(coefficients)
     }
 }
 

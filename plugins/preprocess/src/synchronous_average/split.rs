@@ -150,6 +150,12 @@ impl Means {
         std::mem::take(&mut self.levels)
     }
 
+    /// The scatter without what the covariance is taken from; `None` where parts are asked for: what looks at them takes more
+    /// out of the scatter.
+    pub fn scatter_beside(&self) -> Option<Vec<Complex64>> {
+        if self.parts.is_some() { None } else { self.whole.scatter_beside() }
+    }
+
     /// The parts; `None` where too few turns are left to fill them.
     pub fn split(&self) -> Option<Split> {
         let parts = self.parts.as_ref().filter(|parts| parts.held_out.turns() > 0)?;

@@ -212,6 +212,46 @@ fn the_scatter_is_that_of_the_turns() {
     assert_eq!((profile.turns.used, profile.covariance, profile.scatter), (1, None, None));
 }
 
+/// The scatter without the neighbours, from the turns' harmonics freed of e^{±2πikm/T}, k = 1, 2, by least squares.
+#[test]
+fn the_scatter_beside_the_neighbours_is_what_they_leave() {
+    let (length, turns) = (32, 40);
+    let mut random = scatter(6);
+    let data: Vec<Vec<f64>> = (0..2).map(|_| (0..turns * length).map(|_| 5.0 + random()).collect()).collect();
+    let profile = average(length, stream(&data, marks(0.0, length as f64, turns + 1))).unwrap();
+    let found = profile.scatter_beside.unwrap();
+    for order in [0, 1, 7] {
+        let of = |channel: usize| -> Vec<Complex64> {
+            let transform = |turn: &[f64]| -> Complex64 {
+                let terms = turn.iter().enumerate();
+                let sum: Complex64 = terms
+                    .map(|(index, value)| value * Complex64::cis(TAU * (order * index) as f64 / length as f64))
+                    .sum();
+                sum * if order == 0 { 1.0 } else { 2.0 } / length as f64
+            };
+            let mut all: Vec<Complex64> = data[channel].chunks_exact(length).map(transform).collect();
+            for cycles in [0_i32, 1, -1, 2, -2] {
+                let phase = |turn: usize| Complex64::cis(TAU * f64::from(cycles) * turn as f64 / turns as f64);
+                let share: Complex64 = all.iter().enumerate().map(|(turn, value)| value * phase(turn).conj()).sum();
+                all.iter_mut().enumerate().for_each(|(turn, value)| *value -= share / turns as f64 * phase(turn));
+            }
+            all
+        };
+        let channels = [of(0), of(1)];
+        for (row, a) in channels.iter().enumerate() {
+            for (column, b) in channels.iter().enumerate() {
+                let products: Complex64 = a.iter().zip(b).map(|(a, b)| a * b.conj()).sum();
+                let expected = products / ((turns - 5) * turns) as f64;
+                let found = found[(order * 2 + row) * 2 + column];
+                assert!((found - expected).norm() < 1e-13, "order {order}: {found} {expected}");
+            }
+        }
+    }
+    // Of fewer turns, all is needed.
+    let few = average(length, stream(&data, marks(0.0, length as f64, turns))).unwrap();
+    assert!(few.scatter_beside.is_none() && few.scatter.is_some());
+}
+
 /// Over many captures the mean square of the mean's error is its stated variance: for noise that forgets, and for tones of
 /// any phase, whose turns are anything but independent.
 #[test]

@@ -19,7 +19,8 @@ pub struct Readings {
     pub mean: Vec<Complex64>,
     /// Covariance of `mean` in µm², one matrix `[order][channel][channel]` a setup, channels in the rig's order.
     pub covariance: Option<Vec<Vec<Complex64>>>,
-    /// What it would be with independent turns, likewise; for weights.
+    /// What it would be with independent turns, likewise; for weights, without what `covariance` is taken from where that is
+    /// known apart.
     pub scatter: Option<Vec<Vec<Complex64>>>,
     /// Turns averaged in each setup.
     pub turns: Vec<usize>,
@@ -81,7 +82,7 @@ impl Readings {
             turn_angles: ordered.iter().map(|(profile, _)| profile.turn_angles).collect(),
             mean,
             covariance: matrices(|profile| profile.covariance.as_ref()),
-            scatter: matrices(|profile| profile.scatter.as_ref()),
+            scatter: matrices(|profile| profile.scatter_beside.as_ref().or(profile.scatter.as_ref())),
             turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
             places,
         })

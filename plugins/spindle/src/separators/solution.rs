@@ -2,7 +2,7 @@
 
 use runout_core::{
     Complex64, Error, Result,
-    profile::Profile,
+    profile::{NEIGHBOURS, Profile},
     separation::{Quantity, Residual, SectionAt, Sensitivity, Separation},
     stage::Station,
 };
@@ -85,7 +85,7 @@ impl Solver<'_> {
     /// When the station's profiles do not fit the rig.
     pub fn separate(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Separation> {
         let mut readings = Readings::gather(self.selection, self.layout, station)?;
-        weights::smooth(&mut readings);
+        weights::smooth_by_order(&mut readings);
         if self.second_order {
             leak::widen(self.layout, self.selection.rig.part_radius_mm, &mut readings);
         }
@@ -261,7 +261,7 @@ impl Solver<'_> {
     /// When the station's profiles do not fit the rig.
     pub fn sensitivity(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Sensitivity> {
         let mut readings = Readings::gather(self.selection, self.layout, station)?;
-        weights::smooth(&mut readings);
+        weights::smooth_by_order(&mut readings);
         let operators = method(&readings);
         let to_reference = self.layout.to_reference(self.layout.mean_z_mm + station.z_mm);
         let (width, count) = (self.layout.unknowns.len(), readings.count);
@@ -379,6 +379,8 @@ impl Solver<'_> {
         let mut variance = vec![0.0; values.len()];
         let mut observable = vec![true; values.len()];
         let motions: Vec<usize> = (0..width).filter(|unknown| !layout.unknowns[*unknown].is_form()).collect();
+        let forms: Vec<usize> = layout.forms().collect();
+        let mut form_covariance = propagation.map(|_| vec![Complex64::ZERO; forms.len() * forms.len()]);
         let mut motion_covariance = propagation.map(|_| vec![Complex64::ZERO; motions.len() * motions.len()]);
         for order in 1..=max_order {
             let row = order * width..(order + 1) * width;
@@ -397,6 +399,13 @@ impl Solver<'_> {
                 to_reference.apply_about(&mut covariance);
                 covariance
             });
+            if let (Some(spread), Some(joint)) = (&spread, &mut form_covariance) {
+                let entry = |row: &usize, column: &usize| {
+                    let entry = spread[row * width + column];
+                    if layout.direction < 0.0 { entry.conj() } else { entry }
+                };
+                joint.extend(forms.iter().flat_map(|row| forms.iter().map(move |column| entry(row, column))));
+            }
             if let (Some(spread), Some(joint)) = (&spread, &mut motion_covariance) {
                 let entry = |row: &usize, column: &usize| spread[row * width + column];
                 joint.extend(motions.iter().flat_map(|row| motions.iter().map(move |column| entry(row, column))));
@@ -423,6 +432,8 @@ impl Solver<'_> {
             variance,
             observable,
             motion_covariance,
+            form_covariance,
+            freedom: freedom(station, &self.selection.setups),
             equivalents: Vec::new(),
             motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
@@ -449,6 +460,18 @@ impl Solver<'_> {
         let width = self.layout.unknowns.len();
         (0..width).flat_map(|unknown| columns.iter().map(move |column| column[unknown])).collect()
     }
+}
+
+/// Real degrees of freedom behind the covariance of one order by itself: of the neighbours that captures of so many turns have, and
+/// of both parts of each.
+fn freedom(station: &Station, setups: &[usize]) -> usize {
+    let used = station.profiles.iter().filter(|profile| setups.contains(&profile.setup));
+    let of = |profile: &Profile| match profile.turns.used {
+        0 | 1 => 0,
+        2 => 2,
+        turns => 4 * NEIGHBOURS.min((turns - 1) / 2),
+    };
+    used.map(of).sum()
 }
 
 /// The largest reading of order 1: the largest eccentricity, but for motion.

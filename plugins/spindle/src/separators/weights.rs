@@ -20,7 +20,20 @@ use super::{
 /// With fewer independent samples a channel than this, correlations are shrunk towards none.
 const SAMPLES_A_CHANNEL: f64 = 10.0;
 
-/// Replaces each order's covariance by the mean over its neighbours.
+/// Replaces each order's scatter by the mean over its neighbours, and its covariance by the mean over
+/// [those beside it](profile::smooth_by_order).
+pub fn smooth_by_order(readings: &mut Readings) {
+    let sensors = readings.count / readings.turns.len().max(1);
+    let both = [
+        (&mut readings.scatter, profile::smooth as fn(&mut [Complex64], usize)),
+        (&mut readings.covariance, profile::smooth_by_order),
+    ];
+    for (setups, smooth) in both {
+        setups.iter_mut().flatten().for_each(|matrices| smooth(matrices, sensors * sensors));
+    }
+}
+
+/// Replaces each order's scatter and covariance by the mean over its neighbours.
 pub fn smooth(readings: &mut Readings) {
     let sensors = readings.count / readings.turns.len().max(1);
     for matrices in [&mut readings.covariance, &mut readings.scatter].into_iter().flatten().flatten() {

@@ -130,7 +130,8 @@ struct Ring {
     variance: Vec<f64>,
     gaps: Gaps,
     used: f64,
-    seed: u64,
+    /// Sources of its errors: a seed, and what they make of each order.
+    noise: Vec<(u64, Vec<Complex64>)>,
 }
 
 impl Ring {
@@ -151,6 +152,10 @@ impl Wall {
             let own = orders().count().saturating_sub(1);
             (highest, all_to) = (highest.max(own), all_to.min(own));
             let known = || orders().map(|(order, known)| known.filter(|_| order >= lowest));
+            let source = |noise: &surface::Noise| {
+                let amplitudes = noise.amplitudes.iter().take(fitting).copied().collect();
+                (seed(&[&section.station, &noise.of.to_string()]), amplitudes)
+            };
             Ring {
                 station: section.station.clone(),
                 id: section.id.clone(),
@@ -159,7 +164,7 @@ impl Wall {
                 variance: known().map(|known| known.map_or(f64::NAN, |known| known.variance)).collect(),
                 gaps: section.gaps.clone(),
                 used: section.used,
-                seed: seed(&[&section.station, &section.id]),
+                noise: section.noise.iter().map(source).collect(),
             }
         });
         let rings: Vec<Ring> = rings.collect();
@@ -316,8 +321,11 @@ impl Wall {
     /// Errors of each section; a wall of which some sections have no known error has none either.
     fn errors(&self, filter: &Filter) -> Option<Vec<Errors>> {
         let lowest = if self.placed { 0 } else { 2 };
-        let each = self.rings.iter().map(|ring| Errors::new(&filter.variance(&ring.variance), lowest, ring.seed));
-        each.collect()
+        let of = |ring: &Ring| {
+            let sources = ring.noise.iter().map(|(seed, amplitudes)| (*seed, filter.harmonics(amplitudes)));
+            Errors::of_sources(sources, lowest)
+        };
+        self.rings.iter().map(of).collect()
     }
 
     /// Share of the wall that is there.
@@ -377,7 +385,7 @@ impl Wall {
         let mut errors = self.errors(filter).unwrap_or_default();
         let draws = if errors.is_empty() { 0 } else { draws };
         let mut drawn = forms.clone();
-        monte_carlo_of(draws, |disturbed, found| {
+        monte_carlo_of(draws, self.rings.len(), |disturbed, found| {
             let mut largest_um = disturbed.then_some(0.0);
             if disturbed {
                 for ((errors, form), drawn) in errors.iter_mut().zip(&forms).zip(&mut drawn) {

@@ -13,7 +13,8 @@ use runout_standards::{
     roundness::{Angles, Disturbed, Points, Reference, Series, Values},
     slope::{Drawn, steepest_um_per_rad},
     uncertainty::{
-        DRAWS, Errors, LARGEST, NORMAL_95, Noise, RAYLEIGH_95, Uncertainty, extreme, monte_carlo_of, seed, stand_in,
+        DRAWS, Errors, LARGEST, NORMAL_95, Noise, Uncertainty, extreme, monte_carlo_of, noise_95, seed, stand_in,
+        student_95,
     },
 };
 use runout_turning::{
@@ -81,6 +82,8 @@ pub(super) struct Form {
     equivalents: Vec<Vec<Complex64>>,
     /// Of noise.
     pub(super) variance: Vec<f64>,
+    /// Real degrees of freedom behind it, by order; 0 where it is taken as exact.
+    freedom: Vec<usize>,
     pub(super) held: Held,
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
@@ -110,6 +113,7 @@ impl Form {
             harmonics: from_two(separation.coefficients(unknown).collect()),
             equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),
             variance: separation.noise_variance(unknown),
+            freedom: (0..=separation.max_order()).map(|order| separation.degrees_of_freedom(order)).collect(),
             angles: result.angles,
             radius_mm,
             noise: Noise::new(held.highest + 1, seed(&[&result.station, &at.id])),
@@ -122,9 +126,9 @@ impl Form {
     /// Another form of the same section, taken as exact.
     fn exactly(&self, harmonics: &[Complex64]) -> Self {
         let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
-        let (held, at) = (self.held.clone(), self.at.clone());
+        let (freedom, held, at) = (self.freedom.clone(), self.held.clone(), self.at.clone());
         let (noise, noise_of_texture) = (self.noise.clone(), self.noise_of_texture.clone());
-        Self { harmonics, equivalents, variance, held, at, noise, noise_of_texture, ..*self }
+        Self { harmonics, equivalents, variance, freedom, held, at, noise, noise_of_texture, ..*self }
     }
 
     fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
@@ -206,10 +210,12 @@ impl Form {
             let phase = (-value.arg().to_degrees() / turns).rem_euclid(360.0 / turns);
             let variance = self.variance.get(order).copied().filter(|variance| variance.is_finite());
             let std = variance.map(|variance| (0.5 * variance).sqrt());
-            let of_amplitude = std.map(|std| Uncertainty::of_amplitude(amplitude, std));
-            let of_phase = std.filter(|std| amplitude >= RAYLEIGH_95 * std).map(|std| {
+            let freedom = self.freedom.get(order).copied().unwrap_or(0);
+            let of_amplitude = std.map(|std| Uncertainty::of_amplitude(amplitude, std, freedom));
+            let of_phase = std.filter(|std| amplitude >= noise_95(freedom as f64) * std).map(|std| {
                 let std = (std / (amplitude * turns)).to_degrees();
-                Uncertainty { std, interval_95: [phase - NORMAL_95 * std, phase + NORMAL_95 * std], draws: 0 }
+                let reach = student_95(freedom as f64) * std;
+                Uncertainty { std, interval_95: [phase - reach, phase + reach], draws: 0 }
             });
             let labels = vec![
                 Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),
@@ -238,7 +244,7 @@ impl Form {
         let mut errors = self.errors(filter);
         let draws = if errors.is_some() { draws } else { 0 };
         let mut drawn = form_um.clone();
-        monte_carlo_of(draws, |disturbed, found| {
+        monte_carlo_of(draws, 1, |disturbed, found| {
             if let (true, Some(errors)) = (disturbed, &mut errors) {
                 errors.draw(&mut fourier, &form_um, &mut drawn);
             }
@@ -252,13 +258,22 @@ impl Form {
         form_um
     }
 
+    /// Variances as wide as they are badly known, behind a filter.
+    fn widened(&self, filter: &Filter) -> Vec<f64> {
+        let wider = self.freedom.iter().map(|freedom| (student_95(*freedom as f64) / NORMAL_95).powi(2));
+        let wider = wider.chain(std::iter::repeat(1.0));
+        let variance: Vec<f64> = self.variance.iter().zip(wider).map(|(variance, wider)| variance * wider).collect();
+        filter.variance(&variance)
+    }
+
+    /// Errors as wide as their variance is badly known.
     fn errors(&self, filter: &Filter) -> Option<Errors> {
-        Errors::sharing(&filter.variance(&self.variance), 2, &self.noise)
+        Errors::sharing(&self.widened(filter), 2, &self.noise)
     }
 
     /// Errors that are all taken fresh.
     pub(super) fn fresh_errors(&self, filter: &Filter) -> Option<Errors> {
-        Errors::sharing(&filter.variance(&self.variance), 2, &self.noise_of_texture)
+        Errors::sharing(&self.widened(filter), 2, &self.noise_of_texture)
     }
 
     fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {

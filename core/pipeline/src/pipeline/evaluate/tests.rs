@@ -42,6 +42,8 @@ pub(super) fn station(
         variance: vec![variance; highest + 1],
         observable: (0..=highest).map(|order| !lost.contains(&order)).collect(),
         motion_covariance: None,
+        form_covariance: None,
+        freedom: 0,
         equivalents: Vec::new(),
         motion_z_mm: 0.0,
         residual: Residual::default(),
