@@ -17,7 +17,8 @@ use runout_studies::{
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
-       runout-studies value-coverage [CAMPAIGNS]   the same of every value of the standards, two rigs and two spectra
+       runout-studies value-coverage [CAMPAIGNS [SEED [LAYOUT]]]   the same of every value of the standards, two rigs and two
+                                             spectra, from a seed on; LAYOUT is four or six
        runout-studies blind [CAMPAIGNS [SEED [FILE [LAYOUT]]]]   what the closed loop says of campaigns that it knows
                                              nothing of; LAYOUT is four, six or reversed
        runout-studies blind-campaign INDEX [SEED [LAYOUT]]   one of them in full
@@ -39,9 +40,9 @@ fn main() -> ExitCode {
         }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
-        ["value-coverage"] => value_coverage(300),
-        ["value-coverage", campaigns] if campaigns.parse::<u64>().is_ok() => {
-            value_coverage(campaigns.parse().unwrap_or_default())
+        ["value-coverage", ref rest @ ..] if rest.len() <= 3 && sizes(rest, [300, 0]).is_some() => {
+            let [campaigns, seed] = sizes(rest, [300, 0]).unwrap_or_default();
+            layout(rest.get(2)).and_then(|only| value_coverage(campaigns, seed, only))
         }
         ["blind", ref rest @ ..] if rest.len() <= 4 && sizes(rest, [240, 1]).is_some() => {
             let [campaigns, seed] = sizes(rest, [240, 1]).unwrap_or_default();
@@ -109,12 +110,12 @@ fn coverage(campaigns: u64) -> Result<()> {
     Ok(())
 }
 
-fn value_coverage(campaigns: u64) -> Result<()> {
+fn value_coverage(campaigns: u64, seed: u64, only: Option<Layout>) -> Result<()> {
     let folder = tempfile::tempdir().map_err(|error| Error::new("make", "a folder for recordings", error))?;
-    for rig in values::RIGS {
+    for rig in values::RIGS.into_iter().filter(|rig| only.is_none_or(|only| only == *rig)) {
         for spectrum in Spectrum::ALL {
-            println!("{campaigns} campaigns, simulated: {}; {}\n", rig.name(), spectrum.name());
-            println!("{}", values::table(&values::rows(rig, spectrum, campaigns, folder.path())?));
+            println!("{campaigns} campaigns from seed {seed}, simulated: {}; {}\n", rig.name(), spectrum.name());
+            println!("{}", values::table(&values::rows(rig, spectrum, seed..seed + campaigns, folder.path())?));
         }
     }
     Ok(())

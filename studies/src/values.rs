@@ -5,6 +5,7 @@ use std::{
     collections::BTreeMap,
     fmt::Write,
     num::NonZeroUsize,
+    ops::Range,
     path::Path,
     sync::{
         Mutex,
@@ -94,10 +95,11 @@ samples_per_rev = 512
 [separate]
 plugin = "harmonic-least-squares"
 [evaluate]
-values = ["roundness", "texture", "cylindricity", "error-motion"]
+values = ["roundness", "harmonics", "texture", "cylindricity", "error-motion"]
 references = ["LSCI", "MZCI", "MICI", "MCCI"]
 filter_upr = [15, 50]
 lambda_c_mm = 8
+slope_window_deg = 30
 "#;
 
 /// A campaign: 40 turns of 512 samples, eccentricity 8 µm.
@@ -122,19 +124,19 @@ fn without_noise(mut config: SpindleConfig) -> SpindleConfig {
     config
 }
 
-/// Coverage of every value over campaigns of one rig and spectrum, in a folder for the recordings.
+/// Coverage of every value over campaigns (their seeds) of one rig and spectrum, in a folder for the recordings.
 ///
 /// # Errors
 /// When a stage fails.
-pub fn rows(rig: Layout, spectrum: Spectrum, campaigns: u64, folder: &Path) -> Result<Rows> {
+pub fn rows(rig: Layout, spectrum: Spectrum, campaigns: Range<u64>, folder: &Path) -> Result<Rows> {
     let workers = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let (next, total) = (AtomicU64::new(0), Mutex::new(Rows::new()));
+    let (next, total) = (AtomicU64::new(campaigns.start), Mutex::new(Rows::new()));
     let stopped = || Error::new("evaluate", "campaigns", "a thread stopped");
     std::thread::scope(|scope| {
         let work = |worker: usize| -> Result<()> {
             loop {
                 let seed = next.fetch_add(1, Ordering::Relaxed);
-                if seed >= campaigns {
+                if seed >= campaigns.end {
                     return Ok(());
                 }
                 let config = config(rig, spectrum, seed);

@@ -5,7 +5,7 @@ use runout_studies::values::{RIGS, Spectrum, rows, table};
 #[test]
 fn intervals_of_values_hold_the_truth() {
     let folder = tempfile::tempdir().unwrap();
-    let rows = rows(RIGS[0], Spectrum::Falling, 16, folder.path()).unwrap();
+    let rows = rows(RIGS[0], Spectrum::Falling, 0..16, folder.path()).unwrap();
     println!("{}", table(&rows));
     let known = ["RONt | LSCI | none", "Ra | mean line | none", "synchronous-radial-x | LSC | none"];
     assert!(known.iter().all(|name| rows[*name].intervals() >= 16), "{known:?}");
