@@ -24,8 +24,9 @@ const TAIL: f64 = 0.025;
 /// Half of the 95 % interval of a normal distribution, in standard deviations.
 pub const NORMAL_95: f64 = 1.96;
 
-/// Half of the 95 % interval of Student's distribution, in standard deviations, from its expansion about the normal one (Abramowitz,
-/// Stegun 26.7.5; within 1 % from 3 degrees of freedom, 3 % for 2); the normal one's for 0, a standard deviation taken as exact.
+/// Half of the 95 % interval of Student's distribution, in standard deviations, from its expansion about the normal one
+/// (Abramowitz, Stegun 26.7.5; within 1 % from 3 degrees of freedom, 3 % for 2); the normal one's for 0, a standard
+/// deviation taken as exact.
 #[must_use]
 pub fn student_95(freedom: f64) -> f64 {
     if freedom <= 0.0 {
@@ -61,9 +62,9 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Of an amplitude, from the standard uncertainty of its part along the phasor, known from so many real degrees of freedom (0
-    /// where it is taken as exact). An amplitude that noise alone exceeds in more than [5 % of all cases](noise_95) may be noise: its
-    /// interval begins at 0.
+    /// Of an amplitude, from the standard uncertainty of its part along the phasor, known from so many real degrees of
+    /// freedom (0 where it is taken as exact). An amplitude that noise alone exceeds in more than [5 % of all
+    /// cases](noise_95) may be noise: its interval begins at 0.
     #[must_use]
     pub fn of_amplitude(value: f64, std: f64, freedom: usize) -> Self {
         let reach = student_95(freedom as f64) * std;
@@ -71,8 +72,9 @@ impl Uncertainty {
         Self { std, interval_95: [low, value + reach], draws: 0 }
     }
 
-    /// The same where its draws come from so many transforms of several draws each, which tell a standard deviation no better than
-    /// two real degrees of freedom a transform do: the interval is wider by Student's factor, about its middle.
+    /// The same where its draws come from so many transforms of several draws each, which tell a standard deviation no
+    /// better than two real degrees of freedom a transform do: the interval is wider by Student's factor, about its
+    /// middle.
     #[must_use]
     fn of_transforms(mut self, transforms: f64) -> Self {
         let wider = student_95(2.0 * transforms) / NORMAL_95;

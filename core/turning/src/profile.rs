@@ -258,8 +258,8 @@ impl Profile {
     }
 }
 
-/// Neighbours to each side of an order that the covariance of a mean is taken from. With covariances averaged over five orders
-/// they make 20 complex degrees of freedom.
+/// Neighbours to each side of an order that the covariance of a mean is taken from. With covariances averaged over five
+/// orders they make 20 complex degrees of freedom.
 pub const NEIGHBOURS: usize = 2;
 
 /// Orders to each side over which [`smooth`] averages: the scatter's spectrum is smooth, its estimate is not.
@@ -275,8 +275,8 @@ pub fn smooth(covariance: &mut [Complex64], size: usize) {
 
 /// The same over [`orders_beside`] to each side: what the variance of a result is taken from.
 ///
-/// At low orders the density of asynchronous motion differs from order to order, by slow motion and by single tones: there an
-/// order is looked at by itself.
+/// At low orders the density of asynchronous motion differs from order to order, by slow motion and by single tones:
+/// there an order is looked at by itself.
 pub fn smooth_by_order(covariance: &mut [Complex64], size: usize) {
     smooth_over(covariance, size, |order, max_order| {
         let beside = orders_beside(order);

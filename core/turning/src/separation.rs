@@ -229,8 +229,8 @@ pub struct Separation {
     /// Covariance E[δ δᴴ] of the motions among `unknowns`, `[order][motion][motion]` from order 0; what cannot be told means
     /// nothing. `None` where it is not known.
     pub motion_covariance: Option<Vec<Complex64>>,
-    /// Covariance E[δ δᴴ] of the forms among `unknowns`, `[order][form][form]` from order 0: sections of a station share the errors
-    /// of its motion. What cannot be told means nothing. `None` where it is not known.
+    /// Covariance E[δ δᴴ] of the forms among `unknowns`, `[order][form][form]` from order 0: sections of a station
+    /// share the errors of its motion. What cannot be told means nothing. `None` where it is not known.
     pub form_covariance: Option<Vec<Complex64>>,
     /// Real degrees of freedom behind `variance` at an order that was looked at by itself; 0 where it is taken as exact.
     /// [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
@@ -353,8 +353,8 @@ impl Separation {
         self.freedom * (2 * orders_beside(order) + 1)
     }
 
-    /// Factors by order that make errors with the stated variance as wide as the variance is badly known: Student's 95 % quantile
-    /// over that of a normal distribution.
+    /// Factors by order that make errors with the stated variance as wide as the variance is badly known: Student's 95
+    /// % quantile over that of a normal distribution.
     #[must_use]
     pub fn widening(&self) -> Vec<f64> {
         (0..=self.max_order()).map(|order| student_95(self.degrees_of_freedom(order) as f64) / NORMAL_95).collect()

@@ -289,6 +289,9 @@ fn describe(sections: usize, band_limited: bool) -> &'static str {
     }
 }
 
+/// Standard deviations of own noise below this share of the whole are rounding.
+const ROUNDING: f64 = 1e-6;
+
 /// Of each section, the noise that its errors are made of: own noise, and where covariances are known a part of that of the
 /// sections before it (Cholesky's factor of the covariance, order by order).
 fn noise(separation: &Separation, orders: usize) -> Vec<Vec<Noise>> {
@@ -302,23 +305,26 @@ fn noise(separation: &Separation, orders: usize) -> Vec<Vec<Noise>> {
     let mut noise: Vec<Vec<Noise>> = (0..sections)
         .map(|index| shared(index).map(|of| Noise { of, amplitudes: vec![Complex64::ZERO; orders] }).collect())
         .collect();
-    let mut factor = vec![Complex64::ZERO; sections * sections];
+    let (mut factor, mut total) = (vec![Complex64::ZERO; sections * sections], vec![0.0; sections]);
     for order in 0..orders {
         for row in 0..sections {
             let variance = forms[row].and_then(|form| separation.variance.get(order * width + form).copied());
             // Of what is not known, nothing is drawn.
             let variance = variance.filter(|variance| variance.is_finite() && *variance > 0.0).unwrap_or(0.0);
             let mut left = variance;
+            total[row] = variance.sqrt();
             for column in 0..row {
                 let before: Complex64 =
                     (0..column).map(|k| factor[row * sections + k] * factor[column * sections + k].conj()).sum();
                 let own = factor[column * sections + column].re;
                 let entry = joint.and_then(|joint| joint.get((order * sections + row) * sections + column));
-                let entry = entry.filter(|entry| entry.is_finite() && own > 0.0 && variance > 0.0);
+                // A section whose noise is all that of others has none of its own, but for rounding.
+                let entry = entry.filter(|entry| entry.is_finite() && own > ROUNDING * total[column] && variance > 0.0);
                 let share = entry.map_or(Complex64::ZERO, |entry| (entry - before) / own);
                 // Never more than there is, whatever rounding says.
-                let share = if share.norm_sqr() > left { Complex64::ZERO } else { share };
-                left -= share.norm_sqr();
+                let share = share * (left.sqrt() / share.norm()).min(1.0);
+                let share = if share.is_finite() { share } else { Complex64::ZERO };
+                left = (left - share.norm_sqr()).max(0.0);
                 factor[row * sections + column] = share;
             }
             factor[row * sections + row] = Complex64::from(left.sqrt());

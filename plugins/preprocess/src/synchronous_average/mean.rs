@@ -117,7 +117,7 @@ impl Mean {
     }
 
     /// The [scatter](Self::scatter) without the neighbours that [`covariance`](Self::covariance) is taken from; `None` below
-    /// [`MANY_TURNS`], and where not all turns are looked at.
+    /// [`MANY_TURNS`], and where not all planned turns are there and looked at.
     ///
     /// (T − 1) S = T Σ Cₖ Cₖᴴ over the T − 1 transforms Cₖ of the turns' harmonics, of which the neighbours are left out.
     pub(super) fn scatter_beside(&self) -> Option<Vec<Complex64>> {

@@ -100,14 +100,15 @@ impl Slow {
         Some(Neighbours { period: self.planned, channels: size.channels, angles: size.angles, coefficients })
     }
 
-    /// What these neighbours are of the turns' own harmonics c_m: Σ e^{∓2πikm/T} c_m / T, as [`Neighbours::coefficients`] are
-    /// laid out. With all T planned turns they are at right angles to each other and to the rest of the turns' scatter;
-    /// `None` with fewer turns.
+    /// What these neighbours are of the turns' own harmonics c_m: Σ e^{∓2πikm/T} c_m / T, as
+    /// [`Neighbours::coefficients`] are laid out. With all T planned turns they are at right angles to each other and
+    /// to the rest of the turns' scatter; `None` with fewer turns.
     pub(super) fn of_turns(&self, sum: &[f64], turns: usize, size: Size) -> Option<Vec<Vec<Complex64>>> {
         if turns < self.planned { None } else { self.transforms(sum, turns, size, 0.0) }
     }
 
-    /// Transforms of Uₖ e^{−isk Φ/T} over the turns, s being `within` a turn: 1 where the phase goes on, 0 where each turn has one.
+    /// Transforms of Uₖ e^{−isk Φ/T} over the turns, s being `within` a turn: 1 where the phase goes on, 0 where each
+    /// turn has one.
     fn transforms(&self, sum: &[f64], turns: usize, size: Size, within: f64) -> Option<Vec<Vec<Complex64>>> {
         if self.neighbours == 0 || turns < 3 {
             return None;

@@ -150,8 +150,8 @@ impl Means {
         std::mem::take(&mut self.levels)
     }
 
-    /// The scatter without what the covariance is taken from; `None` where parts are asked for: what looks at them takes more
-    /// out of the scatter.
+    /// The scatter without what the covariance is taken from; `None` where parts are asked for: what looks at them
+    /// takes more out of the scatter.
     pub fn scatter_beside(&self) -> Option<Vec<Complex64>> {
         if self.parts.is_some() { None } else { self.whole.scatter_beside() }
     }

@@ -462,8 +462,8 @@ impl Solver<'_> {
     }
 }
 
-/// Real degrees of freedom behind the covariance of one order by itself: of the neighbours that captures of so many turns have, and
-/// of both parts of each.
+/// Real degrees of freedom behind the covariance of one order by itself: of the neighbours that captures of so many
+/// turns have, and of both parts of each.
 fn freedom(station: &Station, setups: &[usize]) -> usize {
     let used = station.profiles.iter().filter(|profile| setups.contains(&profile.setup));
     let of = |profile: &Profile| match profile.turns.used {
