@@ -215,9 +215,10 @@ fn the_scatter_is_that_of_the_turns() {
 /// The scatter without the neighbours, from the turns' harmonics freed of e^{±2πikm/T}, k = 1, 2, by least squares.
 #[test]
 fn the_scatter_beside_the_neighbours_is_what_they_leave() {
+    // Of fewer channels, the weights look at a part of so many turns only.
     let (length, turns) = (32, 40);
     let mut random = scatter(6);
-    let data: Vec<Vec<f64>> = (0..2).map(|_| (0..turns * length).map(|_| 5.0 + random()).collect()).collect();
+    let data: Vec<Vec<f64>> = (0..3).map(|_| (0..turns * length).map(|_| 5.0 + random()).collect()).collect();
     let profile = average(length, stream(&data, marks(0.0, length as f64, turns + 1))).unwrap();
     let found = profile.scatter_beside.unwrap();
     for order in [0, 1, 7] {
@@ -237,12 +238,12 @@ fn the_scatter_beside_the_neighbours_is_what_they_leave() {
             }
             all
         };
-        let channels = [of(0), of(1)];
+        let channels = [of(0), of(1), of(2)];
         for (row, a) in channels.iter().enumerate() {
             for (column, b) in channels.iter().enumerate() {
                 let products: Complex64 = a.iter().zip(b).map(|(a, b)| a * b.conj()).sum();
                 let expected = products / ((turns - 5) * turns) as f64;
-                let found = found[(order * 2 + row) * 2 + column];
+                let found = found[(order * 3 + row) * 3 + column];
                 assert!((found - expected).norm() < 1e-13, "order {order}: {found} {expected}");
             }
         }
