@@ -679,6 +679,6 @@ mod tests {
             assert_eq!(found, expected, "{draw}");
         }
         let more = Errors::sharing(&[0.01; 31], 2, &noise).unwrap();
-        assert_eq!(more.amplitudes.len(), 31, "more orders than are shared have numbers of their own");
+        assert_eq!(more.sources[0].amplitudes.len(), 31, "more orders than are shared have numbers of their own");
     }
 }

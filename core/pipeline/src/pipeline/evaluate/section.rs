@@ -334,7 +334,7 @@ impl Form {
             (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um))
         };
         let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
-        monte_carlo_of(DRAWS, |disturbed, found| {
+        monte_carlo_of(DRAWS, 1, |disturbed, found| {
             let drawn = disturbed.then(|| errors.turned(&mut fourier));
             for (reference, circle) in &mut circles {
                 let values = match (circle, &drawn) {
