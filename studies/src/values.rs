@@ -23,7 +23,6 @@ use runout_core::{
         run::{Silent, run},
         summary::Summary,
     },
-    stage::Simulator,
 };
 use runout_hdf5::{WriteOptions, write_measurement};
 use runout_spindle::simulate::{SpindleConfig, simulator};

@@ -15,7 +15,7 @@ use runout_core::{
         run::Silent,
     },
     rig::RigConfig,
-    stage::{Loader, Request, Simulator, Source, SourceKind},
+    stage::{Loader, Request, Source, SourceKind},
 };
 use runout_spindle::simulate::{SpindleConfig, SpindleSimulator, simulator};
 use schemars::JsonSchema;
@@ -45,7 +45,7 @@ impl Loader for Held {
     }
 
     fn open(&self, _wanted: &Request) -> Result<Source> {
-        Ok(Source::Turns(self.0.recording()?))
+        Ok(Source::Turns(Box::new(self.0.spindle_recording())))
     }
 }
 

@@ -18,7 +18,6 @@ use runout_core::{
         summary::Summary,
     },
     rig::Gaps,
-    stage::Simulator,
 };
 use runout_hdf5::{WriteOptions, write_measurement};
 use runout_spindle::simulate::{SpindleConfig, SpindleSimulator, simulator};

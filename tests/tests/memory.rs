@@ -17,14 +17,11 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use runout_core::{
-    pipeline::{
-        Registry,
-        config::{INCLUDE_KEY, Pipeline},
-        document::Sources,
-        run::{Silent, run},
-    },
-    stage::Simulator,
+use runout_core::pipeline::{
+    Registry,
+    config::{INCLUDE_KEY, Pipeline},
+    document::Sources,
+    run::{Silent, run},
 };
 use runout_hdf5::{WriteOptions, write_measurement};
 use runout_spindle::simulate::{SpindleConfig, simulator};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use runout_core::{
     Error,
     atomic_file::resolved,
+    measurement::Recording,
     pipeline::{
         Registry,
         config::INCLUDE_KEY,
@@ -12,7 +13,8 @@ use runout_core::{
         error::Fault,
         registry::Context,
     },
-    stage::Simulator,
+    rig::Rig,
+    stage::{Simulation, Simulator},
 };
 use runout_hdf5::{SampleFormat, Scale, WriteOptions, write_measurement};
 use serde::Serialize;
@@ -26,12 +28,17 @@ struct Report {
     title: String,
     output: PathBuf,
     bytes: u64,
-    setups: usize,
-    stations: usize,
-    sensors: usize,
-    samples_per_capture: u64,
-    turns_per_capture: usize,
     effects: usize,
+    #[serde(flatten)]
+    made: Made,
+}
+
+/// The size of what was made.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Made {
+    Turns { setups: usize, stations: usize, sensors: usize, samples_per_capture: u64, turns_per_capture: usize },
+    Points { points: usize, columns: Vec<String> },
 }
 
 /// Computes a campaign and writes it.
@@ -65,7 +72,7 @@ impl Scenario {
             (None, Some(output)) => context.path(output.as_ref()),
             (None, None) => {
                 let fault = Fault::here("missing key `output`");
-                return Err(fault.help("name the measurement file to write, here or by --out"));
+                return Err(fault.help("name the file to write, here or by --out"));
             }
         };
         if sources.files().any(|file| resolved(file) == resolved(&output)) {
@@ -99,8 +106,21 @@ fn samples(root: &Table) -> SampleFormat {
 }
 
 fn write(scenario: &Scenario) -> Result<Report, Error> {
-    let rig = scenario.simulator.rig();
-    let recording = scenario.simulator.recording()?;
+    let made = match scenario.simulator.simulate()? {
+        Simulation::Turns { rig, recording } => write_turns(scenario, rig, &*recording)?,
+        Simulation::Points { table, rows } => {
+            let about = [("title", scenario.title.as_str()), ("scenario", scenario.simulator.scenario())];
+            runout_points::write(&scenario.output, &table, &rows, &about)?;
+            let columns = table.columns.iter().map(|column| column.name.clone()).collect();
+            Made::Points { points: rows.num_rows(), columns }
+        }
+    };
+    let output = scenario.output.clone();
+    let bytes = std::fs::metadata(&output).map_err(|error| Error::new("read", output.display().to_string(), error))?;
+    Ok(Report { title: scenario.title.clone(), output, bytes: bytes.len(), effects: scenario.effects, made })
+}
+
+fn write_turns(scenario: &Scenario, rig: &Rig, recording: &dyn Recording) -> Result<Made, Error> {
     let stations = recording.stations().len();
     let first = recording.open(0, 0)?.capture().clone();
     let options = WriteOptions {
@@ -111,36 +131,36 @@ fn write(scenario: &Scenario) -> Result<Report, Error> {
     };
     let progress = Progress::new("captures");
     progress.expect(stations * rig.setups.len());
-    let output = write_measurement(&*recording, rig, &scenario.output, &options, &mut |name| progress.advance(name))?;
-    drop(progress);
-    let bytes = std::fs::metadata(&output).map_err(|error| Error::new("read", output.display().to_string(), error))?;
-    Ok(Report {
-        title: scenario.title.clone(),
-        output,
-        bytes: bytes.len(),
+    write_measurement(recording, rig, &scenario.output, &options, &mut |name| progress.advance(name))?;
+    Ok(Made::Turns {
         setups: rig.setups.len(),
         stations,
         sensors: rig.sensors.len(),
         samples_per_capture: first.samples,
         turns_per_capture: first.marks.len().saturating_sub(1),
-        effects: scenario.effects,
     })
 }
 
 fn text(report: &Report) -> String {
-    let effects = match report.effects {
-        0 => String::new(),
-        effects => format!("  {} in it, kept with the truth in the file\n", count(effects, "effect")),
+    let size = match &report.made {
+        Made::Turns { setups, stations, sensors, samples_per_capture, turns_per_capture } => format!(
+            "{}, {}, {}, {} of {samples_per_capture} samples each",
+            count(*setups, "setup"),
+            count(*stations, "station"),
+            count(*sensors, "sensor"),
+            count(*turns_per_capture, "turn"),
+        ),
+        Made::Points { points, columns } => {
+            format!("{} with the columns {}", count(*points, "point"), columns.join(", "))
+        }
     };
-    format!(
-        "{}\n  {}, {}, {}, {} of {} samples each\n{effects}  written: {} ({:.1} MB)\n",
-        report.title,
-        count(report.setups, "setup"),
-        count(report.stations, "station"),
-        count(report.sensors, "sensor"),
-        count(report.turns_per_capture, "turn"),
-        report.samples_per_capture,
-        report.output.display(),
-        report.bytes as f64 / 1e6,
-    )
+    let effects = match (report.effects, &report.made) {
+        (0, _) => String::new(),
+        (effects, Made::Turns { .. }) => {
+            format!("  {} in it, kept with the truth in the file\n", count(effects, "effect"))
+        }
+        (effects, Made::Points { .. }) => format!("  {} in it\n", count(effects, "effect")),
+    };
+    let written = format!("{} ({:.1} MB)", report.output.display(), report.bytes as f64 / 1e6);
+    format!("{}\n  {size}\n{effects}  written: {written}\n", report.title)
 }

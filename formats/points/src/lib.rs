@@ -1,11 +1,14 @@
 //! The loader `points`: measured points from CSV or Parquet, for the separators of any domain.
-//!
+
 //! A row is a point. The separator says which columns it takes ([`PointColumn`]); other columns are not read. `columns` gives the
 //! file's names where they differ, `where` selects rows.
 //!
+//! [`PointColumn`]: runout_core::points::PointColumn
+
 mod parquet;
 mod select;
 mod text;
+mod write;
 
 use std::{
     collections::BTreeMap,
@@ -23,6 +26,8 @@ use runout_core::{
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+pub use write::write;
 
 /// Adds the loader `points`, also under the names that it had for single domains.
 pub fn register(registry: &mut Registry) {

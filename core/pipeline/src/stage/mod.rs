@@ -12,4 +12,4 @@ pub use loader::{Loader, Request, Source, SourceKind};
 pub use points::{Form, LinearModel, NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator};
 pub use preprocessor::{Averager, Conditioner, Preprocessor, Wanted};
 pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator};
-pub use simulator::Simulator;
+pub use simulator::{Simulation, Simulator};

@@ -31,13 +31,12 @@ mod tests;
 
 use runout_core::{
     Result,
-    measurement::Recording,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
     },
     rig::Rig,
-    stage::Simulator,
+    stage::{Simulation, Simulator},
 };
 
 pub use config::{
@@ -76,6 +75,12 @@ pub fn simulator(config: &SpindleConfig) -> std::result::Result<SpindleSimulator
 }
 
 impl SpindleSimulator {
+    /// The rig that it simulates.
+    #[must_use]
+    pub fn rig(&self) -> &Rig {
+        &self.world.rig
+    }
+
     /// The recording, computed as it is read.
     #[must_use]
     pub fn spindle_recording(&self) -> SpindleRecording<'_> {
@@ -90,12 +95,8 @@ impl SpindleSimulator {
 }
 
 impl Simulator for SpindleSimulator {
-    fn rig(&self) -> &Rig {
-        &self.world.rig
-    }
-
-    fn recording(&self) -> Result<Box<dyn Recording + '_>> {
-        Ok(Box::new(self.spindle_recording()))
+    fn simulate(&self) -> Result<Simulation<'_>> {
+        Ok(Simulation::Turns { rig: self.rig(), recording: Box::new(self.spindle_recording()) })
     }
 
     fn scenario(&self) -> &str {
