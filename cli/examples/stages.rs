@@ -24,7 +24,7 @@ use runout_core::{
     },
     profile::Profile,
     separation::Separation,
-    stage::{Averager, Conditioner, ResultInfo, Source, Station, StationSeparator, Wanted},
+    stage::{AverageRequest, Averager, Conditioner, ResultInfo, Source, Station, StationSeparator},
 };
 
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;
@@ -56,10 +56,10 @@ fn main() -> Outcome {
     })?;
     let projection = Stages::of(&three_point)?.separator.projection(0).ok_or("three points tell no motion")?;
     for (name, projection) in [("average", None), ("average-and-motion-of-every-turn", Some(&projection))] {
-        let wanted = Wanted { projection, ..Wanted::default() };
+        let wanted = AverageRequest { projection, ..AverageRequest::default() };
         report(name, || {
             let record = Box::new(captures[0].clone());
-            clocked(|| stages.averager.average_wanting(record, wanted).map(black_box).map_err(Into::into))
+            clocked(|| stages.averager.average_requested(record, wanted).map(black_box).map_err(Into::into))
         })?;
     }
     let read_all = || {

@@ -11,7 +11,7 @@ use runout_core::{
     profile::Profile,
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     separation::{Quantity, Separation},
-    stage::{Averager, Conditioner, Preprocessor, Station, StationSeparator, Wanted},
+    stage::{AverageRequest, Averager, Conditioner, Preprocessor, Station, StationSeparator},
 };
 use runout_preprocess::{SynchronousAverageConfig, TrimConfig};
 use runout_spindle::simulate::{SpindleConfig, SpindleSimulator};
@@ -108,8 +108,8 @@ pub fn station_holding_out(
         let stream = recording.open(station, setup)?;
         let recorded = stream.capture().marks.len().saturating_sub(1);
         let trim = trim(recorded.saturating_sub(turns))?;
-        let wanted = Wanted { hold_out: share, ..Wanted::default() };
-        averager.average_wanting(trim.attach(Box::new(Inspection::new(stream)))?, wanted)
+        let wanted = AverageRequest { hold_out: share, ..AverageRequest::default() };
+        averager.average_requested(trim.attach(Box::new(Inspection::new(stream)))?, wanted)
     };
     let profiles: Result<Vec<Profile>> = (0..rig.setups.len()).map(profile).collect();
     let truth = recording.truth(station)?.unwrap_or_default();

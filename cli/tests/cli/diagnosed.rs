@@ -46,6 +46,11 @@ fn a_value_is_one_number_wherever_it_stands() {
     let run = document(&folder, &["run", "pipeline.toml"]);
     let diagnosis = document(&folder, &["diagnose", "pipeline.toml"]);
     let summary = written(&folder, "out/diagnosed/summary.json");
+    let motion = summary["stations"][0]["motion_values"].as_array().unwrap();
+    assert!(
+        motion.iter().any(|value| value["symbol"] == "asynchronous-radial-x"),
+        "error motion values as after a run: {motion:?}"
+    );
     for (index, section) in ["a", "b"].into_iter().enumerate() {
         let [before, after] = [&run, &summary].map(|summary| &summary["stations"][0]["sections"][index]);
         let moved = |name: &str| {

@@ -62,7 +62,7 @@ mod tests {
         model::{Effect, Fit, Model, Setting, closed_loop::Settings, diagnosis::Verdict},
         pipeline::registry::{Context, StageConfig},
         rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
-        stage::{Preprocessor, Station, Wanted},
+        stage::{AverageRequest, Preprocessor, Station},
     };
     use runout_preprocess::SynchronousAverageConfig;
     use runout_spindle::{
@@ -121,10 +121,10 @@ mod tests {
         else {
             panic!("other stages");
         };
-        let wanted = Wanted { hold_out: Some(0.2), ..Wanted::default() };
+        let wanted = AverageRequest { hold_out: Some(0.2), ..AverageRequest::default() };
         let profile = |setup| {
             let stream = Inspection::new(recording.open(0, setup).unwrap());
-            average.average_wanting(delay.attach(Box::new(stream)).unwrap(), wanted).unwrap()
+            average.average_requested(delay.attach(Box::new(stream)).unwrap(), wanted).unwrap()
         };
         let profiles = (0..rig.setups.len()).map(profile).collect();
         Station { name: "s001".into(), z_mm: 0.0, profiles }

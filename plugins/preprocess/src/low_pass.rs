@@ -121,7 +121,7 @@ impl Conditioner for LowPass {
             next: Block::default(),
             tail: Vec::new(),
             scratch: Vec::new(),
-            stage: Stage::Gathering,
+            stage: Stage::Filling,
         }))
     }
 }
@@ -137,7 +137,7 @@ pub(crate) fn significant(value: f64, digits: u8) -> String {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     /// The frames for the continuation before the first are not all there.
-    Gathering,
+    Filling,
     /// In the middle.
     Running,
     /// Everything was handed on.
@@ -186,7 +186,7 @@ impl LowPassStream<'_> {
             samples: defect.samples.start.saturating_sub(spread)..defect.samples.end.saturating_add(spread),
             ..defect
         }));
-        if self.stage == Stage::Gathering {
+        if self.stage == Stage::Filling {
             join(&mut self.held, &mut self.raw);
             if self.held.samples.len() >= kept {
                 self.scratch.clear();
@@ -225,7 +225,7 @@ impl LowPassStream<'_> {
 
     /// Filters and hands on everything that is left, with the continuation after the last sample.
     fn finish(&mut self, block: &mut Block) -> Result<bool> {
-        if self.stage == Stage::Gathering {
+        if self.stage == Stage::Filling {
             let frames = self.held.samples.len() / self.channels().max(1);
             let problem = format!("it holds {frames} samples, the filter needs more than {}", self.pad);
             return Err(Error::new("low-pass", &self.capture.object, problem));

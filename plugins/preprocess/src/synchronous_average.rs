@@ -31,7 +31,7 @@ use runout_core::{
     },
     profile::{Profile, TurnCount},
     rig::Rig,
-    stage::{Averager, Preprocessor, Wanted},
+    stage::{AverageRequest, Averager, Preprocessor},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -205,7 +205,7 @@ impl Averager for SynchronousAverage {
         fourier::max_order(self.config.samples_per_rev)
     }
 
-    fn average_wanting(&self, input: Box<dyn SampleStream + '_>, wanted: Wanted) -> Result<Profile> {
+    fn average_requested(&self, input: Box<dyn SampleStream + '_>, wanted: AverageRequest) -> Result<Profile> {
         let mut input = interruptions::bridged(input, self.rig.as_ref());
         let mut capture = input.capture().clone();
         Self::are_turns(&capture)?;

@@ -21,7 +21,7 @@ use runout_core::{
     profile::Profile,
     rig::{Rig, Rotation},
     separation::{Quantity, Separation},
-    stage::{Averager, Preprocessor, Station, StationSeparator, Wanted},
+    stage::{AverageRequest, Averager, Preprocessor, Station, StationSeparator},
 };
 use runout_preprocess::SynchronousAverageConfig;
 use runout_spindle::{
@@ -55,8 +55,8 @@ fn measured(config: &SpindleConfig) -> (Separation, Vec<Profile>, f64) {
     let averager = averager();
     let profile = |setup| {
         let projection = separator.projection(setup);
-        let wanted = Wanted { projection: projection.as_ref(), ..Wanted::default() };
-        averager.average_wanting(Box::new(Inspection::new(recording.open(0, setup).unwrap())), wanted).unwrap()
+        let wanted = AverageRequest { projection: projection.as_ref(), ..AverageRequest::default() };
+        averager.average_requested(Box::new(Inspection::new(recording.open(0, setup).unwrap())), wanted).unwrap()
     };
     let station = Station { name: "s001".into(), z_mm: 0.0, profiles: (0..rig.setups.len()).map(profile).collect() };
     let forms = recording.truth(0).unwrap().unwrap().form_um;
@@ -294,17 +294,17 @@ fn cost_of_the_spread() {
             next: 0,
         };
         let (averager, projection) = (averager(), separator.projection(0));
-        let best = |wanted: Wanted| {
+        let best = |wanted: AverageRequest| {
             let time = || {
                 let input = memory.clone();
                 let start = Instant::now();
-                averager.average_wanting(Box::new(Inspection::new(Box::new(input))), wanted).unwrap();
+                averager.average_requested(Box::new(Inspection::new(Box::new(input))), wanted).unwrap();
                 start.elapsed().as_secs_f64() * 1e3
             };
             (0..30).map(|_| time()).fold(f64::INFINITY, f64::min)
         };
-        let plain = best(Wanted::default());
-        let spread = best(Wanted { projection: projection.as_ref(), ..Wanted::default() });
+        let plain = best(AverageRequest::default());
+        let spread = best(AverageRequest { projection: projection.as_ref(), ..AverageRequest::default() });
         let (separation, profiles, slope) = measured(&config);
         let start = Instant::now();
         let count = values(&separation, &profiles, slope).len();

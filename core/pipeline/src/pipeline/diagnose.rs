@@ -10,11 +10,12 @@ use corrected_rig::Change;
 
 use super::{
     config::{Pipeline, Route},
-    line::Line,
+    evaluate::Group,
     point_run::PointResult,
+    record_reader::RecordReader,
     result::{Evaluation, complete, true_error},
     result_writer::{Finished, ResultWriter},
-    run::{Observer, spare_inputs},
+    run::{Observer, projections, spare_inputs, with_motion_values},
 };
 use crate::{
     atomic_file::PendingFile,
@@ -46,13 +47,13 @@ pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &d
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator, model: Some(model) }) => {
             let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
             let hold_out = Some(pipeline.diagnose.hold_out.unwrap_or(HOLD_OUT));
-            let line = Line {
+            let line = RecordReader {
                 rig,
                 recording: &**recording,
                 conditioners,
                 averager: &**averager,
                 hold_out,
-                projections: Vec::new(),
+                projections: projections(pipeline, &**separator, rig),
             };
             diagnose_turns(pipeline, &line, threads, (&**separator, &**model), observer)
         }
@@ -60,12 +61,16 @@ pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &d
     }
 }
 
+/// What is not corrected for the effects.
+const UNCORRECTED_SPREAD: &str = "synchronous error motion is corrected for the effects found; the spread of the turns in asynchronous \
+    and total error motion is that of the readings as the rig declares them";
+
 /// Share of the turns that is held out where the pipeline says nothing.
 const HOLD_OUT: f64 = 0.2;
 
 fn diagnose_turns(
     pipeline: &Pipeline,
-    line: &Line,
+    line: &RecordReader,
     threads: Option<NonZeroUsize>,
     (separator, model): (&dyn StationSeparator, &dyn StationModel),
     observer: &dyn Observer,
@@ -108,6 +113,7 @@ fn diagnose_turns(
         };
         let declared = complete(before, Vec::new(), &looked_at);
         let result = complete(after, station.profiles, &pipeline.evaluate);
+        let result = with_motion_values(result, &pipeline.evaluate.centres, radius_mm);
         diagnosis.moved.extend(moved::moved(&declared, &result, &looked_at, radius_mm, several));
         for (errors, result) in errors.iter_mut().zip([&declared, &result]) {
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);
@@ -125,6 +131,9 @@ fn diagnose_turns(
     let surface = writer.build_surface(radius_mm)?;
     let mut remarks = recording.remarks();
     remarks.extend(diagnosis.warnings.iter().cloned());
+    if pipeline.evaluate.has(Group::ErrorMotion) && !diagnosis.added.is_empty() {
+        remarks.push(UNCORRECTED_SPREAD.into());
+    }
     let mut finished = writer.finish(inputs, remarks, surface.as_ref())?;
     if let Some(path) = rig {
         finished.add(corrected_rig::pending(path, pipeline, &changes)?);

@@ -5,10 +5,9 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use super::{
     config::{Pipeline, Route},
     evaluate::{Group, steepest_um_per_deg},
-    line::{Line, separate},
-    outdated,
-    overlap::write_behind,
-    point_run,
+    outdated, point_run,
+    read_ahead::write_behind,
+    record_reader::{RecordReader, separate},
     result::{Evaluation, complete},
     result_writer::ResultWriter,
     steadiness::Steadiness,
@@ -32,6 +31,8 @@ use runout_standards::Value;
 use runout_turning::{
     error_motion::{Centre, ErrorMotion},
     measurement::Recording,
+    rig::Rig,
+    spread::Projection,
 };
 
 /// Watches a run, for a progress bar.
@@ -76,16 +77,13 @@ fn run_turns(
     spare_inputs(&pipeline.outputs(), &recording.inputs())?;
     let rig = pipeline.rig.as_ref().ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
     let mut writer = ResultWriter::begin(pipeline, &pipeline.exporters, recording.stations())?;
-    let wanted = pipeline.evaluate.has(Group::ErrorMotion);
-    let directions = &pipeline.evaluate.directions;
-    let projection = |setup| separator.projection(setup).filter(|_| wanted).map(|found| found.with_lines(directions));
-    let line = Line {
+    let line = RecordReader {
         rig,
         recording,
         conditioners,
         averager,
         hold_out: None,
-        projections: (0..rig.setups.len()).map(projection).collect(),
+        projections: projections(pipeline, separator, rig),
     };
     let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
     let work = |index, station: Station| {
@@ -94,8 +92,7 @@ fn run_turns(
         let truth = recording.truth(index)?;
         let profiles = station.profiles;
         let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
-        let motion_values = error_motion_values(&result, &pipeline.evaluate.centres, rig.part_radius_mm);
-        Ok(StationResult { motion_values, ..result })
+        Ok(with_motion_values(result, &pipeline.evaluate.centres, rig.part_radius_mm))
     };
     let mut steadiness = Steadiness::default();
     let inputs = write_behind(
@@ -108,6 +105,20 @@ fn run_turns(
     let remarks = recording.remarks().into_iter().chain(steadiness.warning(rig)).collect();
     let surface = writer.build_surface(rig.part_radius_mm)?;
     writer.finish(inputs, remarks, surface.as_ref())?.commit(None)
+}
+
+/// How motion follows from the readings of each setup, where error motion values are wanted.
+pub(super) fn projections(pipeline: &Pipeline, separator: &dyn StationSeparator, rig: &Rig) -> Vec<Option<Projection>> {
+    let wanted = pipeline.evaluate.has(Group::ErrorMotion);
+    let directions = &pipeline.evaluate.directions;
+    let projection = |setup| separator.projection(setup).filter(|_| wanted).map(|found| found.with_lines(directions));
+    (0..rig.setups.len()).map(projection).collect()
+}
+
+/// A station with its error motion values.
+pub(super) fn with_motion_values(result: StationResult, centres: &[Centre], radius_mm: f64) -> StationResult {
+    let motion_values = error_motion_values(&result, centres, radius_mm);
+    StationResult { motion_values, ..result }
 }
 
 fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f64) -> Vec<Value> {

@@ -19,12 +19,12 @@ const SHARE: f64 = 0.1;
 pub(super) struct Steadiness {
     stations: usize,
     /// Of each sensor of the rig.
-    sensors: Vec<Seen>,
+    sensors: Vec<SensorCreep>,
 }
 
 /// Creep of one sensor.
 #[derive(Debug, Default, Clone)]
-struct Seen {
+struct SensorCreep {
     /// Stations at which it is certain.
     stations: usize,
     /// The largest over a capture, in µm.
@@ -36,7 +36,7 @@ impl Steadiness {
     /// Looks at the levels of a station's turns.
     pub fn take(&mut self, station: &str, profiles: &[Profile], rig: &Rig) {
         self.stations += 1;
-        self.sensors.resize(rig.sensors.len(), Seen::default());
+        self.sensors.resize(rig.sensors.len(), SensorCreep::default());
         let levels = |sensor: usize| -> Vec<Levels> {
             let of = |profile: &Profile| {
                 let channel = profile.sensors.iter().position(|known| *known == sensor)?;

@@ -10,6 +10,6 @@ pub mod simulator;
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
 pub use points::{Form, LinearModel, NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator};
-pub use preprocessor::{Averager, Conditioner, Preprocessor, Wanted};
+pub use preprocessor::{AverageRequest, Averager, Conditioner, Preprocessor};
 pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator};
 pub use simulator::{Simulation, Simulator};

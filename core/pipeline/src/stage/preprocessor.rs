@@ -26,7 +26,7 @@ pub trait Conditioner: Send + Sync {
 
 /// What an averager is to give besides the average.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Wanted<'a> {
+pub struct AverageRequest<'a> {
     /// The last turns of this share (0 to 1) are averaged by themselves: [`Profile::split`].
     pub hold_out: Option<f64>,
     /// The spread of this motion over the turns is kept: [`Profile::spread`].
@@ -42,14 +42,14 @@ pub trait Averager: Send + Sync {
     ///
     /// # Errors
     /// When the source fails or too little of it can be used.
-    fn average_wanting(&self, input: Box<dyn SampleStream + '_>, wanted: Wanted) -> Result<Profile>;
+    fn average_requested(&self, input: Box<dyn SampleStream + '_>, wanted: AverageRequest) -> Result<Profile>;
 
     /// Reads a stream to its end.
     ///
     /// # Errors
     /// When the source fails or too little of it can be used.
     fn average(&self, input: Box<dyn SampleStream + '_>) -> Result<Profile> {
-        self.average_wanting(input, Wanted::default())
+        self.average_requested(input, AverageRequest::default())
     }
 }
 

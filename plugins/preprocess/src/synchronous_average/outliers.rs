@@ -15,11 +15,11 @@ const TOGETHER: usize = 16;
 pub(super) struct Outliers {
     sigma: f64,
     channels: usize,
-    held: Vec<Held>,
+    held: Vec<PendingTurn>,
 }
 
 /// A turn that is not judged yet.
-pub(super) struct Held {
+pub(super) struct PendingTurn {
     pub turn: Turn,
     /// `[channel][angle]`.
     pub readings: Vec<f64>,
@@ -41,7 +41,7 @@ impl Outliers {
     }
 
     /// Takes a turn; `judged` gets those that can now be told.
-    pub(super) fn add(&mut self, turn: Held, means: &mut Means, judged: &mut Vec<Verdict>) {
+    pub(super) fn add(&mut self, turn: PendingTurn, means: &mut Means, judged: &mut Vec<Verdict>) {
         self.held.push(turn);
         if self.held.len() >= 2 * TOGETHER {
             self.judge(TOGETHER, means, judged);
@@ -56,7 +56,7 @@ impl Outliers {
         let usual: Vec<f64> = (0..channels)
             .map(|channel| median(&mut distances.iter().map(|turn| turn[channel]).collect::<Vec<_>>()))
             .collect();
-        for (Held { turn, readings, harmonics, motion }, distances) in together.into_iter().zip(distances) {
+        for (PendingTurn { turn, readings, harmonics, motion }, distances) in together.into_iter().zip(distances) {
             let farthest = distances.iter().zip(&usual).map(|(distance, usual)| distance - self.sigma * usual);
             let outlier =
                 farthest.enumerate().filter(|(_, beyond)| *beyond > NOTHING_UM).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -78,7 +78,7 @@ impl Outliers {
 const NOTHING_UM: f64 = 1e-9;
 
 /// `[turn][channel]`.
-fn distances_um(turns: &[Held], channels: usize) -> Vec<Vec<f64>> {
+fn distances_um(turns: &[PendingTurn], channels: usize) -> Vec<Vec<f64>> {
     let mut squares = vec![vec![0.0; channels]; turns.len()];
     let length = turns.first().map_or(0, |turn| turn.harmonics.len());
     let orders = (length / channels.max(1)).max(1);

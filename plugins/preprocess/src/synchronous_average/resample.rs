@@ -8,7 +8,7 @@ use runout_core::{
     numerics::{fourier::max_order, lanes::fused},
     profile::{RejectedTurn, Rejection, Split, TurnLevels},
     spread::Spread,
-    stage::Wanted,
+    stage::AverageRequest,
 };
 
 use super::{
@@ -18,7 +18,7 @@ use super::{
     kernel::{Interpolation, Kernel, REACH, on_sample},
     mean::{Analysis, Size},
     orders_held,
-    outliers::{Held, Outliers, Verdict},
+    outliers::{Outliers, PendingTurn, Verdict},
     split::Means,
     spread::Motion,
     turns::{ROUNDING, Turn},
@@ -79,7 +79,12 @@ pub(super) struct Resampling<'a> {
 
 impl<'a> Resampling<'a> {
     /// `turns` are those that the marks allow, in order.
-    pub(super) fn new(average: &'a SynchronousAverage, capture: &'a Capture, turns: Vec<Turn>, wanted: Wanted) -> Self {
+    pub(super) fn new(
+        average: &'a SynchronousAverage,
+        capture: &'a Capture,
+        turns: Vec<Turn>,
+        wanted: AverageRequest,
+    ) -> Self {
         let config = &average.config;
         let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
         let (angles, on_samples) = angles(&turns, config.samples_per_rev, capture.encoder);
@@ -226,7 +231,7 @@ impl<'a> Resampling<'a> {
                 self.used_samples += turn.samples();
             }
             Some(outliers) => {
-                let held = Held {
+                let held = PendingTurn {
                     turn,
                     readings: readings.to_vec(),
                     harmonics: self.harmonics.clone(),

@@ -558,10 +558,10 @@ fn the_spread_is_that_of_the_turns_used() {
     let used: Vec<usize> = (0..turns).filter(|turn| ![8, 21].contains(turn)).collect();
     for outlier_sigma in [None, Some(3.0)] {
         let projection = both_channels();
-        let wanted = Wanted { projection: Some(&projection), ..Wanted::default() };
+        let wanted = AverageRequest { projection: Some(&projection), ..AverageRequest::default() };
         let config = SynchronousAverageConfig { outlier_sigma, ..config(512) };
         let input = Inspection::new(Box::new(stream(&data, marks(0.0, 512.0, turns + 1))));
-        let profile = averager(config).average_wanting(Box::new(input), wanted).unwrap();
+        let profile = averager(config).average_requested(Box::new(input), wanted).unwrap();
         let spread = profile.spread.unwrap();
         assert_eq!((spread.angles, spread.turns), (length, profile.turns.used));
         assert_eq!(spread.directions, [Direction::X, Direction::Y, Direction::Rotating]);
@@ -598,8 +598,8 @@ fn no_spread_of_one_turn_or_without_its_sensor() {
     let wanted_of = |projection: &Projection, turns: usize| {
         let input = stream(&turning(2, turns * 512, 0.0, 512.0), marks(0.0, 512.0, turns + 1));
         let config = SynchronousAverageConfig { min_turns: 1, ..config(512) };
-        let wanted = Wanted { projection: Some(projection), ..Wanted::default() };
-        averager(config).average_wanting(Box::new(input), wanted).unwrap().spread
+        let wanted = AverageRequest { projection: Some(projection), ..AverageRequest::default() };
+        averager(config).average_requested(Box::new(input), wanted).unwrap().spread
     };
     assert!(wanted_of(&both_channels(), 2).is_some());
     assert!(wanted_of(&both_channels(), 1).is_none());

@@ -114,7 +114,7 @@ pub struct StationData {
     /// All of it where motion is no longer assumed to be odd, and even orders are lost.
     freed: Option<Box<Weighed>>,
     /// What the single turns show.
-    pub seen: Arc<Seen>,
+    pub seen: Arc<TurnObservations>,
     /// Leak of each line into the readings.
     pub leaks: Vec<Vec<Complex64>>,
     /// Sensor, mean creep a turn where it is largest and its standard uncertainty, where the levels tell a drift for certain: one observation
@@ -157,7 +157,7 @@ fn variances(readings: &Readings) -> Vec<f64> {
 }
 
 /// What the single turns of a station show, and their average does not.
-pub struct Seen {
+pub struct TurnObservations {
     /// What their levels say of each sensor's creep.
     pub creeping: Vec<Option<Creeping>>,
     /// Changes within a setup.
@@ -166,7 +166,7 @@ pub struct Seen {
     pub lines: Vec<Line>,
 }
 
-impl Seen {
+impl TurnObservations {
     /// `creeping` is what the levels of all stations say of each sensor.
     pub fn new(selection: &Selection, layout: &Layout, station: &Station, creeping: Vec<Option<Creeping>>) -> Self {
         let max_order = station.profiles.iter().map(Profile::max_order).min().unwrap_or(0);
@@ -180,7 +180,12 @@ impl Seen {
 
 impl StationData {
     /// All turns and orders.
-    pub fn whole(selection: &Selection, layout: &Layout, station: &Station, seen: &Arc<Seen>) -> Result<Self> {
+    pub fn whole(
+        selection: &Selection,
+        layout: &Layout,
+        station: &Station,
+        seen: &Arc<TurnObservations>,
+    ) -> Result<Self> {
         let steadied = |profile: &Profile| {
             let mut steadied = Profile { split: None, ..profile.clone() };
             let neighbours = profile.split.as_ref().and_then(|split| split.neighbours.as_ref());
@@ -196,7 +201,12 @@ impl StationData {
     }
 
     /// The turns to fit and those held out, low orders only; all turns where none are held out.
-    pub fn split(selection: &Selection, layout: &Layout, station: &Station, seen: &Arc<Seen>) -> Result<Self> {
+    pub fn split(
+        selection: &Selection,
+        layout: &Layout,
+        station: &Station,
+        seen: &Arc<TurnObservations>,
+    ) -> Result<Self> {
         let part = |part: Part, which: fn(&Split) -> &profile::Part| -> Option<Station> {
             let profile = |profile: &Profile| {
                 let split = profile.split.as_ref()?;
@@ -223,7 +233,7 @@ impl StationData {
         fit: &Station,
         held_out: Option<&Station>,
         part: Part,
-        seen: Arc<Seen>,
+        seen: Arc<TurnObservations>,
     ) -> Result<Self> {
         let mut readings = Readings::gather(selection, layout, fit)?;
         for (sensor, creeping) in seen.creeping.iter().enumerate() {

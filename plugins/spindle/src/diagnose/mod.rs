@@ -31,7 +31,7 @@ use crate::{
     separators::wiring,
 };
 use changes::Change;
-use data::{Seen, Shared, StationData};
+use data::{Shared, StationData, TurnObservations};
 pub use declared::DeclaredSpindle;
 pub use fit::SpindleFit;
 
@@ -62,9 +62,10 @@ impl SpindleModel {
         let places = places(&effects, &selection, &layout, second_order);
         let creeping = drift::creeping(&selection, stations);
         let seen = stations.iter().zip(creeping);
-        let seen = seen.map(|(station, creeping)| Arc::new(Seen::new(&selection, &layout, station, creeping)));
-        let seen: Vec<Arc<Seen>> = seen.collect();
-        let each = |data: fn(&Selection, &Layout, &Station, &Arc<Seen>) -> Result<StationData>| {
+        let seen =
+            seen.map(|(station, creeping)| Arc::new(TurnObservations::new(&selection, &layout, station, creeping)));
+        let seen: Vec<Arc<TurnObservations>> = seen.collect();
+        let each = |data: fn(&Selection, &Layout, &Station, &Arc<TurnObservations>) -> Result<StationData>| {
             let stations = stations.iter().zip(&seen);
             stations.map(|(station, seen)| data(&selection, &layout, station, seen)).collect::<Result<Vec<_>>>()
         };

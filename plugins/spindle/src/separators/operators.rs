@@ -74,20 +74,21 @@ fn pivoted(layout: &Layout, system: &System, weights: Option<&Blocks>) -> OrderO
 /// All orders, weighted.
 fn weighted(layout: &Layout, systems: &[Arc<System>], weights: &[Blocks]) -> Vec<OrderOperator> {
     let mut solved = Vec::with_capacity(systems.len());
-    let mut rooms: [Option<Room>; 2] = [None, None];
+    let mut workspaces: [Option<Workspace>; 2] = [None, None];
     for orders in Orders::up_to(systems.len()) {
         let system = &systems[orders.of(0) - 1];
         let kind = usize::from(orders.of(0) > 1);
-        let room = rooms[kind].get_or_insert_with(|| Room::new(layout.readings.len(), system.columns, &weights[0]));
+        let workspace =
+            workspaces[kind].get_or_insert_with(|| Workspace::new(layout.readings.len(), system.columns, &weights[0]));
         fused(Solving {
             matrices: orders.map(|order| &systems[order - 1].matrix[..]),
             weights: orders.map(|order| weights[order - 1].entries()),
             size: weights[0].size(),
-            room,
+            workspace,
         });
         solved.extend(orders.each().enumerate().map(|(place, order)| {
-            if room.full[place] {
-                OrderOperator { operator: lane(&room.operator, place), rank: system.columns }
+            if workspace.full[place] {
+                OrderOperator { operator: lane(&workspace.operator, place), rank: system.columns }
             } else {
                 pivoted(layout, &systems[order - 1], Some(&weights[order - 1]))
             }
@@ -97,7 +98,7 @@ fn weighted(layout: &Layout, systems: &[Arc<System>], weights: &[Blocks]) -> Vec
 }
 
 /// What solving eight orders needs.
-struct Room {
+struct Workspace {
     weights: Vec<Complexes>,
     /// `[reading][unknown]`, and the same weighted.
     matrix: Vec<Complexes>,
@@ -109,7 +110,7 @@ struct Room {
     full: [bool; TOGETHER],
 }
 
-impl Room {
+impl Workspace {
     fn new(readings: usize, columns: usize, weights: &Blocks) -> Self {
         let matrix = vec![Complexes::ZERO; readings * columns];
         Self {
@@ -130,19 +131,19 @@ struct Solving<'a> {
     weights: [&'a [Complex64]; TOGETHER],
     /// Rows of a block of weights.
     size: usize,
-    room: &'a mut Room,
+    workspace: &'a mut Workspace,
 }
 
 impl FusedWork for Solving<'_> {
     #[inline(always)]
     fn call<A: Arithmetic>(self) {
-        let Self { matrices, weights, size, room } = self;
-        gather(matrices, &mut room.matrix);
-        gather(weights, &mut room.weights);
-        blocks_times::<A>(size, &room.weights, &room.matrix, &mut room.weighted);
-        room.full = room.orthonormal.factor::<A>(&room.weighted, SURELY_INDEPENDENT);
-        room.orthonormal.operator::<A>(&mut room.solving);
-        times_blocks::<A>(size, &room.solving, &room.weights, &mut room.operator);
+        let Self { matrices, weights, size, workspace } = self;
+        gather(matrices, &mut workspace.matrix);
+        gather(weights, &mut workspace.weights);
+        blocks_times::<A>(size, &workspace.weights, &workspace.matrix, &mut workspace.weighted);
+        workspace.full = workspace.orthonormal.factor::<A>(&workspace.weighted, SURELY_INDEPENDENT);
+        workspace.orthonormal.operator::<A>(&mut workspace.solving);
+        times_blocks::<A>(size, &workspace.solving, &workspace.weights, &mut workspace.operator);
     }
 }
 

@@ -36,12 +36,12 @@ impl Propagation {
         let size = readings.count / setups.len().max(1);
         let block = size * size;
         let mut propagation = Self::default();
-        let mut rooms: [Option<Room>; 2] = [None, None];
+        let mut workspaces: [Option<Workspace>; 2] = [None, None];
         for orders in Orders::up_to(operators.systems.len()) {
             let columns = operators.systems[orders.of(0) - 1].columns;
             let kind = usize::from(orders.of(0) > 1);
-            let room = rooms[kind].get_or_insert_with(|| Room::new(size, setups.len(), columns));
-            for (spread, setup) in room.spread.chunks_exact_mut(block).zip(setups) {
+            let workspace = workspaces[kind].get_or_insert_with(|| Workspace::new(size, setups.len(), columns));
+            for (spread, setup) in workspace.spread.chunks_exact_mut(block).zip(setups) {
                 gather(orders.map(|order| &setup[order * block..(order + 1) * block]), spread);
             }
             let weights = operators.weights.as_ref();
@@ -51,13 +51,13 @@ impl Propagation {
                 matrices: orders.map(|order| &operators.systems[order - 1].matrix[..]),
                 operators: orders.map(|order| &operators.orders[order - 1].operator[..]),
                 weights: weights.map(|weights| orders.map(|order| weights[order - 1].entries())),
-                room,
+                workspace,
             });
             for place in 0..orders.each().len() {
-                propagation.covariance.push(lane(&room.covariance, place));
-                propagation.squares.push(room.squares[place].max(0.0));
+                propagation.covariance.push(lane(&workspace.covariance, place));
+                propagation.squares.push(workspace.squares[place].max(0.0));
                 if weights.is_some() {
-                    propagation.weighted_squares.push(room.weighted_squares[place].max(0.0));
+                    propagation.weighted_squares.push(workspace.weighted_squares[place].max(0.0));
                 }
             }
         }
@@ -66,7 +66,7 @@ impl Propagation {
 }
 
 /// What eight orders need.
-struct Room {
+struct Workspace {
     /// Σ, `[setup][sensor][sensor]`.
     spread: Vec<Complexes>,
     /// A, W·A and Wᴴ·W·A, `[reading][unknown]`.
@@ -82,7 +82,7 @@ struct Room {
     weighted_squares: Reals,
 }
 
-impl Room {
+impl Workspace {
     fn new(size: usize, setups: usize, columns: usize) -> Self {
         let blocks = vec![Complexes::ZERO; setups * size * size];
         let matrix = vec![Complexes::ZERO; setups * size * columns];
@@ -110,20 +110,20 @@ struct Propagating<'a> {
     operators: [&'a [Complex64]; TOGETHER],
     weights: Option<[&'a [Complex64]; TOGETHER]>,
     /// Its `spread` is given.
-    room: &'a mut Room,
+    workspace: &'a mut Workspace,
 }
 
 impl FusedWork for Propagating<'_> {
     #[inline(always)]
     fn call<A: Arithmetic>(self) {
-        let Self { size, columns, matrices, operators, weights, room } = self;
-        gather(matrices, &mut room.matrix);
-        gather(operators, &mut room.operator);
-        times_blocks::<A>(size, &room.operator, &room.spread, &mut room.passed);
-        let readings = room.spread.len() / size;
-        for (row, target) in room.covariance.chunks_exact_mut(columns).enumerate() {
-            let passed = &room.passed[row * readings..(row + 1) * readings];
-            for (operator, target) in room.operator.chunks_exact(readings).zip(target) {
+        let Self { size, columns, matrices, operators, weights, workspace } = self;
+        gather(matrices, &mut workspace.matrix);
+        gather(operators, &mut workspace.operator);
+        times_blocks::<A>(size, &workspace.operator, &workspace.spread, &mut workspace.passed);
+        let readings = workspace.spread.len() / size;
+        for (row, target) in workspace.covariance.chunks_exact_mut(columns).enumerate() {
+            let passed = &workspace.passed[row * readings..(row + 1) * readings];
+            for (operator, target) in workspace.operator.chunks_exact(readings).zip(target) {
                 let mut sum = Complexes::ZERO;
                 for (passed, entry) in passed.iter().zip(operator) {
                     sum = sum.plus_adjoint::<A>(entry, passed);
@@ -133,31 +133,31 @@ impl FusedWork for Propagating<'_> {
         }
         // Cheaper than the product: tr Σ − 2 Re tr(PΣ·A) + tr(AᴴA·PΣPᴴ).
         let mut trace = [0.0; TOGETHER];
-        for entry in room.spread.chunks_exact(size * size).flat_map(|block| block.iter().step_by(size + 1)) {
+        for entry in workspace.spread.chunks_exact(size * size).flat_map(|block| block.iter().step_by(size + 1)) {
             for lane in 0..TOGETHER {
                 trace[lane] += entry.re[lane];
             }
         }
-        let fitted = trace_of_product::<A>(columns, &room.passed, &room.matrix);
+        let fitted = trace_of_product::<A>(columns, &workspace.passed, &workspace.matrix);
         let mut normal = [0.0; TOGETHER];
         for row in 0..columns {
             for col in 0..columns {
                 let mut sum = Complexes::ZERO;
-                for entries in room.matrix.chunks_exact(columns) {
+                for entries in workspace.matrix.chunks_exact(columns) {
                     sum = sum.plus_adjoint::<A>(&entries[row], &entries[col]);
                 }
-                normal = sum.real_of_adjoint::<A>(&room.covariance[row * columns + col], normal);
+                normal = sum.real_of_adjoint::<A>(&workspace.covariance[row * columns + col], normal);
             }
         }
-        room.squares = std::array::from_fn(|lane| trace[lane] - 2.0 * fitted[lane] + normal[lane]);
+        workspace.squares = std::array::from_fn(|lane| trace[lane] - 2.0 * fitted[lane] + normal[lane]);
         let Some(weights) = weights else { return };
-        gather(weights, &mut room.weights);
+        gather(weights, &mut workspace.weights);
         // W·A·P is the projector on the columns of W·A, times W, which leaves tr(WΣWᴴ) − Re tr(PΣ·WᴴW·A).
-        blocks_times::<A>(size, &room.weights, &room.matrix, &mut room.weighted);
-        adjoint_blocks_times::<A>(size, &room.weights, &room.weighted, &mut room.twice_weighted);
-        let fitted = trace_of_product::<A>(columns, &room.passed, &room.twice_weighted);
-        let trace = trace_about::<A>(size, &room.weights, &room.spread);
-        room.weighted_squares = std::array::from_fn(|lane| trace[lane] - fitted[lane]);
+        blocks_times::<A>(size, &workspace.weights, &workspace.matrix, &mut workspace.weighted);
+        adjoint_blocks_times::<A>(size, &workspace.weights, &workspace.weighted, &mut workspace.twice_weighted);
+        let fitted = trace_of_product::<A>(columns, &workspace.passed, &workspace.twice_weighted);
+        let trace = trace_about::<A>(size, &workspace.weights, &workspace.spread);
+        workspace.weighted_squares = std::array::from_fn(|lane| trace[lane] - fitted[lane]);
     }
 }
 

@@ -9,7 +9,7 @@ use runout_core::{
     measurement::{Recording, SampleStream, StationTruth},
     pipeline::registry::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
-    stage::{Preprocessor, Station, Wanted},
+    stage::{AverageRequest, Preprocessor, Station},
 };
 use runout_preprocess::{LowPassConfig, SynchronousAverageConfig};
 use runout_spindle::simulate::{self, SpindleConfig};
@@ -81,7 +81,7 @@ pub fn averaged_behind(cutoff_hz: Option<f64>, config: &SpindleConfig, rig: &Rig
             Some(low_pass) => low_pass.attach(inspected).unwrap(),
             None => inspected,
         };
-        averager.average_wanting(stream, Wanted { hold_out: Some(0.2), ..Wanted::default() }).unwrap()
+        averager.average_requested(stream, AverageRequest { hold_out: Some(0.2), ..AverageRequest::default() }).unwrap()
     };
     let profiles = (0..rig.setups.len()).map(profile).collect();
     let station = Station { name: "s001".into(), z_mm: 0.0, profiles };

@@ -28,7 +28,7 @@ use super::{
     config::Route,
     error::Fault,
     evaluate::Evaluate,
-    line::{Line, separate},
+    record_reader::{RecordReader, separate},
     registry::Context,
     result::{Evaluation, complete},
     run::{Observer, spare_inputs},
@@ -113,7 +113,7 @@ impl<'a> Comparing<'a> {
             return Err(Error::new("compare", &pipeline.title, "the loader gave what it did not declare"));
         };
         spare_inputs(&outputs, &recording.inputs())?;
-        let line = Line {
+        let line = RecordReader {
             rig: self.rig,
             recording: &*recording,
             conditioners: self.conditioners,

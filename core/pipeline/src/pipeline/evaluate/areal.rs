@@ -3,7 +3,7 @@
 use std::{borrow::Cow, collections::BTreeSet};
 
 use super::{
-    ArealFilter, Evaluate, Filter, FormRemoval, Found, Group, Held, Label, PartSummary, labelled_with_reasons,
+    ArealFilter, Content, Evaluate, Filter, FormRemoval, Found, Group, Label, PartSummary, labelled_with_reasons,
     texture::found,
 };
 use runout_error::Result;
@@ -67,7 +67,7 @@ pub fn add_areal(
     let lost: BTreeSet<usize> = sections.iter().flat_map(Section::lost_orders).collect();
     let highest = max_order(surface.angles);
     let orders = sections.iter().map(|section| section.orders.len().saturating_sub(1));
-    let held = Held {
+    let held = Content {
         highest,
         all_to: orders.fold(highest, usize::min),
         lost: lost.into_iter().collect(),

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{
-    Evaluate, Found, Group, Held, Label, PartSummary, labelled_with_reasons,
+    Content, Evaluate, Found, Group, Label, PartSummary, labelled_with_reasons,
     texture::{found, sensitivity},
 };
 use runout_numerics::Complex64;
@@ -137,7 +137,8 @@ impl<'a> Generatrix<'a> {
         let numbers: Vec<Found> =
             numbers.map(|(index, value)| found(drawn.as_ref(), index, *value, sensitivity(index))).collect();
         let coverage = measured.points as f64 / (measured.points + measured.missing).max(1) as f64;
-        let held = Held { highest: self.highest, all_to: self.highest, lost: self.lost.clone(), half_power_upr: None };
+        let held =
+            Content { highest: self.highest, all_to: self.highest, lost: self.lost.clone(), half_power_upr: None };
         labelled_with_reasons(labels.collect(), numbers, &filter.along_axis(), &held, coverage)
     }
 }

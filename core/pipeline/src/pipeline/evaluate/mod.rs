@@ -73,7 +73,7 @@ const POINTS_A_WAVE: usize = 16;
 
 /// What a profile holds.
 #[derive(Debug, Clone, Default)]
-struct Held {
+struct Content {
     /// Highest order.
     highest: usize,
     /// Highest order that every part of it has.
@@ -84,7 +84,7 @@ struct Held {
     half_power_upr: Option<f64>,
 }
 
-impl Held {
+impl Content {
     /// Highest order of which at least half is there.
     fn highest_passed(&self) -> usize {
         self.half_power_upr.map_or(self.highest, |half| self.highest.min(half as usize))
@@ -110,7 +110,7 @@ fn labelled(
     labels: Vec<Label>,
     found: Vec<(f64, Option<Uncertainty>)>,
     filter: &Filter,
-    held: &Held,
+    held: &Content,
     coverage: f64,
 ) -> Vec<Value> {
     let found = found.into_iter().map(|(value, uncertainty)| Found { value, uncertainty, no_uncertainty: None });
@@ -122,7 +122,7 @@ fn labelled_with_reasons(
     labels: Vec<Label>,
     found: Vec<Found>,
     filter: &Filter,
-    held: &Held,
+    held: &Content,
     coverage: f64,
 ) -> Vec<Value> {
     let lost_orders = filter.lost(&held.lost);

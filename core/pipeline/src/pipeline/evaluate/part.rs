@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluate, Filter, Group, Held, Label, POINTS_A_WAVE, labelled};
+use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
@@ -110,7 +110,7 @@ struct Wall {
     radius_mm: f64,
     placed: bool,
     rings: Vec<Ring>,
-    held: Held,
+    held: Content,
 }
 
 /// What errors are drawn about.
@@ -169,7 +169,7 @@ impl Wall {
         });
         let rings: Vec<Ring> = rings.collect();
         let half_power_upr = sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min);
-        let held = Held { highest, all_to: all_to.min(highest), lost: lost.into_iter().collect(), half_power_upr };
+        let held = Content { highest, all_to: all_to.min(highest), lost: lost.into_iter().collect(), half_power_upr };
         Self { angles: Angles::equal(count), count, radius_mm, placed, rings, held }
     }
 

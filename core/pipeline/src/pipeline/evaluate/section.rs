@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Evaluate, Filter, Group, Held, Label, POINTS_A_WAVE, labelled};
+use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
 use runout_numerics::{
     Complex64,
     filter::{Degree, Smoother, robust_gaussian},
@@ -84,7 +84,7 @@ pub(super) struct Form {
     pub(super) variance: Vec<f64>,
     /// Real degrees of freedom behind it, by order; 0 where it is taken as exact.
     freedom: Vec<usize>,
-    pub(super) held: Held,
+    pub(super) held: Content,
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
     pub(super) at: SectionAt,
@@ -102,7 +102,7 @@ impl Form {
             each.map(|(order, value)| if order < 2 { Complex64::ZERO } else { value }).collect()
         };
         let at = separation.sections.get(section)?.clone();
-        let held = Held {
+        let held = Content {
             highest: separation.max_order(),
             all_to: separation.max_order(),
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),

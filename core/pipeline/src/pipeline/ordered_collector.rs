@@ -11,7 +11,7 @@ use runout_error::Result;
 const LEAD: usize = 2;
 
 /// Where workers hand on their results.
-pub(super) struct Turnstile<T, F> {
+pub(super) struct OrderedCollector<T, F> {
     state: Mutex<State<T, F>>,
     moved: Condvar,
 }
@@ -25,7 +25,7 @@ struct State<T, F> {
     outcome: Result<()>,
 }
 
-impl<T, F: FnMut(usize, T) -> Result<()>> Turnstile<T, F> {
+impl<T, F: FnMut(usize, T) -> Result<()>> OrderedCollector<T, F> {
     /// Results are numbered from 0.
     pub(super) fn new(take: F) -> Self {
         let state = State { next: 0, early: BTreeMap::new(), take, outcome: Ok(()) };
@@ -73,7 +73,7 @@ mod tests {
     fn run(fails: Option<usize>) -> (Vec<usize>, usize, Result<()>) {
         let (mut taken, claimed, done) = (Vec::new(), AtomicUsize::new(0), AtomicUsize::new(0));
         let farthest = AtomicUsize::new(0);
-        let turnstile = Turnstile::new(|number, result: usize| {
+        let ordered_collector = OrderedCollector::new(|number, result: usize| {
             assert_eq!(number, result);
             done.store(number + 1, Ordering::SeqCst);
             taken.push(result);
@@ -81,7 +81,7 @@ mod tests {
         });
         thread::scope(|scope| {
             for worker in 0..3 {
-                let (turnstile, claimed, done, farthest) = (&turnstile, &claimed, &done, &farthest);
+                let (ordered_collector, claimed, done, farthest) = (&ordered_collector, &claimed, &done, &farthest);
                 scope.spawn(move || {
                     loop {
                         let number = claimed.fetch_add(1, Ordering::SeqCst);
@@ -93,14 +93,14 @@ mod tests {
                         let failed = fails.is_some_and(|first| number >= first);
                         let result =
                             if failed { Err(Error::new("work", number.to_string(), "it failed")) } else { Ok(number) };
-                        if !turnstile.pass(number, result) {
+                        if !ordered_collector.pass(number, result) {
                             return;
                         }
                     }
                 });
             }
         });
-        let outcome = turnstile.outcome();
+        let outcome = ordered_collector.outcome();
         (taken, farthest.into_inner(), outcome)
     }
 

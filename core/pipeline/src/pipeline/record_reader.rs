@@ -9,11 +9,11 @@ use std::{
 };
 
 use super::{
-    overlap::{Captures, read_ahead, read_along},
+    ordered_collector::OrderedCollector,
+    read_ahead::{Captures, read_ahead, read_along},
     run::Observer,
-    turnstile::Turnstile,
 };
-use crate::stage::{Averager, Conditioner, Station, StationSeparator, Wanted};
+use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
 use runout_error::{Error, Result};
 use runout_turning::{
     calibrated::calibrated,
@@ -27,7 +27,7 @@ use runout_turning::{
 };
 
 /// From recorded turns to the profiles of one station after the other.
-pub struct Line<'a> {
+pub struct RecordReader<'a> {
     pub rig: &'a Rig,
     pub recording: &'a dyn Recording,
     pub conditioners: &'a [Box<dyn Conditioner>],
@@ -38,7 +38,7 @@ pub struct Line<'a> {
     pub projections: Vec<Option<Projection>>,
 }
 
-impl Line<'_> {
+impl RecordReader<'_> {
     /// Does `work` on every station (its index and its profiles), and the inputs' checksums meanwhile; `take` gets
     /// what comes of it, in the order of the stations.
     ///
@@ -60,7 +60,7 @@ impl Line<'_> {
         let readers = NonZeroUsize::new(threads / workers).unwrap_or(NonZeroUsize::MIN);
         let next = AtomicUsize::new(0);
         let failed = AtomicBool::new(false);
-        let turnstile = Turnstile::new(|index: usize, result| {
+        let ordered_collector = OrderedCollector::new(|index: usize, result| {
             take(result)?;
             observer.station(&stations[index].name);
             Ok(())
@@ -83,7 +83,7 @@ impl Line<'_> {
                     let told = &spikes[index * setups..(index + 1) * setups];
                     let result =
                         self.station(&stations[index], captures, told).and_then(|station| work(index, station));
-                    if !turnstile.pass(index, result) {
+                    if !ordered_collector.pass(index, result) {
                         failed.store(true, Ordering::Relaxed);
                     }
                 }
@@ -103,7 +103,7 @@ impl Line<'_> {
             worker();
             checksums.join()
         });
-        turnstile.outcome()?;
+        ordered_collector.outcome()?;
         if let Some(checksum) = along {
             return Ok(vec![checksum.finish()?]);
         }
@@ -135,11 +135,11 @@ impl Line<'_> {
         for (setup, spikes) in spikes.iter().enumerate() {
             let capture = captures.open();
             let projection = self.projections.get(setup).and_then(Option::as_ref);
-            let wanted = Wanted { hold_out: self.hold_out, projection };
+            let wanted = AverageRequest { hold_out: self.hold_out, projection };
             profiles = profiles.and_then(|mut profiles: Vec<Profile>| {
                 let stream = capture?;
                 let capture = stream.capture().clone();
-                let mut profile = self.averager.average_wanting(stream, wanted)?;
+                let mut profile = self.averager.average_requested(stream, wanted)?;
                 let spikes = std::mem::take(&mut *spikes.lock().unwrap_or_else(PoisonError::into_inner));
                 profile.warnings.extend(unusual(&spikes, &capture, &profile));
                 profiles.push(profile);
