@@ -65,7 +65,7 @@ impl Means {
                 },
             }
         });
-        let stride = if parts.is_some() { 1 } else { planned / (LOOKED_AT_A_CHANNEL * size.channels) };
+        let stride = planned / (LOOKED_AT_A_CHANNEL * size.channels);
         let readings = size.readings();
         let together = (WAITING / readings.max(1)).clamp(1, TOGETHER);
         Self {
@@ -91,15 +91,20 @@ impl Means {
         &mut self.waiting[self.pending * self.readings..][..self.readings]
     }
 
-    /// Whether the harmonics of the next turn are looked at.
+    /// Whether the harmonics of the next turn are looked at: parts look at each turn, the whole at as many of them as without parts,
+    /// so that it is the same.
     pub fn looks_at_next(&self) -> bool {
+        self.parts.is_some() || self.whole_looks_at_next()
+    }
+
+    fn whole_looks_at_next(&self) -> bool {
         self.turns().is_multiple_of(self.stride)
     }
 
     /// Takes a turn, whose readings are where the [next](Self::next) turn's are to be, with its
     /// harmonics, `[channel][order]`, and its motion.
     pub fn add(&mut self, turn: &Turn, harmonics: &[Complex64], motion: &[f64]) {
-        let looked_at = self.looks_at_next();
+        let looked_at = self.whole_looks_at_next();
         let taken = self.turns();
         let readings = &self.waiting[self.pending * self.readings..][..self.readings];
         self.levels.numbers.push(turn.number);
@@ -150,10 +155,9 @@ impl Means {
         std::mem::take(&mut self.levels)
     }
 
-    /// The scatter without what the covariance is taken from; `None` where parts are asked for: what looks at them
-    /// takes more out of the scatter.
+    /// The scatter without what the covariance is taken from.
     pub fn scatter_beside(&self) -> Option<Vec<Complex64>> {
-        if self.parts.is_some() { None } else { self.whole.scatter_beside() }
+        self.whole.scatter_beside()
     }
 
     /// The parts; `None` where too few turns are left to fill them.

@@ -19,7 +19,7 @@ use crate::{
     effects::{Alterations, SpindleEffect, TurnEvidence},
     layout::Layout,
     selection::Selection,
-    separators::{Blocks, Operators, Propagation, Readings, apply, leak, smooth, whitening},
+    separators::{Blocks, Operators, Propagation, Readings, Scatter, apply, leak, smooth, whitening},
 };
 
 /// Orders to each side over which the noise in the residual's space is averaged, beyond what covariances are.
@@ -235,7 +235,7 @@ impl StationData {
         part: Part,
         seen: Arc<TurnObservations>,
     ) -> Result<Self> {
-        let mut readings = Readings::gather(selection, layout, fit)?;
+        let mut readings = Readings::gather(selection, layout, fit, Scatter::OfAll)?;
         for (sensor, creeping) in seen.creeping.iter().enumerate() {
             if let Some(creeping) = creeping {
                 creeping.take_out_of_scatter(&mut readings, sensor, part);
@@ -249,7 +249,7 @@ impl StationData {
         let creeps = creeps.collect();
         smooth(&mut readings);
         seen.changes.iter().for_each(|change| change.widen(&mut readings));
-        let held_out = held_out.map(|station| Readings::gather(selection, layout, station)).transpose()?;
+        let held_out = held_out.map(|station| Readings::gather(selection, layout, station, Scatter::OfAll)).transpose()?;
         let freed = layout.assumes_odd_motion().then(|| {
             let freed = Alterations { even_order_motion: true, ..Alterations::none(layout) };
             Box::new(Weighed::new(&layout.altered(&freed), selection, readings.clone()))

@@ -23,7 +23,7 @@ pub(crate) mod wiring;
 pub(crate) use algebra::{Blocks, apply, leftover};
 pub(crate) use operators::Operators;
 pub(crate) use propagation::Propagation;
-pub(crate) use readings::Readings;
+pub(crate) use readings::{Readings, Scatter};
 pub(crate) use second_order::{OVERSAMPLING, interpolate};
 pub(crate) use solution::{Estimate, Solver, residual};
 pub(crate) use weights::{smooth, whitening};

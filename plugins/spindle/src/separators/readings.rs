@@ -28,12 +28,21 @@ pub struct Readings {
     pub places: Vec<usize>,
 }
 
+/// Which scatter of the turns weights are taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scatter {
+    /// That of all turns: the closed loop takes drifts and lines out of it.
+    OfAll,
+    /// Where it is known, that without the neighbours which the covariance is taken from: then weights do not know its noise.
+    Beside,
+}
+
 impl Readings {
-    /// Gathers the profiles of a station.
+    /// Gathers the profiles of a station, with the scatter that weights are taken from.
     ///
     /// # Errors
     /// When a setup or a sensor of the rig is missing, or the profiles' angles differ.
-    pub fn gather(selection: &Selection, layout: &Layout, station: &Station) -> Result<Self> {
+    pub fn gather(selection: &Selection, layout: &Layout, station: &Station, scatter: Scatter) -> Result<Self> {
         let object = || format!("station {}", station.name);
         let rig = &selection.rig;
         let sensors = rig.sensors.len();
@@ -82,7 +91,10 @@ impl Readings {
             turn_angles: ordered.iter().map(|(profile, _)| profile.turn_angles).collect(),
             mean,
             covariance: matrices(|profile| profile.covariance.as_ref()),
-            scatter: matrices(|profile| profile.scatter_beside.as_ref().or(profile.scatter.as_ref())),
+            scatter: matrices(match scatter {
+                Scatter::OfAll => |profile| profile.scatter.as_ref(),
+                Scatter::Beside => |profile| profile.scatter_beside.as_ref().or(profile.scatter.as_ref()),
+            }),
             turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
             places,
         })

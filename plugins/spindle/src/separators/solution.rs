@@ -13,7 +13,7 @@ use super::{
     leak,
     operators::{Operators, OrderOperator},
     propagation::Propagation,
-    readings::Readings,
+    readings::{Readings, Scatter},
     second_order::SecondOrder,
     weights, wiring,
 };
@@ -84,7 +84,7 @@ impl Solver<'_> {
     /// # Errors
     /// When the station's profiles do not fit the rig.
     pub fn separate(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Separation> {
-        let mut readings = Readings::gather(self.selection, self.layout, station)?;
+        let mut readings = Readings::gather(self.selection, self.layout, station, Scatter::Beside)?;
         weights::smooth_by_order(&mut readings);
         if self.second_order {
             leak::widen(self.layout, self.selection.rig.part_radius_mm, &mut readings);
@@ -260,7 +260,7 @@ impl Solver<'_> {
     /// # Errors
     /// When the station's profiles do not fit the rig.
     pub fn sensitivity(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Sensitivity> {
-        let mut readings = Readings::gather(self.selection, self.layout, station)?;
+        let mut readings = Readings::gather(self.selection, self.layout, station, Scatter::Beside)?;
         weights::smooth_by_order(&mut readings);
         let operators = method(&readings);
         let to_reference = self.layout.to_reference(self.layout.mean_z_mm + station.z_mm);
