@@ -30,6 +30,11 @@ pub fn record(words: &[&str]) -> Outcome {
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
     let folder = folder.canonicalize().map_err(failed)?;
+    // Measured data, where `cargo xtask data` has brought them: pipelines name them from their own place.
+    let data = target().join("data");
+    if data.is_dir() {
+        copy(&data, &folder.join("target/data")).map_err(failed)?;
+    }
     let mut examples: Vec<PathBuf> = fs::read_dir(root().join("examples"))
         .map_err(|error| format!("cannot read examples/: {error}"))?
         .filter_map(|entry| Some(entry.ok()?.path()))
