@@ -31,7 +31,8 @@ pub fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Fa
         return Err(Failure::Limit(open));
     }
     // What is said of the layout is known before any data.
-    let notes = pipeline.assessment.as_ref().map(|found| found.notes.as_slice()).unwrap_or_default();
+    let mut notes = pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default();
+    notes.extend(pipeline.route.point_separator().map(|separator| separator.notes()).unwrap_or_default());
     let warnings = summary.all_warnings().filter(|warning| !notes.contains(warning)).count();
     if args.fail_on_warning && warnings > 0 { Err(Failure::Warnings(warnings)) } else { Ok(()) }
 }

@@ -19,7 +19,7 @@ use crate::{
     effects::{Alterations, SpindleEffect, TurnEvidence},
     layout::Layout,
     selection::Selection,
-    separators::{Blocks, Operators, Propagation, Readings, Scatter, apply, leak, smooth, whitening},
+    separators::{Blocks, Operators, Propagation, Readings, Scatter, apply, leak, smooth_by_order, whitening},
 };
 
 /// Orders to each side over which the noise in the residual's space is averaged, beyond what covariances are.
@@ -247,9 +247,10 @@ impl StationData {
             Some((sensor, creep, std))
         });
         let creeps = creeps.collect();
-        smooth(&mut readings);
+        smooth_by_order(&mut readings);
         seen.changes.iter().for_each(|change| change.widen(&mut readings));
-        let held_out = held_out.map(|station| Readings::gather(selection, layout, station, Scatter::OfAll)).transpose()?;
+        let held_out =
+            held_out.map(|station| Readings::gather(selection, layout, station, Scatter::OfAll)).transpose()?;
         let freed = layout.assumes_odd_motion().then(|| {
             let freed = Alterations { even_order_motion: true, ..Alterations::none(layout) };
             Box::new(Weighed::new(&layout.altered(&freed), selection, readings.clone()))

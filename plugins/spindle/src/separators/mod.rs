@@ -26,4 +26,4 @@ pub(crate) use propagation::Propagation;
 pub(crate) use readings::{Readings, Scatter};
 pub(crate) use second_order::{OVERSAMPLING, interpolate};
 pub(crate) use solution::{Estimate, Solver, residual};
-pub(crate) use weights::{smooth, whitening};
+pub(crate) use weights::{smooth_by_order, whitening};

@@ -33,14 +33,6 @@ pub fn smooth_by_order(readings: &mut Readings) {
     }
 }
 
-/// Replaces each order's scatter and covariance by the mean over its neighbours.
-pub fn smooth(readings: &mut Readings) {
-    let sensors = readings.count / readings.turns.len().max(1);
-    for matrices in [&mut readings.covariance, &mut readings.scatter].into_iter().flatten().flatten() {
-        profile::smooth(matrices, sensors * sensors);
-    }
-}
-
 /// W with Wᴴ·W = Σ⁻¹ for the scatter Σ of each order from 1: with independent turns it makes errors uncorrelated and of
 /// size 1.
 ///
