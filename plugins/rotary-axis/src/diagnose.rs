@@ -300,7 +300,7 @@ impl RotaryAxis {
             changes.iter().filter(|change| known(change)).max_by(|a, b| a.0.total_cmp(&b.0)).cloned()
         };
         let (_, value, unit, on) = largest(location).or_else(|| largest(placement))?;
-        Some(BiasPerUnit { value, unit: format!("{unit}/({})", parameter.unit), on })
+        Some(BiasPerUnit { value, unit: format!("{unit}/{}", per(&parameter.unit)), on })
     }
 }
 
@@ -335,4 +335,9 @@ fn moved(before: &[NamedValue], after: &[NamedValue]) -> Vec<Moved> {
         })
     });
     both.collect()
+}
+
+/// A unit in a denominator.
+fn per(unit: &str) -> String {
+    if unit.contains('/') { format!("({unit})") } else { unit.to_owned() }
 }

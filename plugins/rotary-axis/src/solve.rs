@@ -107,7 +107,7 @@ pub fn redundant(layout: &Layout, readings: &[Reading], effects: &[Column]) -> R
     let basis = if left.nrows() == 0 { DMatrix::zeros(0, 0) } else { column_space(left, DETERMINED) };
     let mut of_effects = all.columns(free, effects.len()).into_owned();
     for (index, mut column) in of_effects.column_iter_mut().enumerate() {
-        column /= problem.effect_scale[index];
+        column *= problem.effect_scale[index];
     }
     let command = system.blocks.iter().enumerate();
     let command = command.flat_map(|(command, block)| vec![command; block.free_rows]).collect();
