@@ -171,28 +171,7 @@ impl RotaryAxis {
             Estimate { value: one.value, std: (scale.factor * one.std).hypot(farthest) }
         };
 
-        let mut values = Vec::new();
-        let about = [
-            "offset of the axis' average line (ISO 230-1)",
-            "offset of the axis' average line (ISO 230-1)",
-            "tilt of the axis' average line (ISO 230-1)",
-            "tilt of the axis' average line (ISO 230-1)",
-        ];
-        let located: Vec<(String, Estimate, f64, &str, &str)> = axis
-            .location_symbols()
-            .into_iter()
-            .zip((0..4).map(|index| widened(&|fit| fit.location()[index])))
-            .zip([(1e3, "um"), (1e3, "um"), (1e6, "urad"), (1e6, "urad")])
-            .zip(about)
-            .map(|(((symbol, one), (scale, unit)), about)| (symbol, one, scale, unit, about))
-            .collect();
-        let mut order: Vec<usize> = (0..located.len()).collect();
-        // X before Y before Z, offsets before tilts.
-        order.sort_by(|a, b| (*a / 2, &located[*a].0).cmp(&(*b / 2, &located[*b].0)));
-        for index in order {
-            let (symbol, one, to_unit, unit, about) = &located[index];
-            values.push(value(symbol, to_unit * one.value, to_unit * one.std, unit, about));
-        }
+        let mut values = location_values(axis, [0, 1, 2, 3].map(|index| widened(&|fit| fit.location()[index])));
         let left_out = left_out(campaign, effects, &found);
         values.extend(self.ranges(campaign, &left_out));
         let mut remarks = campaign.warnings.clone();
@@ -346,6 +325,26 @@ impl RotaryAxis {
     }
 }
 
+/// The four location errors as values, offsets before tilts, in the order of their symbols.
+pub(crate) fn location_values(axis: Axis, found: [Estimate; 4]) -> Vec<NamedValue> {
+    let mut values: Vec<NamedValue> = axis
+        .location_symbols()
+        .into_iter()
+        .zip(found)
+        .enumerate()
+        .map(|(index, (symbol, one))| {
+            let (scale, unit, about) = if index < 2 {
+                (1e3, "um", "location error: offset of the axis' average line (ISO 230-1)")
+            } else {
+                (1e6, "urad", "location error: tilt of the axis' average line (ISO 230-1)")
+            };
+            value(&symbol, scale * one.value, scale * one.std, unit, about)
+        })
+        .collect();
+    values.sort_by(|a, b| (&b.unit == "um", &a.symbol).cmp(&(&a.unit == "um", &b.symbol)));
+    values
+}
+
 /// A number of a fit in a unit, with its standard uncertainty; nothing where it is not observable.
 type Sized<'a> = dyn Fn(&dyn Fn(&Fit) -> Estimate, f64) -> [Option<f64>; 2] + 'a;
 
@@ -359,7 +358,7 @@ pub(crate) fn machine_order(axis: Axis, along_z: [Estimate; 6]) -> [Estimate; 6]
     machine
 }
 
-fn component_table(axis: Axis) -> TableSpec {
+pub(crate) fn component_table(axis: Axis) -> TableSpec {
     let symbols = axis.component_symbols();
     let units = ["um", "um", "um", "urad", "urad", "urad"];
     let name = |index: usize| format!("{}_{}", symbols[index].to_lowercase(), units[index]);

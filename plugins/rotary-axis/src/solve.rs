@@ -52,7 +52,7 @@ const MAX_STEPS: usize = 60;
 /// mm.
 const SETTLED: f64 = 1e-9;
 /// Number of conditions of the gauge.
-const GAUGE: usize = 10;
+pub const GAUGE: usize = 10;
 /// As many commands with all six component errors observable carry the gauge alone.
 const ENOUGH_COMMANDS: usize = 4;
 
@@ -207,7 +207,7 @@ struct Solution {
 }
 
 /// The ten conditions of one command.
-fn gauge(phi: f64) -> DMatrix<f64> {
+pub fn gauge(phi: f64) -> DMatrix<f64> {
     let back = turn(-phi);
     let mut conditions = DMatrix::zeros(GAUGE, 6);
     conditions.view_mut((0, 0), (6, 6)).fill_with_identity();

@@ -21,8 +21,9 @@ const FLAT_BALLS: &str = "balls = [
 const CONFIG: &str = "std_um = 1.0";
 
 fn diagnosed(balls: &str, config: &str, more: &str) -> PointDiagnosis {
-    let text =
-        format!("{balls}{COMPONENTS}{LOCATION}{PLACEMENT}commands = {{ step_deg = 10, count = 36 }}\nnoise_um = 1.0\n{more}");
+    let text = format!(
+        "{balls}{COMPONENTS}{LOCATION}{PLACEMENT}commands = {{ step_deg = 10, count = 36 }}\nnoise_um = 1.0\n{more}"
+    );
     let points = scenario(&text).simulate().points();
     let separator = separator(&format!("{balls}{config}"));
     let settings = Settings { max_added: 40, ..Settings::default() };
@@ -109,7 +110,9 @@ fn each_effect_is_named_at_its_size_and_the_location_stays_right() {
             let added = &found.diagnosis.added;
             let shown: Vec<String> = added
                 .iter()
-                .map(|one| format!("{} {:?} or {:?} {:?}", one.effect, one.targets, one.confounded_with, one.parameters))
+                .map(|one| {
+                    format!("{} {:?} or {:?} {:?}", one.effect, one.targets, one.confounded_with, one.parameters)
+                })
                 .collect();
             println!("{} {size}: {:?} {shown:#?}", case.name, found.diagnosis.verdict);
             assert_eq!(added.len(), 1, "{} {size} {:?}", case.name, found.diagnosis);
@@ -123,7 +126,11 @@ fn each_effect_is_named_at_its_size_and_the_location_stays_right() {
             for (symbol, truth) in [("EX0C", 23.7), ("EY0C", 3.1), ("EA0C", 41.0), ("EB0C", 34.6)] {
                 let [number, std] = value(&found.after, symbol);
                 // Second order: the axis' own errors change the place at which a scale of 10⁻³ acts.
-                assert!((number - truth).abs() < 4.5 * std + 2e-4 * size.abs(), "{} {size} {symbol} {number} {std}", case.name);
+                assert!(
+                    (number - truth).abs() < 4.5 * std + 2e-4 * size.abs(),
+                    "{} {size} {symbol} {number} {std}",
+                    case.name
+                );
             }
         }
     }
@@ -206,7 +213,11 @@ fn strangers_are_said_to_be_unexplained() {
     let bad = diagnosed(THREE_BALLS, CONFIG, "stranger = [{ row = 50, rows = 1, by_um = [40, 30, 0] }]");
     println!("{:?} {:?}", bad.diagnosis.verdict, bad.diagnosis.unexplained);
     assert!(bad.diagnosis.added.is_empty(), "{:?}", bad.diagnosis.added);
-    assert!(bad.diagnosis.unexplained.iter().any(|left| left.place.contains("C = 140°")), "{:?}", bad.diagnosis.unexplained);
+    assert!(
+        bad.diagnosis.unexplained.iter().any(|left| left.place.contains("C = 140°")),
+        "{:?}",
+        bad.diagnosis.unexplained
+    );
 }
 
 #[test]
