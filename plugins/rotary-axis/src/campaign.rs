@@ -1,5 +1,6 @@
 //! From rows of a table to readings: balls, distinct commands, time, direction, and warnings about what looks wrong.
 
+use nalgebra::Vector3;
 use runout_core::{
     Error, Result,
     pipeline::error::known_names,
@@ -13,6 +14,7 @@ use runout_core::{
 use crate::{
     axis::Axis,
     config::RotaryAxisConfig,
+    kinematics::turn,
     noise::{self, Noise},
     solve::{Layout, Reading},
 };
@@ -132,7 +134,17 @@ impl Campaign {
                 readings.iter_mut().for_each(|reading| reading.std = 1e-3 * std);
                 Noise::Stated(std)
             }
-            (None, None) => noise::of_repeats(&readings, &order.time, &direction),
+            (None, None) => {
+                let lost_motion: Vec<Vector3<f64>> = readings
+                    .iter()
+                    .zip(&direction)
+                    .map(|(reading, direction)| {
+                        let place = turn(commands_deg[reading.command].to_radians()) * config.ball(used[reading.ball]);
+                        Vector3::z().cross(&place) * *direction
+                    })
+                    .collect();
+                noise::of_repeats(&readings, &order.time, &direction, &lost_motion)
+            }
         };
         if let Noise::Repeats { std_um, .. } = noise {
             readings.iter_mut().for_each(|reading| reading.std = 1e-3 * std_um);

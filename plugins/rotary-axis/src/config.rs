@@ -9,7 +9,7 @@ use runout_core::{
     stage::Separator,
 };
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{axis::Axis, separate::RotaryAxis};
 
@@ -39,7 +39,7 @@ fn default_component_errors() -> bool {
 }
 
 /// A ball, or a point of the table.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ball {
     /// Its name, as in the column `ball`.

@@ -35,6 +35,7 @@ pub fn register(registry: &mut Registry) {
     registry.separators.add(Plugin::of::<RotaryAxisConfig>());
     registry.separators.add(Plugin::of::<CircleFitConfig>());
     registry.separators.add(Plugin::of::<ThreePointConfig>());
+    registry.simulators.add(Plugin::of::<simulate::Scenario>());
     for kind in effects::KINDS {
         registry.effects.add(EffectEntry::new(kind.id(), kind.about(), kind.parameters(), kind));
     }

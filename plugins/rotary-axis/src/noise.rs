@@ -1,6 +1,6 @@
 //! Noise of one reading from repeats: their scatter after a common smooth drift.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::solve::Reading;
 
@@ -27,14 +27,21 @@ const FREEDOM_A_FUNCTION: usize = 12;
 /// Standard deviation of one coordinate from repeats of one ball at one command.
 ///
 /// Each ball and command, approached in one direction, has a level of its own; a drift common to all, a polynomial of time in each
-/// coordinate, is fitted beside.
-pub fn of_repeats(readings: &[Reading], time: &[f64], direction: &[f64]) -> Noise {
-    let found =
-        scatter(readings, time, |index| (readings[index].ball, readings[index].command, direction[index] > 0.0));
+/// coordinate, is fitted beside. Where no repeats share a direction, both directions share a level, and what lost motion of the
+/// rotary axis adds (`lost_motion`, of any size) is fitted, too.
+pub fn of_repeats(readings: &[Reading], time: &[f64], direction: &[f64], lost_motion: &[Vector3<f64>]) -> Noise {
+    let place = |index: usize| (readings[index].ball, readings[index].command);
+    let in_one_direction = scatter(readings, time, None, |index| (place(index), direction[index] > 0.0));
+    let found = in_one_direction.or_else(|| scatter(readings, time, Some(lost_motion), place));
     found.unwrap_or(Noise::Unknown)
 }
 
-fn scatter<K: PartialEq>(readings: &[Reading], time: &[f64], key: impl Fn(usize) -> K) -> Option<Noise> {
+fn scatter<K: PartialEq>(
+    readings: &[Reading],
+    time: &[f64],
+    lost_motion: Option<&[Vector3<f64>]>,
+    key: impl Fn(usize) -> K,
+) -> Option<Noise> {
     let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
     for index in 0..readings.len() {
         let own = key(index);
@@ -47,33 +54,51 @@ fn scatter<K: PartialEq>(readings: &[Reading], time: &[f64], key: impl Fn(usize)
     let rows: usize = groups.iter().map(|(_, members)| members.len()).sum();
     let free = rows - groups.len();
     let powers = HIGHEST_POWER.min(free / FREEDOM_A_FUNCTION);
-    let mut columns = DMatrix::zeros(rows, powers);
-    let mut values = DMatrix::zeros(rows, 3);
+    let others = usize::from(lost_motion.is_some());
+    let mut columns = DMatrix::zeros(3 * rows, 3 * powers + others);
+    let mut values = DVector::zeros(3 * rows);
     let mut row = 0;
     for (_, members) in &groups {
-        let count = members.len() as f64;
-        let level = members.iter().map(|member| readings[*member].value).sum::<nalgebra::Vector3<f64>>() / count;
+        let mean = |of: &dyn Fn(usize) -> Vector3<f64>| {
+            members.iter().map(|member| of(*member)).sum::<Vector3<f64>>() / members.len() as f64
+        };
+        let reading = |member: usize| readings[member].value;
+        let lost = |member: usize| lost_motion.map_or_else(Vector3::zeros, |lost| lost[member]);
+        let (level, lost_level) = (mean(&reading), mean(&lost));
         let functions = |member: &usize| legendre(2.0 * time[*member] - 1.0, powers);
-        let mean = members.iter().map(functions).sum::<DVector<f64>>() / count;
+        let drift_level = members.iter().map(functions).sum::<DVector<f64>>() / members.len() as f64;
         for member in members {
-            columns.row_mut(row).copy_from(&(functions(member) - &mean).transpose());
-            values.row_mut(row).copy_from(&(readings[*member].value - level).transpose());
-            row += 1;
+            let drift = functions(member) - &drift_level;
+            for coordinate in 0..3 {
+                values[row] = reading(*member)[coordinate] - level[coordinate];
+                for (power, entry) in drift.iter().enumerate() {
+                    columns[(row, 3 * power + coordinate)] = *entry;
+                }
+                if others > 0 {
+                    columns[(row, 3 * powers)] = lost(*member)[coordinate] - lost_level[coordinate];
+                }
+                row += 1;
+            }
         }
     }
     let mut rank = 0;
-    if powers > 0 {
+    if columns.ncols() > 0 && rows > 0 {
+        for mut column in columns.column_iter_mut() {
+            let size = column.norm();
+            if size > 0.0 {
+                column /= size;
+            }
+        }
         let svd = columns.svd(true, false);
-        let most = svd.singular_values.max();
         let kept: Vec<usize> =
-            (0..powers).filter(|index| svd.singular_values[*index] > 1e-9 * most.max(1e-9)).collect();
+            (0..svd.singular_values.len()).filter(|index| svd.singular_values[*index] > 1e-9).collect();
         rank = kept.len();
         if let Some(u) = svd.u {
             let basis = u.select_columns(&kept);
             values -= &basis * basis.tr_mul(&values);
         }
     }
-    let dof = 3 * free.saturating_sub(rank);
+    let dof = (3 * free).saturating_sub(rank);
     let std_um = 1e3 * (values.norm_squared() / dof.max(1) as f64).sqrt();
     (dof >= FEWEST && std_um > 0.0).then_some(Noise::Repeats { std_um, dof })
 }

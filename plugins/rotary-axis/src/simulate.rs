@@ -3,20 +3,29 @@
 //! Everything is in the machine's frame: errors are named as they act there, and places follow from isometries composed one after
 //! the other. Nothing is shared with the separator's equations.
 
-use std::{collections::BTreeMap, fmt::Write};
+use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use runout_core::points::{Column, Labels, Points, Trace};
+use runout_core::{
+    Result,
+    pipeline::{
+        error::{Fault, known_names},
+        registry::{Context, StageConfig},
+    },
+    points::{Column, Labels, Points, Trace},
+    stage::{Simulation, Simulator},
+    table::{ColumnSpec, TableSpec, numbers, texts},
+};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{axis::Axis, config::Ball};
 
-/// A campaign and its truth.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
+/// An R-test of a rotary axis, and its truth.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// The rotary axis.
@@ -55,21 +64,9 @@ pub struct Scenario {
     /// How balls were placed, in µm by their ids.
     #[serde(default)]
     pub placement: BTreeMap<String, [f64; 3]>,
-    /// Scale errors of X, Y, Z, in µm/m.
+    /// What else happens.
     #[serde(default)]
-    pub scale_um_per_m: BTreeMap<String, f64>,
-    /// Squareness errors XY, XZ, YZ, in µrad.
-    #[serde(default)]
-    pub squareness_urad: BTreeMap<String, f64>,
-    /// Drifts.
-    #[serde(default)]
-    pub drift: Vec<Drift>,
-    /// Lost motion of the rotary axis, in µrad.
-    #[serde(default)]
-    pub backlash_urad: f64,
-    /// What no model knows.
-    #[serde(default)]
-    pub stranger: Vec<Stranger>,
+    pub effect: Vec<SimulatedEffect>,
 }
 
 fn one() -> usize {
@@ -81,7 +78,7 @@ fn ten() -> f64 {
 }
 
 /// Commands of a pass.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Commands {
     /// First command.
@@ -94,7 +91,7 @@ pub struct Commands {
 }
 
 /// A harmonic of a component error: cosine·cos(order·φ) + sine·sin(order·φ).
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Harmonic {
     /// ISO symbol: EXC.
@@ -109,29 +106,53 @@ pub struct Harmonic {
     pub sine: f64,
 }
 
-/// A drift along one coordinate of the machine.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Drift {
-    /// x, y or z.
-    pub along: String,
-    /// At the end of the campaign (linear), or long after (exponential), in µm.
-    pub drift_um: f64,
-    /// Time constant as a share of the campaign; linear without it.
-    #[serde(default)]
-    pub time_constant: Option<f64>,
-}
-
-/// What no model knows: a displacement of one ball from some row on, for some rows.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Stranger {
-    /// First row.
-    pub row: usize,
-    /// Rows of the same ball that it lasts; a slip lasts to the end.
-    pub rows: usize,
-    /// Displacement on the table, in µm.
-    pub by_um: [f64; 3],
+/// What happens besides.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "plugin", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SimulatedEffect {
+    /// A linear axis that measures has a scale error.
+    LinearAxisScale {
+        /// X, Y or Z.
+        targets: [String; 1],
+        /// Error per length, in µm/m.
+        scale_um_per_m: f64,
+    },
+    /// Two linear axes that measure are not square to each other.
+    LinearAxisSquareness {
+        /// XY, XZ or YZ.
+        targets: [String; 1],
+        /// Angle, in µrad.
+        angle_urad: f64,
+    },
+    /// Readings drift along a coordinate.
+    ThermalDrift {
+        /// x, y or z.
+        targets: [String; 1],
+        /// At the end of the campaign (linear), or long after (exponential), in µm.
+        drift_um: f64,
+        /// Time constant as a share of the campaign; linear without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        time_constant: Option<f64>,
+    },
+    /// The rotary axis loses motion where its direction reverses.
+    Backlash {
+        /// In µrad.
+        lost_motion_urad: f64,
+    },
+    /// A ball slips on the table: a stranger to the closed loop.
+    SlippedBall {
+        /// Row from which it stands elsewhere.
+        row: usize,
+        /// Displacement on the table, in µm.
+        by_um: [f64; 3],
+    },
+    /// One bad reading: a stranger to the closed loop.
+    BadReading {
+        /// The row.
+        row: usize,
+        /// In µm.
+        by_um: [f64; 3],
+    },
 }
 
 /// Simulated rows.
@@ -154,6 +175,9 @@ pub struct Simulated {
 
 const COORDINATES: [&str; 3] = ["X", "Y", "Z"];
 const ROTATIONS: [&str; 3] = ["A", "B", "C"];
+const DRIFTS: [&str; 3] = ["x", "y", "z"];
+/// What is read along the first axis in proportion to the second.
+const SQUARENESS: [(&str, (usize, usize)); 3] = [("XY", (0, 1)), ("XZ", (0, 2)), ("YZ", (1, 2))];
 
 impl Scenario {
     /// The rows.
@@ -180,32 +204,44 @@ impl Scenario {
             component: component.clone(),
         };
         let total = self.balls.len() * self.passes * commands.len();
-        let mut moved = vec![Vector3::zeros(); self.balls.len()];
-        let mut remaining = vec![0_usize; self.balls.len()];
+        let mut slipped = vec![Vector3::zeros(); self.balls.len()];
+        let lost_motion: f64 = self
+            .effect
+            .iter()
+            .map(
+                |effect| {
+                    if let SimulatedEffect::Backlash { lost_motion_urad } = effect { *lost_motion_urad } else { 0.0 }
+                },
+            )
+            .sum();
         for (ball, pass) in self.sequence() {
             let back = self.back_and_forth && pass % 2 == 1;
             for step in 0..commands.len() {
                 let index = if back { commands.len() - 1 - step } else { step };
                 let row = made.ball.len();
-                for stranger in self.stranger.iter().filter(|stranger| stranger.row == row) {
-                    moved[ball] = 1e-3 * Vector3::from(stranger.by_um);
-                    remaining[ball] = stranger.rows;
+                let mut bad = Vector3::zeros();
+                for effect in &self.effect {
+                    match effect {
+                        SimulatedEffect::SlippedBall { row: from, by_um } if *from == row => {
+                            slipped[ball] = 1e-3 * Vector3::from(*by_um);
+                        }
+                        SimulatedEffect::BadReading { row: at, by_um } if *at == row => {
+                            bad = 1e-3 * Vector3::from(*by_um);
+                        }
+                        _ => {}
+                    }
                 }
                 let nominal = Point3::from(Vector3::from(self.balls[ball].place()));
                 let placed = self.placement.get(&self.balls[ball].id).copied().unwrap_or_default();
-                let mut stands = nominal + 1e-3 * Vector3::from(placed);
-                if remaining[ball] > 0 {
-                    stands += moved[ball];
-                    remaining[ball] -= 1;
-                }
+                let stands = nominal + 1e-3 * Vector3::from(placed) + slipped[ball];
                 let ideal = UnitQuaternion::from_scaled_axis(line * commands[index].to_radians());
-                let lost = if back { -0.5e-6 } else { 0.5e-6 } * self.backlash_urad;
+                let lost = if back { -0.5e-6 } else { 0.5e-6 } * lost_motion;
                 let turned = UnitQuaternion::from_scaled_axis(line * lost) * ideal;
                 let carried = location * self.isometry(component[index]) * turned;
                 let place = carried * stands;
                 let share = row as f64 / (total.max(2) - 1) as f64;
                 let read = measures * place.coords + self.drift_at(share);
-                let mut deviation = read - (ideal * nominal).coords;
+                let mut deviation = read - (ideal * nominal).coords + bad;
                 for coordinate in 0..3 {
                     deviation[coordinate] += 1e-3 * self.noise_um * noise.sample::<f64, _>(StandardNormal);
                 }
@@ -269,23 +305,139 @@ impl Scenario {
     /// What the linear axes read of a place.
     fn measuring(&self) -> Matrix3<f64> {
         let mut reads = Matrix3::identity();
-        for (place, letter) in COORDINATES.iter().enumerate() {
-            reads[(place, place)] += 1e-6 * self.scale_um_per_m.get(*letter).copied().unwrap_or(0.0);
-        }
-        for (name, row, column) in [("XY", 0, 1), ("XZ", 0, 2), ("YZ", 1, 2)] {
-            reads[(row, column)] += 1e-6 * self.squareness_urad.get(name).copied().unwrap_or(0.0);
+        for effect in &self.effect {
+            match effect {
+                SimulatedEffect::LinearAxisScale { targets: [target], scale_um_per_m } => {
+                    let place = COORDINATES.iter().position(|letter| letter == target).unwrap_or(0);
+                    reads[(place, place)] += 1e-6 * scale_um_per_m;
+                }
+                SimulatedEffect::LinearAxisSquareness { targets: [target], angle_urad } => {
+                    let (_, place) = SQUARENESS.iter().find(|(name, _)| name == target).unwrap_or(&SQUARENESS[0]);
+                    reads[*place] += 1e-6 * angle_urad;
+                }
+                _ => {}
+            }
         }
         reads
     }
 
     fn drift_at(&self, share: f64) -> Vector3<f64> {
         let mut sum = Vector3::zeros();
-        for drift in &self.drift {
-            let place = COORDINATES.iter().position(|letter| letter.eq_ignore_ascii_case(&drift.along)).unwrap_or(0);
-            let course = drift.time_constant.map_or(share, |constant| -(-share / constant).exp_m1());
-            sum[place] += 1e-3 * drift.drift_um * course;
+        for effect in &self.effect {
+            if let SimulatedEffect::ThermalDrift { targets: [target], drift_um, time_constant } = effect {
+                let place = DRIFTS.iter().position(|letter| letter == target).unwrap_or(0);
+                let course = time_constant.map_or(share, |constant| -(-share / constant).exp_m1());
+                sum[place] += 1e-3 * drift_um * course;
+            }
         }
         sum
+    }
+}
+
+impl StageConfig for Scenario {
+    type Stage = Box<dyn Simulator>;
+
+    const NAME: &'static str = "rotary-axis";
+    const ABOUT: &'static str = "an R-test: balls on a rotary axis, read at commands of it";
+
+    fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        Ok(Box::new(self.checked()?))
+    }
+}
+
+impl Scenario {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// The first that cannot be, with its key.
+    pub fn checked(self) -> std::result::Result<RotaryAxisSimulator, Fault> {
+        if i64::try_from(self.seed).is_err() {
+            return Err(Fault::at("seed", format!("expected a seed up to {}, found {}", i64::MAX, self.seed)));
+        }
+        if !(self.noise_um.is_finite() && self.noise_um >= 0.0) {
+            return Err(Fault::at("noise_um", format!("the noise must be at least 0 µm, found {}", self.noise_um)));
+        }
+        if self.balls.is_empty() {
+            return Err(Fault::at("balls", "expected at least one ball"));
+        }
+        if self.commands.count == 0 {
+            return Err(Fault::at("count", "expected at least one command").under("commands"));
+        }
+        if self.passes == 0 {
+            return Err(Fault::at("passes", "expected at least one pass"));
+        }
+        let letters = || COORDINATES.iter().chain(&ROTATIONS);
+        let one_of = |name: &str, known: Vec<String>| {
+            known.iter().all(|own| own != name).then(|| known_names(name, known.iter().map(String::as_str)))
+        };
+        let of =
+            |between: &str| letters().map(|letter| format!("E{letter}{between}{}", self.letter())).collect::<Vec<_>>();
+        for symbol in self.location.keys() {
+            if let Some(help) = one_of(symbol, of("0")) {
+                return Err(Fault::at(symbol, "there is no such location error").help(help).under("location"));
+            }
+        }
+        for (index, harmonic) in self.component.iter().enumerate() {
+            if let Some(help) = one_of(&harmonic.error, of("")) {
+                let fault = Fault::at("error", "there is no such component error").help(help);
+                return Err(fault.under_item("component", index));
+            }
+        }
+        for id in self.placement.keys() {
+            if let Some(help) = one_of(id, self.balls.iter().map(|ball| ball.id.clone()).collect()) {
+                return Err(Fault::at(id, "there is no such ball").help(help).under("placement"));
+            }
+        }
+        for (index, effect) in self.effect.iter().enumerate() {
+            let names = |all: &[&str]| all.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+            let unknown = match effect {
+                SimulatedEffect::LinearAxisScale { targets: [target], .. } => one_of(target, names(&COORDINATES)),
+                SimulatedEffect::LinearAxisSquareness { targets: [target], .. } => {
+                    one_of(target, names(&SQUARENESS.map(|(name, _)| name)))
+                }
+                SimulatedEffect::ThermalDrift { targets: [target], .. } => one_of(target, names(&DRIFTS)),
+                _ => None,
+            };
+            if let Some(help) = unknown {
+                let fault = Fault::at("targets", "the effect cannot act there").help(help);
+                return Err(fault.under_item("effect", index));
+            }
+        }
+        let text = toml::to_string(&self)
+            .map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
+        Ok(RotaryAxisSimulator { text: format!("plugin = \"{}\"\n{text}", Self::NAME), scenario: self })
+    }
+}
+
+/// A checked scenario.
+#[derive(Debug, Clone)]
+pub struct RotaryAxisSimulator {
+    scenario: Scenario,
+    text: String,
+}
+
+impl Simulator for RotaryAxisSimulator {
+    fn simulate(&self) -> Result<Simulation<'_>> {
+        let made = self.scenario.simulate();
+        let table = made.table();
+        let deviation = |coordinate: usize| {
+            // To 0.01 µm, as devices write them.
+            numbers(made.deviation_mm.iter().map(|all| (all[coordinate] * 1e5).round() / 1e5).collect::<Vec<f64>>())
+        };
+        let rows = table.rows(vec![
+            texts(&made.ball),
+            numbers(made.command_deg.iter().copied()),
+            deviation(0),
+            deviation(1),
+            deviation(2),
+            numbers(made.time_s.iter().copied()),
+            numbers(made.repeat.iter().copied()),
+        ])?;
+        Ok(Simulation::Points { table, rows })
+    }
+
+    fn scenario(&self) -> &str {
+        &self.text
     }
 }
 
@@ -308,16 +460,17 @@ impl Simulated {
         Points { input: "simulated.csv".into(), columns, labels, traces: vec![whole] }
     }
 
-    /// As a text file, deviations to 0.01 µm.
-    #[must_use]
-    pub fn csv(&self) -> String {
-        let mut text = format!("ball,{},dx_mm,dy_mm,dz_mm,time_s,repeat\n", self.axis.command());
-        for (row, ball) in self.ball.iter().enumerate() {
-            let [x, y, z] = self.deviation_mm[row];
-            let (command, time, repeat) = (self.command_deg[row], self.time_s[row], self.repeat[row]);
-            // Writing to a String does not fail.
-            let _ = writeln!(text, "{ball},{command},{x:.5},{y:.5},{z:.5},{time},{repeat}");
-        }
-        text
+    fn table(&self) -> TableSpec {
+        let deviation = |name: &str| ColumnSpec::number(name, "mm", "actual less nominal place of the ball");
+        let columns = vec![
+            ColumnSpec::name("ball", "id of the ball"),
+            ColumnSpec::number(self.axis.command(), "deg", "command of the axis").repeating(),
+            deviation("dx_mm"),
+            deviation("dy_mm"),
+            deviation("dz_mm"),
+            ColumnSpec::number("time_s", "s", "time").repeating(),
+            ColumnSpec::number("repeat", "", "number of the pass").repeating(),
+        ];
+        TableSpec::new("points", "readings of a simulated R-test", columns)
     }
 }

@@ -48,55 +48,65 @@ const PASSES: &str = "passes = 2\nball_by_ball = true\n";
 const CASES: [Case; 9] = [
     Case {
         name: "linear-axis-scale X",
-        keys: |size| format!("scale_um_per_m = {{ X = {size} }}"),
+        keys: |size| format!("effect = [{{ plugin = 'linear-axis-scale', targets = ['X'], scale_um_per_m = {size} }}]"),
         parameter: "scale",
         sizes: [15.0, 800.0],
     },
     Case {
         name: "linear-axis-scale Y",
-        keys: |size| format!("scale_um_per_m = {{ Y = {size} }}"),
+        keys: |size| format!("effect = [{{ plugin = 'linear-axis-scale', targets = ['Y'], scale_um_per_m = {size} }}]"),
         parameter: "scale",
         sizes: [15.0, -800.0],
     },
     Case {
         name: "linear-axis-squareness XY",
-        keys: |size| format!("squareness_urad = {{ XY = {size} }}"),
+        keys: |size| {
+            format!("effect = [{{ plugin = 'linear-axis-squareness', targets = ['XY'], angle_urad = {size} }}]")
+        },
         parameter: "angle",
         sizes: [20.0, 800.0],
     },
     Case {
         name: "linear-axis-squareness XZ",
-        keys: |size| format!("squareness_urad = {{ XZ = {size} }}"),
+        keys: |size| {
+            format!("effect = [{{ plugin = 'linear-axis-squareness', targets = ['XZ'], angle_urad = {size} }}]")
+        },
         parameter: "angle",
         sizes: [25.0, 800.0],
     },
     Case {
         name: "linear-axis-squareness YZ",
-        keys: |size| format!("squareness_urad = {{ YZ = {size} }}"),
+        keys: |size| {
+            format!("effect = [{{ plugin = 'linear-axis-squareness', targets = ['YZ'], angle_urad = {size} }}]")
+        },
         parameter: "angle",
         sizes: [25.0, -800.0],
     },
     Case {
         name: "thermal-drift x linear",
-        keys: |size| format!("drift = [{{ along = 'x', drift_um = {size} }}]"),
+        keys: |size| format!("effect = [{{ plugin = 'thermal-drift', targets = ['x'], drift_um = {size} }}]"),
         parameter: "drift",
         sizes: [6.0, 300.0],
     },
     Case {
         name: "thermal-drift z linear",
-        keys: |size| format!("drift = [{{ along = 'z', drift_um = {size} }}]"),
+        keys: |size| format!("effect = [{{ plugin = 'thermal-drift', targets = ['z'], drift_um = {size} }}]"),
         parameter: "drift",
         sizes: [8.0, 300.0],
     },
     Case {
         name: "thermal-drift y exponential",
-        keys: |size| format!("drift = [{{ along = 'y', drift_um = {size}, time_constant = 0.15 }}]"),
+        keys: |size| {
+            format!(
+                "effect = [{{ plugin = 'thermal-drift', targets = ['y'], drift_um = {size}, time_constant = 0.15 }}]"
+            )
+        },
         parameter: "drift",
         sizes: [12.0, 300.0],
     },
     Case {
         name: "backlash",
-        keys: |size| format!("backlash_urad = {size}\nback_and_forth = true"),
+        keys: |size| format!("effect = [{{ plugin = 'backlash', lost_motion_urad = {size} }}]\nback_and_forth = true"),
         parameter: "lost_motion",
         sizes: [12.0, 1000.0],
     },
@@ -138,7 +148,11 @@ fn each_effect_is_named_at_its_size_and_the_location_stays_right() {
 
 #[test]
 fn scales_of_x_and_y_are_confounded_and_of_z_blind() {
-    let found = diagnosed(THREE_BALLS, CONFIG, &format!("{PASSES}scale_um_per_m = {{ X = 100 }}"));
+    let found = diagnosed(
+        THREE_BALLS,
+        CONFIG,
+        &format!("{PASSES}effect = [{{ plugin = 'linear-axis-scale', targets = ['X'], scale_um_per_m = 100 }}]"),
+    );
     let added = &found.diagnosis.added[0];
     assert!(names(added, "linear-axis-scale X") && names(added, "linear-axis-scale Y"), "{added:?}");
     assert!(added.parameters[0].std.is_none());
@@ -154,7 +168,11 @@ fn scales_of_x_and_y_are_confounded_and_of_z_blind() {
 
 #[test]
 fn balls_at_one_height_do_not_show_squareness_to_z() {
-    let found = diagnosed(FLAT_BALLS, CONFIG, &format!("{PASSES}squareness_urad = {{ XZ = 100 }}"));
+    let found = diagnosed(
+        FLAT_BALLS,
+        CONFIG,
+        &format!("{PASSES}effect = [{{ plugin = 'linear-axis-squareness', targets = ['XZ'], angle_urad = 100 }}]"),
+    );
     assert!(found.diagnosis.added.is_empty(), "{:?}", found.diagnosis.added);
     for target in ["XZ", "YZ"] {
         let blind = found.diagnosis.blind_to.iter().find(|blind| blind.targets == [target]).unwrap();
@@ -187,9 +205,11 @@ fn several_effects_are_found_together() {
         CONFIG,
         &format!(
             "{PASSES}back_and_forth = true
-            backlash_urad = 60
-            squareness_urad = {{ XY = 40 }}
-            drift = [{{ along = 'z', drift_um = 30, time_constant = 0.2 }}]"
+            effect = [
+                {{ plugin = 'backlash', lost_motion_urad = 60 }},
+                {{ plugin = 'linear-axis-squareness', targets = ['XY'], angle_urad = 40 }},
+                {{ plugin = 'thermal-drift', targets = ['z'], drift_um = 30, time_constant = 0.2 }},
+            ]"
         ),
     );
     let all = ["backlash", "linear-axis-squareness XY", "thermal-drift z exponential"];
@@ -206,11 +226,11 @@ fn several_effects_are_found_together() {
 #[test]
 fn strangers_are_said_to_be_unexplained() {
     // A ball slips in the middle of its pass; one reading is bad.
-    let slip = diagnosed(THREE_BALLS, CONFIG, "stranger = [{ row = 50, rows = 1000, by_um = [25, -10, 5] }]");
+    let slip = diagnosed(THREE_BALLS, CONFIG, "effect = [{ plugin = 'slipped-ball', row = 50, by_um = [25, -10, 5] }]");
     println!("{:?} {:?}", slip.diagnosis.verdict, slip.diagnosis.added);
     assert_eq!(slip.diagnosis.verdict, Verdict::Unexplained, "{:?}", slip.diagnosis);
     assert!(slip.diagnosis.added.is_empty(), "{:?}", slip.diagnosis.added);
-    let bad = diagnosed(THREE_BALLS, CONFIG, "stranger = [{ row = 50, rows = 1, by_um = [40, 30, 0] }]");
+    let bad = diagnosed(THREE_BALLS, CONFIG, "effect = [{ plugin = 'bad-reading', row = 50, by_um = [40, 30, 0] }]");
     println!("{:?} {:?}", bad.diagnosis.verdict, bad.diagnosis.unexplained);
     assert!(bad.diagnosis.added.is_empty(), "{:?}", bad.diagnosis.added);
     assert!(
@@ -235,7 +255,7 @@ fn known_effects_are_taken_out() {
     let text = format!(
         "{THREE_BALLS}{COMPONENTS}{LOCATION}{PLACEMENT}noise_um = 1.0
         commands = {{ step_deg = 10, count = 36 }}
-        squareness_urad = {{ XZ = 100 }}"
+        effect = [{{ plugin = 'linear-axis-squareness', targets = ['XZ'], angle_urad = 100 }}]"
     );
     let points = scenario(&text).simulate().points();
     let separator = separator(&format!("{THREE_BALLS}{CONFIG}"));

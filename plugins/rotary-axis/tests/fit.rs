@@ -96,13 +96,27 @@ fn intervals_hold_the_truth_with_noise_from_repeats() {
 
 #[test]
 fn a_drift_does_not_inflate_the_noise_of_repeats() {
-    for drift in ["{ along = 'x', drift_um = 40 }", "{ along = 'z', drift_um = 30, time_constant = 0.3 }"] {
-        let text = campaign(&format!("noise_um = 1.5\npasses = 3\nball_by_ball = true\ndrift = [{drift}]"));
+    for drift in [
+        "{ plugin = 'thermal-drift', targets = ['x'], drift_um = 40 }",
+        "{ plugin = 'thermal-drift', targets = ['z'], drift_um = 30, time_constant = 0.3 }",
+    ] {
+        let text = campaign(&format!("noise_um = 1.5\npasses = 3\nball_by_ball = true\neffect = [{drift}]"));
         let found = separated(THREE_BALLS, &scenario(&text).simulate().points());
         let remark = found.remarks.iter().find(|remark| remark.contains("scatter of repeats")).unwrap();
         let std: f64 = remark.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!((std - 1.5).abs() < 0.2, "{remark}");
     }
+}
+
+#[test]
+fn repeats_in_opposite_directions_give_the_noise_without_lost_motion() {
+    let text = campaign(
+        "noise_um = 1.5\npasses = 2\nback_and_forth = true\neffect = [{ plugin = 'backlash', lost_motion_urad = 200 }]",
+    );
+    let found = separated(THREE_BALLS, &scenario(&text).simulate().points());
+    let remark = found.remarks.iter().find(|remark| remark.contains("scatter of repeats")).unwrap();
+    let std: f64 = remark.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((std - 1.5).abs() < 0.3, "{remark}");
 }
 
 #[test]
