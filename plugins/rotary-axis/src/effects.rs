@@ -1,0 +1,169 @@
+//! What a declared R-test may lack: errors of the linear axes that measure, drift, and lost motion of the rotary axis.
+//!
+//! With the nominal place (x, y, z) of the ball in the machine and the time t (0 at the first reading, 1 at the last), a
+//! deviation gains
+//!
+//! | effect | target | what it adds |
+//! | --- | --- | --- |
+//! | `linear-axis-scale` | X, Y, Z | s·x to dx, and so on |
+//! | `linear-axis-squareness` | XY, XZ, YZ | γ·y to dx, γ·z to dx, γ·z to dy |
+//! | `thermal-drift` | x, y, z, linear | D·t |
+//! | `thermal-drift` | x, y, z, exponential | D·(1 − e^(−t/T)) |
+//! | `backlash` | | ±B/2 of rotation, by the direction of approach |
+
+use nalgebra::Vector3;
+use runout_core::model::{Effect, Parameter};
+
+use crate::{axis::Axis, campaign::Campaign, kinematics::turn, solve::Column};
+
+/// An effect, wherever it acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    LinearAxisScale,
+    LinearAxisSquareness,
+    ThermalDrift,
+    Backlash,
+}
+
+/// Every effect.
+pub const KINDS: [Kind; 4] = [Kind::LinearAxisScale, Kind::LinearAxisSquareness, Kind::ThermalDrift, Kind::Backlash];
+
+/// Time constant at which a known drift without one counts, as a share of the campaign.
+pub const USUAL_TIME_CONSTANT: f64 = 0.3;
+/// Time constants that are looked for: shorter ones end within the first readings, longer ones are straight lines.
+pub const TIME_CONSTANTS: [f64; 2] = [0.02, 1.0];
+
+impl Kind {
+    /// Its id.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::LinearAxisScale => "linear-axis-scale",
+            Self::LinearAxisSquareness => "linear-axis-squareness",
+            Self::ThermalDrift => "thermal-drift",
+            Self::Backlash => "backlash",
+        }
+    }
+
+    /// What it does, in one line.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::LinearAxisScale => "a linear axis that measures has a scale error",
+            Self::LinearAxisSquareness => "two linear axes that measure are not square to each other",
+            Self::ThermalDrift => "readings drift along an axis in time: linearly or exponentially",
+            Self::Backlash => "a rotary axis loses motion where its direction reverses",
+        }
+    }
+
+    /// What it is described by.
+    pub fn parameters(self) -> Vec<Parameter> {
+        let of = |name: &str, unit: &str, tolerance| Parameter { name: name.into(), unit: unit.into(), tolerance };
+        match self {
+            Self::LinearAxisScale => vec![of("scale", "um/m", 50.0)],
+            Self::LinearAxisSquareness => vec![of("angle", "urad", 50.0)],
+            Self::ThermalDrift => vec![of("drift", "um", 10.0)],
+            Self::Backlash => vec![of("lost_motion", "urad", 50.0)],
+        }
+    }
+}
+
+/// An effect at its target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Candidate {
+    /// Of the machine's coordinate.
+    Scale(usize),
+    /// Adds to the first coordinate, in proportion to the second.
+    Squareness(usize, usize),
+    Linear(usize),
+    Exponential(usize),
+    Backlash,
+}
+
+/// Everything that is looked for.
+pub const CANDIDATES: [Candidate; 13] = [
+    Candidate::Scale(0),
+    Candidate::Scale(1),
+    Candidate::Scale(2),
+    Candidate::Squareness(0, 1),
+    Candidate::Squareness(0, 2),
+    Candidate::Squareness(1, 2),
+    Candidate::Linear(0),
+    Candidate::Linear(1),
+    Candidate::Linear(2),
+    Candidate::Exponential(0),
+    Candidate::Exponential(1),
+    Candidate::Exponential(2),
+    Candidate::Backlash,
+];
+
+impl Candidate {
+    fn kind(self) -> Kind {
+        match self {
+            Self::Scale(_) => Kind::LinearAxisScale,
+            Self::Squareness(..) => Kind::LinearAxisSquareness,
+            Self::Linear(_) | Self::Exponential(_) => Kind::ThermalDrift,
+            Self::Backlash => Kind::Backlash,
+        }
+    }
+
+    /// Its description.
+    pub fn effect(self) -> Effect {
+        let upper = ["X", "Y", "Z"];
+        let lower = ["x", "y", "z"];
+        let mut parameters = self.kind().parameters();
+        let targets = match self {
+            Self::Scale(coordinate) => vec![upper[coordinate].to_owned()],
+            Self::Squareness(one, other) => vec![format!("{}{}", upper[one], upper[other])],
+            Self::Linear(coordinate) => vec![lower[coordinate].to_owned(), "linear".to_owned()],
+            Self::Exponential(coordinate) => {
+                // Of the linear column beside: a change of the time constant, times the drift.
+                parameters.push(Parameter {
+                    name: "time_constant".into(),
+                    unit: "campaign".into(),
+                    tolerance: USUAL_TIME_CONSTANT,
+                });
+                vec![lower[coordinate].to_owned(), "exponential".to_owned()]
+            }
+            Self::Backlash => Vec::new(),
+        };
+        Effect { id: self.kind().id().into(), targets, parameters }
+    }
+
+    /// What one unit of each parameter adds to each reading, mm; of an exponential drift, D and D·ΔT at a time constant T.
+    pub fn columns(self, axis: Axis, campaign: &Campaign, time_constant: f64) -> Vec<Column> {
+        let each = |add: &dyn Fn(usize, [f64; 3]) -> [f64; 3]| -> Column {
+            let readings = campaign.readings.iter().enumerate();
+            readings
+                .map(|(row, reading)| {
+                    let nominal = turn(campaign.layout.phi[reading.command]) * campaign.layout.balls[reading.ball];
+                    axis.inward(add(row, axis.outward(&nominal)))
+                })
+                .collect()
+        };
+        let along = |coordinate: usize, value: f64| {
+            let mut machine = [0.0; 3];
+            machine[coordinate] = value;
+            machine
+        };
+        match self {
+            Self::Scale(coordinate) => vec![each(&|_, at| along(coordinate, 1e-6 * at[coordinate]))],
+            Self::Squareness(one, other) => vec![each(&|_, at| along(one, 1e-6 * at[other]))],
+            Self::Linear(coordinate) => vec![each(&|row, _| along(coordinate, 1e-3 * campaign.time[row]))],
+            Self::Exponential(coordinate) => {
+                let settled = |row: usize| (-campaign.time[row] / time_constant).exp();
+                let slope = |row: usize| -settled(row) * campaign.time[row] / (time_constant * time_constant);
+                vec![
+                    each(&|row, _| along(coordinate, 1e-3 * (1.0 - settled(row)))),
+                    each(&|row, _| along(coordinate, 1e-3 * slope(row))),
+                ]
+            }
+            Self::Backlash => {
+                let about = Vector3::z();
+                let column = campaign.readings.iter().zip(&campaign.direction).map(|(reading, direction)| {
+                    let nominal = turn(campaign.layout.phi[reading.command]) * campaign.layout.balls[reading.ball];
+                    about.cross(&nominal) * (0.5e-6 * direction)
+                });
+                vec![column.collect()]
+            }
+        }
+    }
+}

@@ -1,0 +1,546 @@
+//! The separator `rotary-axis`.
+
+use nalgebra::Vector3;
+use runout_core::{
+    Error, Result,
+    points::{PointColumn, Points},
+    stage::{
+        NamedValue, Outcome, PointModel, PointSeparator,
+        points::{residual_table, value},
+    },
+    table::{ColumnSpec, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
+};
+
+use crate::{
+    axis::Axis,
+    campaign::{Campaign, FEWEST_COMMANDS, columns, steps},
+    config::RotaryAxisConfig,
+    kinematics::Errors,
+    noise::Noise,
+    solve::{Column, Estimate, Fit, Layout, Reading, fit},
+};
+
+/// Location and component errors of a rotary axis: all balls, commands and repeats in one weighted least-squares fit.
+#[derive(Debug, Clone)]
+pub struct RotaryAxis(pub(crate) RotaryAxisConfig);
+
+/// Commands are left out in at most so many fits.
+const MOST_LEFT_OUT: usize = 40;
+/// A command left out is predicted where its neighbours are at most this many median steps apart.
+const WIDEST_STEPS: f64 = 3.5;
+/// Few degrees of freedom of the noise.
+const FEW_DEGREES: usize = 30;
+/// Commands of the full turn by which `check` finds what the balls observe.
+const CHECKED_COMMANDS: usize = 12;
+
+/// Range of each coordinate of one ball's deviations, mm.
+#[derive(Debug, Clone, Copy)]
+struct Ranges([[f64; 2]; 3]);
+
+impl Ranges {
+    fn none() -> Self {
+        Self([[f64::INFINITY, f64::NEG_INFINITY]; 3])
+    }
+
+    fn take(&mut self, machine: [f64; 3]) {
+        for (range, value) in self.0.iter_mut().zip(machine) {
+            *range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+
+    /// µm; NaN where there is none.
+    fn um(&self, coordinate: usize) -> f64 {
+        let [low, high] = self.0[coordinate];
+        if high >= low { 1e3 * (high - low) } else { f64::NAN }
+    }
+}
+
+impl PointSeparator for RotaryAxis {
+    fn columns(&self) -> Vec<PointColumn> {
+        columns(self.0.axis)
+    }
+
+    fn tables(&self) -> Vec<TableSpec> {
+        vec![component_table(self.0.axis), compensation_table(self.0.axis), residual_table("um")]
+    }
+
+    fn separate(&self, points: &Points) -> Result<Outcome> {
+        let campaign = Campaign::of(&self.0, points)?;
+        self.conclude(points, &campaign, &[], &[], &[])
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![
+            "the zero error of the sensor nest enters the two offsets of the axis one to one: not observable".to_owned(),
+            "component errors have mean 0 over the distinct commands and no part that turns with the table (1/rev): those are \
+             location of the axis and placement of the balls"
+                .to_owned(),
+        ];
+        if !self.0.component_errors {
+            notes.push("component errors are declared absent".to_owned());
+        }
+        notes.extend(self.observed());
+        notes
+    }
+
+    fn model(&self) -> Option<&dyn PointModel> {
+        Some(self)
+    }
+}
+
+impl RotaryAxis {
+    /// What the configured balls observe over a full turn.
+    fn observed(&self) -> Vec<String> {
+        let layout = Layout {
+            balls: (0..self.0.balls.len()).map(|ball| self.0.ball(ball)).collect(),
+            phi: (0..CHECKED_COMMANDS).map(|command| (30.0 * command as f64).to_radians()).collect(),
+            component_errors: self.0.component_errors,
+        };
+        let readings: Vec<Reading> = (0..layout.balls.len())
+            .flat_map(|ball| {
+                (0..CHECKED_COMMANDS).map(move |command| Reading { ball, command, value: Vector3::zeros(), std: 1.0 })
+            })
+            .collect();
+        let Ok(found) = fit(&layout, &readings, &[]) else { return Vec::new() };
+        let location = self.0.axis.location_symbols();
+        let mut names: Vec<String> = location.into_iter().collect();
+        let mut lost: Vec<bool> = found.location().iter().map(|one| one.value.is_nan()).collect();
+        if self.0.component_errors {
+            names.extend(self.0.axis.component_symbols());
+            let mut of_components = [false; 6];
+            for command in 0..CHECKED_COMMANDS {
+                let found = machine_order(self.0.axis, found.component(command));
+                of_components.iter_mut().zip(found).for_each(|(lost, one)| *lost |= one.value.is_nan());
+            }
+            lost.extend(of_components);
+        }
+        let list = |wanted: bool| -> Vec<&str> {
+            names.iter().zip(&lost).filter(|(_, lost)| **lost == wanted).map(|(name, _)| name.as_str()).collect()
+        };
+        let mut said = vec![match (list(false), list(true)) {
+            (observed, lost) if lost.is_empty() => {
+                format!("observable with all balls at all commands of a full turn: {}", observed.join(", "))
+            }
+            (observed, lost) if observed.is_empty() => {
+                let help = if layout.balls.len() == 1 {
+                    "one ball: declare `component_errors = false`, or measure three balls off one line"
+                } else {
+                    "measure three balls off one line"
+                };
+                format!("not observable with these balls: {} ({help})", lost.join(", "))
+            }
+            (observed, lost) => format!(
+                "observable with all balls at all commands of a full turn: {}; not observable: {} (the rotation about the \
+                 balls' line; measure three balls off one line)",
+                observed.join(", "),
+                lost.join(", ")
+            ),
+        }];
+        let heights = layout.balls.iter().map(|ball| ball.z);
+        let spread = heights.clone().fold(f64::NEG_INFINITY, f64::max) - heights.fold(f64::INFINITY, f64::min);
+        if layout.balls.len() > 2 && spread < 1e-3 * layout.balls.iter().map(Vector3::norm).fold(0.0, f64::max) {
+            said.push(
+                "the balls are at one height along the axis: squareness of the linear axis along it to the others is not \
+                 observable"
+                    .to_owned(),
+            );
+        }
+        said
+    }
+
+    /// The outcome of a fit with effects, whose values are fitted beside; `before` is the residual without them. Where the data
+    /// do not decide between effects, `alternatives` are the others: how far results with them differ is added to the
+    /// uncertainty.
+    pub(crate) fn conclude(
+        &self,
+        points: &Points,
+        campaign: &Campaign,
+        effects: &[Column],
+        before: &[Vector3<f64>],
+        alternatives: &[Vec<Column>],
+    ) -> Result<Outcome> {
+        let failure = |problem: String| Error::new("fit", points.input.display().to_string(), problem);
+        let found = fit(&campaign.layout, &campaign.readings, effects).map_err(failure)?;
+        let axis = self.0.axis;
+        let others: Vec<Fit> =
+            alternatives.iter().filter_map(|effects| fit(&campaign.layout, &campaign.readings, effects).ok()).collect();
+        let scale = scale(&found, campaign.noise);
+        let widened = |of: &dyn Fn(&Fit) -> Estimate| {
+            let one = of(&found);
+            let farthest = others.iter().map(|other| (of(other).value - one.value).abs()).fold(0.0, f64::max);
+            Estimate { value: one.value, std: (scale.factor * one.std).hypot(farthest) }
+        };
+
+        let mut values = location_values(axis, [0, 1, 2, 3].map(|index| widened(&|fit| fit.location()[index])));
+        let left_out = left_out(campaign, effects, &found);
+        values.extend(self.ranges(campaign, &left_out));
+        let mut remarks = campaign.warnings.clone();
+        remarks.extend(self.lost(&found, campaign));
+        remarks.extend(noise_remark(campaign.noise));
+        remarks.extend(scale.remark.clone());
+        if left_out.iter().any(Option::is_none) {
+            remarks.push(
+                "commands beside a gap are not predicted when they are left out: the ranges after compensation lack them"
+                    .into(),
+            );
+        }
+        let sized = |of: &dyn Fn(&Fit) -> Estimate, unit: f64| {
+            let one = widened(of);
+            [unit * one.value, unit * one.std].map(|number| number.is_finite().then_some(number))
+        };
+        let tables = vec![
+            self.component_rows(campaign, &sized)?,
+            self.compensation_rows(campaign, &left_out, &sized)?,
+            residual_rows(axis, campaign, if before.is_empty() { &found.residual } else { before }, &found.residual)?,
+        ];
+        let [first, second] = ["offsets", "tilts"];
+        let convention = format!(
+            "deviations are actual less nominal places of the balls in machine coordinates; the axis turns right-handed about \
+             +{}; {first} of the axis in the machine frame at the origin, {second} by the right hand; compensation is to be \
+             added to the commands of the linear axes",
+            ['X', 'Y', 'Z'][axis.order()[2]]
+        );
+        Ok(Outcome { convention, tables, values, form: None, remarks })
+    }
+
+    fn lost(&self, found: &Fit, campaign: &Campaign) -> Option<String> {
+        let symbols = self.0.axis.location_symbols();
+        let lost: Vec<&str> = symbols
+            .iter()
+            .zip(found.location())
+            .filter(|(_, one)| one.value.is_nan())
+            .map(|(symbol, _)| symbol.as_str())
+            .collect();
+        let components = self.0.axis.component_symbols();
+        let mut counts = [0; 6];
+        if campaign.layout.component_errors {
+            for command in 0..campaign.commands_deg.len() {
+                let at = machine_order(self.0.axis, found.component(command));
+                counts.iter_mut().zip(at).for_each(|(count, one)| *count += usize::from(one.value.is_nan()));
+            }
+        }
+        let all = campaign.commands_deg.len();
+        let of_components = components.iter().zip(counts).filter(|(_, count)| *count > 0).map(|(symbol, count)| {
+            if count == all { symbol.clone() } else { format!("{symbol} at {count} of {all} commands") }
+        });
+        let said: Vec<String> = lost.into_iter().map(str::to_owned).chain(of_components).collect();
+        let help = match campaign.balls.len() {
+            1 => {
+                "one ball does not separate location errors from component errors; `component_errors = false` declares \
+                  these absent"
+            }
+            2 => "two balls do not show the rotation about their line",
+            _ => "the balls, or the commands at which all were measured, do not determine them",
+        };
+        (!said.is_empty()).then(|| format!("not observable: {} ({help})", said.join(", ")))
+    }
+
+    /// Range of each ball's coordinates as measured, and after compensation on commands that the fit has not seen.
+    fn ranges(&self, campaign: &Campaign, left_out: &[Option<Vector3<f64>>]) -> Vec<NamedValue> {
+        let balls = campaign.balls.len();
+        let mut before = vec![Ranges::none(); balls];
+        let mut after = vec![Ranges::none(); balls];
+        for (reading, left) in campaign.readings.iter().zip(left_out) {
+            before[reading.ball].take(self.0.axis.outward(&reading.value));
+            if let Some(left) = left {
+                after[reading.ball].take(self.0.axis.outward(left));
+            }
+        }
+        let what = [
+            ("before", before, "peak to valley of the ball's deviation as measured, its placement included"),
+            (
+                "after",
+                after,
+                "peak to valley of the ball's deviation less compensation and placement, at commands left out of the fit",
+            ),
+        ];
+        let mut values = Vec::new();
+        for (ball, id) in campaign.balls.iter().enumerate() {
+            for (when, ranges, about) in &what {
+                for (coordinate, name) in ["dx", "dy", "dz"].into_iter().enumerate() {
+                    let number = ranges[ball].um(coordinate);
+                    values.push(value(&format!("{name}_range_{when}"), number, f64::NAN, "um", about).of(id));
+                }
+            }
+        }
+        values
+    }
+
+    fn component_rows(&self, campaign: &Campaign, sized: &Sized<'_>) -> Result<TableRows> {
+        let spec = component_table(self.0.axis);
+        let mut cells: Vec<Vec<Option<f64>>> = vec![Vec::new(); 12];
+        for command in 0..campaign.commands_deg.len() {
+            for index in 0..6 {
+                let one = |fit: &Fit| machine_order(self.0.axis, fit.component(command))[index];
+                let [number, std] = sized(&one, if index < 3 { 1e3 } else { 1e6 });
+                cells[index].push(number);
+                cells[6 + index].push(std);
+            }
+        }
+        let mut arrays = vec![numbers(campaign.commands_deg.iter().copied())];
+        arrays.extend(cells.into_iter().map(numbers_or_null));
+        if !campaign.layout.component_errors {
+            arrays = spec.columns.iter().map(|_| numbers_or_null([])).collect();
+        }
+        Ok(TableRows { rows: spec.rows(arrays)?, table: spec.name })
+    }
+
+    fn compensation_rows(
+        &self,
+        campaign: &Campaign,
+        left_out: &[Option<Vector3<f64>>],
+        sized: &Sized<'_>,
+    ) -> Result<TableRows> {
+        let axis = self.0.axis;
+        let spec = compensation_table(axis);
+        let commands = campaign.commands_deg.len();
+        let mut of_ball = vec![vec![(Vector3::zeros(), 0_usize); commands]; campaign.balls.len()];
+        for (reading, left) in campaign.readings.iter().zip(left_out) {
+            if let Some(left) = left {
+                let cell = &mut of_ball[reading.ball][reading.command];
+                *cell = (cell.0 + left, cell.1 + 1);
+            }
+        }
+        let balls = campaign.balls.iter().zip(&campaign.layout.balls).enumerate();
+        let balls = balls.map(|(ball, (id, place))| (id.as_str(), *place, Some(ball)));
+        let tool = self.0.tool_points.iter().map(|point| (point.id.as_str(), axis.inward(point.place()), None));
+        let (mut command_deg, mut ids) = (Vec::new(), Vec::new());
+        let mut cells: Vec<Vec<Option<f64>>> = vec![Vec::new(); 9];
+        for (id, place, ball) in balls.chain(tool) {
+            for command in 0..commands {
+                command_deg.push(campaign.commands_deg[command]);
+                ids.push(id);
+                let mean = ball.map(|ball| of_ball[ball][command]).filter(|(_, count)| *count > 0);
+                for (coordinate, machine) in axis.order().into_iter().enumerate() {
+                    let [number, std] = sized(&|fit| fit.deviation(command, &place)[coordinate], 1.0);
+                    cells[machine].push(number);
+                    cells[3 + machine].push(std);
+                    cells[6 + machine].push(mean.map(|(sum, count)| 1e3 * sum[coordinate] / count as f64));
+                }
+            }
+        }
+        let mut arrays = vec![numbers(command_deg), texts(ids)];
+        arrays.extend(cells.into_iter().map(numbers_or_null));
+        Ok(TableRows { rows: spec.rows(arrays)?, table: spec.name })
+    }
+}
+
+/// The four location errors as values, offsets before tilts, in the order of their symbols.
+pub(crate) fn location_values(axis: Axis, found: [Estimate; 4]) -> Vec<NamedValue> {
+    let mut values: Vec<NamedValue> = axis
+        .location_symbols()
+        .into_iter()
+        .zip(found)
+        .enumerate()
+        .map(|(index, (symbol, one))| {
+            let (scale, unit, about) = if index < 2 {
+                (1e3, "um", "location error: offset of the axis' average line (ISO 230-1)")
+            } else {
+                (1e6, "urad", "location error: tilt of the axis' average line (ISO 230-1)")
+            };
+            value(&symbol, scale * one.value, scale * one.std, unit, about)
+        })
+        .collect();
+    values.sort_by(|a, b| (&b.unit == "um", &a.symbol).cmp(&(&a.unit == "um", &b.symbol)));
+    values
+}
+
+/// A number of a fit in a unit, with its standard uncertainty; nothing where it is not observable.
+type Sized<'a> = dyn Fn(&dyn Fn(&Fit) -> Estimate, f64) -> [Option<f64>; 2] + 'a;
+
+/// Component errors of an axis along z in the machine's order.
+pub(crate) fn machine_order(axis: Axis, along_z: [Estimate; 6]) -> [Estimate; 6] {
+    let mut machine = along_z;
+    for (place, coordinate) in axis.order().into_iter().enumerate() {
+        machine[coordinate] = along_z[place];
+        machine[3 + coordinate] = along_z[3 + place];
+    }
+    machine
+}
+
+pub(crate) fn component_table(axis: Axis) -> TableSpec {
+    let symbols = axis.component_symbols();
+    let units = ["um", "um", "um", "urad", "urad", "urad"];
+    let name = |index: usize| format!("{}_{}", symbols[index].to_lowercase(), units[index]);
+    let mut columns = vec![ColumnSpec::number(axis.command(), "deg", "command of the axis").repeating()];
+    columns.extend((0..6).map(|index| {
+        let about = format!("component error {} (ISO 230-1)", symbols[index]);
+        ColumnSpec::number(name(index), units[index], about).or_null()
+    }));
+    columns.extend((0..6).map(|index| {
+        let about = format!("standard uncertainty of {}", name(index));
+        ColumnSpec::number(format!("std_{}", name(index)), units[index], about).or_null()
+    }));
+    let about = "component errors at each distinct command: mean 0 over these, and no part that turns with the table (1/rev); \
+                 null where not observable";
+    TableSpec::new("component_errors", about, columns)
+}
+
+fn compensation_table(axis: Axis) -> TableSpec {
+    let mut columns = vec![
+        ColumnSpec::number(axis.command(), "deg", "command of the axis").repeating(),
+        ColumnSpec::name("point", "the ball, or the point of `tool_points`"),
+    ];
+    for name in ["dx_mm", "dy_mm", "dz_mm"] {
+        let about = "what location and component errors do to the point: add it to the command of the linear axis";
+        columns.push(ColumnSpec::number(name, "mm", about).or_null());
+    }
+    for name in ["dx_mm", "dy_mm", "dz_mm"] {
+        let about = format!("standard uncertainty of {name}");
+        columns.push(ColumnSpec::number(format!("std_{name}"), "mm", about).or_null());
+    }
+    for name in ["dx", "dy", "dz"] {
+        let about = "mean deviation that remains, the ball's placement taken out, where the fit has not seen this command and \
+                     its component errors are interpolated";
+        columns.push(ColumnSpec::number(format!("remains_{name}_um"), "um", about).or_null());
+    }
+    TableSpec::new("compensation", "compensation of the balls and of tool points at each distinct command", columns)
+}
+
+fn residual_rows(
+    axis: Axis,
+    campaign: &Campaign,
+    before: &[Vector3<f64>],
+    after: &[Vector3<f64>],
+) -> Result<TableRows> {
+    let spec = residual_table("um");
+    let machine = |values: Vec<&Vector3<f64>>| -> Vec<f64> {
+        values.into_iter().flat_map(|value| axis.outward(value).map(|entry| 1e3 * entry)).collect()
+    };
+    let readings = machine(campaign.readings.iter().map(|reading| &reading.value).collect());
+    let groups = campaign.readings.iter().flat_map(|reading| {
+        let at = format!(
+            "{}, {} = {}°",
+            campaign.balls[reading.ball],
+            axis.letter(),
+            campaign.commands_deg[reading.command]
+        );
+        ["x", "y", "z"].map(|coordinate| format!("{at}, {coordinate}"))
+    });
+    let groups: Vec<String> = groups.collect();
+    let rows = spec.rows(vec![
+        counts(0..readings.len()),
+        texts(groups),
+        numbers(readings),
+        numbers(machine(before.iter().collect())),
+        numbers(machine(after.iter().collect())),
+    ])?;
+    Ok(TableRows { table: spec.name, rows })
+}
+
+/// What is left of each reading (mm) by a fit that has not seen its command, with component errors interpolated linearly between
+/// the commands beside it; nothing beside a gap.
+fn left_out(campaign: &Campaign, effects: &[Column], whole: &Fit) -> Vec<Option<Vector3<f64>>> {
+    let Campaign { layout, readings, commands_deg, .. } = campaign;
+    let commands = commands_deg.len();
+    let mut left = vec![None; readings.len()];
+    if commands <= FEWEST_COMMANDS {
+        return left;
+    }
+    let values: Vec<f64> =
+        whole.effects().iter().map(|one| if one.value.is_finite() { one.value } else { 0.0 }).collect();
+    // Effects keep the values of the whole: a fit without a command would hardly change them.
+    let corrected = |row: usize| {
+        effects.iter().zip(&values).fold(readings[row].value, |sum, (column, value)| sum - column[row] * *value)
+    };
+    let mut widths = steps(commands_deg);
+    widths.sort_by(f64::total_cmp);
+    let widest = WIDEST_STEPS * widths[widths.len() / 2];
+    let folds = commands.min(MOST_LEFT_OUT);
+    for fold in 0..folds {
+        let kept: Vec<usize> = (0..commands).filter(|command| command % folds != fold).collect();
+        let place = |command: usize| kept.iter().position(|own| *own == command);
+        let seen: Vec<Reading> = (0..readings.len())
+            .filter_map(|row| {
+                let command = place(readings[row].command)?;
+                Some(Reading { command, value: corrected(row), ..readings[row] })
+            })
+            .collect();
+        let reduced = Layout { phi: kept.iter().map(|command| layout.phi[*command]).collect(), ..layout.clone() };
+        let Ok(found) = fit(&reduced, &seen, &[]) else { continue };
+        for row in 0..readings.len() {
+            let reading = &readings[row];
+            if reading.command % folds != fold {
+                continue;
+            }
+            let errors = if layout.component_errors {
+                between(&kept, commands_deg, reading.command, widest, &found)
+            } else {
+                Some(found.errors(0))
+            };
+            if let Some(errors) = errors {
+                let expected = found.expected(&errors, layout.phi[reading.command], reading.ball);
+                left[row] = Some(corrected(row) - expected);
+            }
+        }
+    }
+    left
+}
+
+/// Errors at a command that a fit has not seen, from its neighbours around the turn.
+fn between(kept: &[usize], commands_deg: &[f64], command: usize, widest: f64, found: &Fit) -> Option<Errors> {
+    let ahead = |from: f64, to: f64| (to - from).rem_euclid(360.0);
+    let at = commands_deg[command];
+    let by = |distance: &dyn Fn(f64) -> f64| {
+        let all = kept.iter().enumerate().map(|(place, own)| (place, distance(commands_deg[*own])));
+        all.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let (before, back) = by(&|own| ahead(own, at))?;
+    let (after, forth) = by(&|own| ahead(at, own))?;
+    if back + forth > widest {
+        return None;
+    }
+    let share = back / (back + forth);
+    let [one, other] = [before, after].map(|place| found.errors(place));
+    let mean = |a: Vector3<f64>, b: Vector3<f64>| a * (1.0 - share) + b * share;
+    Some(Errors { shift: mean(one.shift, other.shift), angle: mean(one.angle, other.angle), ..one })
+}
+
+/// By how much standard uncertainties are larger than the noise makes them.
+pub(crate) struct Scale {
+    pub factor: f64,
+    pub remark: Option<String>,
+}
+
+/// Where the noise is not known, the residual gives it; where more is left than the noise explains, uncertainties grow with it.
+pub(crate) fn scale(found: &Fit, noise: Noise) -> Scale {
+    let left = found.chi2_per_dof();
+    if noise == Noise::Unknown {
+        let remark = if found.dof == 0 {
+            "neither `std_um` nor repeats give the noise, and no degrees of freedom are left: there are no standard \
+             uncertainties"
+                .to_owned()
+        } else {
+            format!(
+                "neither `std_um` nor repeats give the noise: standard uncertainties are from what the fit leaves, {:.2} µm \
+                 with {} degrees of freedom",
+                left.sqrt(),
+                found.dof
+            )
+        };
+        return Scale { factor: left.sqrt(), remark: Some(remark) };
+    }
+    let chance = 1.0 + 3.0 * (2.0 / found.dof.max(1) as f64).sqrt();
+    if left > chance {
+        let remark = format!(
+            "the fit leaves more than the noise: χ² per degree of freedom is {left:.2}, where chance makes up to {chance:.2}. \
+             The standard uncertainties are {:.2} times as large as the noise makes them; `diagnose` looks for the cause",
+            left.sqrt()
+        );
+        return Scale { factor: left.sqrt(), remark: Some(remark) };
+    }
+    Scale { factor: 1.0, remark: None }
+}
+
+fn noise_remark(noise: Noise) -> Option<String> {
+    match noise {
+        Noise::Repeats { std_um, dof } => {
+            let few = if dof < FEW_DEGREES { ": few" } else { "" };
+            Some(format!(
+                "the standard uncertainty of one coordinate of a row is the scatter of repeats after a common smooth drift: \
+                 {std_um:.2} µm with {dof} degrees of freedom{few}"
+            ))
+        }
+        _ => None,
+    }
+}
