@@ -3,9 +3,9 @@
 use runout_core::{
     Error, Result,
     model::{
-        Effect, Setting,
+        Effect, Fit, Setting,
         closed_loop::{self, Closed, Settings},
-        diagnosis::{Diagnosis, Moved, Unexplained},
+        diagnosis::{Diagnosis, Moved, Unexplained, Verdict},
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
@@ -24,6 +24,8 @@ use crate::{
 const MOST_ORDERS: usize = 5;
 /// Share of a column outside the span of those before it, below which it is none of its own.
 const INDEPENDENT: f64 = 1e-7;
+/// Standard deviations of χ² per degree of freedom that are more than chance.
+const CHANCE: f64 = 4.0;
 /// Sectors of the ring in which what is left is summed.
 const SECTORS: usize = 36;
 
@@ -139,6 +141,9 @@ impl TouchProbe {
         let (_, declared) = self.conclude(prepared, missing, &Content::declared(), &readings)?;
         let (_, mut after) = self.conclude(prepared, missing, &content(missing, &diagnosis), &readings)?;
         diagnosis.moved = moved(&declared, &after);
+        if let Noise::Repeats(dof) = prepared.weights.noise {
+            more_than_repeats(&mut diagnosis, &fit, dof);
+        }
         let [before, left] = [&before, &fit].map(|fit| in_order(terms, prepared, fit));
         if !diagnosis.unexplained.is_empty() {
             let place = self.place(prepared, &left);
@@ -190,6 +195,16 @@ impl TouchProbe {
             format!("{of_setup:.0} % of the squares in setup {id} ({touches_of_setup:.0} % of the touches), {sector}");
         let is_one = touches.setups.len() > 1 && of_setup > 1.5 * touches_of_setup;
         (is_one.then_some(setup), whole_setup)
+    }
+}
+
+/// Repeats tell the noise well: more than chance makes of it is unexplained, also below the limit for noise that is only stated.
+fn more_than_repeats(diagnosis: &mut Diagnosis, fit: &LinearFit, noise_dof: usize) {
+    let left = fit.remainder();
+    let std = (2.0 / left.dof.max(1) as f64 + 2.0 / noise_dof.max(1) as f64).sqrt();
+    if left.chi2_per_dof() > 1.0 + CHANCE * std && diagnosis.verdict != Verdict::Unexplained {
+        diagnosis.verdict = Verdict::Unexplained;
+        diagnosis.unexplained.extend(fit.unexplained());
     }
 }
 

@@ -180,7 +180,11 @@ impl TouchProbe {
             return Ok(());
         }
         let highest = self.0.max_order;
-        let problem = format!("{count} touches do not determine orders up to {highest} and the centring of each setup");
+        let mut problem =
+            format!("{count} touches do not determine orders up to {highest} and the centring of each setup");
+        for remark in &prepared.touches.remarks {
+            problem = format!("{problem}; {remark}");
+        }
         let help = format!(
             "a setup needs at least {} directions all around for orders up to {highest}; `max_order` lowers it",
             2 * highest + 1
