@@ -14,6 +14,7 @@ use crate::{
     config::{TouchProbeConfig, listed},
     design::{Fitted, Noise, Parameter, Part, Weights, form_order, lobing_order, wave},
     held_out::Ranges,
+    separate::lost_orders,
     touches::Touches,
 };
 
@@ -443,7 +444,13 @@ impl Found<'_> {
     fn remarks(&self, lobes: &[Lobe]) -> Vec<String> {
         let mut remarks = self.touches.remarks.clone();
         let [lobing, form] = self.lost(lobes);
-        remarks.push(format!("lost orders of lobing: {}; of the form of the ring: {}", listed(&lobing), listed(&form)));
+        // What the declared setups lose is a note of the separator; touches may lose more.
+        let all: Vec<usize> = (0..self.config.setups.len()).collect();
+        let declared = self.config.lost(&all);
+        let declared_lobing: &[usize] = if self.config.ring_form_um.is_some() { &[] } else { &declared };
+        if lobing[1..] != *declared_lobing || form[1..] != declared[..] {
+            remarks.push(lost_orders(&listed(&lobing), &listed(&form)));
+        }
         let bounded: Vec<usize> = lobes.iter().filter(|lobe| lobe.bounded).map(|lobe| lobe.order).collect();
         if let (Some(bound), false) = (self.config.ring_form_um, bounded.is_empty()) {
             remarks.push(format!(

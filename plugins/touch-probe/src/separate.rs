@@ -21,6 +21,11 @@ use crate::{
     touches::Touches,
 };
 
+/// Lost orders, in words.
+pub(crate) fn lost_orders(lobing: &str, form: &str) -> String {
+    format!("lost orders of lobing: {lobing}; of the form of the ring: {form}")
+}
+
 /// Passes of moving the centre: the second order of 1 mm of eccentricity in 25 mm leaves less than 1 nm after three.
 const RECENTRED: usize = 3;
 
@@ -89,8 +94,9 @@ impl PointSeparator for TouchProbe {
         let config = &self.0;
         let all: Vec<usize> = (0..config.setups.len()).collect();
         let lost = config.lost(&all);
-        let both = |first: usize| listed(&(first..=1).chain(lost.iter().copied()).collect::<Vec<_>>());
-        let mut notes = vec![format!("lost orders of lobing: {}; of the form of the ring: {}", both(1), both(1))];
+        let with_first = |orders: &[usize]| listed(&[&[1], orders].concat());
+        let lost_lobing: &[usize] = if config.ring_form_um.is_some() { &[] } else { &lost };
+        let mut notes = vec![lost_orders(&with_first(lost_lobing), &with_first(&lost))];
         notes.push("order 1 of lobing is centring of the ring: it is lost with any setups".into());
         notes.push("the error of `ring_radius_mm` goes into the mean pre-travel one to one".into());
         match (config.ring_form_um, lost.is_empty()) {
