@@ -22,6 +22,8 @@ use crate::{
 
 /// Orders above those declared that may be added: more of them describe something local, which they do not explain.
 const MOST_ORDERS: usize = 5;
+/// Most effects of all kinds.
+const MOST_ADDED: usize = 9;
 /// Share of a column outside the span of those before it, below which it is none of its own.
 const INDEPENDENT: f64 = 1e-7;
 /// Standard deviations of χ² per degree of freedom that are more than chance.
@@ -39,6 +41,7 @@ impl PointModel for TouchProbe {
         let missing = self.missing();
         let terms = self.terms(points, &prepared, &missing)?;
         let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
+        let settings = &Settings { max_added: settings.max_added.min(MOST_ADDED), ..settings.clone() };
         let mut closed = closed_loop::diagnose(&terms, settings)?;
         let orders: Vec<usize> = orders(&missing).collect();
         let added = |closed: &Closed<LinearFit>| {
