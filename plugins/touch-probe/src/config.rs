@@ -1,16 +1,8 @@
 //! `[separate] plugin = "touch-probe"`, and what its setups can separate.
 
-use runout_core::{
-    pipeline::{
-        error::{Fault, within},
-        registry::{Context, StageConfig},
-    },
-    stage::Separator,
-};
+use runout_core::pipeline::error::{Fault, within};
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-use crate::separate::TouchProbe;
 
 /// `[separate] plugin = "touch-probe"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -55,23 +47,12 @@ const HIGHEST_ORDER: usize = 60;
 /// |1 − e^{inΔ}| is below this. Setting angles are not known better, and noise would be amplified 70 times.
 const INSEPARABLE: f64 = 0.02;
 
-impl StageConfig for TouchProbeConfig {
-    type Stage = Separator;
-
-    const NAME: &'static str = "touch-probe";
-    const ABOUT: &'static str = "pre-travel and lobing of a touch-trigger probe, from touches of a ring";
-
-    fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        Ok(Separator::Points(Box::new(self.separator()?)))
-    }
-}
-
 impl TouchProbeConfig {
     /// Checks the values.
     ///
     /// # Errors
     /// The first that cannot be, with its key.
-    pub fn separator(self) -> std::result::Result<TouchProbe, Fault> {
+    pub(crate) fn checked(&self) -> Result<(), Fault> {
         let positive = |key: &str, what: &str, unit: &str, value: f64| {
             if value.is_finite() && value > 0.0 {
                 return Ok(());
@@ -112,7 +93,7 @@ impl TouchProbeConfig {
             let help = "or measure again with the ring, or the probe in the spindle, turned by 100°";
             return Err(Fault::at("ring_form_um", problem).help(help));
         }
-        Ok(TouchProbe(self))
+        Ok(())
     }
 
     /// Whether setups (indices) separate lobing of an order from form of the ring.
@@ -158,4 +139,9 @@ pub(crate) fn listed(orders: &[usize]) -> String {
         _ => format!("{from}-{to}"),
     };
     if runs.is_empty() { "none".into() } else { runs.iter().map(one).collect::<Vec<_>>().join(", ") }
+}
+
+/// Lost orders, in words.
+pub(crate) fn lost_orders(lobing: &str, form: &str) -> String {
+    format!("lost orders of lobing: {lobing}; of the form of the ring: {form}")
 }

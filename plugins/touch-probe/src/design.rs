@@ -9,14 +9,8 @@ use crate::{
     effects::Missing,
     solve::{Solved, solve},
     touches::{Touch, Touches},
+    waves::{Part, angles, wave},
 };
-
-/// Cosine or sine of an order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    Cosine,
-    Sine,
-}
 
 /// A parameter of the model.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,19 +50,6 @@ impl Content {
 pub(crate) struct Design {
     pub parameters: Vec<Parameter>,
     pub columns: Vec<Vec<f64>>,
-}
-
-/// Angles of a touch: as seen from the probe and from the ring.
-pub(crate) fn angles(config: &TouchProbeConfig, touch: &Touch) -> [f64; 2] {
-    let setup = &config.setups[touch.setup];
-    [touch.angle - setup.probe_deg.to_radians(), touch.angle - setup.ring_deg.to_radians()]
-}
-
-pub(crate) fn wave(order: usize, part: Part, angle: f64) -> f64 {
-    match part {
-        Part::Cosine => (order as f64 * angle).cos(),
-        Part::Sine => (order as f64 * angle).sin(),
-    }
 }
 
 impl Design {

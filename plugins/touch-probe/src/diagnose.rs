@@ -14,10 +14,11 @@ use runout_core::{
 
 use crate::{
     config::TouchProbeConfig,
-    design::{Content, Design, Noise, Parameter, Part, angles},
+    design::{Content, Design, Noise, Parameter},
     effects::{Missing, highest},
     outcome::residual_rows,
     separate::{Prepared, TouchProbe},
+    waves::{Part, angles},
 };
 
 /// Orders above those declared that may be added: more of them describe something local, which they do not explain.
@@ -208,6 +209,10 @@ fn more_than_repeats(diagnosis: &mut Diagnosis, fit: &LinearFit, noise_dof: usiz
     if left.chi2_per_dof() > 1.0 + CHANCE * std && diagnosis.verdict != Verdict::Unexplained {
         diagnosis.verdict = Verdict::Unexplained;
         diagnosis.unexplained.extend(fit.unexplained());
+    }
+    // Passes that are far worse than the others make the scatter of repeats: it is then no noise.
+    if !diagnosis.unexplained.is_empty() {
+        diagnosis.verdict = Verdict::Unexplained;
     }
 }
 

@@ -4,8 +4,8 @@ use runout_core::model::{Effect, Parameter};
 
 use crate::{
     config::TouchProbeConfig,
-    design::{Part, angles, wave},
     touches::{Touch, Touches},
+    waves::{Part, angles, wave},
 };
 
 /// Orders above `max_order` that are looked for, at least and at most.

@@ -4,7 +4,7 @@ use crate::{
     config::TouchProbeConfig,
     design::{Content, Design, Fitted, Weights, form_order, lobing_order},
     effects::Missing,
-    outcome::Lobe,
+    lobe::Lobe,
     solve::solve,
     touches::Touches,
 };

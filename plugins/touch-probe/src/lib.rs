@@ -10,12 +10,14 @@ mod design;
 mod diagnose;
 mod effects;
 mod held_out;
+mod lobe;
 mod noise;
 mod outcome;
 mod separate;
 pub mod simulate;
 mod solve;
 mod touches;
+mod waves;
 
 use runout_core::pipeline::registry::{Plugin, Registry};
 

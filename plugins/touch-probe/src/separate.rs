@@ -2,17 +2,21 @@
 
 use runout_core::{
     Error, Result,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
     points::{
         PointColumn,
         PointKind::{Label, Number},
         Points,
     },
-    stage::{Outcome, PointModel, PointSeparator},
+    stage::{Outcome, PointModel, PointSeparator, Separator},
     table::TableSpec,
 };
 
 use crate::{
-    config::{TouchProbeConfig, listed},
+    config::{SetupConfig, TouchProbeConfig, listed, lost_orders},
     design::{Content, Design, Fitted, Parameter, Weights, lobing_order},
     effects::{Missing, missing},
     held_out::ranges,
@@ -21,17 +25,34 @@ use crate::{
     touches::Touches,
 };
 
-/// Lost orders, in words.
-pub(crate) fn lost_orders(lobing: &str, form: &str) -> String {
-    format!("lost orders of lobing: {lobing}; of the form of the ring: {form}")
-}
-
 /// Passes of moving the centre: the second order of 1 mm of eccentricity in 25 mm leaves less than 1 nm after three.
 const RECENTRED: usize = 3;
 
 /// One weighted least-squares fit over all touches.
 #[derive(Debug, Clone)]
 pub struct TouchProbe(pub(crate) TouchProbeConfig);
+
+impl StageConfig for TouchProbeConfig {
+    type Stage = Separator;
+
+    const NAME: &'static str = "touch-probe";
+    const ABOUT: &'static str = "pre-travel and lobing of a touch-trigger probe, from touches of a ring";
+
+    fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        Ok(Separator::Points(Box::new(self.separator()?)))
+    }
+}
+
+impl TouchProbeConfig {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// The first that cannot be, with its key.
+    pub fn separator(self) -> std::result::Result<TouchProbe, Fault> {
+        self.checked()?;
+        Ok(TouchProbe(self))
+    }
+}
 
 const COLUMNS: [PointColumn; 8] = [
     PointColumn::needed("setup", Label, "", "id of the setup"),
@@ -120,7 +141,7 @@ impl PointSeparator for TouchProbe {
             ),
             _ => {}
         }
-        let still = |of: fn(&crate::SetupConfig) -> f64| {
+        let still = |of: fn(&SetupConfig) -> f64| {
             config.setups.iter().all(|setup| (of(setup) - of(&config.setups[0])).abs() < 0.1)
         };
         let machine = "errors of the axes (scale, squareness, reversal)";
