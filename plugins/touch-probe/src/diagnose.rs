@@ -1,0 +1,302 @@
+//! The touch probe as a model for the closed loop.
+
+use runout_core::{
+    Error, Result,
+    model::{
+        Effect, Fit, Setting,
+        closed_loop::{self, Closed, Settings},
+        diagnosis::{Diagnosis, Moved, Unexplained, Verdict},
+        linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
+    },
+    points::Points,
+    stage::{NamedValue, Outcome, PointDiagnosis, PointModel},
+};
+
+use crate::{
+    config::TouchProbeConfig,
+    design::{Content, Design, Noise, Parameter},
+    effects::{Missing, highest},
+    outcome::residual_rows,
+    separate::{Prepared, TouchProbe},
+    waves::{Part, angles},
+};
+
+/// Orders above those declared that may be added: more of them describe something local, which they do not explain.
+const MOST_ORDERS: usize = 5;
+/// Most effects of all kinds.
+const MOST_ADDED: usize = 9;
+/// Share of a column outside the span of those before it, below which it is none of its own.
+const INDEPENDENT: f64 = 1e-7;
+/// Standard deviations of χ² per degree of freedom that are more than chance.
+const CHANCE: f64 = 4.0;
+/// Sectors of the ring in which what is left is summed.
+const SECTORS: usize = 36;
+
+impl PointModel for TouchProbe {
+    fn effects(&self) -> Vec<Effect> {
+        self.missing().into_iter().map(Missing::effect).collect()
+    }
+
+    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
+        let prepared = self.prepare(points)?;
+        let missing = self.missing();
+        let terms = self.terms(points, &prepared, &missing)?;
+        let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
+        let settings = &Settings { max_added: settings.max_added.min(MOST_ADDED), ..settings.clone() };
+        let mut closed = closed_loop::diagnose(&terms, settings)?;
+        let orders: Vec<usize> = orders(&missing).collect();
+        let added = |closed: &Closed<LinearFit>| {
+            closed.settings.iter().filter(|setting| orders.contains(&setting.effect)).count()
+        };
+        if added(&closed) > MOST_ORDERS {
+            let mut left_out = settings.left_out.clone();
+            left_out.extend(orders.iter().copied());
+            let settings = Settings { left_out, ..settings.clone() };
+            closed = closed_loop::diagnose(&terms, &settings)?;
+            closed.diagnosis.warnings.push(format!(
+                "more than {MOST_ORDERS} orders above `max_order` would describe what is left: it is local, and no order of lobing \
+                 or form"
+            ));
+        }
+        self.concluded(&prepared, &missing, &terms, closed, settings)
+    }
+}
+
+fn orders(missing: &[Missing]) -> impl Iterator<Item = usize> + '_ {
+    let is_order = |one: &Missing| matches!(one, Missing::LobingOrder(_) | Missing::RingFormOrder(_));
+    missing.iter().enumerate().filter(move |(_, one)| is_order(one)).map(|(index, _)| index)
+}
+
+impl TouchProbe {
+    /// The terms of the loop: of weight 1 each, in µm.
+    fn terms(&self, points: &Points, prepared: &Prepared, missing: &[Missing]) -> Result<LinearTerms> {
+        let Prepared { touches, weights } = prepared;
+        let scale = if weights.noise == Noise::Residual { 1.0 } else { weights.rms_um() };
+        let weigh = |column: Vec<f64>| -> Vec<f64> {
+            column.into_iter().zip(&weights.std_um).map(|(value, std)| value * scale / std).collect()
+        };
+        let design = Design::new(&self.0, touches, missing, &Content::declared());
+        let columns = design.columns.iter().cloned().map(weigh).collect();
+        let declared = design.parameters.iter().zip(independent(columns)).filter_map(|(parameter, column)| {
+            Some(Declared { name: name(&self.0, parameter), unit: "um".into(), column: column? })
+        });
+        let terms = missing.iter().map(|one| Term {
+            effect: one.effect(),
+            columns: one.columns(&self.0, touches).into_iter().map(weigh).collect(),
+            rank: 0,
+        });
+        let (group, groups) = self.groups(prepared);
+        let observations = Observations {
+            values: weigh(prepared.readings_um()),
+            unit: "um".into(),
+            std: (weights.noise != Noise::Residual).then_some(scale),
+            group,
+            groups,
+        };
+        let object = points.input.display().to_string();
+        let model = LinearTerms::new(observations, declared.collect(), terms.collect())
+            .map_err(|error| Error::new("fit the probe to", object, error))?;
+        let last = highest(self.0.max_order);
+        let limit = format!("`separate.max_order` is {}", self.0.max_order);
+        Ok(model
+            .ending_at(format!("lobing-order-{last}"), limit.clone())
+            .ending_at(format!("ring-form-order-{last}"), limit)
+            .told_apart_by("more setups, with the ring and the probe each turned by an angle of its own"))
+    }
+
+    /// What is held out together: a pass, or every fifth touch of a setup where there is one pass only.
+    fn groups(&self, prepared: &Prepared) -> (Vec<usize>, Vec<String>) {
+        let touches = &prepared.touches;
+        let repeated = touches.repeats.len() > 1;
+        let mut names: Vec<String> = Vec::new();
+        let mut counts = vec![0_usize; self.0.setups.len()];
+        let group = touches.all.iter().map(|touch| {
+            let setup = &self.0.setups[touch.setup].id;
+            let number = counts[touch.setup];
+            counts[touch.setup] += 1;
+            let name = if repeated {
+                format!("setup {setup}, repeat {}", touch.repeat)
+            } else {
+                format!("setup {setup}, touches {} of each 5", number % 5 + 1)
+            };
+            names.iter().position(|known| *known == name).unwrap_or_else(|| {
+                names.push(name);
+                names.len() - 1
+            })
+        });
+        (group.collect(), names)
+    }
+
+    fn concluded(
+        &self,
+        prepared: &Prepared,
+        missing: &[Missing],
+        terms: &LinearTerms,
+        closed: Closed<LinearFit>,
+        settings: &Settings,
+    ) -> Result<PointDiagnosis> {
+        let Closed { mut diagnosis, before, after: fit, .. } = closed;
+        let mut readings = prepared.readings_um();
+        for Setting { effect, values } in &settings.known {
+            for (column, value) in missing[*effect].columns(&self.0, &prepared.touches).iter().zip(values) {
+                readings.iter_mut().zip(column).for_each(|(reading, entry)| *reading -= value * entry);
+            }
+        }
+        let (_, declared) = self.conclude(prepared, missing, &Content::declared(), &readings)?;
+        let (_, mut after) = self.conclude(prepared, missing, &content(missing, &diagnosis), &readings)?;
+        diagnosis.moved = moved(&declared, &after);
+        if let Noise::Repeats(dof) = prepared.weights.noise {
+            more_than_repeats(&mut diagnosis, &fit, dof);
+        }
+        let [before, left] = [&before, &fit].map(|fit| in_order(terms, prepared, fit));
+        if !diagnosis.unexplained.is_empty() {
+            let place = self.place(prepared, &left);
+            for unexplained in &mut diagnosis.unexplained {
+                self.name_place(unexplained, &place);
+            }
+        }
+        after.tables.push(residual_rows(&self.0, &prepared.touches, &before, &left)?);
+        diagnosis.warnings.append(&mut after.remarks);
+        Ok(PointDiagnosis { diagnosis, after })
+    }
+
+    fn name_place(&self, unexplained: &mut Unexplained, (setup, text): &(Option<usize>, String)) {
+        unexplained.setup = setup.map(|setup| self.0.setups[setup].id.clone());
+        unexplained.place = format!("{}; {text}", unexplained.place);
+    }
+
+    /// Where most is left: a setup, or a sector of the ring.
+    fn place(&self, prepared: &Prepared, left_um: &[f64]) -> (Option<usize>, String) {
+        let touches = &prepared.touches;
+        let mut of_setup = vec![[0.0, 0.0]; self.0.setups.len()];
+        let mut of_sector = vec![[0.0, 0.0]; SECTORS];
+        for ((touch, left), std) in touches.all.iter().zip(left_um).zip(&prepared.weights.std_um) {
+            let ring = angles(&self.0, touch)[1].to_degrees().rem_euclid(360.0);
+            let sector = ((ring * SECTORS as f64 / 360.0) as usize).min(SECTORS - 1);
+            let square = (left / std).powi(2);
+            for sum in [&mut of_setup[touch.setup], &mut of_sector[sector]] {
+                sum[0] += square;
+                sum[1] += 1.0;
+            }
+        }
+        let whole: f64 = of_setup.iter().map(|[squares, _]| squares).sum();
+        let worst = |sums: &[[f64; 2]]| -> (usize, f64, f64) {
+            let mean = |[squares, count]: &[f64; 2]| if *count > 0.0 { squares / count } else { 0.0 };
+            let index = (0..sums.len()).max_by(|a, b| mean(&sums[*a]).total_cmp(&mean(&sums[*b]))).unwrap_or(0);
+            let [squares, count] = sums[index];
+            (index, 100.0 * squares / whole, 100.0 * count / touches.all.len() as f64)
+        };
+        let (setup, of_setup, touches_of_setup) = worst(&of_setup);
+        let (sector, of_sector, touches_of_sector) = worst(&of_sector);
+        let width = 360 / SECTORS;
+        let sector = format!(
+            "{of_sector:.0} % of the squares at {}° to {}° of the ring ({touches_of_sector:.0} % of the touches)",
+            sector * width,
+            (sector + 1) * width
+        );
+        let id = &self.0.setups[setup].id;
+        let whole_setup =
+            format!("{of_setup:.0} % of the squares in setup {id} ({touches_of_setup:.0} % of the touches), {sector}");
+        let is_one = touches.setups.len() > 1 && of_setup > 1.5 * touches_of_setup;
+        (is_one.then_some(setup), whole_setup)
+    }
+}
+
+/// Repeats tell the noise well: more than chance makes of it is unexplained, also below the limit for noise that is only stated.
+fn more_than_repeats(diagnosis: &mut Diagnosis, fit: &LinearFit, noise_dof: usize) {
+    let left = fit.remainder();
+    let std = (2.0 / left.dof.max(1) as f64 + 2.0 / noise_dof.max(1) as f64).sqrt();
+    if left.chi2_per_dof() > 1.0 + CHANCE * std && diagnosis.verdict != Verdict::Unexplained {
+        diagnosis.verdict = Verdict::Unexplained;
+        diagnosis.unexplained.extend(fit.unexplained());
+    }
+    // Passes that are far worse than the others make the scatter of repeats: it is then no noise.
+    if !diagnosis.unexplained.is_empty() {
+        diagnosis.verdict = Verdict::Unexplained;
+    }
+}
+
+/// The columns that are not in the span of those before them.
+fn independent(columns: Vec<Vec<f64>>) -> Vec<Option<Vec<f64>>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let kept = columns.into_iter().map(|column| {
+        let whole = dot(&column, &column).sqrt();
+        let mut left = column.clone();
+        for _ in 0..2 {
+            for known in &basis {
+                let share = dot(known, &left);
+                left.iter_mut().zip(known).for_each(|(entry, known)| *entry -= share * known);
+            }
+        }
+        let size = dot(&left, &left).sqrt();
+        (size > INDEPENDENT * whole).then(|| {
+            basis.push(left.iter().map(|entry| entry / size).collect());
+            column
+        })
+    });
+    kept.collect()
+}
+
+fn name(config: &TouchProbeConfig, parameter: &Parameter) -> String {
+    let part = |part: &Part| if *part == Part::Cosine { "cosine" } else { "sine" };
+    match parameter {
+        Parameter::Mean => "mean pre-travel".into(),
+        Parameter::Centre { setup, axis } => format!("centre {} of {}", ["x", "y"][*axis], config.setups[*setup].id),
+        Parameter::Lobing { order, part: of, shared: false } => format!("lobing {order} {}", part(of)),
+        Parameter::Lobing { order, part: of, shared: true } => format!("lobing and ring form {order} {}", part(of)),
+        Parameter::Form { order, part: of } => format!("ring form {order} {}", part(of)),
+        Parameter::Effect { effect } => format!("effect {effect}"),
+    }
+}
+
+/// What the final fit holds: effects that were added, of a confounded set all members, so that what depends on the choice has a
+/// large uncertainty or is lost.
+fn content(missing: &[Missing], diagnosis: &Diagnosis) -> Content {
+    let mut content = Content::declared();
+    for (index, one) in missing.iter().enumerate() {
+        let effect = one.effect();
+        let name = effect.name();
+        let found = diagnosis.added.iter().find(|added| {
+            (added.effect == effect.id && added.targets == effect.targets) || added.confounded_with.contains(&name)
+        });
+        let Some(found) = found else { continue };
+        match one {
+            Missing::LobingOrder(order) if found.confounded_with.is_empty() => content.more_lobing.push(*order),
+            Missing::RingFormOrder(order) if found.confounded_with.is_empty() => content.more_form.push(*order),
+            _ => content.effects.push(index),
+        }
+    }
+    content
+}
+
+/// The residual of the loop's fit, touch by touch in µm.
+fn in_order(terms: &LinearTerms, prepared: &Prepared, fit: &LinearFit) -> Vec<f64> {
+    let scale = terms.observations().std.unwrap_or(1.0);
+    let mut left = vec![f64::NAN; prepared.touches.all.len()];
+    for (value, place) in fit.residual().into_iter().zip(terms.places()) {
+        left[*place] = value * prepared.weights.std_um[*place] / scale;
+    }
+    left
+}
+
+/// Values that both results have.
+fn moved(before: &Outcome, after: &Outcome) -> Vec<Moved> {
+    let number = |values: &[NamedValue], like: &NamedValue| {
+        values.iter().find(|one| one.symbol == like.symbol && one.of == like.of).and_then(|one| one.value)
+    };
+    let of = |value: &NamedValue| {
+        Some(Moved {
+            value: value.symbol.clone(),
+            section: value.of.clone(),
+            before: number(&before.values, value)?,
+            after: value.value?,
+            std: value.std,
+            unit: value.unit.clone(),
+            reference: None,
+            filter: None,
+            lost_orders: Vec::new(),
+        })
+    };
+    after.values.iter().filter_map(of).collect()
+}

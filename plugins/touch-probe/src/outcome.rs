@@ -1,0 +1,388 @@
+//! From a fit to lobes, tables and values.
+
+use std::f64::consts::TAU;
+
+use runout_core::{
+    Complex64, Result,
+    separation::{Quantity, Residual, SectionAt, Separation},
+    stage::{Form, NamedValue, Outcome, points::value},
+    table::{ColumnSpec, TableRows, TableSpec, counts, flags, numbers, texts},
+};
+
+use crate::{
+    config::{TouchProbeConfig, listed, lost_orders},
+    design::{Fitted, Noise, Parameter, Weights, form_order},
+    held_out::Ranges,
+    lobe::{Lobe, pretravel_um},
+    touches::Touches,
+    waves::{Part, wave},
+};
+
+/// Directions of the tables `pretravel` and `compensation`: every 6°.
+const DIRECTIONS: usize = 60;
+
+/// The tables of the result.
+pub(crate) fn tables() -> Vec<TableSpec> {
+    let um = |name: &str, about: &str| ColumnSpec::number(name, "um", about);
+    let mm = |name: &str, about: &str| ColumnSpec::number(name, "mm", about);
+    let deg = |name: &str, about: &str| ColumnSpec::number(name, "deg", about);
+    vec![
+        TableSpec::new(
+            "pretravel",
+            "pre-travel by direction, without mean and order 1, of the observable orders of lobing",
+            vec![
+                deg("direction_deg", "direction of the touch in the probe's frame").repeating(),
+                um(
+                    "pretravel_um",
+                    "travel after contact until the probe triggers, less its mean and order 1; outward positive",
+                ),
+                um("std_pretravel_um", "its standard uncertainty"),
+            ],
+        ),
+        TableSpec::new(
+            "compensation",
+            "what to add to a place that was read, by direction: mean and the orders of lobing with evidence",
+            vec![
+                deg(
+                    "direction_deg",
+                    "direction of the touch in the probe's frame, outward; the machine's at probe angle 0",
+                )
+                .repeating(),
+                mm("dx_mm", "to add to x, in the probe's frame"),
+                mm("dy_mm", "to add to y, in the probe's frame"),
+            ],
+        ),
+        TableSpec::new(
+            "lobing",
+            "orders of lobing and of ring form: A cos(n angle + phase); NaN where an order is lost",
+            vec![
+                ColumnSpec::count("order", "", "undulations per revolution"),
+                ColumnSpec::flag("lobing_lost", "whether lobing of this order is not observable"),
+                ColumnSpec::flag("form_lost", "whether form of the ring of this order is not observable"),
+                ColumnSpec::flag("bounded", "whether lobing holds the form of the ring, within its declared bound"),
+                ColumnSpec::flag("evident", "whether lobing of this order is in the compensation"),
+                um("amplitude_um", "amplitude of lobing"),
+                um("std_amplitude_um", "its standard uncertainty"),
+                deg("phase_deg", "phase of lobing, in the probe's frame"),
+                deg("std_phase_deg", "its standard uncertainty"),
+                um("form_amplitude_um", "amplitude of the form of the ring"),
+                um("std_form_amplitude_um", "its standard uncertainty"),
+            ],
+        ),
+        TableSpec::new(
+            "residual",
+            "residual of each touch",
+            vec![
+                ColumnSpec::count("reading", "", "number of the touch, from 0"),
+                ColumnSpec::name("setup", "id of the setup"),
+                ColumnSpec::count("repeat", "", "number of the repeat"),
+                deg("direction_deg", "direction of the touch in the machine, from the centre of the ring"),
+                um("value", "reading less ring radius and centring"),
+                um("before", "value less the declared model"),
+                um("after", "value less the final model; that of a run is the declared one"),
+            ],
+        ),
+    ]
+}
+
+fn rows(name: &str, columns: Vec<runout_core::table::ArrayRef>) -> Result<TableRows> {
+    let spec = tables().into_iter().find(|spec| spec.name == name);
+    let spec = spec.unwrap_or_else(|| TableSpec::new(name, "", Vec::new()));
+    Ok(TableRows { rows: spec.rows(columns)?, table: spec.name })
+}
+
+/// Rows of the table `residual`.
+pub(crate) fn residual_rows(
+    config: &TouchProbeConfig,
+    touches: &Touches,
+    before: &[f64],
+    after: &[f64],
+) -> Result<TableRows> {
+    let all = || touches.all.iter();
+    let columns = vec![
+        counts(0..touches.all.len()),
+        texts(all().map(|touch| &config.setups[touch.setup].id)),
+        counts(all().map(|touch| touch.repeat)),
+        numbers(all().map(|touch| touch.angle.to_degrees().rem_euclid(360.0))),
+        numbers(all().map(|touch| touch.reading_um)),
+        numbers(before.iter().copied()),
+        numbers(after.iter().copied()),
+    ];
+    rows("residual", columns)
+}
+
+/// What a result is made of.
+pub(crate) struct Found<'a> {
+    pub config: &'a TouchProbeConfig,
+    pub touches: &'a Touches,
+    pub fit: &'a Fitted,
+    pub weights: &'a Weights,
+    pub ranges: Ranges,
+}
+
+impl Found<'_> {
+    /// Orders that are lost: of lobing (order 1 always), and of form.
+    pub fn lost(&self, lobes: &[Lobe]) -> [Vec<usize>; 2] {
+        let lobing = lobes.iter().filter(|lobe| !lobe.observable).map(|lobe| lobe.order);
+        let form = (2..=self.config.max_order).filter(|order| self.form_places(*order).is_none());
+        [std::iter::once(1).chain(lobing).collect(), std::iter::once(1).chain(form).collect()]
+    }
+
+    fn form_places(&self, order: usize) -> Option<[usize; 2]> {
+        self.fit.design.pair(form_order, order).filter(|places| self.fit.is_told(places))
+    }
+
+    /// Tables, values, form and remarks; without the table `residual`.
+    pub fn outcome(&self) -> Result<Outcome> {
+        let lobes = Lobe::all(self.config, self.fit);
+        let mut tables = vec![self.pretravel(&lobes)?, self.compensation(&lobes)?, self.lobing(&lobes)?];
+        tables.retain(|table| table.rows.num_rows() > 0);
+        Ok(Outcome {
+            convention: "pre-travel moves the place that is read outward (positive); angles are right-handed about the axis of the \
+                         ring, directions from its centre"
+                .into(),
+            tables,
+            values: self.values(&lobes),
+            form: self.form(&lobes),
+            remarks: self.remarks(&lobes),
+        })
+    }
+
+    fn pretravel(&self, lobes: &[Lobe]) -> Result<TableRows> {
+        let angles: Vec<f64> = (0..DIRECTIONS).map(|index| TAU * index as f64 / DIRECTIONS as f64).collect();
+        let each: Vec<[f64; 2]> =
+            angles.iter().map(|angle| pretravel_um(self.fit, lobes, *angle, self.config.ring_form_um)).collect();
+        let columns = vec![
+            numbers(angles.iter().map(|angle| angle.to_degrees())),
+            numbers(each.iter().map(|[number, _]| *number)),
+            numbers(each.iter().map(|[_, std]| *std)),
+        ];
+        rows("pretravel", columns)
+    }
+
+    fn compensation(&self, lobes: &[Lobe]) -> Result<TableRows> {
+        let angles: Vec<f64> = (0..DIRECTIONS).map(|index| TAU * index as f64 / DIRECTIONS as f64).collect();
+        let known = lobes.iter().any(|lobe| lobe.observable) && self.mean().is_some();
+        let radial = |angle: f64| {
+            if !known {
+                return f64::NAN;
+            }
+            let lobing = lobes.iter().filter(|lobe| lobe.evident).map(|lobe| {
+                let [a, b] = lobe.parts_um;
+                a * wave(lobe.order, Part::Cosine, angle) + b * wave(lobe.order, Part::Sine, angle)
+            });
+            self.mean().map_or(f64::NAN, |[mean, _]| mean) + lobing.sum::<f64>()
+        };
+        let columns = vec![
+            numbers(angles.iter().map(|angle| angle.to_degrees())),
+            numbers(angles.iter().map(|angle| -1e-3 * radial(*angle) * angle.cos())),
+            numbers(angles.iter().map(|angle| -1e-3 * radial(*angle) * angle.sin())),
+        ];
+        rows("compensation", columns)
+    }
+
+    fn lobing(&self, lobes: &[Lobe]) -> Result<TableRows> {
+        let or_nan = |lobe: &Lobe, number: f64| if lobe.observable { number } else { f64::NAN };
+        let forms: Vec<[f64; 2]> = lobes.iter().map(|lobe| self.form_amplitude(lobe.order)).collect();
+        let columns = vec![
+            counts(lobes.iter().map(|lobe| lobe.order)),
+            flags(lobes.iter().map(|lobe| !lobe.observable)),
+            flags(lobes.iter().map(|lobe| self.form_places(lobe.order).is_none())),
+            flags(lobes.iter().map(|lobe| lobe.bounded)),
+            flags(lobes.iter().map(|lobe| lobe.evident)),
+            numbers(lobes.iter().map(|lobe| or_nan(lobe, lobe.amplitude_um()))),
+            numbers(lobes.iter().map(|lobe| or_nan(lobe, lobe.std_um()[0]))),
+            numbers(lobes.iter().map(|lobe| or_nan(lobe, lobe.phase_deg()))),
+            numbers(
+                lobes.iter().map(|lobe| or_nan(lobe, (lobe.std_um()[1] / lobe.amplitude_um()).to_degrees().min(180.0))),
+            ),
+            numbers(forms.iter().map(|[number, _]| *number)),
+            numbers(forms.iter().map(|[_, std]| *std)),
+        ];
+        rows("lobing", columns)
+    }
+
+    fn form_amplitude(&self, order: usize) -> [f64; 2] {
+        let Some(places) = self.form_places(order) else { return [f64::NAN; 2] };
+        let [a, b] = places.map(|place| self.fit.solved.coefficients[place]);
+        let amplitude = a.hypot(b);
+        let [[aa, ab], [_, bb]] = places.map(|row| places.map(|column| self.fit.covariance(row, column)));
+        [amplitude, (a * a * aa + 2.0 * a * b * ab + b * b * bb).max(0.0).sqrt() / amplitude]
+    }
+
+    fn mean(&self) -> Option<[f64; 2]> {
+        let place = self.fit.design.place(&Parameter::Mean).filter(|place| self.fit.is_told(&[*place]))?;
+        Some([self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()])
+    }
+
+    fn values(&self, lobes: &[Lobe]) -> Vec<NamedValue> {
+        let [mean, std] = self.mean().unwrap_or([f64::NAN; 2]);
+        let about =
+            "mean pre-travel and stylus: reading less ring radius; holds the error of the ring's radius one to one";
+        let mut values = vec![value("pretravel_mean", mean, std, "um", about)];
+        let Ranges { before, after, without_form, by_repeats, .. } = self.ranges;
+        let held = if by_repeats { "a repeat" } else { "touches" };
+        let of_ranges = [
+            ("range_before", before, "radius of one pass about its least-squares circle, as read".to_owned()),
+            ("range_after", after, format!("the same, compensated for lobing; {held} left out of the fit")),
+            (
+                "range_after_without_form",
+                without_form,
+                format!("the same, compensated, and the form of the ring taken out; {held} left out of the fit"),
+            ),
+        ];
+        for (symbol, range, about) in of_ranges {
+            values.push(value(symbol, range.um, range.std_um, "um", &format!("range, mean over passes: {about}")));
+        }
+        for lobe in lobes {
+            let of = |number: f64| if lobe.observable { number } else { f64::NAN };
+            let [along, across] = lobe.std_um();
+            let order = lobe.order;
+            let about = format!("amplitude of lobing of order {order}");
+            values.push(value(&format!("lobe_{order}_amplitude"), of(lobe.amplitude_um()), of(along), "um", &about));
+            let about = format!(
+                "phase of lobing of order {order}: A cos({order} direction + phase), probe's frame; null without \
+                                 evidence of the order"
+            );
+            let evident = |number: f64| if lobe.evident { of(number) } else { f64::NAN };
+            let std = (across / lobe.amplitude_um()).to_degrees();
+            values.push(value(&format!("lobe_{order}_phase"), evident(lobe.phase_deg()), evident(std), "deg", &about));
+        }
+        for setup in &self.touches.setups {
+            for (axis, symbol) in ["centre_x", "centre_y"].into_iter().enumerate() {
+                let parameter = Parameter::Centre { setup: *setup, axis };
+                let place = self.fit.design.place(&parameter).filter(|place| self.fit.is_told(&[*place]));
+                let [number, std] = place.map_or([f64::NAN; 2], |place| {
+                    let moved = self.touches.centre_um[*setup][axis];
+                    [moved + self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()]
+                });
+                let about = "centre of the ring, from the nominal one; holds lobing of order 1";
+                values.push(value(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
+            }
+        }
+        let about = match self.weights.noise {
+            Noise::Stated => "standard uncertainty of a touch, as stated (rms)".to_owned(),
+            Noise::Repeats(dof) => format!("standard deviation of a touch, from repeats ({dof} degrees of freedom)"),
+            Noise::Residual => "standard deviation of a touch, from what the fit leaves".to_owned(),
+        };
+        let noise = self.weights.rms_um();
+        let (noise, std) = match self.weights.noise {
+            Noise::Stated => (noise, f64::NAN),
+            Noise::Repeats(dof) => (noise, noise / (2.0 * dof as f64).sqrt()),
+            Noise::Residual => {
+                let noise = self.fit.variance.sqrt();
+                (noise, noise / (2.0 * self.fit.solved.dof as f64).sqrt())
+            }
+        };
+        values.push(value("touch_std", noise, std, "um", &about));
+        values
+    }
+
+    /// The ring as a section, where any order of its form may be observable.
+    fn form(&self, lobes: &[Lobe]) -> Option<Form> {
+        let all: Vec<usize> = (0..self.config.setups.len()).collect();
+        (2..=self.config.max_order).any(|order| self.config.separates(&all, order)).then_some(())?;
+        let highest = lobes.iter().map(|lobe| lobe.order).max().unwrap_or(0).max(self.config.max_order);
+        let lost = Complex64::new(f64::NAN, f64::NAN);
+        let (mut estimate, mut variance) = (vec![lost; highest + 1], vec![f64::NAN; highest + 1]);
+        let mut observable = vec![false; highest + 1];
+        // Level and centring are not form.
+        for order in 0..2 {
+            (estimate[order], variance[order], observable[order]) = (Complex64::ZERO, 0.0, true);
+        }
+        for order in 2..=highest {
+            let Some(places) = self.form_places(order) else {
+                // Above the declared orders form is taken as 0 unless it was found.
+                if order > self.config.max_order {
+                    (estimate[order], variance[order], observable[order]) = (Complex64::ZERO, 0.0, true);
+                }
+                continue;
+            };
+            // a cos nα + b sin nα = Re (a − ib) e^{inα}.
+            let [a, b] = places.map(|place| self.fit.solved.coefficients[place]);
+            estimate[order] = Complex64::new(a, -b);
+            variance[order] = places.iter().map(|place| self.fit.covariance(*place, *place)).sum();
+            observable[order] = true;
+        }
+        let left = &self.fit.residual_um;
+        let rms_um = (left.iter().map(|value| value * value).sum::<f64>() / left.len().max(1) as f64).sqrt();
+        let share = (self.fit.solved.dof as f64 / left.len().max(1) as f64).sqrt();
+        let expected = if self.weights.noise == Noise::Residual { f64::NAN } else { self.weights.rms_um() * share };
+        let separation = Separation {
+            sections: vec![SectionAt::whole("ring", 0.0)],
+            unknowns: vec![Quantity::Form(0)],
+            estimate,
+            variance,
+            motion_covariance: None,
+            form_covariance: None,
+            freedom: match self.weights.noise {
+                Noise::Stated => 0,
+                Noise::Repeats(dof) => dof,
+                Noise::Residual => self.fit.solved.dof,
+            },
+            equivalents: Vec::new(),
+            observable,
+            motion_z_mm: 0.0,
+            residual: Residual {
+                rms_um,
+                expected_rms_um: expected,
+                chi2_per_dof: self.fit.chi2_per_dof,
+                dof: self.fit.solved.dof,
+                orders: None,
+            },
+            warnings: Vec::new(),
+        };
+        Some(Form { sections: vec![separation], radius_mm: self.config.ring_radius_mm })
+    }
+
+    fn remarks(&self, lobes: &[Lobe]) -> Vec<String> {
+        let mut remarks = self.touches.remarks.clone();
+        let [lobing, form] = self.lost(lobes);
+        // What the declared setups lose is a note of the separator; touches may lose more.
+        let all: Vec<usize> = (0..self.config.setups.len()).collect();
+        let declared = self.config.lost(&all);
+        let declared_lobing: &[usize] = if self.config.ring_form_um.is_some() { &[] } else { &declared };
+        if lobing[1..] != *declared_lobing || form[1..] != declared[..] {
+            remarks.push(lost_orders(&listed(&lobing), &listed(&form)));
+        }
+        let bounded: Vec<usize> = lobes.iter().filter(|lobe| lobe.bounded).map(|lobe| lobe.order).collect();
+        if let (Some(bound), false) = (self.config.ring_form_um, bounded.is_empty()) {
+            remarks.push(format!(
+                "lobing of orders {} is what is read, with the form of the ring: its uncertainty includes the bound of {bound} µm",
+                listed(&bounded)
+            ));
+        }
+        let evident: Vec<usize> = lobes.iter().filter(|lobe| lobe.evident).map(|lobe| lobe.order).collect();
+        remarks.push(format!("orders of lobing with evidence, which the compensation has: {}", listed(&evident)));
+        let silent: Vec<&str> = (0..self.config.setups.len())
+            .filter(|setup| !self.touches.setups.contains(setup))
+            .map(|setup| self.config.setups[setup].id.as_str())
+            .collect();
+        if !silent.is_empty() {
+            remarks.push(format!("setups without touches: {}", silent.join(", ")));
+        }
+        if self.fit.solved.dof == 0 {
+            remarks.push("as many parameters as touches: nothing is left for a residual".into());
+        }
+        let dof = self.fit.solved.dof.max(1) as f64;
+        if self.fit.chi2_per_dof > 1.0 + 4.0 * (2.0 / dof).sqrt() {
+            remarks.push(format!(
+                "the residual is {:.1} times the noise (χ² per degree of freedom {:.2}): uncertainties are widened by as much, and \
+                 `diagnose` looks for the cause",
+                self.fit.chi2_per_dof.sqrt(),
+                self.fit.chi2_per_dof
+            ));
+        }
+        let centres = self.touches.setups.iter().map(|setup| {
+            let [x, y] = self.touches.centre_um[*setup];
+            x.hypot(y)
+        });
+        let far = centres.fold(0.0, f64::max);
+        if far > 0.01 * 1e3 * self.config.ring_radius_mm {
+            remarks.push(format!(
+                "the ring was up to {far:.0} µm off the nominal centre: touches were not normal to its wall"
+            ));
+        }
+        remarks
+    }
+}

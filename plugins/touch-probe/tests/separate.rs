@@ -1,0 +1,80 @@
+//! Simulated campaigns: recovered within the stated uncertainty, and what the setups lose.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+mod support;
+
+use runout_core::stage::PointSeparator;
+use support::{column, config, lobing, scenario, setups, table, value};
+
+/// Pre-travel, lobes, mean and ranges over many campaigns: three quarters of them with uneven directions.
+#[test]
+fn intervals_hold_the_truth_as_often_as_they_say() {
+    let mut inside = [0_usize; 3];
+    let mut all = [0_usize; 3];
+    for seed in 0..200 {
+        let mut scenario = scenario(seed, &setups(&[(0.0, 0.0), (100.0, 0.0), (217.0, 0.0)]));
+        scenario.repeats = 2;
+        scenario.directions = 40;
+        scenario.gap_deg = (seed % 4 > 0).then_some([100.0, 100.0 + 4.0 * (seed % 5) as f64]);
+        let outcome = config(&scenario, 12, None).separate(&scenario.touched().points()).unwrap();
+        let truth = lobing(&scenario);
+        let table = table(&outcome, "pretravel");
+        let [directions, found, std] =
+            ["direction_deg", "pretravel_um", "std_pretravel_um"].map(|name| column(&table, name));
+        for ((direction, found), std) in directions.iter().zip(found).zip(std) {
+            all[0] += 1;
+            inside[0] += usize::from((found - truth.at(direction.to_radians())).abs() < 1.96 * std);
+        }
+        for order in [3, 6] {
+            let found = value(&outcome, &format!("lobe_{order}_amplitude"));
+            all[1] += 1;
+            let off = found.value.unwrap() - truth.amplitude(order);
+            inside[1] += usize::from(off.abs() < 1.96 * found.std.unwrap());
+        }
+        let mean = value(&outcome, "pretravel_mean");
+        all[2] += 1;
+        inside[2] += usize::from((mean.value.unwrap() - truth.mean_um).abs() < 1.96 * mean.std.unwrap());
+    }
+    for ((inside, all), what) in inside.iter().zip(all).zip(["pre-travel", "amplitudes", "mean"]) {
+        let share = 100.0 * *inside as f64 / all as f64;
+        println!("{what}: {share:.1} % of {all} intervals");
+        assert!((93.0..97.0).contains(&share), "{what}: {share}");
+    }
+}
+
+/// The probe of the paper's size, against the paper's own table: the mean of one pass by direction.
+#[test]
+fn the_range_after_compensation_beats_a_table() {
+    let (mut before, mut after, mut by_table, mut numbers) = (0.0, 0.0, 0.0, 0);
+    const SEEDS: u64 = 12;
+    for seed in 0..SEEDS {
+        let mut scenario = scenario(seed, &setups(&[(0.0, 0.0), (100.0, 0.0), (217.0, 0.0)]));
+        scenario.repeats = 4;
+        let touched = scenario.touched();
+        let outcome = config(&scenario, 15, None).separate(&touched.points()).unwrap();
+        before += value(&outcome, "range_before").value.unwrap() / SEEDS as f64;
+        after += value(&outcome, "range_after_without_form").value.unwrap() / SEEDS as f64;
+        let lobing = table(&outcome, "lobing");
+        numbers += 2 * runout_core::table::RecordBatch::column_by_name(&lobing, "evident")
+            .map(|flags| support::flags(flags).into_iter().filter(|flag| *flag).count())
+            .unwrap();
+        // The paper's table: what the first pass read in each direction, taken from the second pass; another setup of the ring.
+        let pass = |setup: usize, repeat: usize| {
+            let first = (setup * scenario.repeats + repeat) * scenario.directions;
+            support::about_circle(&touched.place_mm[first..first + scenario.directions])
+        };
+        let (table, other) = (pass(0, 0), pass(0, 1));
+        let left: Vec<f64> = other.iter().zip(&table).map(|(other, table)| other - table).collect();
+        by_table += support::range(&left) / SEEDS as f64;
+        if seed == 0 {
+            println!("lobing {:.1} µm peak to valley", support::lobing(&scenario).range());
+        }
+    }
+    println!(
+        "before {before:.2} µm; after {after:.2} µm with {} numbers; by a table of 60 {by_table:.2} µm",
+        numbers as f64 / SEEDS as f64
+    );
+    assert!((14.0..20.0).contains(&before));
+    assert!(after < 0.6 * 8.1, "{after}");
+}
