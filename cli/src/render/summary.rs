@@ -42,6 +42,7 @@ pub fn text(summary: &Summary) -> String {
         }
         lost_orders(&mut page, summary);
         surface(&mut page, summary);
+        named::section(&mut page, &summary.values);
     }
     let mut warnings = summary.warnings.clone();
     warnings.extend(stations.iter().flat_map(|station| station.warnings.iter().cloned()));

@@ -17,6 +17,7 @@ pub mod provenance;
 pub mod reading;
 pub mod rig;
 pub mod separation;
+pub mod smoothing;
 pub mod spread;
 pub mod station;
 pub mod surface;

@@ -1,5 +1,6 @@
 //! The synchronous average of one capture, one harmonic at a time, with its covariance over the turns.
 
+pub use crate::smoothing::{SMOOTHING, orders_beside};
 use std::f64::consts::TAU;
 
 use crate::{
@@ -262,9 +263,6 @@ impl Profile {
 /// orders they make 20 complex degrees of freedom.
 pub const NEIGHBOURS: usize = 2;
 
-/// Orders to each side over which [`smooth`] averages: the scatter's spectrum is smooth, its estimate is not.
-pub const SMOOTHING: usize = 2;
-
 /// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over its neighbours. Order 1
 /// stays by itself: what shakes the eccentricity shakes no other order.
 pub fn smooth(covariance: &mut [Complex64], size: usize) {
@@ -282,12 +280,6 @@ pub fn smooth_by_order(covariance: &mut [Complex64], size: usize) {
         let beside = orders_beside(order);
         order - beside..=(order + beside).min(max_order)
     });
-}
-
-/// Orders to each side over which [`smooth_by_order`] averages: a quarter of the order, [`SMOOTHING`] at most.
-#[must_use]
-pub fn orders_beside(order: usize) -> usize {
-    (order / 4).min(SMOOTHING)
 }
 
 /// Means over windows of orders, by order and highest order.

@@ -1,6 +1,6 @@
 //! Form and motion, one harmonic at a time: estimates, covariance, and what the layout cannot tell.
 
-use crate::{azimuth::Azimuth, profile::orders_beside};
+use crate::{azimuth::Azimuth, smoothing::orders_beside};
 use runout_numerics::Complex64;
 use runout_standards::{
     gaps::Gaps,

@@ -135,8 +135,11 @@ impl Route {
             tables.extend(StationTables::new(assessment, rig).specs());
         }
         tables.extend(self.point_separator().into_iter().flat_map(PointSeparator::tables));
-        if !self.gives_form() {
-            tables.push(tables::named_values());
+        let own = tables::named_values(self.gives_form());
+        match self {
+            Self::Turns { .. } => {}
+            Self::Points { .. } if self.gives_form() => tables.push(own.optional()),
+            Self::Points { .. } => tables.push(own),
         }
         tables.push(tables::corrections());
         tables

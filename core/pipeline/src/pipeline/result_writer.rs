@@ -180,9 +180,12 @@ impl ResultWriter {
         let values = if self.of_form {
             self.station_tables.value_rows(&self.summary)?
         } else {
-            named_value_rows(&self.summary.values)?
+            named_value_rows(&self.summary.values, false)?
         };
-        let last: Vec<TableRows> = std::iter::once(values).chain(correction_rows(&self.summary.effects)?).collect();
+        let named = self.of_form && !self.summary.values.is_empty();
+        let named = named.then(|| named_value_rows(&self.summary.values, true)).transpose()?;
+        let last: Vec<TableRows> =
+            std::iter::once(values).chain(named).chain(correction_rows(&self.summary.effects)?).collect();
         self.write(&last)?;
         let about = if self.of_form {
             self.station_tables.about(&self.summary)

@@ -405,11 +405,12 @@ fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
     ]
 }
 
-/// The table of a domain's own values.
+/// The table of a domain's own values; `of_form` where the result has form, whose values are in the table `values`.
 #[must_use]
-pub fn named_values() -> TableSpec {
+pub fn named_values(of_form: bool) -> TableSpec {
     TableSpec::new(
-        "values",
+        // Beside those that are computed from form.
+        if of_form { "named_values" } else { "values" },
         "values of the result",
         vec![
             ColumnSpec::text("symbol", "the standard's symbol, or a short name"),
@@ -427,8 +428,8 @@ pub fn named_values() -> TableSpec {
 ///
 /// # Errors
 /// Never in practice: the columns are of one length.
-pub fn named_value_rows(values: &[NamedValue]) -> Result<TableRows> {
-    let spec = named_values();
+pub fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRows> {
+    let spec = named_values(of_form);
     let rows = spec.rows(vec![
         texts(values.iter().map(|value| &value.symbol)),
         texts_or_null(values.iter().map(|value| value.of.as_ref())),
