@@ -11,7 +11,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{axis::Axis, separate::RotaryAxis};
+use crate::axis::Axis;
 
 /// `[separate] plugin = "rotary-axis"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -57,6 +57,10 @@ impl Ball {
         [self.x_mm, self.y_mm, self.z_mm]
     }
 }
+
+/// Location and component errors of a rotary axis: all balls, commands and repeats in one weighted least-squares fit.
+#[derive(Debug, Clone)]
+pub struct RotaryAxis(pub(crate) RotaryAxisConfig);
 
 /// Balls closer than this are one, in mm.
 const APART_MM: f64 = 1e-3;

@@ -19,9 +19,9 @@ use runout_core::{
 
 use crate::{
     campaign::Campaign,
+    config::RotaryAxis,
     effects::{CANDIDATES, Candidate, TIME_CONSTANTS, USUAL_TIME_CONSTANT},
     noise::Noise,
-    separate::RotaryAxis,
     solve::{Column, Redundant, fit, redundant},
 };
 

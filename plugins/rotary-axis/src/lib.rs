@@ -24,10 +24,9 @@ use runout_core::pipeline::{
 };
 
 pub use axis::Axis;
-pub use config::{Ball, RotaryAxisConfig};
+pub use config::{Ball, RotaryAxis, RotaryAxisConfig};
 pub use model::{RTest, RTestConfig};
 pub use paper::{CircleFitConfig, ThreePointConfig};
-pub use separate::RotaryAxis;
 
 /// Adds the separators and what they may lack.
 pub fn register(registry: &mut Registry) {

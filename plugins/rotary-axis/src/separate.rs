@@ -14,15 +14,11 @@ use runout_core::{
 use crate::{
     axis::Axis,
     campaign::{Campaign, FEWEST_COMMANDS, columns, steps},
-    config::RotaryAxisConfig,
+    config::RotaryAxis,
     kinematics::Errors,
     noise::Noise,
     solve::{Column, Estimate, Fit, Layout, Reading, fit},
 };
-
-/// Location and component errors of a rotary axis: all balls, commands and repeats in one weighted least-squares fit.
-#[derive(Debug, Clone)]
-pub struct RotaryAxis(pub(crate) RotaryAxisConfig);
 
 /// Commands are left out in at most so many fits.
 const MOST_LEFT_OUT: usize = 40;

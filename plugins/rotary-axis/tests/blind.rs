@@ -60,7 +60,7 @@ fn random_campaigns_are_diagnosed() {
             0 | 1 => String::new(),
             2 => format!(
                 "{{ plugin = 'slipped-ball', row = {}, by_um = [{}, {}, 3] }}",
-                80 + seed,
+                40 + seed,
                 own(8.0, 40.0),
                 own(-30.0, 30.0)
             ),
