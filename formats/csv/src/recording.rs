@@ -11,7 +11,7 @@ use runout_core::{
 
 use crate::{
     config::Stated,
-    header::Header,
+    header::{Header, Phase},
     rows::{Piece, Rows},
     scan::Scan,
 };
@@ -33,14 +33,20 @@ pub(crate) struct CsvRecording {
     most_kept: usize,
 }
 
+/// What a column of marks leaves open between setups.
+const MARKS_AT_WHOLE_SAMPLES: &str = "marks of a column `index` are at whole samples: half a sample is not known of the angle between two \
+    setups, and no stated uncertainty includes it; take an encoder's angle, a trace of the mark, or fractional marks (HDF5)";
+
 impl CsvRecording {
     /// Looks at every file's header.
     pub(crate) fn open(rig: &Rig, stations: Vec<StationKey>, paths: Vec<Vec<PathBuf>>, stated: Stated) -> Result<Self> {
         let mut remarks = Vec::new();
         let mut unknown: Vec<String> = Vec::new();
+        let mut at_whole_samples = false;
         for path in paths.iter().flatten() {
             let (header, ..) = Header::open(path, rig, stated.marker.as_ref())?;
             remarks.extend(header.remarks);
+            at_whole_samples |= matches!(header.phase, Phase::Index(_));
             for name in header.unknown {
                 if !unknown.contains(&name) {
                     unknown.push(name);
@@ -49,6 +55,9 @@ impl CsvRecording {
         }
         if !unknown.is_empty() {
             remarks.push(format!("columns that the rig does not name: {}", unknown.join(", ")));
+        }
+        if at_whole_samples && rig.setups.len() > 1 {
+            remarks.push(MARKS_AT_WHOLE_SAMPLES.into());
         }
         Ok(Self { rig: rig.clone(), stations, paths, stated, remarks, most_kept: MOST_KEPT })
     }
