@@ -111,7 +111,7 @@ impl<'a> Stages<'a> {
                 let conditioner = &**conditioners.first().ok_or("the pipeline has no filter")?;
                 Ok(Self { conditioner, averager: &**averager, separator: &**separator })
             }
-            _ => Err("the pipeline is not one of recorded turns".into()),
+            Route::Points { .. } => Err("the pipeline is not one of recorded turns".into()),
         }
     }
 }

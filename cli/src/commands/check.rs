@@ -13,6 +13,7 @@ use runout_core::{
     points::PointColumn,
     rig::{Rig, Rotation},
     separation::{Assessment, OrderAssessment, Quantity},
+    stage::PointSeparator,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -152,13 +153,13 @@ fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> 
     if let Err(error) = pipeline.loader.open(&pipeline.request()) {
         notes.push(format!("the data are not there yet, or cannot be used: {error}"));
     }
-    notes.extend(pipeline.route.point_separator().map(|separator| separator.notes()).unwrap_or_default());
+    notes.extend(pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default());
     if pipeline.exporters.is_empty() {
         notes.push("there is no [[export]]: a run would only print its summary".into());
     }
     let foresight = match &pipeline.route {
         Route::Turns { separator, .. } => separator.foresee(effects).transpose()?,
-        _ => None,
+        Route::Points { .. } => None,
     };
     Ok(Report {
         title: pipeline.title.clone(),

@@ -1,8 +1,11 @@
 //! `runout run`.
 
-use runout_core::pipeline::{
-    Registry,
-    run::{self, Decision},
+use runout_core::{
+    pipeline::{
+        Registry,
+        run::{self, Decision},
+    },
+    stage::PointSeparator,
 };
 
 use super::{pipeline, print};
@@ -32,7 +35,7 @@ pub fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Fa
     }
     // What is said of the layout is known before any data.
     let mut notes = pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default();
-    notes.extend(pipeline.route.point_separator().map(|separator| separator.notes()).unwrap_or_default());
+    notes.extend(pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default());
     let warnings = summary.all_warnings().filter(|warning| !notes.contains(warning)).count();
     if args.fail_on_warning && warnings > 0 { Err(Failure::Warnings(warnings)) } else { Ok(()) }
 }

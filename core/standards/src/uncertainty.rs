@@ -622,7 +622,7 @@ mod tests {
             second.draw(&mut fourier, &level, &mut drawn[1]);
             let [a, b] = drawn.map(|profile| {
                 let mut harmonics = vec![Complex64::ZERO; length / 2];
-                Fourier::new(length).analyse(profile.into_iter(), &mut harmonics);
+                Fourier::new(length).analyse(profile, &mut harmonics);
                 harmonics[order]
             });
             squares = [squares[0] + a.norm_sqr(), squares[1] + b.norm_sqr()];

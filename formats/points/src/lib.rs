@@ -74,8 +74,8 @@ impl StageConfig for PointsConfig {
         }
         let mut names: Vec<&String> = self.columns.values().collect();
         names.sort_unstable();
-        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(Fault::at("columns", format!("two columns of the file are named `{}`", pair[0])));
+        if let Some((name, _)) = names.iter().zip(names.iter().skip(1)).find(|(one, next)| one == next) {
+            return Err(Fault::at("columns", format!("two columns of the file are named `{name}`")));
         }
         Ok(Box::new(PointFile { path: context.path(&self.path), config: self }))
     }

@@ -7,7 +7,7 @@ mod bad_data;
 mod measured_data;
 mod simulator;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
@@ -30,8 +30,8 @@ fn measured() -> Option<PathBuf> {
     measured_data::file("zeiss-cylinder/cylinder-r15.csv")
 }
 
-fn load(path: PathBuf) -> Points {
-    runout_points::read(&path, &separator(50, &[]).columns()).unwrap()
+fn load(path: &Path) -> Points {
+    runout_points::read(path, &separator(50, &[]).columns()).unwrap()
 }
 
 fn separator(max_order: usize, hold_out: &[&str]) -> LeastSquaresCylinder {
@@ -125,7 +125,7 @@ fn nested_models(points: &Points) -> Vec<[f64; 2]> {
 #[test]
 fn generatrices_that_were_never_used_are_predicted() {
     let Some(path) = measured() else { return };
-    let points = load(path);
+    let points = load(&path);
     for max_order in [15, 50] {
         let separator = separator(max_order, &[]);
         let cylinder = separator.cylinder(&points).unwrap();
@@ -148,7 +148,7 @@ fn generatrices_that_were_never_used_are_predicted() {
 #[test]
 fn what_each_parameter_of_the_cylinder_explains() {
     let Some(path) = measured() else { return };
-    let points = load(path);
+    let points = load(&path);
     let found = nested_models(&points);
     let references = [("radius", [5.95, 5.80]), ("+ eccentricity", [1.40, 1.61]), ("+ tilt", [1.19, 1.51])];
     println!("µm rms left:        circles (reference)   generatrices (reference)");
@@ -169,7 +169,7 @@ fn what_each_parameter_of_the_cylinder_explains() {
 #[test]
 fn a_circle_held_out_is_predicted_by_its_neighbours() {
     let Some(path) = measured() else { return };
-    let points = load(path);
+    let points = load(&path);
     let separator = separator(15, &["C4"]);
     let cylinder = separator.cylinder(&points).unwrap();
     let predictions = separator.predictions(&points, &cylinder, &surface(&separator, &points)).unwrap();

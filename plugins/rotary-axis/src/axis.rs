@@ -92,7 +92,7 @@ mod tests {
     fn renaming_is_cyclic_and_goes_back() {
         for axis in [Axis::A, Axis::B, Axis::C] {
             let machine = [1.0, 2.0, 3.0];
-            assert_eq!(axis.outward(&axis.inward(machine)), machine);
+            assert!(axis.outward(&axis.inward(machine)).iter().zip(machine).all(|(a, b)| (a - b).abs() < 1e-15));
             let basis = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| axis.inward(unit));
             assert_eq!(basis[0].cross(&basis[1]), basis[2]);
         }

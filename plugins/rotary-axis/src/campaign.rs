@@ -66,6 +66,7 @@ pub struct Campaign {
 
 impl Campaign {
     /// The readings of points.
+    #[allow(clippy::too_many_lines, reason = "one column after the other")]
     pub fn of(config: &RotaryAxisConfig, points: &Points) -> Result<Self> {
         let file = points.input.display().to_string();
         let refuse = |problem: String| Error::new("fit", &file, problem);
@@ -104,7 +105,7 @@ impl Campaign {
         let repeat = optional("repeat").map_or_else(|| vec![0.0; command.len()], |column| column.values.clone());
         let direction = match optional("direction") {
             Some(column) => {
-                if let Some(row) = column.values.iter().position(|value| value.abs() != 1.0) {
+                if let Some(row) = column.values.iter().position(|value| ![1.0_f64, -1.0].contains(value)) {
                     let found = column.values[row];
                     return Err(refuse(format!("point {}: `direction` is 1 or -1, found {found}", row + 1)));
                 }
@@ -131,7 +132,9 @@ impl Campaign {
                 Noise::Column
             }
             (None, Some(std)) => {
-                readings.iter_mut().for_each(|reading| reading.std = 1e-3 * std);
+                for reading in &mut readings {
+                    reading.std = 1e-3 * std;
+                }
                 Noise::Stated(std)
             }
             (None, None) => {
@@ -147,7 +150,9 @@ impl Campaign {
             }
         };
         if let Noise::Repeats { std_um, .. } = noise {
-            readings.iter_mut().for_each(|reading| reading.std = 1e-3 * std_um);
+            for reading in &mut readings {
+                reading.std = 1e-3 * std_um;
+            }
         }
         let layout = Layout {
             balls: used.iter().map(|ball| config.ball(*ball)).collect(),
@@ -251,7 +256,8 @@ fn directions(order: &[usize], balls: &[usize], repeat: &[f64], command: &[f64])
     let mut direction = vec![0.0_f64; command.len()];
     let mut passes: Vec<(usize, f64, Vec<usize>)> = Vec::new();
     for row in order {
-        let known = passes.iter_mut().find(|(ball, pass, _)| *ball == balls[*row] && *pass == repeat[*row]);
+        let known =
+            passes.iter_mut().find(|(ball, pass, _)| *ball == balls[*row] && pass.total_cmp(&repeat[*row]).is_eq());
         match known {
             Some((_, _, rows)) => rows.push(*row),
             None => passes.push((balls[*row], repeat[*row], vec![*row])),
@@ -320,7 +326,7 @@ mod tests {
         let (commands, of) = distinct(&[0.0, 90.0, 180.0, 270.0, 360.0, 359.999, 90.001, -90.0]);
         assert_eq!(commands, [-90.0, 0.0, 90.0, 180.0]);
         assert_eq!(of, [1, 2, 3, 0, 1, 1, 2, 0]);
-        assert_eq!(widest_gap(&commands), 90.0);
+        assert!((widest_gap(&commands) - 90.0).abs() < 1e-12);
     }
 
     #[test]

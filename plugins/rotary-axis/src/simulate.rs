@@ -192,7 +192,7 @@ impl Scenario {
             .collect();
         let component: Vec<[f64; 6]> =
             commands.iter().map(|command| self.component_at(command.to_radians(), &mut noise)).collect();
-        let location = self.isometry(self.errors_at("0", 1.0));
+        let location = Self::isometry(self.errors_at("0", 1.0));
         let measures = self.measuring();
         let mut made = Simulated {
             axis: self.axis,
@@ -237,7 +237,7 @@ impl Scenario {
                 let ideal = UnitQuaternion::from_scaled_axis(line * commands[index].to_radians());
                 let lost = if back { -0.5e-6 } else { 0.5e-6 } * lost_motion;
                 let turned = UnitQuaternion::from_scaled_axis(line * lost) * ideal;
-                let carried = location * self.isometry(component[index]) * turned;
+                let carried = location * Self::isometry(component[index]) * turned;
                 let place = carried * stands;
                 let share = row as f64 / (total.max(2) - 1) as f64;
                 let read = measures * place.coords + self.drift_at(share);
@@ -296,7 +296,7 @@ impl Scenario {
     }
 
     /// Displacement and rotation by six errors in µm and µrad: displacement first to act last.
-    fn isometry(&self, errors: [f64; 6]) -> Isometry3<f64> {
+    fn isometry(errors: [f64; 6]) -> Isometry3<f64> {
         let [x, y, z, a, b, c] = errors;
         let rotation = UnitQuaternion::from_scaled_axis(1e-6 * Vector3::new(a, b, c));
         Isometry3::from_parts(Translation3::new(1e-3 * x, 1e-3 * y, 1e-3 * z), rotation)

@@ -132,8 +132,8 @@ fn random_campaigns_are_diagnosed() {
         "named {named} of {visible}, false alarms {alarms} of {clean}, strangers unexplained {unexplained} of {strangers}, \
          location errors within 1.96 std: {share:.3}"
     );
-    assert!(named as f64 >= 0.95 * visible as f64);
+    assert!(named as f64 >= 0.95 * f64::from(visible));
     assert_eq!(alarms, 0);
-    assert!(unexplained as f64 >= 0.9 * strangers as f64);
+    assert!(unexplained as f64 >= 0.9 * f64::from(strangers));
     assert!(share > 0.92);
 }

@@ -320,7 +320,7 @@ fn bad_input_is_refused_or_warned_of() {
     micrometres.columns[1..4].iter_mut().for_each(|column| column.values.iter_mut().for_each(|value| *value *= 1e3));
     match separator(&config).separate(&micrometres) {
         Ok(found) => {
-            assert!(found.remarks.iter().any(|remark| remark.contains("are they in µm?")), "{:?}", found.remarks)
+            assert!(found.remarks.iter().any(|remark| remark.contains("are they in µm?")), "{:?}", found.remarks);
         }
         Err(error) => assert!(error.to_string().contains("mm"), "{error}"),
     }

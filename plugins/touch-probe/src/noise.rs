@@ -31,15 +31,14 @@ pub(crate) fn weights(touches: &mut Touches) -> Weights {
         return weights;
     }
     let count = touches.all.len();
-    match repeated {
-        Some((std, dof)) => Weights { std_um: vec![std; count], noise: Noise::Repeats(dof) },
-        None => {
-            let problem = "no direction was touched twice in a setup, and no `std_um` is stated";
-            touches.remarks.push(format!(
-                "{problem}: the noise is taken from what the fit leaves, so that nothing says whether noise only is left"
-            ));
-            Weights { std_um: vec![1.0; count], noise: Noise::Residual }
-        }
+    if let Some((std, dof)) = repeated {
+        Weights { std_um: vec![std; count], noise: Noise::Repeats(dof) }
+    } else {
+        let problem = "no direction was touched twice in a setup, and no `std_um` is stated";
+        touches.remarks.push(format!(
+            "{problem}: the noise is taken from what the fit leaves, so that nothing says whether noise only is left"
+        ));
+        Weights { std_um: vec![1.0; count], noise: Noise::Residual }
     }
 }
 

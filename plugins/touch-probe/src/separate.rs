@@ -132,14 +132,12 @@ impl PointSeparator for TouchProbe {
             ),
             _ => {}
         }
-        match config.positions() {
-            1 => {}
-            2 => notes.push(
+        if config.positions() == 2 {
+            notes.push(
                 "with two relative angles of ring and probe, nothing is redundant below `max_order`: a ring that bent or slipped in a \
                  setup does not show; three or more angles show it"
                     .into(),
-            ),
-            _ => {}
+            );
         }
         let still = |of: fn(&SetupConfig) -> f64| {
             config.setups.iter().all(|setup| (of(setup) - of(&config.setups[0])).abs() < 0.1)

@@ -293,7 +293,9 @@ impl TouchProbeScenario {
             })
             .collect();
         let rms = drawn.iter().map(|wave| 0.5 * wave.amplitude_um.powi(2)).sum::<f64>().sqrt();
-        drawn.iter_mut().for_each(|wave| wave.amplitude_um *= self.ring.random_rms_um / rms);
+        for wave in &mut drawn {
+            wave.amplitude_um *= self.ring.random_rms_um / rms;
+        }
         waves.extend(drawn);
         waves
     }

@@ -168,12 +168,11 @@ impl Touches {
                 .push("all setups are turned by less than 6.3°: `ring_deg` and `probe_deg` may be in radians".into());
         }
         let small = |um: &f64| *um > 0.0 && *um < TOO_SMALL_UM;
-        if config.std_um.as_ref().is_some_and(small)
-            || self.all.iter().filter_map(|touch| touch.std_um).all(|um| small(&um))
+        if (config.std_um.as_ref().is_some_and(small)
+            || self.all.iter().filter_map(|touch| touch.std_um).all(|um| small(&um)))
+            && self.all.iter().any(|touch| touch.std_um.is_some())
         {
-            if self.all.iter().any(|touch| touch.std_um.is_some()) {
-                self.remarks.push("a standard uncertainty below 0.005 µm is stated: it may be in mm".into());
-            }
+            self.remarks.push("a standard uncertainty below 0.005 µm is stated: it may be in mm".into());
         }
         if config.ring_form_um.as_ref().is_some_and(small) {
             self.remarks.push("`ring_form_um` is below 0.005 µm: it may be in mm".into());

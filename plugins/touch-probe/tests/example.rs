@@ -1,6 +1,6 @@
 //! The example: its touches are those of its scenario, and its pipeline runs.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::format_collect, reason = "tests")]
 
 use std::path::PathBuf;
 

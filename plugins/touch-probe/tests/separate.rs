@@ -1,6 +1,6 @@
 //! Simulated campaigns: recovered within the stated uncertainty, and what the setups lose.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::items_after_statements, reason = "tests")]
 
 mod support;
 

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     atomic_file::{PendingFile, commit_all},
-    stage::{About, Completed, Export, Exporter, NamedValue, ResultInfo, Takes},
+    stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
 };
 use runout_closed_loop::diagnosis::Correction;
 use runout_error::{Error, Result};
@@ -39,6 +39,7 @@ enum SurfaceUse {
 }
 
 /// Gives a result to the exporters piece by piece, and keeps what its summary needs.
+#[allow(clippy::struct_excessive_bools, reason = "facts of a pipeline, each of which is asked for by itself")]
 pub(super) struct ResultWriter {
     exports: Vec<Box<dyn Export>>,
     /// Whether an exporter takes tables.
@@ -71,7 +72,7 @@ impl ResultWriter {
             longest_name: longest_name(pipeline.rig.as_ref(), stations),
         };
         let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(&info)).collect();
-        let tested = pipeline.route.point_separator().is_some_and(|separator| separator.needs_surface());
+        let tested = pipeline.route.point_separator().is_some_and(PointSeparator::needs_surface);
         let takes = |takes| exporters.iter().any(|exporter| exporter.takes() == takes);
         let evaluate = pipeline.evaluate.clone();
         let needed = takes(Takes::Surface) || (evaluate.needs_surface() && !evaluate.all);
@@ -247,7 +248,7 @@ impl Finished {
 /// A summary of nothing yet.
 fn begun(pipeline: &Pipeline) -> Summary {
     let notes = pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default();
-    let of_points = pipeline.route.point_separator().map(|separator| separator.notes()).unwrap_or_default();
+    let of_points = pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default();
     Summary {
         title: pipeline.title.clone(),
         provenance: Provenance {

@@ -94,6 +94,7 @@ impl SurfaceBuilder {
     }
 
     /// What was added.
+    #[must_use]
     pub fn sections(&self) -> &[Section] {
         &self.sections
     }
@@ -179,17 +180,20 @@ pub struct Uncertain {
 
 impl Uncertain {
     /// The sections that the surface was made of.
+    #[must_use]
     pub fn sections(&self) -> &[Section] {
         &self.sections
     }
 
     /// Measured rings: places in mm, ascending.
+    #[must_use]
     pub fn z_mm(&self) -> &[f64] {
         &self.rings.z_mm
     }
 
     /// Harmonics of each measured ring by order from 0, with the power that their errors add taken out where `without_noise`;
     /// errors of orders below `lowest` are taken as none.
+    #[must_use]
     pub fn harmonics(&self, lowest: usize, without_noise: bool) -> Vec<Vec<Complex64>> {
         let angles = self.rings.angles;
         let mut fourier = Fourier::new(angles);
@@ -206,6 +210,7 @@ impl Uncertain {
     }
 
     /// The measured rings one after the other, without the power that their errors add.
+    #[must_use]
     pub fn without_noise(&self, lowest: usize) -> Vec<f64> {
         let mut fourier = Fourier::new(self.rings.angles);
         let rings = self.harmonics(lowest, true);
@@ -213,6 +218,7 @@ impl Uncertain {
     }
 
     /// Standard deviation of each measured ring's errors at any one angle, in µm; NaN where nothing is known.
+    #[must_use]
     pub fn std_um(&self, lowest: usize) -> Vec<f64> {
         let std = |variance: &Vec<f64>| Errors::new(variance, lowest, 0).map_or(f64::NAN, |errors| errors.std_um());
         self.variance.iter().map(std).collect()
@@ -220,6 +226,7 @@ impl Uncertain {
 
     /// Errors of all measured rings, one after the other, independent from call to call. Orders below `lowest` are taken as
     /// exact. `None` where a ring's errors are not known.
+    #[must_use]
     pub fn errors(&self, lowest: usize, seed: u64) -> Option<impl FnMut(&mut [f64]) + '_> {
         let each = self.variance.iter().zip(0..);
         let errors: Option<Vec<Errors>> =
@@ -245,6 +252,7 @@ impl Uncertain {
     }
 
     /// A surface's deviations from those of its measured rings.
+    #[must_use]
     pub fn laid(&self, rings_um: &[f64]) -> Vec<f64> {
         let Rings { angles, z_mm, .. } = &self.rings;
         let rings = Rings { angles: *angles, z_mm: z_mm.clone(), deviation_um: rings_um.to_vec() };

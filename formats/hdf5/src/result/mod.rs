@@ -141,13 +141,12 @@ impl<const N: usize> Export for ResultExport<N> {
     fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
         let place = self.tables.iter().position(|known| known.name == table.name);
         let mut append = || -> hdf5_metno::Result<()> {
-            let known = match place {
-                Some(place) => &mut self.tables[place],
-                None => {
-                    self.tables.push(TableGroup::create(&self.file, table)?);
-                    let last = self.tables.len() - 1;
-                    &mut self.tables[last]
-                }
+            let known = if let Some(place) = place {
+                &mut self.tables[place]
+            } else {
+                self.tables.push(TableGroup::create(&self.file, table)?);
+                let last = self.tables.len() - 1;
+                &mut self.tables[last]
             };
             known.append(rows)
         };

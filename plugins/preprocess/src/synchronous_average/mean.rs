@@ -129,7 +129,9 @@ impl Mean {
         let (channels, turns) = (self.size.channels, self.turns as f64);
         let left = turns - 1.0 - neighbours.len() as f64;
         for (order, matrix) in covariance.chunks_exact_mut(channels * channels).enumerate() {
-            matrix.iter_mut().for_each(|entry| *entry *= (turns - 1.0) / left);
+            for entry in matrix.iter_mut() {
+                *entry *= (turns - 1.0) / left;
+            }
             for side in &neighbours {
                 let values = &side[order * channels..(order + 1) * channels];
                 for (row, value) in matrix.chunks_exact_mut(channels).zip(values) {
