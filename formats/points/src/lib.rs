@@ -1,5 +1,5 @@
 //! The loader `points`: measured points from CSV or Parquet, for the separators of any domain.
-
+//!
 //! A row is a point. The separator says which columns it takes ([`PointColumn`]); other columns are not read. `columns` gives the
 //! file's names where they differ, `where` selects rows.
 //!

@@ -184,6 +184,9 @@ impl Raw {
     fn number(&self, place: usize, row: usize) -> Result<f64> {
         let text = match &self.table.columns[place] {
             RawColumn::Numbers(numbers) if numbers[row].is_finite() => return Ok(numbers[row]),
+            RawColumn::Numbers(numbers) if numbers[row].is_nan() => {
+                return Err(self.refuse(place, row, "expected a finite number, found null or NaN"));
+            }
             RawColumn::Numbers(numbers) => numbers[row].to_string(),
             RawColumn::Texts(_) => self.text(place, row)?,
         };
@@ -205,7 +208,8 @@ impl Raw {
     }
 
     fn refuse(&self, place: usize, row: usize, problem: &str) -> Error {
-        let at = self.table.lines.get(row).map_or_else(|| format!("row {row}"), |line| format!("line {line}"));
+        let at =
+            self.table.lines.get(row).map_or_else(|| format!("row {} from 1", row + 1), |line| format!("line {line}"));
         let name = &self.table.names[place];
         Error::new("read", format!("{}, {at}, column {} ({name})", self.file, place + 1), problem)
     }

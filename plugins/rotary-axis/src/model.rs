@@ -192,10 +192,14 @@ impl LinearModel for RTest {
             ));
         }
         if *held_out_rms > 2.0 * self.0.std_um {
+            let why = if used.len() < FEW_POINTS {
+                "with the others alone its place is mostly extrapolated, so leaving out compares models here but does not \
+                 confirm one"
+            } else {
+                "the model lacks something, the stated uncertainty is too small, or a column has another unit than its name"
+            };
             remarks.push(format!(
-                "a point left out is predicted to {held_out_rms:.1} µm rms only, {:.1} times the stated uncertainty: with \
-                 the others alone its place is mostly extrapolated, so leaving out compares models here but does not \
-                 confirm one",
+                "a point left out is predicted to {held_out_rms:.1} µm rms only, {:.1} times the stated uncertainty: {why}",
                 held_out_rms / self.0.std_um
             ));
         }
