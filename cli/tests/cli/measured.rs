@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::folder::Folder;
+use crate::folder::{Folder, RIG};
 
 const PIPELINE: &str = include_str!("../../../examples/11-measured-r-test/pipeline.toml");
 const POINTS: &str = include_str!("../../../examples/11-measured-r-test/r-test.csv");
@@ -42,4 +42,18 @@ fn what_it_cannot_do_is_said() {
     assert!(ran.status == 1 && ran.stderr.contains("it is what the run reads"), "{}", ran.stderr);
     let ran = folder.run(&["diagnose", "pipeline.toml", "--set", "diagnose.effects=[\"harmonics-2\"]"]);
     assert!(ran.status == 2 && ran.stderr.contains("did you mean `harmonic-2`"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_rig_beside_points_is_refused_and_not_ignored() {
+    let inline = PIPELINE.replace("[load]", &format!("[rig]\n{RIG}\n[load]"));
+    let included = PIPELINE.replace("[load]", "rig = \"rig.toml\"\n\n[load]");
+    for pipeline in [&inline, &included] {
+        let folder = Folder::with(&[("pipeline.toml", pipeline), ("r-test.csv", POINTS), ("rig.toml", RIG)]);
+        for command in ["check", "run", "diagnose"] {
+            let ran = folder.run(&[command, "pipeline.toml"]);
+            let said = ran.stderr.contains("measured points take no [rig]") && ran.stderr.contains("pipeline.toml:");
+            assert!(ran.status == 2 && said, "{command}: {}", ran.stderr);
+        }
+    }
 }

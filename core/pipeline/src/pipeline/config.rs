@@ -203,6 +203,10 @@ impl Pipeline {
                     let fault = Fault::here("measured points take no preprocessor").help("leave [[preprocess]] out");
                     return Err(document::resolve(fault, table));
                 }
+                if let Some(table) = &rig_table {
+                    let fault = Fault::span(table.span(), "measured points take no [rig]");
+                    return Err(fault.help("leave it out; [separate] describes how points were measured"));
+                }
                 (points(registry.separators.build(&separate_table, &context)?, &separate_table, root)?, None)
             }
         };
