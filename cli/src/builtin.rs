@@ -20,6 +20,7 @@ pub fn registry() -> Registry {
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,
+        runout_figures::register,
     ] {
         register(&mut registry);
     }

@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod diagnosed;
 mod diagnostics;
+mod figures;
 mod folder;
 mod lost_orders;
 mod measured;

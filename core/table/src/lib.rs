@@ -4,6 +4,8 @@
 //! at a time, so that memory does not grow with a result. Columns keep unit and meaning as the metadata `unit` and `about` of
 //! their Arrow fields.
 
+pub mod figure;
+
 use std::{collections::HashMap, sync::Arc};
 
 use arrow_array::{BooleanArray, Float64Array, StringArray, UInt32Array};
@@ -12,6 +14,7 @@ use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use runout_error::{Error, Result};
 
 pub use arrow_array::{ArrayRef, RecordBatch};
+pub use figure::{Figure, Measure};
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,19 +120,34 @@ pub struct TableSpec {
     pub columns: Vec<ColumnSpec>,
     /// Whether a result may lack it.
     pub optional: bool,
+    /// What to draw of it.
+    pub figures: Vec<Figure>,
 }
 
 impl TableSpec {
     /// A table that every result has.
     #[must_use]
     pub fn new(name: impl Into<String>, about: impl Into<String>, columns: Vec<ColumnSpec>) -> Self {
-        Self { name: name.into(), about: about.into(), columns, optional: false }
+        Self { name: name.into(), about: about.into(), columns, optional: false, figures: Vec::new() }
     }
 
     /// The same as one that a result may lack.
     #[must_use]
     pub fn optional(self) -> Self {
         Self { optional: true, ..self }
+    }
+
+    /// The same with a figure.
+    #[must_use]
+    pub fn figure(mut self, figure: Figure) -> Self {
+        self.figures.push(figure);
+        self
+    }
+
+    /// The column of this name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&ColumnSpec> {
+        self.columns.iter().find(|column| column.name == name)
     }
 
     /// Its columns as Arrow's schema, with `unit` and `about` as metadata of each field.

@@ -8,7 +8,7 @@ use runout_core::{
         NamedValue, Outcome, PointModel, PointSeparator,
         points::{residual_table, value},
     },
-    table::{ColumnSpec, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
+    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
 };
 
 use crate::{
@@ -369,7 +369,13 @@ pub(crate) fn component_table(axis: Axis) -> TableSpec {
     }));
     let about = "component errors at each distinct command: mean 0 over these, and no part that turns with the table (1/rev); \
                  null where not observable";
+    let measures = |indices: std::ops::Range<usize>| {
+        let measure = |index| Measure::new(name(index)).with_std(format!("std_{}", name(index)));
+        indices.map(|index| measure(index).with_symbol(symbols[index].clone())).collect::<Vec<_>>()
+    };
     TableSpec::new("component_errors", about, columns)
+        .figure(Figure::lines("component-errors-um", "Component errors", axis.command(), measures(0..3)))
+        .figure(Figure::lines("component-errors-urad", "Component errors", axis.command(), measures(3..6)))
 }
 
 fn compensation_table(axis: Axis) -> TableSpec {

@@ -4,7 +4,7 @@ use runout_core::{
     Result,
     evaluate::straightness::strt_lsli_um,
     stage::{NamedValue, Outcome, points::value},
-    table::{ColumnSpec, TableRows, TableSpec, numbers},
+    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 
 use crate::moves::rms;
@@ -62,6 +62,12 @@ pub fn table() -> TableSpec {
             std("slide_std_um", "slide_um"),
         ],
     )
+    .figure(Figure::lines(
+        "straightness",
+        "Straightness",
+        "z_mm",
+        [Measure::new("part_um").with_std("part_std_um"), Measure::new("slide_um").with_std("slide_std_um")],
+    ))
 }
 
 impl Straightness {

@@ -6,7 +6,7 @@ use runout_core::{
     Complex64, Result,
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{Form, NamedValue, Outcome, points::value},
-    table::{ColumnSpec, TableRows, TableSpec, counts, flags, numbers, texts},
+    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers, texts},
 };
 
 use crate::{
@@ -38,7 +38,13 @@ pub(crate) fn tables() -> Vec<TableSpec> {
                 ),
                 um("std_pretravel_um", "its standard uncertainty"),
             ],
-        ),
+        )
+        .figure(Figure::polar(
+            "pretravel",
+            "Pre-travel",
+            "direction_deg",
+            [Measure::new("pretravel_um").with_std("std_pretravel_um")],
+        )),
         TableSpec::new(
             "compensation",
             "what to add to a place that was read, by direction: mean and the orders of lobing with evidence",

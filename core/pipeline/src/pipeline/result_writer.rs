@@ -73,10 +73,10 @@ impl ResultWriter {
         };
         let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(&info)).collect();
         let tested = pipeline.route.point_separator().is_some_and(PointSeparator::needs_surface);
-        let takes = |takes| exporters.iter().any(|exporter| exporter.takes() == takes);
+        let takes = |takes: Takes| exporters.iter().any(|exporter| exporter.takes() == takes);
         let evaluate = pipeline.evaluate.clone();
         let needed = takes(Takes::Surface) || (evaluate.needs_surface() && !evaluate.all);
-        let surface = match (needed, tested || evaluate.all) {
+        let surface = match (needed, tested || evaluate.all || takes(Takes::TablesAndSurface)) {
             (true, _) => SurfaceUse::Needed,
             (false, true) => SurfaceUse::WhereThere,
             (false, false) => SurfaceUse::Unused,
@@ -84,7 +84,7 @@ impl ResultWriter {
         let gathered = surface != SurfaceUse::Unused || evaluate.has(Group::Cylindricity);
         Ok(Self {
             exports: exports?,
-            tables_wanted: takes(Takes::Tables),
+            tables_wanted: takes(Takes::Tables) || takes(Takes::TablesAndSurface),
             specs: pipeline.tables.clone(),
             station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref()),
             of_form: pipeline.route.gives_form(),

@@ -17,8 +17,8 @@ use runout_numerics::{
 };
 use runout_standards::{Value, uncertainty::Uncertainty};
 use runout_table::{
-    ArrayRef, ColumnSpec, TableRows, TableSpec, counts, counts_or_null, flags, no_numbers, numbers, numbers_or_null,
-    texts, texts_or_null,
+    ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, counts_or_null, flags, no_numbers, numbers,
+    numbers_or_null, texts, texts_or_null,
 };
 use runout_turning::station::StationResult;
 use runout_turning::{
@@ -163,6 +163,11 @@ fn form() -> TableSpec {
             ColumnSpec::number("std_um", "um", std_of("form_um")).repeating(),
         ],
     )
+    .figure(
+        Figure::polar("form", "Form", "angle_deg", [Measure::new("form_um").with_std("std_um")])
+            .panels(["station"])
+            .curves(["section"]),
+    )
 }
 
 fn form_rows(result: &StationResult) -> Vec<ArrayRef> {
@@ -200,7 +205,15 @@ fn motion(line: Option<Azimuth>) -> TableSpec {
     };
     columns.extend(motions.iter().map(value));
     columns.extend(motions.iter().map(std));
-    TableSpec::new("motion", "error motion of the axis over the spindle's angle", columns).optional()
+    let mut table = TableSpec::new("motion", "error motion of the axis over the spindle's angle", columns).optional();
+    for (unit, id, title) in
+        [("um", "motion", "Synchronous error motion"), ("urad", "tilt", "Synchronous tilt error motion")]
+    {
+        let values = motions.iter().filter(|motion| motion.quantity.unit() == unit);
+        let values = values.map(|motion| Measure::new(motion.name).with_std(format!("std_{}", motion.name)));
+        table = table.figure(Figure::polar(id, title, "angle_deg", values).panels(["station"]));
+    }
+    table
 }
 
 fn motion_rows(result: &StationResult, line: Option<Azimuth>) -> Vec<ArrayRef> {
@@ -239,6 +252,12 @@ fn harmonics() -> TableSpec {
             ),
             ColumnSpec::flag("observable", "whether the layout separates this order"),
         ],
+    )
+    .figure(
+        Figure::amplitudes("form-harmonics", "Harmonics of the form", "order", ["re", "im"])
+            .panels(["station"])
+            .curves(["section"])
+            .only("quantity", "form"),
     )
 }
 
@@ -299,6 +318,11 @@ fn reading() -> TableSpec {
         ],
     )
     .optional()
+    .figure(
+        Figure::polar("reading", "Averaged reading", "angle_deg", [Measure::new("reading_um").with_std("std_um")])
+            .panels(["station"])
+            .curves(["setup", "sensor"]),
+    )
 }
 
 fn reading_rows(result: &StationResult, rig: Option<&Rig>) -> Vec<ArrayRef> {

@@ -30,6 +30,8 @@ pub enum Takes {
     Tables,
     /// The surface.
     Surface,
+    /// Tables, and the surface where there is one.
+    TablesAndSurface,
 }
 
 /// What exporters know when they begin.

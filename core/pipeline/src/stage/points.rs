@@ -11,7 +11,7 @@ use runout_closed_loop::{
     linear_terms::{LinearFit, LinearTerms},
 };
 use runout_error::Result;
-use runout_table::{ColumnSpec, TableRows, TableSpec, counts, numbers, texts};
+use runout_table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts};
 use runout_turning::{separation::Separation, surface::Surface};
 
 /// Separates measured points as a whole.
@@ -194,6 +194,7 @@ pub fn residual_table(unit: &str) -> TableSpec {
             residual("after", "the final model; that of a run is the declared one"),
         ],
     )
+    .figure(Figure::lines("residual", "Residual", "reading", ["before", "after"].map(Measure::new)))
 }
 
 fn residual_rows(terms: &LinearTerms, before: &LinearFit, after: &LinearFit) -> Result<TableRows> {
