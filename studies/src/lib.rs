@@ -8,6 +8,7 @@ pub mod eccentricity;
 pub mod minimum_zone_cylinder;
 pub mod monte_carlo;
 pub mod plot;
+pub mod points_pictures;
 pub mod results;
 pub mod scaling;
 pub mod straightness;

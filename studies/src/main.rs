@@ -7,10 +7,10 @@ use std::{path::Path, process::ExitCode};
 use runout_core::{Error, Result, atomic_file};
 use runout_studies::{
     averaging,
-    blind::{self, draw::Layout},
+    blind::{self, domains, draw::Layout, points::Domain},
     coverage, eccentricity,
     minimum_zone_cylinder::{self, Wall},
-    monte_carlo, results, scaling, straightness, surface as unrolled,
+    monte_carlo, points_pictures, results, scaling, straightness, surface as unrolled,
     values::{self, Spectrum},
 };
 
@@ -21,10 +21,13 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
                                              spectra, from a seed on; LAYOUT is four or six
        runout-studies blind [CAMPAIGNS [SEED [FILE [LAYOUT]]]]   what the closed loop says of campaigns that it knows
                                              nothing of; LAYOUT is four, six or reversed
-       runout-studies blind-campaign INDEX [SEED [LAYOUT]]   one of them in full
+       runout-studies blind --domain NAME [CAMPAIGNS [SEED [FILE]]]   the same of measured points: rotary-axis, touch-probe, …
+       runout-studies blind-campaign INDEX [SEED [LAYOUT]]   one of them in full; of points with --domain NAME
        runout-studies monte-carlo [CAMPAIGNS]   time of many campaigns, on one thread and on all
        runout-studies diagnose-scaling       time of a diagnosis over the number of stations
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
+       runout-studies component-errors PIPELINE PICTURE   component errors of a C axis over the command
+       runout-studies pretravel PIPELINE PICTURE   pre-travel of a touch-trigger probe by direction
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth
        runout-studies compare-results A B [RELATIVE]   numbers of two folders that differ by more
@@ -32,8 +35,26 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let mut words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let domain = match domain(&mut words) {
+        Ok(domain) => domain,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return ExitCode::from(2);
+        }
+    };
     let outcome = match words[..] {
+        ["blind", ref rest @ ..] if domain.is_some() && rest.len() <= 3 && sizes(rest, [200, 1]).is_some() => {
+            let sizes = sizes(rest, [200, 1]).unwrap_or_default();
+            domain.map_or(Ok(()), |domain| blind_points(domain, sizes, rest.get(2).copied()))
+        }
+        ["blind-campaign", ref rest @ ..] if domain.is_some() && rest.len() <= 2 && sizes(rest, [0, 1]).is_some() => {
+            domain.map_or(Ok(()), |domain| blind_campaign_of_points(domain, sizes(rest, [0, 1]).unwrap_or_default()))
+        }
+        _ if domain.is_some() => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
         ["eccentricity"] => eccentricity::rows(20).map(|rows| println!("{}", eccentricity::table(&rows))),
         ["eccentricity", seeds] if seeds.parse::<u64>().is_ok() => {
             eccentricity::rows(seeds.parse().unwrap_or_default()).map(|rows| println!("{}", eccentricity::table(&rows)))
@@ -61,6 +82,10 @@ fn main() -> ExitCode {
             compare_results(a, b, relative.parse().unwrap_or_default())
         }
         ["surface", pipeline, picture] => surface(pipeline, picture),
+        ["component-errors", pipeline, picture] => {
+            drawn(picture, points_pictures::component_errors(Path::new(pipeline), 'C'))
+        }
+        ["pretravel", pipeline, picture] => drawn(picture, points_pictures::pretravel(Path::new(pipeline))),
         ["straightness-traces", file] => straightness_traces(file),
         ["straightness", file, picture] => straightness(file, picture),
         ["minimum-zone-cylinder", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [50, 200]).is_some() => {
@@ -81,6 +106,19 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Takes `--domain NAME` out of the words; nothing where there is none, or where it is the spindle, which has a benchmark of its own.
+fn domain(words: &mut Vec<&str>) -> Result<Option<&'static Domain>> {
+    let Some(place) = words.iter().position(|word| *word == "--domain") else { return Ok(None) };
+    let name = words.get(place + 1).copied().unwrap_or_default();
+    words.drain(place..(place + 2).min(words.len()));
+    let found = domains::named(name);
+    if found.is_none() && name != "spindle" {
+        let known: Vec<&str> = std::iter::once("spindle").chain(domains::ALL.map(|domain| domain.name)).collect();
+        return Err(Error::new("find the domain", name, format!("there are {}", known.join(", "))));
+    }
+    Ok(found)
 }
 
 fn monte_carlo(campaigns: u64) -> Result<()> {
@@ -168,6 +206,26 @@ fn blind_campaign([index, seed]: [u64; 2], only: Option<Layout>) -> Result<()> {
     Ok(())
 }
 
+fn blind_points(domain: &Domain, [campaigns, seed]: [u64; 2], file: Option<&str>) -> Result<()> {
+    let start = std::time::Instant::now();
+    let text = blind::points::report::report(&blind::points::campaigns(domain, campaigns, seed)?);
+    println!("{campaigns} campaigns of seed {seed}, {}, simulated\n\n{text}", domain.name);
+    if let Some(path) = file {
+        let path = atomic_file::write(path, text.as_bytes())?;
+        println!("written: {}", path.display());
+    }
+    eprintln!("in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn blind_campaign_of_points(domain: &Domain, [index, seed]: [u64; 2]) -> Result<()> {
+    let (kind, campaign) = blind::points::campaign(domain, seed, index)?;
+    let judged = blind::points::judge::judge(index, kind, &campaign)?;
+    println!("{}: {}\n{:#?}", judged.layout, judged.planted(), judged.diagnosis);
+    println!("{:#?}\n{:?}\n{:?}\n{}", judged.effects, judged.values, judged.failures(), judged.said());
+    Ok(())
+}
+
 fn compare_results(a: &str, b: &str, relative: f64) -> Result<()> {
     let found = results::compare(Path::new(a), Path::new(b), relative)?;
     println!("{}", found.report());
@@ -176,6 +234,12 @@ fn compare_results(a: &str, b: &str, relative: f64) -> Result<()> {
 
 fn surface(pipeline: &str, picture: &str) -> Result<()> {
     let path = atomic_file::write(picture, &unrolled::picture(Path::new(pipeline))?)?;
+    println!("picture: {}", path.display());
+    Ok(())
+}
+
+fn drawn(path: &str, picture: Result<Vec<u8>>) -> Result<()> {
+    let path = atomic_file::write(path, &picture?)?;
     println!("picture: {}", path.display());
     Ok(())
 }

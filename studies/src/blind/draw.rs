@@ -1,10 +1,10 @@
 //! Campaigns drawn by chance: rigs, what is wrong with them, and how much.
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use runout_core::rig::{RigConfig, SensorConfig};
 use runout_spindle::simulate::{FormHarmonic, Geometry, Orders, SpindleConfig};
 
+pub use super::Kind;
+use super::{chance::Chance, turn};
 use crate::campaign;
 
 /// A campaign, and what the loop is to find in it.
@@ -91,19 +91,6 @@ impl Layout {
     }
 }
 
-/// What a campaign is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Nothing is wrong.
-    Clean,
-    /// One effect that the loop knows.
-    Single,
-    /// Two of them.
-    Pair,
-    /// Something that it does not know.
-    Stranger,
-}
-
 /// Something wrong.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planted {
@@ -154,28 +141,11 @@ const PAIRED: [&str; 7] = [
 /// Strangers.
 pub const STRANGERS: [&str; 4] = ["dent", "backlash", "step", "slipped-probe"];
 
-/// Twenty campaigns in turn.
-const KINDS: [Kind; 20] = {
-    use Kind::{Clean, Pair, Single, Stranger};
-    [
-        Clean, Single, Stranger, Single, Clean, Pair, Single, Stranger, Clean, Single, Single, Clean, Stranger, Single,
-        Clean, Pair, Single, Clean, Stranger, Single,
-    ]
-};
-
 /// Draws a campaign, of one layout or any; the same seed and index give the same.
 #[must_use]
 pub fn campaign(seed: u64, index: u64, only: Option<Layout>) -> Campaign {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(index);
-    let mut draw = Draw { random };
-    let length = KINDS.len() as u64;
-    let place = (index % length) as usize;
-    let kind = KINDS[place];
-    // How many of its kind came before: each effect and stranger has its turn.
-    let each = KINDS.iter().filter(|other| **other == kind).count() as u64;
-    let before = KINDS[..place].iter().filter(|other| **other == kind).count() as u64;
-    let turn = (index / length * each + before) as usize;
+    let mut draw = Chance::new(seed, index);
+    let (kind, turn) = turn(index);
     let ids: Vec<&str> = match kind {
         Kind::Clean => vec![],
         Kind::Single => vec![EFFECTS[turn % EFFECTS.len()]],
@@ -220,32 +190,7 @@ pub fn campaign(seed: u64, index: u64, only: Option<Layout>) -> Campaign {
     Campaign { index, rig, kind, config, sound, planted, second_order }
 }
 
-/// Chance.
-pub(super) struct Draw {
-    random: ChaCha8Rng,
-}
-
-impl Draw {
-    pub(super) fn below(&mut self, count: usize) -> usize {
-        self.random.random_range(0..count)
-    }
-
-    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.random.random_range(low..high)
-    }
-
-    /// Every decade as likely.
-    pub(super) fn size(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    /// The same with either sign; of pairs only the upper half of the decades.
-    pub(super) fn signed(&mut self, low: f64, high: f64, large: bool) -> f64 {
-        let low = if large { (low * high).sqrt() } else { low };
-        let size = self.size(low, high);
-        if self.below(2) == 0 { size } else { -size }
-    }
-
+impl Chance {
     fn sound(&mut self, rig: Layout, index: u64, seed: u64) -> SpindleConfig {
         let mut config = campaign::reference(seed.wrapping_mul(1_000_003).wrapping_add(index) >> 1, 0.0);
         config.rig = rig.config();

@@ -1,9 +1,15 @@
-//! The blind benchmark of the closed loop: simulated campaigns with something wrong that the loop is not told of, from below
+//! The blind benchmarks of the closed loop: simulated campaigns with something wrong that the loop is not told of, from below
 //! what can be seen to large; two things wrong; nothing wrong; and strangers, which it does not know.
+//!
+//! [`draw`], [`judge`] and [`report`] are the spindle's. Measured points share one driver, [`points`]; a domain adds one file to
+//! [`domains`].
 
+pub mod chance;
+pub mod domains;
 pub mod draw;
 pub mod judge;
 mod plant;
+pub mod points;
 pub mod report;
 
 use std::sync::{
@@ -16,11 +22,49 @@ use runout_core::{Error, Result};
 use draw::Layout;
 use judge::Judged;
 
+/// What a campaign is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Nothing is wrong.
+    Clean,
+    /// One effect that the loop knows.
+    Single,
+    /// Two of them.
+    Pair,
+    /// Something that it does not know.
+    Stranger,
+}
+
+/// Twenty campaigns in turn.
+const KINDS: [Kind; 20] = {
+    use Kind::{Clean, Pair, Single, Stranger};
+    [
+        Clean, Single, Stranger, Single, Clean, Pair, Single, Stranger, Clean, Single, Single, Clean, Stranger, Single,
+        Clean, Pair, Single, Clean, Stranger, Single,
+    ]
+};
+
+/// What a campaign is for, and how many of its kind came before: each effect and stranger has its turn.
+#[must_use]
+pub fn turn(index: u64) -> (Kind, usize) {
+    let length = KINDS.len() as u64;
+    let place = (index % length) as usize;
+    let kind = KINDS[place];
+    let each = KINDS.iter().filter(|other| **other == kind).count() as u64;
+    let before = KINDS[..place].iter().filter(|other| **other == kind).count() as u64;
+    (kind, (index / length * each + before) as usize)
+}
+
 /// Diagnoses the first `count` campaigns of a seed, of one layout or of all, on as many threads as there are processors.
 ///
 /// # Errors
 /// When a campaign cannot be simulated or diagnosed.
 pub fn campaigns(count: u64, seed: u64, only: Option<Layout>) -> Result<Vec<Judged>> {
+    each(count, seed, |index| judge::judge(draw::campaign(seed, index, only)))
+}
+
+/// The same of each campaign, in their order, on as many threads as there are processors.
+fn each<T: Send>(count: u64, seed: u64, judge: impl Fn(u64) -> Result<T> + Sync) -> Result<Vec<T>> {
     let workers = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let next = AtomicU64::new(0);
     let judged = Mutex::new(Vec::new());
@@ -32,17 +76,17 @@ pub fn campaigns(count: u64, seed: u64, only: Option<Layout>) -> Result<Vec<Judg
                 if index >= count {
                     return Ok(());
                 }
-                let one = judge::judge(draw::campaign(seed, index, only)).map_err(|error| {
+                let one = judge(index).map_err(|error| {
                     next.store(count, Ordering::Relaxed);
                     Error::new("diagnose", format!("campaign {index} of seed {seed}"), error)
                 })?;
-                judged.lock().map_err(|_| stopped())?.push(one);
+                judged.lock().map_err(|_| stopped())?.push((index, one));
             }
         };
         let handles: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
         handles.into_iter().try_for_each(|handle| handle.join().unwrap_or_else(|_| Err(stopped())))
     })?;
     let mut judged = judged.into_inner().map_err(|_| stopped())?;
-    judged.sort_by_key(|one| one.campaign.index);
-    Ok(judged)
+    judged.sort_by_key(|(index, _)| *index);
+    Ok(judged.into_iter().map(|(_, one)| one).collect())
 }

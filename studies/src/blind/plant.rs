@@ -7,13 +7,13 @@ use runout_spindle::simulate::{
     SpeedRipple, SpindleConfig, Step, ThermalDrift,
 };
 
-use super::draw::{Draw, Planted};
+use super::{chance::Chance, draw::Planted};
 
 fn planted(id: &'static str, target: Option<&String>, parameters: Vec<(&'static str, f64)>, size: String) -> Planted {
     Planted { id, target: target.cloned(), parameters, size }
 }
 
-impl Draw {
+impl Chance {
     /// Puts something wrong into a campaign: from below what can be seen to large.
     pub(super) fn plant(&mut self, id: &str, large: bool, config: &mut SpindleConfig) -> Planted {
         let (effect, planted) = match id {

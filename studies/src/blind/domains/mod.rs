@@ -1,0 +1,15 @@
+//! Domains of measured points with a blind benchmark: one file each, and a line in [`ALL`].
+
+mod rotary_axis;
+mod touch_probe;
+
+use super::points::Domain;
+
+/// All of them.
+pub const ALL: [Domain; 2] = [rotary_axis::DOMAIN, touch_probe::DOMAIN];
+
+/// The domain of a name.
+#[must_use]
+pub fn named(name: &str) -> Option<&'static Domain> {
+    ALL.iter().find(|domain| domain.name == name)
+}

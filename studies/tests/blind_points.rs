@@ -1,0 +1,22 @@
+//! The short version of `runout-studies blind --domain …`.
+
+use runout_studies::blind::{Kind, domains, points};
+
+#[test]
+fn what_is_wrong_is_named_and_nothing_else() {
+    for domain in &domains::ALL {
+        let all = points::campaigns(domain, 20, 2).unwrap();
+        println!("{}\n\n{}", domain.name, points::report::report(&all));
+        let mut visible = 0;
+        for judged in &all {
+            let place = format!("{} {}: {}; said {}", domain.name, judged.index, judged.planted(), judged.said());
+            if judged.kind == Kind::Clean {
+                assert!(judged.false_alarms.is_empty() && !judged.is_unexplained(), "{place}");
+            }
+            visible += usize::from(judged.is_visible());
+        }
+        // An effect may be near the limit: one miss at most.
+        let missed = all.iter().filter(|judged| judged.kind != Kind::Clean && !judged.failures().is_empty()).count();
+        assert!(missed <= 1 && visible >= 6, "{}: {missed} missed, {visible} visible", domain.name);
+    }
+}
