@@ -17,6 +17,7 @@ pub fn registry() -> Registry {
         runout_quadrature::register,
         runout_rotary_axis::register,
         runout_touch_probe::register,
+        runout_rotor::register,
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,

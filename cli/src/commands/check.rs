@@ -13,7 +13,7 @@ use runout_core::{
     points::PointColumn,
     rig::{Rig, Rotation},
     separation::{Assessment, OrderAssessment, Quantity},
-    stage::PointSeparator,
+    stage::{Planned, PointSeparator, Source, check},
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -62,7 +62,7 @@ pub struct TakenColumn {
 /// A plugin in its place.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stage {
-    /// The table's key: "load", "preprocess", "separate", "export".
+    /// The table's key: "load", "preprocess", "separate", "export", "check".
     pub stage: &'static str,
     /// The plugin's name.
     pub plugin: String,
@@ -150,8 +150,22 @@ pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(
 
 fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
-    if let Err(error) = pipeline.loader.open(&pipeline.request()) {
-        notes.push(format!("the data are not there yet, or cannot be used: {error}"));
+    let source = pipeline.loader.open(&pipeline.request());
+    match &source {
+        Ok(Source::Points(points)) => notes.extend(points.remarks.iter().cloned()),
+        Ok(Source::Turns(_)) => {}
+        Err(error) => notes.push(format!("the data are not there yet, or cannot be used: {error}")),
+    }
+    if !pipeline.checks.is_empty() {
+        let speeds_rpm = match &source {
+            Ok(Source::Turns(recording)) => {
+                check::speeds_of(&**recording, pipeline.rig.as_ref().map_or(0, |rig| rig.setups.len()))
+            }
+            _ => Vec::new(),
+        };
+        for check in &pipeline.checks {
+            notes.extend(check.notes(&Planned { speeds_rpm: &speeds_rpm })?);
+        }
     }
     notes.extend(pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default());
     if pipeline.exporters.is_empty() {
@@ -177,7 +191,7 @@ fn stages(sources: &Sources) -> Result<Vec<Stage>, Failure> {
     let document = Document::parse(sources)?;
     let root = document.root().get_ref();
     let mut stages = Vec::new();
-    for stage in ["load", "preprocess", "separate", "export"] {
+    for stage in ["load", "preprocess", "separate", "export", "check"] {
         let name = |table: &DeValue| Some(table.get("plugin")?.get_ref().as_str()?.to_owned());
         let names: Vec<String> = match root.get(stage).map(Spanned::get_ref) {
             Some(DeValue::Array(tables)) => tables.iter().filter_map(|table| name(table.get_ref())).collect(),

@@ -62,6 +62,7 @@ pub fn entries(registry: &Registry) -> Vec<Entry> {
     add(&mut entries, "separate", &registry.separators);
     add(&mut entries, "export", &registry.exporters);
     add(&mut entries, "simulate", &registry.simulators);
+    add(&mut entries, "check", &registry.checks);
     entries.extend(registry.effects.iter().map(|effect| Entry {
         stage: EFFECT,
         name: effect.name,
@@ -87,7 +88,7 @@ fn add<S>(entries: &mut Vec<Entry>, stage: &'static str, catalogue: &Catalogue<S
         schema: plugin.schema().to_value(),
         place: match stage {
             "simulate" => "a scenario".into(),
-            "preprocess" | "export" => format!("[[{stage}]]"),
+            "preprocess" | "export" | "check" => format!("[[{stage}]]"),
             stage => format!("[{stage}]"),
         },
     }));

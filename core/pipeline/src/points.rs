@@ -7,14 +7,18 @@ use runout_error::{Error, Result};
 /// Points in named columns, grouped into traces.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
-    /// The file behind them.
+    /// The file behind them; empty where they come from the configuration alone.
     pub input: PathBuf,
+    /// Further files behind them.
+    pub besides: Vec<PathBuf>,
     /// Columns of equal length; the unit is part of the name (`angle_deg`).
     pub columns: Vec<Column>,
     /// Columns of texts: names of balls, of setups.
     pub labels: Vec<Labels>,
     /// Consecutive points that were measured in one go.
     pub traces: Vec<Trace>,
+    /// What the user should know of the file.
+    pub remarks: Vec<String>,
 }
 
 /// One named column of texts.
@@ -91,6 +95,13 @@ pub struct Trace {
 }
 
 impl Points {
+    /// Every file behind them.
+    #[must_use]
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        let files = std::iter::once(&self.input).chain(&self.besides);
+        files.filter(|file| !file.as_os_str().is_empty()).cloned().collect()
+    }
+
     /// A column by name.
     ///
     /// # Errors

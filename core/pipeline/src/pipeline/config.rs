@@ -19,7 +19,7 @@ use crate::{
     atomic_file::resolved,
     points::PointColumn,
     stage::{
-        Averager, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Request, Separator,
+        Averager, Check, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Request, Separator,
         SourceKind, StationModel, StationSeparator, Takes,
     },
 };
@@ -60,6 +60,8 @@ pub struct Pipeline {
     pub exporters: Vec<Box<dyn Exporter>>,
     /// The same for the results of a diagnosis: below `diagnosed/`, or where `[diagnose] out` says.
     pub diagnosed: Vec<Box<dyn Exporter>>,
+    /// What `check` asks besides.
+    pub checks: Vec<Box<dyn Check>>,
     /// The tables of its result, also those that it may lack.
     pub tables: Vec<TableSpec>,
     /// What the separator can tell with the rig.
@@ -146,8 +148,9 @@ impl Route {
     }
 }
 
-const KEYS: [&str; 11] =
-    ["title", "rig", "load", "preprocess", "separate", "compare", "surface", "evaluate", "limit", "diagnose", "export"];
+const KEYS: [&str; 12] = [
+    "title", "rig", "load", "preprocess", "separate", "compare", "surface", "evaluate", "limit", "diagnose", "export", "check",
+];
 
 impl Pipeline {
     /// Checks a configuration against the registry and builds every stage.
@@ -222,6 +225,8 @@ impl Pipeline {
             .iter()
             .map(|table| compare::candidate(table, registry, &context))
             .collect::<Result<_, _>>()?;
+        let checks =
+            tables(root, "check")?.iter().map(|table| registry.checks.build(table, &context)).collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref())?;
         let tables = route.tables(assessment.as_ref(), rig.as_ref());
         let exporting = Exporting { registry, context: &context, route: &route, tables: &tables, diagnose: &diagnose };
@@ -239,6 +244,7 @@ impl Pipeline {
             evaluate,
             exporters,
             diagnosed,
+            checks,
             tables,
             assessment,
             configuration: document::resolved_text(root, sources)?,
@@ -596,6 +602,7 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
             "limit": { "type": "array", "items": limit },
             "diagnose": diagnose,
             "export": { "type": "array", "items": choice(&registry.exporters) },
+            "check": { "type": "array", "items": choice(&registry.checks) },
         },
     })
 }

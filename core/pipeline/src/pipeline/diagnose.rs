@@ -150,7 +150,7 @@ fn diagnose_points(
     model: &dyn PointModel,
     observer: &dyn Observer,
 ) -> Result<Diagnosis> {
-    spare_inputs(&pipeline.diagnosed_outputs(), std::slice::from_ref(&points.input))?;
+    spare_inputs(&pipeline.diagnosed_outputs(), &points.inputs())?;
     let effects = model.effects_of(points)?;
     let settings = if model.points_name_targets() {
         let settings = pipeline.diagnose.settings_for(&effects);

@@ -21,7 +21,7 @@ pub(super) fn run(
     separator: &dyn PointSeparator,
     observer: &dyn Observer,
 ) -> Result<Summary> {
-    spare_inputs(&pipeline.outputs(), std::slice::from_ref(&points.input))?;
+    spare_inputs(&pipeline.outputs(), &points.inputs())?;
     let outcome = separator.separate(points)?;
     let result = PointResult { outcome, remarks: Some(separator), effects: Vec::new() };
     result.write(pipeline, &pipeline.exporters, points, observer)?.commit(None)
@@ -68,6 +68,8 @@ impl PointResult<'_> {
         if let Some(separator) = self.remarks {
             remarks.extend(separator.remarks(points, surface.as_ref())?);
         }
-        writer.finish(vec![Input::of(&points.input)?], remarks, surface.as_ref())
+        remarks.extend(points.remarks.iter().cloned());
+        let inputs = points.inputs().iter().map(|input| Input::of(input)).collect::<Result<_>>()?;
+        writer.finish(inputs, remarks, surface.as_ref())
     }
 }

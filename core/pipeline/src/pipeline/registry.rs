@@ -11,7 +11,7 @@ use super::{
     effects::EffectCatalogue,
     error::{Fault, known_names},
 };
-use crate::stage::{Exporter, Loader, Preprocessor, Separator, Simulator};
+use crate::stage::{Check, Exporter, Loader, Preprocessor, Separator, Simulator};
 use runout_turning::rig::Rig;
 
 /// Every plugin by stage, and every effect.
@@ -27,6 +27,8 @@ pub struct Registry {
     pub exporters: Catalogue<Box<dyn Exporter>>,
     /// From scenarios to recordings.
     pub simulators: Catalogue<Box<dyn Simulator>>,
+    /// What `check` compares a pipeline with.
+    pub checks: Catalogue<Box<dyn Check>>,
     /// What models may lack.
     pub effects: EffectCatalogue,
 }

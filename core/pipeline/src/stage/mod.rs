@@ -1,5 +1,6 @@
 //! The stages of a pipeline: one trait a file. A plugin implements one of them.
 
+pub mod check;
 pub mod exporter;
 pub mod loader;
 pub mod points;
@@ -7,6 +8,7 @@ pub mod preprocessor;
 pub mod separator;
 pub mod simulator;
 
+pub use check::{Check, Planned};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
 pub use points::{Form, LinearModel, NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator};

@@ -77,7 +77,7 @@ impl<'a> Recording<'a> {
     pub fn points(self) -> Points {
         let columns = ["z_mm", "angle_deg", "deviation_um"].into_iter().zip(self.columns);
         let columns = columns.map(|(name, values)| Column { name: name.into(), values }).collect();
-        Points { input: "simulated.csv".into(), columns, labels: Vec::new(), traces: self.traces }
+        Points { input: "simulated.csv".into(), columns, traces: self.traces, ..Points::default() }
     }
 }
 

@@ -1,0 +1,148 @@
+//! Speeds at which a natural frequency is a multiple of the speed: lines of the Campbell diagram that cross.
+
+use std::collections::BTreeMap;
+
+use runout_core::Result;
+
+use crate::modal::{Modal, Mode};
+
+/// A mode whose frequency is `ratio` times the speed.
+#[derive(Debug, Clone)]
+pub struct Crossing {
+    /// In rad/s.
+    pub speed: f64,
+    /// The mode at this speed.
+    pub mode: Mode,
+}
+
+/// Relative accuracy of a crossing of a damped rotor.
+const ACCURACY: f64 = 1e-9;
+/// Steps of a search; bisection alone needs 30.
+const MOST_STEPS: usize = 60;
+
+/// Finds crossings of one rotor, and keeps the frequencies that it computes on the way.
+pub struct Search<'a> {
+    modal: &'a Modal,
+    known: BTreeMap<u64, Vec<f64>>,
+}
+
+impl<'a> Search<'a> {
+    /// A search for this rotor.
+    #[must_use]
+    pub fn new(modal: &'a Modal) -> Self {
+        Self { modal, known: BTreeMap::new() }
+    }
+
+    /// The lowest crossings, ascending. Without damping they are eigenvalues of their own; with damping, roots of
+    /// ωₙ(Ω) − ratio·Ω, whose every value is an eigenvalue problem at its speed.
+    ///
+    /// # Errors
+    /// When eigenvalues do not converge.
+    pub fn crossings(&mut self, ratio: f64, count: usize) -> Result<Vec<Crossing>> {
+        let mut undamped = self.modal.crossings(ratio)?;
+        if self.modal.is_conservative() {
+            undamped.truncate(count);
+            return Ok(undamped.into_iter().map(|(speed, mode)| Crossing { speed, mode }).collect());
+        }
+        let roots = self.roots(ratio, count, &undamped.iter().map(|(speed, _)| *speed).collect::<Vec<_>>(), ACCURACY)?;
+        roots.into_iter().map(|(speed, number)| self.at(speed, number)).collect::<Result<Vec<_>>>().map(|found| {
+            found.into_iter().flatten().collect()
+        })
+    }
+
+    /// The same as speeds alone, with a relative accuracy of one in a thousand.
+    ///
+    /// # Errors
+    /// When eigenvalues do not converge.
+    pub fn speeds(&mut self, ratio: f64, count: usize) -> Result<Vec<f64>> {
+        let undamped: Vec<f64> = self.modal.crossings(ratio)?.into_iter().map(|(speed, _)| speed).collect();
+        if self.modal.is_conservative() {
+            return Ok(undamped.into_iter().take(count).collect());
+        }
+        Ok(self.roots(ratio, count, &undamped, 1e-3)?.into_iter().map(|(speed, _)| speed).collect())
+    }
+
+    /// Roots and the number of their frequency among all at that speed, in the order of speed.
+    fn roots(&mut self, ratio: f64, count: usize, undamped: &[f64], accuracy: f64) -> Result<Vec<(f64, usize)>> {
+        let mut found = Vec::new();
+        let mut low = 0.0;
+        for high in grid(undamped, count) {
+            let (at_low, at_high) = (self.frequencies(low)?.clone(), self.frequencies(high)?.clone());
+            for number in 0..at_low.len() {
+                let (first, last) = (at_low[number] - ratio * low, at_high[number] - ratio * high);
+                // Motion that does not oscillate at either end meets no line.
+                if at_high[number].max(at_low[number]) > 0.0 && (first > 0.0) != (last > 0.0) {
+                    found.push((self.root(ratio, number, (low, first), (high, last), accuracy)?, number));
+                }
+            }
+            low = high;
+            if found.len() >= count {
+                break;
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(count);
+        Ok(found)
+    }
+
+    /// The Illinois variant of the false position (Dowell and Jarratt 1971).
+    fn root(
+        &mut self,
+        ratio: f64,
+        number: usize,
+        (mut low, mut at_low): (f64, f64),
+        (mut high, mut at_high): (f64, f64),
+        accuracy: f64,
+    ) -> Result<f64> {
+        for _ in 0..MOST_STEPS {
+            let middle = (low * at_high - high * at_low) / (at_high - at_low);
+            let value = self.frequencies(middle)?[number] - ratio * middle;
+            // A slope of the difference near 0 is rare: frequencies rarely follow the line.
+            if value.abs() <= accuracy * ratio * middle || (high - low).abs() <= accuracy * high {
+                return Ok(middle);
+            }
+            if (value > 0.0) == (at_high > 0.0) {
+                (high, at_high) = (middle, value);
+                at_low *= 0.5;
+            } else {
+                (low, at_low) = (high, at_high);
+                (high, at_high) = (middle, value);
+            }
+        }
+        Ok(f64::midpoint(low, high))
+    }
+
+    /// The mode of a frequency by its number among all.
+    fn at(&self, speed: f64, number: usize) -> Result<Option<Crossing>> {
+        let modes = self.modal.at(speed)?;
+        let still = self.modal.size().saturating_sub(modes.len());
+        let mode = number.checked_sub(still).and_then(|index| modes.into_iter().nth(index));
+        Ok(mode.map(|mode| Crossing { speed, mode }))
+    }
+
+    fn frequencies(&mut self, speed: f64) -> Result<&Vec<f64>> {
+        let key = speed.to_bits();
+        if !self.known.contains_key(&key) {
+            let found = self.modal.frequencies(speed)?;
+            self.known.insert(key, found);
+        }
+        Ok(&self.known[&key])
+    }
+}
+
+/// Speeds between the crossings of the undamped rotor, and above them.
+fn grid(undamped: &[f64], count: usize) -> Vec<f64> {
+    let mut speeds: Vec<f64> = Vec::new();
+    for pair in undamped.windows(2).take(count + 2) {
+        // Nearer crossings are those of two planes: each has a frequency of its own.
+        if pair[1] > 1.02 * pair[0] {
+            speeds.push((pair[0] * pair[1]).sqrt());
+        }
+    }
+    let last = undamped.get(..undamped.len().min(count + 3)).and_then(<[f64]>::last).copied().unwrap_or(0.0);
+    if last > 0.0 {
+        // Damping can hold a rotor at its bearings and raise frequencies above those without it.
+        speeds.extend([1.1 * last, 1.5 * last, 2.5 * last]);
+    }
+    speeds
+}
