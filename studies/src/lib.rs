@@ -10,6 +10,7 @@ pub mod monte_carlo;
 pub mod plot;
 pub mod points_pictures;
 pub mod results;
+pub mod rotor;
 pub mod scaling;
 pub mod straightness;
 pub mod surface;

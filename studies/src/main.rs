@@ -10,7 +10,7 @@ use runout_studies::{
     blind::{self, domains, draw::Layout, points::Domain},
     coverage, eccentricity,
     minimum_zone_cylinder::{self, Wall},
-    monte_carlo, points_pictures, results, scaling, straightness, surface as unrolled,
+    monte_carlo, points_pictures, results, rotor, scaling, straightness, surface as unrolled,
     values::{self, Spectrum},
 };
 
@@ -31,6 +31,7 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth
        runout-studies compare-results A B [RELATIVE]   numbers of two folders that differ by more
+       runout-studies rotor                  frequencies of rotors beside closed forms and beside ross-rotordynamics
        runout-studies minimum-zone-cylinder [WALLS [STARTS]]   MZCY beside a global search, simulated and measured";
 
 fn main() -> ExitCode {
@@ -92,6 +93,7 @@ fn main() -> ExitCode {
             let [walls, starts] = sizes(rest, [50, 200]).unwrap_or_default();
             minimum_zone_cylinder(walls, starts as usize)
         }
+        ["rotor"] => rotors(),
         ["averaging"] => averaging(None),
         ["averaging", picture] => averaging(Some(picture)),
         _ => {
@@ -137,6 +139,15 @@ fn averaging(picture: Option<&str>) -> Result<()> {
         let path = atomic_file::write(path, &figure.picture("Ra tends to the part's own (simulated)")?)?;
         println!("picture: {}", path.display());
     }
+    Ok(())
+}
+
+fn rotors() -> Result<()> {
+    println!("Slender beams, length/diameter 200 to 300\n\n{}", rotor::table(&rotor::beams()?, "closed form"));
+    let peer = rotor::peer()?;
+    let title = format!("Rotors of ross-rotordynamics {}, lateral modes", peer.version);
+    println!("{title}\n\n{}", rotor::table(&peer.rows, "ross"));
+    println!("Damping ratios\n\n{}", rotor::table(&peer.damping, "ross"));
     Ok(())
 }
 
