@@ -32,6 +32,7 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth
        runout-studies compare-results A B [RELATIVE]   numbers of two folders that differ by more
        runout-studies rotor                  frequencies of rotors beside closed forms and beside ross-rotordynamics
+       runout-studies campbell ROTOR PICTURE MOST_RPM MODES   Campbell diagram of a rotor's TOML, as PNG
        runout-studies minimum-zone-cylinder [WALLS [STARTS]]   MZCY beside a global search, simulated and measured";
 
 fn main() -> ExitCode {
@@ -94,6 +95,9 @@ fn main() -> ExitCode {
             minimum_zone_cylinder(walls, starts as usize)
         }
         ["rotor"] => rotors(),
+        ["campbell", rotor, picture, most_rpm, modes] if most_rpm.parse::<f64>().is_ok() && modes.parse::<usize>().is_ok() => {
+            campbell(rotor, picture, most_rpm.parse().unwrap_or_default(), modes.parse().unwrap_or_default())
+        }
         ["averaging"] => averaging(None),
         ["averaging", picture] => averaging(Some(picture)),
         _ => {
@@ -139,6 +143,12 @@ fn averaging(picture: Option<&str>) -> Result<()> {
         let path = atomic_file::write(path, &figure.picture("Ra tends to the part's own (simulated)")?)?;
         println!("picture: {}", path.display());
     }
+    Ok(())
+}
+
+fn campbell(path: &str, picture: &str, most_rpm: f64, modes: usize) -> Result<()> {
+    let drawn = rotor::campbell(Path::new(path), most_rpm, modes, &[1.0, 2.0, 3.0])?;
+    println!("picture: {}", atomic_file::write(picture, &drawn)?.display());
     Ok(())
 }
 

@@ -1,16 +1,19 @@
 //! Natural frequencies and critical speeds of rotors, beside closed forms and beside a peer's numbers.
 
-use std::{f64::consts::PI, fmt::Write as _};
+use std::{f64::consts::PI, fmt::Write as _, path::Path};
 
 use runout_core::{Error, Result};
 use runout_rotor::{
     assemble,
     crossings::Search,
     equations::Equations,
+    loader,
     modal::{Modal, Mode, hertz, rpm},
     model::RotorModel,
 };
 use serde_json::Value;
+
+use crate::plot::{self, Axes, Curve};
 
 /// A number beside its reference.
 #[derive(Debug, Clone)]
@@ -163,6 +166,33 @@ pub fn table(rows: &[Row], reference: &str) -> String {
     let _ = writeln!(text, "largest difference {worst:.4} %");
     text
 }
+
+/// The Campbell diagram of a rotor's file as PNG: `count` frequencies up to `most_rpm`, and the lines of the orders.
+///
+/// # Errors
+/// When the rotor cannot be read or solved, or the picture cannot be drawn.
+pub fn campbell(path: &Path, most_rpm: f64, count: usize, orders: &[f64]) -> Result<Vec<u8>> {
+    let modal = Modal::new(&loader::read(path)?.equations)?;
+    let speeds: Vec<f64> = (0..=40).map(|step| most_rpm * f64::from(step) / 40.0).collect();
+    let lines: Vec<Vec<Mode>> = speeds.iter().map(|speed| modal.at(speed * PI / 30.0)).collect::<Result<_>>()?;
+    let mut curves = Vec::new();
+    let mut highest: f64 = 0.0;
+    for index in 0..count {
+        let point = |(speed, modes): (&f64, &Vec<Mode>)| Some((*speed, hertz(modes.get(index)?.frequency())));
+        let points: Vec<(f64, f64)> = speeds.iter().zip(&lines).filter_map(point).collect();
+        highest = points.iter().fold(highest, |most, (_, frequency)| most.max(*frequency));
+        curves.push(Curve { name: format!("mode {}", index + 1), points, colour: COLOURS[index % COLOURS.len()], dashed: false, dots: false });
+    }
+    for order in orders {
+        let end = most_rpm.min(60.0 * highest / order);
+        let points = vec![(0.0, 0.0), (end, order * end / 60.0)];
+        curves.push(Curve { name: format!("{order} × speed"), points, colour: "#888888", dashed: true, dots: false });
+    }
+    let axes = Axes { title: "Campbell diagram (computed)", x: "speed, rpm", y: "natural frequency, Hz" };
+    plot::curves(&axes, &curves).map_err(|problem| Error::new("draw", path.display().to_string(), problem))
+}
+
+const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"];
 
 fn rotor(name: &str, text: &str) -> Result<Equations> {
     let model: RotorModel = toml::from_str(text).map_err(|error| Error::new("read", name, error))?;

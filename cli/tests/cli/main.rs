@@ -12,6 +12,7 @@ mod measured;
 mod one_line;
 mod other_rigs;
 mod reading;
+mod rotor;
 mod safety;
 mod schemas;
 mod straightness;
