@@ -17,6 +17,8 @@ pub struct Crossing {
 
 /// Relative accuracy of a crossing of a damped rotor.
 const ACCURACY: f64 = 1e-9;
+/// A difference that is this many times as large as the accuracy, with the speed known to the accuracy, is a jump.
+const JUMP: f64 = 100.0;
 /// Steps of a search; bisection alone needs 30.
 const MOST_STEPS: usize = 60;
 
@@ -72,7 +74,8 @@ impl<'a> Search<'a> {
                 let (first, last) = (at_low[number] - ratio * low, at_high[number] - ratio * high);
                 // Motion that does not oscillate at either end meets no line.
                 if at_high[number].max(at_low[number]) > 0.0 && (first > 0.0) != (last > 0.0) {
-                    found.push((self.root(ratio, number, (low, first), (high, last), accuracy)?, number));
+                    let root = self.root(ratio, number, (low, first), (high, last), accuracy)?;
+                    found.extend(root.map(|speed| (speed, number)));
                 }
             }
             low = high;
@@ -85,7 +88,8 @@ impl<'a> Search<'a> {
         Ok(found)
     }
 
-    /// The Illinois variant of the false position (Dowell and Jarratt 1971).
+    /// The Illinois variant of the false position (Dowell and Jarratt 1971). `None` where the difference jumps over 0, as a motion
+    /// begins to oscillate there.
     fn root(
         &mut self,
         ratio: f64,
@@ -93,13 +97,13 @@ impl<'a> Search<'a> {
         (mut low, mut at_low): (f64, f64),
         (mut high, mut at_high): (f64, f64),
         accuracy: f64,
-    ) -> Result<f64> {
+    ) -> Result<Option<f64>> {
         for _ in 0..MOST_STEPS {
             let middle = (low * at_high - high * at_low) / (at_high - at_low);
             let value = self.frequencies(middle)?[number] - ratio * middle;
-            // A slope of the difference near 0 is rare: frequencies rarely follow the line.
-            if value.abs() <= accuracy * ratio * middle || (high - low).abs() <= accuracy * high {
-                return Ok(middle);
+            let near = accuracy * ratio * middle;
+            if value.abs() <= near || (high - low).abs() <= accuracy * high {
+                return Ok(Some(middle).filter(|_| value.abs() <= JUMP * near));
             }
             if (value > 0.0) == (at_high > 0.0) {
                 (high, at_high) = (middle, value);
@@ -109,7 +113,7 @@ impl<'a> Search<'a> {
                 (high, at_high) = (middle, value);
             }
         }
-        Ok(f64::midpoint(low, high))
+        Ok(None)
     }
 
     /// The mode of a frequency by its number among all.

@@ -14,6 +14,10 @@ const RIGID: f64 = 1e-12;
 /// Frequencies below so much of the lowest elastic one are zero, where there are rigid-body motions.
 const STANDSTILL: f64 = 1e-3;
 
+/// Motion with a damping ratio above this decays by nineteen powers of ten within a period: it does not oscillate. With strong
+/// damping, gyroscopic moments give such motions a small imaginary part.
+const OVERDAMPED: f64 = 0.99;
+
 /// A rotor in the coordinates of its modes at rest.
 #[derive(Debug, Clone)]
 pub struct Modal {
@@ -151,7 +155,7 @@ impl Modal {
     }
 
     /// Damped natural frequencies at a speed, in rad/s: as many as there are degrees of freedom, ascending, 0 for each motion that
-    /// does not oscillate. The n-th of them is a continuous function of the speed.
+    /// does not oscillate. The n-th of them is a continuous function of the speed, but where a motion begins to oscillate.
     ///
     /// # Errors
     /// When the eigenvalues do not converge.
@@ -232,7 +236,7 @@ impl Modal {
     }
 
     fn oscillates(&self, eigenvalue: c64) -> bool {
-        eigenvalue.im > self.standstill()
+        eigenvalue.im > self.standstill() && eigenvalue.re.abs() <= OVERDAMPED * eigenvalue.norm()
     }
 
     fn first_order(&self, speed: f64) -> Mat<f64> {
