@@ -9,8 +9,10 @@ use runout_core::{Error, Result};
 
 use crate::equations::Equations;
 
-/// Eigenvalues of the stiffness below so much of the largest are zero: motion as a rigid body.
+/// Eigenvalues of the scaled stiffness below so much of the largest are zero: motion as a rigid body.
 const RIGID: f64 = 1e-12;
+/// Eigenvalues below minus so much of it are no rounding of numbers in a file.
+const NEGATIVE: f64 = 1e-8;
 /// Frequencies below so much of the lowest elastic one are zero, where there are rigid-body motions.
 const STANDSTILL: f64 = 1e-3;
 
@@ -67,41 +69,23 @@ impl Modal {
             return Err(Error::new("solve", object, "the mass matrix is not positive definite"));
         };
         let lower = factor.L();
-        // L⁻¹·A·L⁻ᵀ by two solutions with L.
-        let reduced = |matrix: &Mat<f64>| {
-            let mut half = matrix.clone();
-            lower.solve_lower_triangular_in_place(half.as_mut());
-            let mut whole = half.transpose().to_owned();
-            lower.solve_lower_triangular_in_place(whole.as_mut());
-            whole.transpose().to_owned()
-        };
-        let stiffness = reduced(&equations.stiffness);
-        let symmetric = Mat::from_fn(stiffness.nrows(), stiffness.ncols(), |row, column| {
-            f64::midpoint(stiffness[(row, column)], stiffness[(column, row)])
-        });
-        let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| not_converged(0.0))?;
-        let mut squares: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
-        let largest = squares.iter().fold(0.0, |most: f64, square| most.max(square.abs()));
-        if let Some(lowest) = squares.first().filter(|lowest| **lowest < -1e2 * RIGID * largest) {
-            let problem = format!(
-                "expected a positive semidefinite stiffness; its lowest eigenvalue relative to the mass is {lowest:.3e} 1/s²: the \
-                 rotor would move away from rest by itself"
-            );
-            return Err(Error::new("use", "the stiffness", problem).help("check the signs of its elements"));
-        }
-        if largest == 0.0 {
-            return Err(Error::new("use", "the stiffness", "expected numbers other than 0"));
-        }
-        let rigid = squares.iter().take_while(|square| **square <= RIGID * largest).count();
-        squares[..rigid].fill(0.0);
-        let basis = eigen.U();
-        let mut shapes = basis.to_owned();
+        let root = StiffnessRoot::new(&equations.stiffness)?;
+        // K = B·Bᵀ: singular values of L⁻¹·B are the frequencies, with the accuracy of the largest; as eigenvalues they would be squared.
+        let mut reduced = root.factor;
+        lower.solve_lower_triangular_in_place(reduced.as_mut());
+        let decomposed = reduced.svd().map_err(|_| not_converged(0.0))?;
+        let size = equations.size();
+        let singular = decomposed.S().column_vector();
+        let mut squares: Vec<f64> = (0..size).rev().map(|index| singular[index].powi(2)).collect();
+        squares[..root.rigid].fill(0.0);
+        let basis = decomposed.U();
+        let mut shapes = Mat::from_fn(size, size, |row, column| basis[(row, size - 1 - column)]);
         lower.transpose().solve_upper_triangular_in_place(shapes.as_mut());
         let in_modes = |matrix: &Mat<f64>| shapes.transpose() * matrix * &shapes;
         let zero = |matrix: &Mat<f64>| matrix.col_iter().all(|column| column.iter().all(|value| *value == 0.0));
         Ok(Self {
             squares,
-            rigid,
+            rigid: root.rigid,
             gyroscopic: in_modes(&equations.gyroscopic),
             damping: in_modes(&equations.damping),
             circulatory: in_modes(&equations.circulatory),
@@ -250,6 +234,50 @@ impl Modal {
             }
             (Some(row), Some(column)) => -(self.damping[(row, column)] + speed * self.gyroscopic[(row, column)]),
         })
+    }
+}
+
+/// B of K = B·Bᵀ, by the eigenvalues of K with its diagonal scaled to 1, so that soft parts of a stiff model keep their accuracy.
+struct StiffnessRoot {
+    factor: Mat<f64>,
+    rigid: usize,
+}
+
+impl StiffnessRoot {
+    fn new(stiffness: &Mat<f64>) -> Result<Self> {
+        let size = stiffness.nrows();
+        let refuse = |problem: String| {
+            Err(Error::new("use", "the stiffness", problem).help("check the signs of its elements"))
+        };
+        if let Some(dof) = (0..size).find(|dof| stiffness[(*dof, *dof)] < 0.0) {
+            return refuse(format!(
+                "expected a positive semidefinite matrix; row {row}, column {row} is {value:e}",
+                row = dof + 1,
+                value = stiffness[(dof, dof)]
+            ));
+        }
+        let scale: Vec<f64> = (0..size)
+            .map(|dof| if stiffness[(dof, dof)] > 0.0 { stiffness[(dof, dof)].sqrt() } else { 1.0 })
+            .collect();
+        let scaled = Mat::from_fn(size, size, |row, column| stiffness[(row, column)] / (scale[row] * scale[column]));
+        let eigen = scaled.self_adjoint_eigen(Side::Lower).map_err(|_| not_converged(0.0))?;
+        let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
+        let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        if largest == 0.0 {
+            return refuse("expected numbers other than 0".into());
+        }
+        if let Some(lowest) = values.first().filter(|lowest| **lowest < -NEGATIVE * largest) {
+            return refuse(format!(
+                "expected a positive semidefinite matrix; with its diagonal scaled to 1 its lowest eigenvalue is {lowest:.3e}: the \
+                 rotor would move away from rest by itself"
+            ));
+        }
+        let rigid = values.iter().take_while(|value| **value <= RIGID * largest).count();
+        let vectors = eigen.U();
+        let factor = Mat::from_fn(size, size, |row, column| {
+            if column < rigid { 0.0 } else { scale[row] * vectors[(row, column)] * values[column].sqrt() }
+        });
+        Ok(Self { factor, rigid })
     }
 }
 
