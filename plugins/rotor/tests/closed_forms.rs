@@ -60,16 +60,16 @@ fn stodola(length: f64, stiffness: f64, speed: f64) -> Vec<f64> {
 
 #[test]
 fn a_disk_splits_each_mode_by_its_gyroscopic_moment() {
-    let parts = overhung(600.0, 20.0);
+    let parts = overhung(600.0, 8.0);
     let all = equations(&parts);
     for speed in [0.0, 50.0, 300.0, 2000.0] {
-        let expected = stodola(0.6, bending(20.0), speed);
+        let expected = stodola(0.6, bending(8.0), speed);
         let modes = modal(&parts).at(speed).unwrap();
         println!("{speed} rad/s: {expected:.4?} {:.4?}", modes.iter().take(4).map(Mode::frequency).collect::<Vec<_>>());
         assert_eq!(expected.len(), 4, "{speed}: {expected:?}");
         for (mode, root) in modes.iter().zip(&expected) {
             // Shear of the slender shaft softens it by some 1e-4.
-            near(mode.frequency(), root.abs(), 1e-3);
+            near(mode.frequency(), root.abs(), 3e-4);
             if speed > 0.0 {
                 let direction = if *root > 0.0 { Whirl::Forward } else { Whirl::Backward };
                 assert_eq!(whirl(&mode.shape, &all.nodes), direction, "{speed} {root}");
