@@ -95,7 +95,9 @@ fn main() -> ExitCode {
             minimum_zone_cylinder(walls, starts as usize)
         }
         ["rotor"] => rotors(),
-        ["campbell", rotor, picture, most_rpm, modes] if most_rpm.parse::<f64>().is_ok() && modes.parse::<usize>().is_ok() => {
+        ["campbell", rotor, picture, most_rpm, modes]
+            if most_rpm.parse::<f64>().is_ok() && modes.parse::<usize>().is_ok() =>
+        {
             campbell(rotor, picture, most_rpm.parse().unwrap_or_default(), modes.parse().unwrap_or_default())
         }
         ["averaging"] => averaging(None),

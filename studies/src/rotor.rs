@@ -83,7 +83,8 @@ pub fn beams() -> Result<Vec<Row>> {
             // I/A of a tube, in m².
             let gyration = ((1e-3 * outer).powi(2) + (1e-3 * inner).powi(2)) / 16.0;
             for (index, root) in roots.iter().enumerate() {
-                let reference = (root / (1e-3 * length)).powi(2) * (1e9 * youngs_gpa * gyration / density).sqrt() / (2.0 * PI);
+                let reference =
+                    (root / (1e-3 * length)).powi(2) * (1e9 * youngs_gpa * gyration / density).sqrt() / (2.0 * PI);
                 for plane in 0..2 {
                     let found = modes.get(2 * index + plane).map_or(f64::NAN, |mode| hertz(mode.frequency()));
                     let what = format!("{name}, {ends}, mode {}", 2 * index + plane + 1);
@@ -119,7 +120,8 @@ pub struct Peer {
 /// When a rotor cannot be solved or the golden numbers cannot be read.
 pub fn peer() -> Result<Peer> {
     let golden: Value = serde_json::from_str(PEER).map_err(|error| Error::new("read", "ross.json", error))?;
-    let mut peer = Peer { version: golden["version"]["ross"].as_str().unwrap_or_default().to_owned(), ..Peer::default() };
+    let mut peer =
+        Peer { version: golden["version"]["ross"].as_str().unwrap_or_default().to_owned(), ..Peer::default() };
     for (name, text) in PEER_ROTORS {
         let modal = Modal::new(&rotor(name, text)?)?;
         let numbers = &golden["rotors"][name];
@@ -130,7 +132,8 @@ pub fn peer() -> Result<Peer> {
                 let of = |pick: fn(&Mode) -> f64| modes.get(index).map_or(f64::NAN, pick);
                 let what = format!("{name}, {speed_rpm:.0} rpm, mode {}", index + 1);
                 let [found, ratio] = [of(|mode| hertz(mode.frequency())), of(Mode::damping_ratio)];
-                let row = |unit, found, key: &str| Row { what: what.clone(), unit, found, reference: number(&expected[key]) };
+                let row =
+                    |unit, found, key: &str| Row { what: what.clone(), unit, found, reference: number(&expected[key]) };
                 peer.rows.push(row("Hz", found, "frequency_hz"));
                 // An undamped rotor has damping ratios of rounding only.
                 let damping = row("1", ratio, "damping_ratio");
@@ -181,7 +184,13 @@ pub fn campbell(path: &Path, most_rpm: f64, count: usize, orders: &[f64]) -> Res
         let point = |(speed, modes): (&f64, &Vec<Mode>)| Some((*speed, hertz(modes.get(index)?.frequency())));
         let points: Vec<(f64, f64)> = speeds.iter().zip(&lines).filter_map(point).collect();
         highest = points.iter().fold(highest, |most, (_, frequency)| most.max(*frequency));
-        curves.push(Curve { name: format!("mode {}", index + 1), points, colour: COLOURS[index % COLOURS.len()], dashed: false, dots: false });
+        curves.push(Curve {
+            name: format!("mode {}", index + 1),
+            points,
+            colour: COLOURS[index % COLOURS.len()],
+            dashed: false,
+            dots: false,
+        });
     }
     for order in orders {
         let end = most_rpm.min(60.0 * highest / order);

@@ -23,7 +23,8 @@ fn the_example_has_its_tables_and_values() {
 
 #[test]
 fn mistakes_have_their_status() {
-    let folder = Folder::with(&[("spindle.toml", &SPINDLE.replace("length_mm = 300.0", "length_mm = 0")), ("p.toml", PIPELINE)]);
+    let folder =
+        Folder::with(&[("spindle.toml", &SPINDLE.replace("length_mm = 300.0", "length_mm = 0")), ("p.toml", PIPELINE)]);
     let ran = folder.run(&["run", "p.toml"]);
     assert_eq!(ran.status, 1, "{}", ran.stderr);
     assert!(ran.stderr.contains("spindle.toml") && ran.stderr.contains("above 0 mm"), "{}", ran.stderr);

@@ -131,7 +131,8 @@ impl Assembly {
         let element = Element::new(&section, length_m);
         let damping: Square = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
-                material.mass_damping_per_s * element.mass[i][j] + material.stiffness_damping_s * element.stiffness[i][j]
+                material.mass_damping_per_s * element.mass[i][j]
+                    + material.stiffness_damping_s * element.stiffness[i][j]
             })
         });
         let planes = [(IN_XZ, [1.0; 4]), (IN_YZ, SIGN_YZ)];
@@ -153,7 +154,9 @@ impl Assembly {
     }
 
     fn disk(&mut self, disk: &Disk, first: usize) {
-        for (dof, inertia) in [disk.mass_kg, disk.mass_kg, disk.diametral_kg_m2, disk.diametral_kg_m2].iter().enumerate() {
+        for (dof, inertia) in
+            [disk.mass_kg, disk.mass_kg, disk.diametral_kg_m2, disk.diametral_kg_m2].iter().enumerate()
+        {
             self.add(Role::Mass, first + dof, first + dof, *inertia);
         }
         self.add(Role::Gyroscopic, first + 2, first + 3, disk.polar_kg_m2);

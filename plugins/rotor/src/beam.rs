@@ -68,10 +68,8 @@ impl Element {
     /// The element of a section with a length in m.
     #[must_use]
     pub fn new(section: &Section, length: f64) -> Self {
-        let (bending, shearing) = (
-            section.youngs * section.second_moment(),
-            section.shear_coefficient() * section.shear * section.area(),
-        );
+        let (bending, shearing) =
+            (section.youngs * section.second_moment(), section.shear_coefficient() * section.shear * section.area());
         let phi = 12.0 * bending / (shearing * length * length);
         let rotary = section.density * section.second_moment();
         let mut element = Self::default();

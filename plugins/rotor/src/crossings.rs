@@ -46,10 +46,13 @@ impl<'a> Search<'a> {
             undamped.truncate(count);
             return Ok(undamped.into_iter().map(|(speed, mode)| Crossing { speed, mode }).collect());
         }
-        let roots = self.roots(ratio, count, &undamped.iter().map(|(speed, _)| *speed).collect::<Vec<_>>(), ACCURACY)?;
-        roots.into_iter().map(|(speed, number)| self.at(speed, number)).collect::<Result<Vec<_>>>().map(|found| {
-            found.into_iter().flatten().collect()
-        })
+        let roots =
+            self.roots(ratio, count, &undamped.iter().map(|(speed, _)| *speed).collect::<Vec<_>>(), ACCURACY)?;
+        roots
+            .into_iter()
+            .map(|(speed, number)| self.at(speed, number))
+            .collect::<Result<Vec<_>>>()
+            .map(|found| found.into_iter().flatten().collect())
     }
 
     /// The same as speeds alone, with a relative accuracy of one in a thousand.

@@ -158,7 +158,9 @@ impl Equations {
 fn mirror(matrix: &mut Mat<f64>, sign: f64) -> std::result::Result<(), String> {
     let size = matrix.nrows();
     let scale: Vec<f64> = (0..size)
-        .map(|row| (0..size).map(|column| matrix[(row, column)].abs().max(matrix[(column, row)].abs())).fold(0.0, f64::max))
+        .map(|row| {
+            (0..size).map(|column| matrix[(row, column)].abs().max(matrix[(column, row)].abs())).fold(0.0, f64::max)
+        })
         .collect();
     for row in 0..size {
         for column in 0..=row {

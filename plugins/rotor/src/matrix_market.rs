@@ -72,7 +72,10 @@ mod tests {
     #[test]
     fn every_kind_of_file_reads() {
         let general = [[4.0, -1.5], [2.0, 3.0]].map(Vec::from).to_vec();
-        assert_eq!(rows("%%MatrixMarket matrix coordinate real general\n% note\n2 2 4\n1 1 4\n1 2 -1.5\n2 1 2e0\n2 2 3\n"), general);
+        assert_eq!(
+            rows("%%MatrixMarket matrix coordinate real general\n% note\n2 2 4\n1 1 4\n1 2 -1.5\n2 1 2e0\n2 2 3\n"),
+            general
+        );
         assert_eq!(rows("%%MatrixMarket matrix array real general\n2 2\n4\n2\n-1.5\n3\n"), general);
         let symmetric = [[4.0, -1.0], [-1.0, 3.0]].map(Vec::from).to_vec();
         assert_eq!(rows("%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 4\n2 1 -1\n2 2 3\n"), symmetric);

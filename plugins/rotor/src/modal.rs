@@ -148,7 +148,8 @@ impl Modal {
             return Ok(self.squares.iter().map(|square| square.sqrt()).collect());
         }
         let values = self.first_order(speed).eigenvalues().map_err(|_| not_converged(speed))?;
-        let mut found: Vec<f64> = values.into_iter().filter(|value| self.oscillates(*value)).map(|value| value.im).collect();
+        let mut found: Vec<f64> =
+            values.into_iter().filter(|value| self.oscillates(*value)).map(|value| value.im).collect();
         found.resize(self.squares.len().max(found.len()), 0.0);
         found.sort_by(f64::total_cmp);
         Ok(found)
@@ -190,8 +191,9 @@ impl Modal {
             }
             let frequency = inverse.sqrt().recip();
             let moving: Vec<c64> = (0..elastic).map(|row| vectors[(row, index)] / root(row)).collect();
-            let following = (0..rigid)
-                .map(|row| moving.iter().enumerate().map(|(column, value)| follows[(row, column)] * value).sum::<c64>());
+            let following = (0..rigid).map(|row| {
+                moving.iter().enumerate().map(|(column, value)| follows[(row, column)] * value).sum::<c64>()
+            });
             let in_modes: Vec<c64> = following.chain(moving.iter().copied()).collect();
             let eigenvalue = c64::new(0.0, frequency);
             found.push((frequency / ratio, Mode { eigenvalue, shape: self.displacement(&in_modes) }));
@@ -227,7 +229,13 @@ impl Modal {
         let size = self.squares.len();
         Mat::from_fn(2 * size, 2 * size, |row, column| match (row.checked_sub(size), column.checked_sub(size)) {
             (None, None) => 0.0,
-            (None, Some(column)) => if row == column { self.root(row) } else { 0.0 },
+            (None, Some(column)) => {
+                if row == column {
+                    self.root(row)
+                } else {
+                    0.0
+                }
+            }
             (Some(row), None) => {
                 let own = if row == column { self.squares[row] } else { 0.0 };
                 -(own + self.circulatory[(row, column)]) / self.root(column)
@@ -246,9 +254,8 @@ struct StiffnessRoot {
 impl StiffnessRoot {
     fn new(stiffness: &Mat<f64>) -> Result<Self> {
         let size = stiffness.nrows();
-        let refuse = |problem: String| {
-            Err(Error::new("use", "the stiffness", problem).help("check the signs of its elements"))
-        };
+        let refuse =
+            |problem: String| Err(Error::new("use", "the stiffness", problem).help("check the signs of its elements"));
         if let Some(dof) = (0..size).find(|dof| stiffness[(*dof, *dof)] < 0.0) {
             return refuse(format!(
                 "expected a positive semidefinite matrix; row {row}, column {row} is {value:e}",
@@ -256,9 +263,8 @@ impl StiffnessRoot {
                 value = stiffness[(dof, dof)]
             ));
         }
-        let scale: Vec<f64> = (0..size)
-            .map(|dof| if stiffness[(dof, dof)] > 0.0 { stiffness[(dof, dof)].sqrt() } else { 1.0 })
-            .collect();
+        let scale: Vec<f64> =
+            (0..size).map(|dof| if stiffness[(dof, dof)] > 0.0 { stiffness[(dof, dof)].sqrt() } else { 1.0 }).collect();
         let scaled = Mat::from_fn(size, size, |row, column| stiffness[(row, column)] / (scale[row] * scale[column]));
         let eigen = scaled.self_adjoint_eigen(Side::Lower).map_err(|_| not_converged(0.0))?;
         let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();

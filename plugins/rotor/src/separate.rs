@@ -62,7 +62,9 @@ impl StageConfig for RotorModesConfig {
         within("modes", "a number of modes", self.modes, 1..=200)?;
         if let Some(speed) = self.campbell_rpm.iter().find(|speed| !(speed.is_finite() && **speed >= 0.0)) {
             let fault = Fault::at("campbell_rpm", format!("expected speeds of at least 0 rpm, found {speed}"));
-            return Err(fault.help("the rotor turns from x towards y; turning the other way gives the same frequencies"));
+            return Err(
+                fault.help("the rotor turns from x towards y; turning the other way gives the same frequencies")
+            );
         }
         within("campbell_rpm", "a number of speeds", self.campbell_rpm.len(), 0..=2000)?;
         avoid::check("avoid_orders", &self.avoid_orders, "avoid_within_percent", self.avoid_within_percent)?;
@@ -123,7 +125,8 @@ impl Solution {
             Ok((oscillating, modes))
         };
         let (oscillating, at_rest) = modes_at(0.0)?;
-        let campbell = config.campbell_rpm.iter().map(|speed| Ok((*speed, modes_at(*speed)?.1))).collect::<Result<_>>()?;
+        let campbell =
+            config.campbell_rpm.iter().map(|speed| Ok((*speed, modes_at(*speed)?.1))).collect::<Result<_>>()?;
         let mut search = Search::new(&modal);
         let critical = search.crossings(1.0, config.modes)?;
         let share = config.avoid_within_percent / 100.0;
@@ -151,7 +154,10 @@ impl Solution {
             ));
         }
         if self.overdamped > 0 {
-            remarks.push(format!("{} motions do not oscillate at rest: they are damped too strongly, and are no modes", self.overdamped));
+            remarks.push(format!(
+                "{} motions do not oscillate at rest: they are damped too strongly, and are no modes",
+                self.overdamped
+            ));
         }
         if let Some((number, mode)) = unstable(&self.at_rest) {
             remarks.push(format!(
@@ -162,13 +168,17 @@ impl Solution {
         if let Some((speed, number, mode)) =
             self.campbell.iter().find_map(|(speed, modes)| unstable(modes).map(|(number, mode)| (speed, number, mode)))
         {
-            remarks.push(format!("mode {number} grows by itself at {speed} rpm (damping ratio {:.2e})", mode.damping_ratio()));
+            remarks.push(format!(
+                "mode {number} grows by itself at {speed} rpm (damping ratio {:.2e})",
+                mode.damping_ratio()
+            ));
         }
         if self.at_rest.len() < config.modes {
             remarks.push(format!("the model has {} modes; {} were asked for", self.at_rest.len(), config.modes));
         }
         Ok(Outcome {
-            convention: "z along the axis, rotation from x towards y; mode 1 has the lowest frequency of its speed".into(),
+            convention: "z along the axis, rotation from x towards y; mode 1 has the lowest frequency of its speed"
+                .into(),
             tables: self.rows()?,
             values: self.values(),
             form: None,
@@ -186,7 +196,8 @@ impl Solution {
             .iter()
             .flat_map(|(speed, modes)| modes.iter().enumerate().map(|(index, mode)| (*speed, index + 1, mode)))
             .collect();
-        let at_rest: Vec<(usize, &Mode)> = self.at_rest.iter().enumerate().map(|(index, mode)| (index + 1, mode)).collect();
+        let at_rest: Vec<(usize, &Mode)> =
+            self.at_rest.iter().enumerate().map(|(index, mode)| (index + 1, mode)).collect();
         let shapes: Vec<(usize, f64, (f64, f64))> = at_rest
             .iter()
             .flat_map(|(number, mode)| {
@@ -197,41 +208,54 @@ impl Solution {
             .collect();
         let planar = !self.nodes.is_empty();
         let rows = [
-            (modes_table(), vec![
-                counts(at_rest.iter().map(|(number, _)| *number)),
-                numbers(at_rest.iter().map(|(_, mode)| hertz(mode.frequency()))),
-                numbers(at_rest.iter().map(|(_, mode)| mode.damping_ratio())),
-                texts(at_rest.iter().map(|(_, mode)| self.whirl(mode).name())),
-            ]),
-            (campbell_table(), vec![
-                numbers(campbell.iter().map(|(speed, ..)| *speed)),
-                counts(campbell.iter().map(|(_, number, _)| *number)),
-                numbers(campbell.iter().map(|(.., mode)| hertz(mode.frequency()))),
-                numbers(campbell.iter().map(|(.., mode)| mode.damping_ratio())),
-                texts(campbell.iter().map(|(.., mode)| self.whirl(mode).name())),
-            ]),
-            (critical_table(), vec![
-                counts(1..=self.critical.len()),
-                texts(self.critical.iter().map(|critical| self.whirl(&critical.mode).name())),
-                numbers(self.critical.iter().map(|critical| rpm(critical.speed))),
-                numbers(self.critical.iter().map(|critical| hertz(critical.mode.frequency()))),
-            ]),
-            (shapes_table(), vec![
-                counts(shapes.iter().map(|(number, ..)| *number)),
-                numbers_or_null(shapes.iter().map(|(_, z_mm, _)| Some(*z_mm).filter(|_| planar))),
-                numbers(shapes.iter().map(|(.., (x, _))| *x)),
-                numbers_or_null(shapes.iter().map(|(.., (_, y))| Some(*y).filter(|_| planar))),
-            ]),
-            (avoid_table(), vec![
-                numbers(self.ranges.iter().map(|range| range.order)),
-                counts(self.ranges.iter().map(|range| range.mode)),
-                numbers(self.ranges.iter().map(|range| rpm(range.from))),
-                numbers_or_null(self.ranges.iter().map(|range| Some(rpm(range.to)).filter(|to| to.is_finite()))),
-            ]),
+            (
+                modes_table(),
+                vec![
+                    counts(at_rest.iter().map(|(number, _)| *number)),
+                    numbers(at_rest.iter().map(|(_, mode)| hertz(mode.frequency()))),
+                    numbers(at_rest.iter().map(|(_, mode)| mode.damping_ratio())),
+                    texts(at_rest.iter().map(|(_, mode)| self.whirl(mode).name())),
+                ],
+            ),
+            (
+                campbell_table(),
+                vec![
+                    numbers(campbell.iter().map(|(speed, ..)| *speed)),
+                    counts(campbell.iter().map(|(_, number, _)| *number)),
+                    numbers(campbell.iter().map(|(.., mode)| hertz(mode.frequency()))),
+                    numbers(campbell.iter().map(|(.., mode)| mode.damping_ratio())),
+                    texts(campbell.iter().map(|(.., mode)| self.whirl(mode).name())),
+                ],
+            ),
+            (
+                critical_table(),
+                vec![
+                    counts(1..=self.critical.len()),
+                    texts(self.critical.iter().map(|critical| self.whirl(&critical.mode).name())),
+                    numbers(self.critical.iter().map(|critical| rpm(critical.speed))),
+                    numbers(self.critical.iter().map(|critical| hertz(critical.mode.frequency()))),
+                ],
+            ),
+            (
+                shapes_table(),
+                vec![
+                    counts(shapes.iter().map(|(number, ..)| *number)),
+                    numbers_or_null(shapes.iter().map(|(_, z_mm, _)| Some(*z_mm).filter(|_| planar))),
+                    numbers(shapes.iter().map(|(.., (x, _))| *x)),
+                    numbers_or_null(shapes.iter().map(|(.., (_, y))| Some(*y).filter(|_| planar))),
+                ],
+            ),
+            (
+                avoid_table(),
+                vec![
+                    numbers(self.ranges.iter().map(|range| range.order)),
+                    counts(self.ranges.iter().map(|range| range.mode)),
+                    numbers(self.ranges.iter().map(|range| rpm(range.from))),
+                    numbers_or_null(self.ranges.iter().map(|range| Some(rpm(range.to)).filter(|to| to.is_finite()))),
+                ],
+            ),
         ];
-        rows.into_iter()
-            .map(|(spec, columns)| Ok(TableRows { rows: spec.rows(columns)?, table: spec.name }))
-            .collect()
+        rows.into_iter().map(|(spec, columns)| Ok(TableRows { rows: spec.rows(columns)?, table: spec.name })).collect()
     }
 
     fn values(&self) -> Vec<NamedValue> {
@@ -317,7 +341,9 @@ fn shapes_table() -> TableSpec {
     let about = "shapes of the modes at rest, at the instant of the largest displacement; the largest is 1";
     let columns = vec![
         mode_column(),
-        ColumnSpec::number("z_mm", "mm", "place along the shaft; null where matrices do not say it").or_null().repeating(),
+        ColumnSpec::number("z_mm", "mm", "place along the shaft; null where matrices do not say it")
+            .or_null()
+            .repeating(),
         ColumnSpec::number("x", "1", "displacement along x; without places, each degree of freedom in its order"),
         ColumnSpec::number("y", "1", "displacement along y; null without places").or_null(),
     ];
@@ -325,7 +351,8 @@ fn shapes_table() -> TableSpec {
 }
 
 fn avoid_table() -> TableSpec {
-    let about = "speeds at which a mode is near a multiple of the speed; at these, error motion is the rotor's vibration";
+    let about =
+        "speeds at which a mode is near a multiple of the speed; at these, error motion is the rotor's vibration";
     let columns = vec![
         ColumnSpec::number("order", "1/rev", "multiple of the speed").repeating(),
         ColumnSpec::count("mode", "", "number of the mode in the order of the speeds at which it meets this order"),

@@ -28,7 +28,12 @@ pub fn columns() -> Vec<PointColumn> {
             "",
             "stiffness, mass, gyroscopic (at 1 rad/s), damping or circulatory; or places",
         ),
-        PointColumn::needed(ROW, PointKind::Number, "", "row from 1; of places the degree of freedom, 0 for one that is held"),
+        PointColumn::needed(
+            ROW,
+            PointKind::Number,
+            "",
+            "row from 1; of places the degree of freedom, 0 for one that is held",
+        ),
         PointColumn::needed(COLUMN, PointKind::Number, "", "column from 1; of places 1 for x, 2 for y"),
         PointColumn::needed(VALUE, PointKind::Number, "", "element in SI units; of places z in mm"),
     ]
@@ -111,7 +116,8 @@ pub fn from_points(points: &Points) -> Result<Equations> {
     for trace in &points.traces {
         let elements = trace.points.clone().map(|index| (rows[index] as usize, columns[index] as usize, values[index]));
         if trace.id == PLACES {
-            nodes = places(elements, size).map_err(|problem| Error::new("read", format!("{object}, places"), problem))?;
+            nodes =
+                places(elements, size).map_err(|problem| Error::new("read", format!("{object}, places"), problem))?;
         } else if let Some(role) = Role::ALL.into_iter().find(|role| role.name() == trace.id) {
             let mut matrix = Mat::zeros(size, size);
             elements.for_each(|(row, column, value)| matrix[(row - 1, column - 1)] += value);
@@ -126,10 +132,7 @@ pub fn from_points(points: &Points) -> Result<Equations> {
 }
 
 /// Nodes in the order of z.
-fn places(
-    elements: impl Iterator<Item = (usize, usize, f64)>,
-    size: usize,
-) -> std::result::Result<Vec<Node>, String> {
+fn places(elements: impl Iterator<Item = (usize, usize, f64)>, size: usize) -> std::result::Result<Vec<Node>, String> {
     let mut nodes: Vec<Node> = Vec::new();
     for (dof, direction, z_mm) in elements {
         if dof > size {

@@ -58,8 +58,7 @@ pub fn whirl(shape: &[c64], nodes: &[Node]) -> Whirl {
     if largest <= LINE * size {
         return Whirl::Planar;
     }
-    let [forward, backward] =
-        [1.0, -1.0].map(|sign| areas.iter().any(|area| sign * area > SMALL * largest));
+    let [forward, backward] = [1.0, -1.0].map(|sign| areas.iter().any(|area| sign * area > SMALL * largest));
     match (forward, backward) {
         (true, true) => Whirl::Mixed,
         (true, false) => Whirl::Forward,
@@ -101,7 +100,8 @@ pub fn align(modes: &mut [Mode], nodes: &[Node]) {
     let mut start = 0;
     while start < modes.len() {
         let first = modes[start].eigenvalue;
-        let same = modes[start..].iter().take_while(|mode| (mode.eigenvalue - first).norm() < SAME * first.norm()).count();
+        let same =
+            modes[start..].iter().take_while(|mode| (mode.eigenvalue - first).norm() < SAME * first.norm()).count();
         if same > 1 {
             align_one(&mut modes[start..start + same], nodes);
         }

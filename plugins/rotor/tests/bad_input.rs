@@ -25,10 +25,18 @@ fn mistakes_of_a_file_have_their_place() {
         (r#"segments = [{ length_mm = 0, outer_mm = 50, material = "steel" }]"#, "line 2", "above 0 mm, found 0"),
         (r#"segments = [{ length_mm = -3, outer_mm = 50, material = "steel" }]"#, "line 2", "found -3"),
         (r#"segments = [{ length_mm = nan, outer_mm = 50, material = "steel" }]"#, "line 2", "found NaN"),
-        (r#"segments = [{ length_mm = 9, outer_mm = 5, inner_mm = 5, material = "steel" }]"#, "line 2", "outer diameter"),
+        (
+            r#"segments = [{ length_mm = 9, outer_mm = 5, inner_mm = 5, material = "steel" }]"#,
+            "line 2",
+            "outer diameter",
+        ),
         (r#"segments = [{ length_mm = 9, outer_mm = 5, material = "steal" }]"#, "line 2", "did you mean `steel`"),
         (r#"segments = [{ length_mm = 9, outer_mm = 5, material = "steel", elements = 0 }]"#, "line 2", "at least one"),
-        (r#"segments = [{ length_mm = 9, outer_mm = 5, material = "steel", elements = 900 }]"#, "line 2", "at most 199"),
+        (
+            r#"segments = [{ length_mm = 9, outer_mm = 5, material = "steel", elements = 900 }]"#,
+            "line 2",
+            "at most 199",
+        ),
         (r#"segments = [{ length_mm = 9, outer_mm = 5, material = "steel", element = 9 }]"#, "line 2", "`elements`"),
         ("", "line 1", "at least one segment"),
         ("segments = []", "line 2", "at least one segment"),
@@ -103,7 +111,9 @@ fn units_that_look_wrong_are_warned_of() {
     }
     let with = |part: &str| warnings(&format!("{MATERIALS}{SHAFT}\n{part}"));
     assert!(with("bearings = [{ z_mm = 0, kxx_n_per_m = 300, kyy_n_per_m = 3e8 }]").contains("N/µm"));
-    assert!(with("disks = [{ z_mm = 0, mass_kg = 2, polar_kg_m2 = 1600, diametral_kg_m2 = 900 }]").contains("gyration"));
+    assert!(
+        with("disks = [{ z_mm = 0, mass_kg = 2, polar_kg_m2 = 1600, diametral_kg_m2 = 900 }]").contains("gyration")
+    );
     let thin = r#"segments = [{ length_mm = 0.2, outer_mm = 0.05, material = "steel" }]"#;
     assert!(warnings(&format!("{MATERIALS}{thin}")).contains("is it in m?"));
 }
@@ -128,7 +138,11 @@ fn matrices_that_are_no_rotor_are_refused() {
     let mass = ("M.mtx", "array real general\n2 2\n2\n0\n0\n2\n");
     let good = "array real general\n2 2\n8e6\n0\n0\n2e6\n";
     let cases = [
-        (("K.mtx", "array real general\n2 2\n8e6\n1e6\n0\n2e6\n"), mass, "row 2, column 1 is 1e6, row 1, column 2 is 0"),
+        (
+            ("K.mtx", "array real general\n2 2\n8e6\n1e6\n0\n2e6\n"),
+            mass,
+            "row 2, column 1 is 1e6, row 1, column 2 is 0",
+        ),
         (("K.mtx", "array real general\n2 2\n8e6\n0\n0\n-2e6\n"), mass, "positive semidefinite"),
         (("K.mtx", "array real general\n2 2\n0\n0\n0\n0\n"), mass, "other than 0"),
         (("K.mtx", good), ("M.mtx", "array real general\n2 2\n2\n0\n0\n-2\n"), "positive definite"),

@@ -102,7 +102,8 @@ fn critical_speeds_are_those_of_the_closed_form() {
         near(crossing.mode.frequency(), crossing.speed, 1e-12);
         // The eigenproblem at this speed has this frequency.
         let modes = rotor.at(crossing.speed).unwrap();
-        let nearest = modes.iter().map(|mode| (mode.frequency() / crossing.speed - 1.0).abs()).fold(f64::INFINITY, f64::min);
+        let nearest =
+            modes.iter().map(|mode| (mode.frequency() / crossing.speed - 1.0).abs()).fold(f64::INFINITY, f64::min);
         assert!(nearest < 1e-8, "{nearest:e}");
     }
 }

@@ -13,8 +13,8 @@ use runout_core::{
     points::Points,
     stage::{Outcome, PointSeparator},
 };
-use support::{MATERIALS, modal, near, points, separator, solved};
 use std::{f64::consts::PI, path::Path};
+use support::{MATERIALS, modal, near, points, separator, solved};
 
 const ROTOR: &str = r#"segments = [{ length_mm = 600, outer_mm = 40, material = "steel", elements = 6 }]
     disks = [{ z_mm = 400, mass_kg = 12, polar_kg_m2 = 0.12, diametral_kg_m2 = 0.07 }]

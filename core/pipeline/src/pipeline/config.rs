@@ -149,7 +149,18 @@ impl Route {
 }
 
 const KEYS: [&str; 12] = [
-    "title", "rig", "load", "preprocess", "separate", "compare", "surface", "evaluate", "limit", "diagnose", "export", "check",
+    "title",
+    "rig",
+    "load",
+    "preprocess",
+    "separate",
+    "compare",
+    "surface",
+    "evaluate",
+    "limit",
+    "diagnose",
+    "export",
+    "check",
 ];
 
 impl Pipeline {
@@ -225,8 +236,10 @@ impl Pipeline {
             .iter()
             .map(|table| compare::candidate(table, registry, &context))
             .collect::<Result<_, _>>()?;
-        let checks =
-            tables(root, "check")?.iter().map(|table| registry.checks.build(table, &context)).collect::<Result<_, _>>()?;
+        let checks = tables(root, "check")?
+            .iter()
+            .map(|table| registry.checks.build(table, &context))
+            .collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref())?;
         let tables = route.tables(assessment.as_ref(), rig.as_ref());
         let exporting = Exporting { registry, context: &context, route: &route, tables: &tables, diagnose: &diagnose };
