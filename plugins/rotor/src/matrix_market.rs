@@ -26,6 +26,7 @@ pub fn read(path: &Path) -> Result<Mat<f64>> {
 fn parse(text: &str) -> std::result::Result<Mat<f64>, String> {
     let header = text.lines().next().unwrap_or_default().to_lowercase();
     let words: Vec<&str> = header.split_whitespace().collect();
+    sizes_fit(text, words.get(2) == Some(&"coordinate"))?;
     let (size, elements) = if words.get(3) == Some(&"integer") {
         let matrix = load_coo_from_matrix_market_str::<i128>(text).map_err(|error| said(error.message()))?;
         let elements: Vec<_> = matrix.triplet_iter().map(|(row, column, value)| (row, column, *value as f64)).collect();
@@ -48,6 +49,25 @@ fn parse(text: &str) -> std::result::Result<Mat<f64>, String> {
         matrix[(row, column)] += value;
     }
     Ok(matrix)
+}
+
+/// Refuses sizes and indices that no integer holds, at which the parser panics.
+fn sizes_fit(text: &str, coordinate: bool) -> std::result::Result<(), String> {
+    let lines = text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('%'));
+    for (order, (number, line)) in lines.enumerate() {
+        // The first line holds sizes; then, with coordinates, each begins with row and column.
+        let whole = match (order, coordinate) {
+            (0, _) => 3,
+            (_, true) => 2,
+            (_, false) => return Ok(()),
+        };
+        for word in line.split_whitespace().take(whole) {
+            if word.bytes().all(|byte| byte.is_ascii_digit()) && word.parse::<u32>().is_err() {
+                return Err(format!("line {}: {word} is too large for a size or an index", number + 1));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The parser's message on one line, without its drawing of the place.
@@ -99,7 +119,11 @@ mod tests {
             ("%%MatrixMarket matrix coordinate real general\n5000 5000 1\n1 1 4\n", "at most"),
             ("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 4 0\n", ""),
             ("%%MatrixMarket matrix array real general\n2 2\n1\nx\n3\n4\n", "4:1"),
-            ("%%MatrixMarket matrix array real general\n99999999999999999999 2\n1\n", ""),
+            (
+                "%%MatrixMarket matrix array real general\n99999999999999999999 2\n1\n",
+                "line 2: 99999999999999999999 is too large",
+            ),
+            ("%%MatrixMarket matrix coordinate real general\n2 2 1\n99999999999999999999 2 1\n", "line 3"),
             ("1 2\n", ""),
             ("", ""),
         ];
