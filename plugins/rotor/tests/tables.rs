@@ -9,10 +9,7 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, UInt32Type},
 };
-use runout_core::{
-    points::Points,
-    stage::{Outcome, PointSeparator},
-};
+use runout_core::{points::Points, stage::Outcome};
 use std::{f64::consts::PI, path::Path};
 use support::{MATERIALS, modal, near, points, separator, solved};
 
