@@ -128,8 +128,9 @@ pub struct SimulateArgs {
 /// `runout plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    /// The rig: what stands under [rig] in a pipeline, in a file of its own.
-    #[arg(value_name = "RIG.toml")]
+    /// The rig: what stands under [rig] in a pipeline, in a file of its own. Or a pipeline of measured points, of which the layout
+    /// is planned; the options but --set and --json are of rigs.
+    #[arg(value_name = "RIG.toml|PIPELINE.toml")]
     pub rig: PathBuf,
     /// Orders (undulations per revolution) to plan for, both ends included.
     #[arg(long, value_name = "FIRST..LAST", default_value = "2..150", value_parser = orders)]
@@ -216,7 +217,7 @@ pub struct PluginsArgs {
 /// `runout schema`.
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
-    /// `pipeline`, `scenario`, `rig`, `summary`, `diagnosis`, `compare`, `check`, `plan`, or a plugin's name; all the files' schemas without it.
+    /// `pipeline`, `scenario`, `rig`, `summary`, `diagnosis`, `compare`, `check`, `plan`, `plan-points`, or a plugin's name; all the files' schemas without it.
     pub name: Option<String>,
     /// Write each file's schema to `NAME.schema.json` in this folder.
     #[arg(long, value_name = "DIR", conflicts_with = "name")]

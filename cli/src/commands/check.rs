@@ -2,7 +2,7 @@
 
 use runout_core::{
     azimuth::Azimuth,
-    model::foresight::Foresight,
+    model::{diagnosis, foresight::Foresight},
     pipeline::{
         Pipeline, Registry,
         config::Route,
@@ -34,6 +34,9 @@ pub struct Report {
     /// What the rig can and cannot separate; absent for measured points.
     #[serde(flatten)]
     pub separability: Option<Separability>,
+    /// Orders that measured points would not separate; absent where their domain has none.
+    #[serde(flatten)]
+    pub of_points: Option<OfPoints>,
     /// Effects that the closed loop would show, be blind to or confound; absent where there is no model of effects.
     #[serde(flatten)]
     pub foresight: Option<Foresight>,
@@ -44,6 +47,13 @@ pub struct Report {
     pub tables: Vec<String>,
     /// What the user should know.
     pub notes: Vec<String>,
+}
+
+/// What can be said of measured points.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct OfPoints {
+    /// Orders that cannot be separated, by what they are of.
+    pub lost_orders: diagnosis::LostOrders,
 }
 
 /// A column of measured points.
@@ -171,6 +181,7 @@ fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> 
     if pipeline.exporters.is_empty() {
         notes.push("there is no [[export]]: a run would only print its summary".into());
     }
+    let separator = pipeline.route.point_separator();
     let foresight = match &pipeline.route {
         Route::Turns { separator, .. } => separator.foresee(effects).transpose()?,
         Route::Points { .. } => None,
@@ -180,6 +191,7 @@ fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> 
         stages: stages(sources)?,
         rig: pipeline.rig.as_ref().map(RigSize::from),
         separability: pipeline.assessment.as_ref().map(|found| Separability::new(found, pipeline.rig.as_ref())),
+        of_points: separator.and_then(PointSeparator::lost_orders).map(|lost_orders| OfPoints { lost_orders }),
         foresight,
         columns: pipeline.request().columns.iter().map(TakenColumn::from).collect(),
         tables: pipeline.tables.iter().map(|table| table.name.clone()).collect(),

@@ -6,8 +6,8 @@ use runout_core::{
     Error, Result,
     atomic_file::{self, resolved},
     pipeline::{
-        Registry,
-        compare::{Comparing, Comparison, StationComparison},
+        Pipeline, Registry,
+        compare::{Comparing, ComparingPoints, Comparison, StationComparison},
         document::{Document, Sources},
         error::known_names,
     },
@@ -25,6 +25,9 @@ pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::resu
     known(&args.with, registry)?;
     let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
     let mut output = Output::named(args.out.as_deref(), &sources)?;
+    if pipeline.route.point_separator().is_some() {
+        return points(args, json, registry, &sources, &pipeline, output);
+    }
     let comparing = match Comparing::new(&mut pipeline, &args.with, registry, sources.folder()) {
         Ok(comparing) => comparing,
         Err(fault) => return Err(Document::parse(&sources)?.diagnose(fault).into()),
@@ -40,6 +43,28 @@ pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::resu
     let mut comparison = comparing.run(args.threads, &progress, args.out.iter().cloned().collect(), take)?;
     drop(progress);
     comparison.stations = stations;
+    output.finish(&comparison)?;
+    print(&comparison, json, render::compare::text)
+}
+
+/// The same of measured points, which are in memory as a whole.
+fn points(
+    args: &CompareArgs,
+    json: bool,
+    registry: &Registry,
+    sources: &Sources,
+    pipeline: &Pipeline,
+    output: Output,
+) -> std::result::Result<(), Failure> {
+    if let Output::Table(path, _) = &output {
+        let message = format!("{}: measured points have no orders to write as a table", path.display());
+        return Err(Failure::Name { message, help: "name a file that ends in .json".into() });
+    }
+    let comparing = match ComparingPoints::new(pipeline, &args.with, registry, sources) {
+        Ok(comparing) => comparing,
+        Err(fault) => return Err(Document::parse(sources)?.diagnose(fault).into()),
+    };
+    let comparison = comparing.run(args.out.iter().cloned().collect())?;
     output.finish(&comparison)?;
     print(&comparison, json, render::compare::text)
 }

@@ -2,12 +2,14 @@
 //! for its sensors.
 
 mod map;
+pub mod points;
 mod report;
 
 use std::ops::RangeInclusive;
 
 use runout_core::{
     pipeline::{
+        Registry,
         document::{self, Document, Sources},
         error::Fault,
     },
@@ -27,13 +29,16 @@ use crate::{
 };
 pub use report::{Arrangement, Gain, Optimised, Report, Score, Suggested, Unresolved};
 
-/// Plans a rig.
+/// Plans a rig, or the layout of a pipeline of measured points.
 ///
 /// # Errors
-/// When the rig is wrong, the sensors have no room, or the map cannot be written.
-pub fn execute(args: &PlanArgs, json: bool) -> Result<(), Failure> {
+/// When the rig or the pipeline is wrong, the sensors have no room, or the map cannot be written.
+pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     // A rig file includes no other.
     let sources = Sources::read(&args.rig, &args.overrides.set, "")?;
+    if points::is_pipeline(&sources)? {
+        return points::execute(args, &sources, json, registry);
+    }
     let rig = rig(&sources)?;
     map::refuse(args.map.as_deref(), &sources)?;
     let optimum = args.optimise.map(|Optimise::Angles| better_angles(&rig, args)).transpose()?;

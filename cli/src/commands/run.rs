@@ -1,11 +1,8 @@
 //! `runout run`.
 
-use runout_core::{
-    pipeline::{
-        Registry,
-        run::{self, Decision},
-    },
-    stage::PointSeparator,
+use runout_core::pipeline::{
+    Registry,
+    run::{self, Decision},
 };
 
 use super::{pipeline, print};
@@ -33,9 +30,6 @@ pub fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Fa
     if !open.is_empty() {
         return Err(Failure::Limit(open));
     }
-    // What is said of the layout is known before any data.
-    let mut notes = pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default();
-    notes.extend(pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default());
-    let warnings = summary.all_warnings().filter(|warning| !notes.contains(warning)).count();
+    let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();
     if args.fail_on_warning && warnings > 0 { Err(Failure::Warnings(warnings)) } else { Ok(()) }
 }

@@ -50,6 +50,10 @@ fn files(registry: &Registry) -> Vec<(&'static str, Value)> {
         ("compare", of::<Comparison>("runout compare", SchemaSettings::default().for_serialize())),
         ("check", of::<check::Report>("runout check", SchemaSettings::default().for_serialize())),
         ("plan", of::<plan::Report>("runout plan", SchemaSettings::default().for_serialize())),
+        (
+            "plan-points",
+            of::<plan::points::PointReport>("runout plan, measured points", SchemaSettings::default().for_serialize()),
+        ),
     ]
 }
 

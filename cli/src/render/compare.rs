@@ -1,5 +1,7 @@
 //! Several separators on the same data, for people.
 
+mod points;
+
 use runout_core::pipeline::compare::{Comparison, Difference, MethodValue, QuantityComparison};
 
 use super::{
@@ -14,6 +16,9 @@ use super::{
 pub fn text(comparison: &Comparison) -> String {
     let mut page = Page::default();
     page.line(&comparison.title);
+    if comparison.stations.is_empty() && !comparison.values.is_empty() {
+        return points::text(page, comparison);
+    }
     page.line(format_args!("{}, compared with {}", count(comparison.stations.len(), "station"), comparison.reference));
     methods(&mut page, comparison);
     let several = if comparison.stations.len() > 1 { ", medians over the stations" } else { "" };

@@ -3,6 +3,7 @@
 use runout_core::model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step, Verdict};
 
 use super::{
+    foresight::WHOLE,
     number::{lacking, ranges, significant, spread, with_std},
     page::Page,
     summary::described,
@@ -50,8 +51,9 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     }
     if let Some(lost) = &diagnosis.lost_orders {
         page.heading("Lost orders");
-        page.line(format_args!("  form    {}", ranges(&lost.form)));
-        page.line(format_args!("  motion  {}", ranges(&lost.motion)));
+        for (quantity, orders) in &lost.0 {
+            page.line(format_args!("  {quantity:<6}  {}", ranges(orders)));
+        }
     }
     page.bullets("Put into the rig", &changes(&diagnosis.added));
     page.bullets("Warnings and notes", &diagnosis.warnings);
@@ -220,7 +222,12 @@ fn blind(all: &[Blind]) -> Table {
         };
         let [low, high] = [low, high].map(|value| significant(value, 2));
         let size = if low == high { low } else { format!("{low} to {high}") };
-        let targets: Vec<String> = group.iter().map(|one| one.targets.join(", ")).collect();
+        let has_targets = all.iter().any(|one| one.effect == first.effect && !one.targets.is_empty());
+        let target = |one: &&Blind| match one.targets[..] {
+            [] if has_targets => WHOLE.to_owned(),
+            ref targets => targets.join(", "),
+        };
+        let targets: Vec<String> = group.iter().map(target).collect();
         let per_unit = unit(&first.bias_per_unit.unit);
         table.row([
             first.effect.clone(),

@@ -10,6 +10,7 @@ pub mod keys;
 pub mod number;
 pub mod page;
 pub mod plan;
+pub mod plan_points;
 pub mod summary;
 pub mod table;
 

@@ -11,6 +11,7 @@ mod lost_orders;
 mod measured;
 mod one_line;
 mod other_rigs;
+mod points;
 mod reading;
 mod rotor;
 mod safety;

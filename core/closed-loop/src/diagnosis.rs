@@ -1,6 +1,6 @@
 //! What a closed loop found, for people and programs.
 
-use std::{fmt, path::PathBuf};
+use std::{collections::BTreeMap, fmt, path::PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -268,13 +268,16 @@ pub struct Refused {
     pub reason: String,
 }
 
-/// Orders that a layout cannot separate.
+/// Orders that a layout cannot separate, by what they are of: "form" in any section, "motion", "lobing".
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct LostOrders {
-    /// Of form, in any section.
-    pub form: Vec<usize>,
-    /// Of motion.
-    pub motion: Vec<usize>,
+pub struct LostOrders(pub BTreeMap<String, Vec<usize>>);
+
+impl LostOrders {
+    /// Of several quantities.
+    #[must_use]
+    pub fn of<const N: usize>(lost: [(&str, Vec<usize>); N]) -> Self {
+        Self(lost.into_iter().map(|(quantity, orders)| (quantity.to_owned(), orders)).collect())
+    }
 }
 
 /// Errors against a known truth.

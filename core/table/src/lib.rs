@@ -8,12 +8,12 @@ pub mod figure;
 
 use std::{collections::HashMap, sync::Arc};
 
-use arrow_array::{BooleanArray, Float64Array, StringArray, UInt32Array};
+use arrow_array::{BooleanArray, StringArray, UInt32Array};
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 
 use runout_error::{Error, Result};
 
-pub use arrow_array::{ArrayRef, RecordBatch};
+pub use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch};
 pub use figure::{Figure, Measure};
 
 /// What a column holds.

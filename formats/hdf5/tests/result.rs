@@ -65,7 +65,7 @@ pub fn summary() -> Summary {
             configuration: "title = \"Shaft\"\n# µm\n".into(),
             inputs: vec![Input { path: "shaft.h5".into(), bytes: 1234, blake3: "ab".repeat(32) }],
         },
-        lost_orders: LostOrders { form: vec![1], motion: Vec::new() },
+        lost_orders: LostOrders { form: vec![1], motion: Vec::new(), ..LostOrders::default() },
         stations: vec![StationSummary {
             station: "s1".into(),
             z_mm: 12.5,

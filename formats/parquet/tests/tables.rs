@@ -82,7 +82,7 @@ fn summary() -> Summary {
             configuration: "[load]\nplugin = \"csv\"\n".into(),
             inputs: vec![Input { path: "shaft.h5".into(), bytes: 12, blake3: "00ff".into() }],
         },
-        lost_orders: LostOrders { form: vec![LOST], motion: vec![LOST] },
+        lost_orders: LostOrders { form: vec![LOST], motion: vec![LOST], ..LostOrders::default() },
         warnings: vec!["order 4 is lost".into()],
         ..Summary::default()
     }

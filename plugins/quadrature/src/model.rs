@@ -301,8 +301,8 @@ impl LinearModel for Quadrature {
             convention: ANGLE.into(),
             tables: vec![correction.rows(points, &samples)?],
             values: values.collect(),
-            form: None,
             remarks,
+            ..Outcome::default()
         })
     }
 }

@@ -23,6 +23,8 @@ use crate::{
 const SAME_COMMAND_DEG: f64 = 5e-3;
 /// Fewer distinct commands determine no harmonic.
 pub const FEWEST_COMMANDS: usize = 3;
+/// Commands within ±this are a turn in radians, or nothing that separates much.
+const RADIANS: f64 = 7.0;
 /// A median deviation above this, in mm, looks like another unit.
 const LARGE_MM: f64 = 2.0;
 /// The largest deviation below this, in mm, looks like another unit.
@@ -283,7 +285,7 @@ fn looks_wrong(axis: Axis, command: &[f64], deviations: [&[f64]; 3]) -> Vec<Stri
     let name = axis.command();
     let largest = command.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
     let (different, _) = distinct(command);
-    if largest <= std::f64::consts::TAU + 0.01 && different.len() > FEWEST_COMMANDS {
+    if largest <= RADIANS && different.len() > FEWEST_COMMANDS {
         warnings.push(format!(
             "all commands in `{name}` are within ±{largest:.2}°: are they in rad? {} commands within so small an angle \
              separate little",

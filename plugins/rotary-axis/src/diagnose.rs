@@ -73,6 +73,14 @@ impl PointModel for RotaryAxis {
     }
 }
 
+/// The readings and effects of the loop.
+struct Assembled {
+    terms: LinearTerms,
+    data: Redundant,
+    first: Vec<usize>,
+    tried: [usize; 3],
+}
+
 /// One run of the loop at fixed time constants.
 struct Run {
     diagnosis: Diagnosis,
@@ -153,6 +161,25 @@ impl RotaryAxis {
         constants: [f64; 3],
         grid: &[f64],
     ) -> std::result::Result<Run, String> {
+        let Assembled { terms, data, first, tried } = self.assembled(campaign, constants, grid)?;
+        let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
+        let closed = closed_loop::diagnose(&terms, settings).map_err(|error| error.to_string())?;
+        let added = closed.settings.into_iter().skip(settings.known.len()).collect();
+        Ok(Run { diagnosis: closed.diagnosis, added, constants, data, first, tried })
+    }
+
+    /// The terms of the loop at the usual time constants.
+    pub(crate) fn linear_terms(&self, campaign: &Campaign) -> std::result::Result<LinearTerms, String> {
+        self.assembled(campaign, [USUAL_TIME_CONSTANT; 3], &[]).map(|assembled| assembled.terms)
+    }
+
+    /// The terms of the loop at fixed time constants, and further ones to try.
+    fn assembled(
+        &self,
+        campaign: &Campaign,
+        constants: [f64; 3],
+        grid: &[f64],
+    ) -> std::result::Result<Assembled, String> {
         let axis = self.0.axis;
         let mut columns: Vec<Column> = Vec::new();
         let mut first = Vec::with_capacity(CANDIDATES.len());
@@ -198,12 +225,8 @@ impl RotaryAxis {
             .map_err(|error| error.to_string())?
             .told_apart_by(
                 "a calibration of the linear axes on their own, or a campaign with the balls in another order of time",
-            )
-            .with_known(&settings.known)
-            .considering(settings.effects.as_deref());
-        let closed = closed_loop::diagnose(&model, settings).map_err(|error| error.to_string())?;
-        let added = closed.settings.into_iter().skip(settings.known.len()).collect();
-        Ok(Run { diagnosis: closed.diagnosis, added, constants, data, first, tried })
+            );
+        Ok(Assembled { terms: model, data, first, tried })
     }
 
     /// Columns of effects that were added.

@@ -14,6 +14,7 @@ mod kinematics;
 mod model;
 mod noise;
 mod paper;
+mod plan;
 mod separate;
 pub mod simulate;
 mod solve;

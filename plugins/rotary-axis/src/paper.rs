@@ -159,10 +159,14 @@ impl PointSeparator for CircleFit {
             estimate(tilt_x, plane_covariance[(2, 2)]),
             estimate(tilt_y, plane_covariance[(1, 1)]),
         ];
-        let mut remarks = campaign.warnings;
-        remarks
-            .push(format!("only {id} is used; component errors are taken as absent, and go into the location errors"));
-        Ok(Outcome { values: location_values(self.config.axis, location), remarks, ..Outcome::default() })
+        let notes =
+            vec![format!("only {id} is used; component errors are taken as absent, and go into the location errors")];
+        Ok(Outcome {
+            values: location_values(self.config.axis, location),
+            remarks: campaign.warnings,
+            notes,
+            ..Outcome::default()
+        })
     }
 }
 
@@ -293,9 +297,13 @@ impl PointSeparator for ThreePoint {
         let mut arrays = vec![numbers(campaign.commands_deg.iter().copied())];
         arrays.extend(cells.into_iter().map(numbers_or_null));
         let tables = vec![TableRows { rows: spec.rows(arrays)?, table: spec.name }];
-        let mut remarks = campaign.warnings;
-        remarks.push("placement of the balls is taken as nominal: what it adds goes into the errors".into());
-        Ok(Outcome { values: location_values(self.0.axis, location), tables, remarks, ..Outcome::default() })
+        Ok(Outcome {
+            values: location_values(self.0.axis, location),
+            tables,
+            remarks: campaign.warnings,
+            notes: vec!["placement of the balls is taken as nominal: what it adds goes into the errors".into()],
+            ..Outcome::default()
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use runout_core::{
     Error, Result,
     points::{PointColumn, Points},
     stage::{
-        NamedValue, Outcome, PointModel, PointSeparator,
+        NamedValue, Outcome, PointModel, PointPlan, PointSeparator,
         points::{residual_table, value},
     },
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
@@ -79,12 +79,28 @@ impl PointSeparator for RotaryAxis {
         notes
     }
 
+    fn plan(&self, points: Option<&Points>) -> Result<Option<PointPlan>> {
+        self.planned(points).map(Some)
+    }
+
     fn model(&self) -> Option<&dyn PointModel> {
         Some(self)
     }
 }
 
 impl RotaryAxis {
+    /// The four location errors (µm, µrad) by the one fit alone, without what a result has besides: for benchmarks.
+    ///
+    /// # Errors
+    /// When the points do not hold what the fit needs.
+    pub fn fit_only(&self, points: &Points) -> Result<[f64; 4]> {
+        let campaign = Campaign::of(&self.0, points)?;
+        let found = fit(&campaign.layout, &campaign.readings, &[])
+            .map_err(|problem| Error::new("fit", points.input.display().to_string(), problem))?;
+        let location = found.location();
+        Ok([0, 1, 2, 3].map(|index| if index < 2 { 1e3 } else { 1e6 } * location[index].value))
+    }
+
     /// What the configured balls observe over a full turn.
     fn observed(&self) -> Vec<String> {
         let layout = Layout {
@@ -172,7 +188,7 @@ impl RotaryAxis {
         values.extend(self.ranges(campaign, &left_out));
         let mut remarks = campaign.warnings.clone();
         remarks.extend(self.lost(&found, campaign));
-        remarks.extend(noise_remark(campaign.noise));
+        let notes = noise_remark(campaign.noise).into_iter().collect();
         remarks.extend(scale.remark.clone());
         if left_out.iter().any(Option::is_none) {
             remarks.push(
@@ -196,7 +212,7 @@ impl RotaryAxis {
              added to the commands of the linear axes",
             ['X', 'Y', 'Z'][axis.order()[2]]
         );
-        Ok(Outcome { convention, tables, values, form: None, remarks })
+        Ok(Outcome { convention, tables, values, remarks, notes, ..Outcome::default() })
     }
 
     fn lost(&self, found: &Fit, campaign: &Campaign) -> Option<String> {

@@ -81,7 +81,7 @@ impl Straightness {
         let table = table();
         let tables = vec![TableRows { rows: table.rows(columns.into())?, table: table.name }];
         let values = self.values();
-        Ok(Outcome { convention: CONVENTION.into(), tables, values, form: None, remarks: self.warnings })
+        Ok(Outcome { convention: CONVENTION.into(), tables, values, remarks: self.warnings, ..Outcome::default() })
     }
 
     fn values(&self) -> Vec<NamedValue> {

@@ -68,6 +68,11 @@ fn orders(missing: &[Missing]) -> impl Iterator<Item = usize> + '_ {
 }
 
 impl TouchProbe {
+    /// The terms of the loop for some touches.
+    pub(crate) fn linear_terms(&self, points: &Points) -> Result<LinearTerms> {
+        self.terms(points, &self.prepare(points)?, &self.missing())
+    }
+
     /// The terms of the loop: of weight 1 each, in µm.
     fn terms(&self, points: &Points, prepared: &Prepared, missing: &[Missing]) -> Result<LinearTerms> {
         let Prepared { touches, weights } = prepared;

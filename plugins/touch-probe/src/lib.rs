@@ -13,6 +13,7 @@ mod held_out;
 mod lobe;
 mod noise;
 mod outcome;
+mod plan;
 mod separate;
 pub mod simulate;
 mod solve;

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64, Result,
+    model::diagnosis::LostOrders,
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{Form, NamedValue, Outcome, points::value},
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers, texts},
@@ -143,6 +144,7 @@ impl Found<'_> {
         let lobes = Lobe::all(self.config, self.fit);
         let mut tables = vec![self.pretravel(&lobes)?, self.compensation(&lobes)?, self.lobing(&lobes)?];
         tables.retain(|table| table.rows.num_rows() > 0);
+        let [lobing, form] = self.lost(&lobes);
         Ok(Outcome {
             convention: "pre-travel moves the place that is read outward (positive); angles are right-handed about the axis of the \
                          ring, directions from its centre"
@@ -150,7 +152,9 @@ impl Found<'_> {
             tables,
             values: self.values(&lobes),
             form: self.form(&lobes),
+            lost_orders: Some(LostOrders::of([("lobing", lobing), ("form", form)])),
             remarks: self.remarks(&lobes),
+            notes: self.notes(&lobes),
         })
     }
 
@@ -341,6 +345,21 @@ impl Found<'_> {
         Some(Form { sections: vec![separation], radius_mm: self.config.ring_radius_mm })
     }
 
+    /// What the result is made of.
+    fn notes(&self, lobes: &[Lobe]) -> Vec<String> {
+        let mut notes = Vec::new();
+        let bounded: Vec<usize> = lobes.iter().filter(|lobe| lobe.bounded).map(|lobe| lobe.order).collect();
+        if let (Some(bound), false) = (self.config.ring_form_um, bounded.is_empty()) {
+            notes.push(format!(
+                "lobing of orders {} is what is read, with the form of the ring: its uncertainty includes the bound of {bound} µm",
+                listed(&bounded)
+            ));
+        }
+        let evident: Vec<usize> = lobes.iter().filter(|lobe| lobe.evident).map(|lobe| lobe.order).collect();
+        notes.push(format!("orders of lobing with evidence, which the compensation has: {}", listed(&evident)));
+        notes
+    }
+
     fn remarks(&self, lobes: &[Lobe]) -> Vec<String> {
         let mut remarks = self.touches.remarks.clone();
         let [lobing, form] = self.lost(lobes);
@@ -351,15 +370,6 @@ impl Found<'_> {
         if lobing[1..] != *declared_lobing || form[1..] != declared[..] {
             remarks.push(lost_orders(&listed(&lobing), &listed(&form)));
         }
-        let bounded: Vec<usize> = lobes.iter().filter(|lobe| lobe.bounded).map(|lobe| lobe.order).collect();
-        if let (Some(bound), false) = (self.config.ring_form_um, bounded.is_empty()) {
-            remarks.push(format!(
-                "lobing of orders {} is what is read, with the form of the ring: its uncertainty includes the bound of {bound} µm",
-                listed(&bounded)
-            ));
-        }
-        let evident: Vec<usize> = lobes.iter().filter(|lobe| lobe.evident).map(|lobe| lobe.order).collect();
-        remarks.push(format!("orders of lobing with evidence, which the compensation has: {}", listed(&evident)));
         let silent: Vec<&str> = (0..self.config.setups.len())
             .filter(|setup| !self.touches.setups.contains(setup))
             .map(|setup| self.config.setups[setup].id.as_str())

@@ -2,6 +2,7 @@
 
 use runout_core::{
     Error, Result,
+    model::diagnosis::LostOrders,
     pipeline::{
         error::Fault,
         registry::{Context, StageConfig},
@@ -11,7 +12,7 @@ use runout_core::{
         PointKind::{Label, Number},
         Points,
     },
-    stage::{Outcome, PointModel, PointSeparator, Separator},
+    stage::{Outcome, PointModel, PointPlan, PointSeparator, Separator},
     table::TableSpec,
 };
 
@@ -156,12 +157,30 @@ impl PointSeparator for TouchProbe {
         notes
     }
 
+    fn lost_orders(&self) -> Option<LostOrders> {
+        Some(self.0.lost_orders(&(0..self.0.setups.len()).collect::<Vec<_>>()))
+    }
+
+    fn plan(&self, _points: Option<&Points>) -> Result<Option<PointPlan>> {
+        self.planned().map(Some)
+    }
+
     fn model(&self) -> Option<&dyn PointModel> {
         Some(self)
     }
 }
 
 impl TouchProbe {
+    /// χ² per degree of freedom of the one fit alone, without what a result has besides: for benchmarks.
+    ///
+    /// # Errors
+    /// When the points do not hold what the fit needs.
+    pub fn fit_only(&self, points: &Points) -> Result<f64> {
+        let prepared = self.prepare(points)?;
+        let readings = prepared.readings_um();
+        Ok(self.fit(&prepared, &[], &Content::declared(), &readings).chi2_per_dof)
+    }
+
     /// What the model may lack.
     pub(crate) fn missing(&self) -> Vec<Missing> {
         missing(self.0.max_order)

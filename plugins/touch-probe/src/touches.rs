@@ -7,7 +7,7 @@ use crate::config::TouchProbeConfig;
 /// Directions of one setup that are nearer than this are the same, in degrees.
 const SAME_DIRECTION_DEG: f64 = 0.2;
 /// A column of angles within ±this, in degrees, with as many points as this, is in radians.
-const RADIANS: (f64, usize) = (6.3, 8);
+const RADIANS: (f64, usize) = (7.0, 8);
 /// A pre-travel or a range above this, in µm, is none.
 const ABSURD_UM: f64 = 1000.0;
 /// A standard uncertainty of a touch below this, in µm, is one in mm.
@@ -160,12 +160,12 @@ impl Touches {
                 && angles.iter().any(|a| *a != 0.0)
         };
         if in_radians(commanded) {
-            self.remarks.push("all directions are within ±6.3°: `direction_deg` may be in radians".into());
+            self.remarks.push("all directions are within ±7°: `direction_deg` may be in radians".into());
         }
         let turned = || config.setups.iter().flat_map(|setup| [setup.ring_deg, setup.probe_deg]);
         if turned().any(|angle| angle != 0.0) && turned().all(|angle| angle.abs() < RADIANS.0) {
             self.remarks
-                .push("all setups are turned by less than 6.3°: `ring_deg` and `probe_deg` may be in radians".into());
+                .push("all setups are turned by less than 7°: `ring_deg` and `probe_deg` may be in radians".into());
         }
         let small = |um: &f64| *um > 0.0 && *um < TOO_SMALL_UM;
         if (config.std_um.as_ref().is_some_and(small)

@@ -40,7 +40,7 @@ fn at_the_floor() -> Diagnosis {
             blind("axial-motion", "", 1e-5),
         ],
         refused: vec![],
-        lost_orders: Some(LostOrders { form: vec![], motion: vec![1] }),
+        lost_orders: Some(LostOrders::of([("form", vec![]), ("motion", vec![1])])),
         truth: None,
         warnings: vec![],
         outputs: vec![],
@@ -155,4 +155,16 @@ fn noise_that_is_not_known_and_another_unit() {
         ..at_the_floor()
     };
     assert_snapshot!(text(&diagnosis));
+}
+
+#[test]
+fn what_acts_on_the_rig_or_on_one_setup_is_told_apart() {
+    let bias_per_unit = BiasPerUnit { value: 0.3, unit: "um/deg".into(), on: "form".into() };
+    let one = |targets: &[&str]| Blind {
+        effect: "speed-ripple".into(),
+        targets: targets.iter().map(|target| (*target).to_owned()).collect(),
+        bias_per_unit: bias_per_unit.clone(),
+    };
+    let shown = text(&Diagnosis { blind_to: vec![one(&[]), one(&["a"]), one(&["b"])], ..at_the_floor() });
+    assert!(shown.contains("the whole rig, a, b"), "{shown}");
 }

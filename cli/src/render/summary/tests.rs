@@ -114,7 +114,7 @@ fn summary(stations: usize) -> Summary {
     };
     Summary {
         title: "Turned shaft".into(),
-        lost_orders: LostOrders { form: (2..=80).step_by(2).collect(), motion: vec![1] },
+        lost_orders: LostOrders { form: (2..=80).step_by(2).collect(), motion: vec![1], ..LostOrders::default() },
         stations: (0..stations).map(station).collect(),
         surface: Some(SurfaceSummary {
             angles: 720,

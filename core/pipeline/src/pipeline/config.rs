@@ -232,10 +232,12 @@ impl Pipeline {
             })
             .transpose()?
             .unwrap_or_default();
-        let compare = tables(root, "compare")?
-            .iter()
-            .map(|table| compare::candidate(table, registry, &context))
-            .collect::<Result<_, _>>()?;
+        let mut compare = Vec::new();
+        for table in tables(root, "compare")? {
+            let shared = loader.kind() == SourceKind::Points;
+            let whole = if shared { compare::with_shared_keys(&table, &separate_table, registry) } else { table };
+            compare.push(compare::candidate(&whole, registry, &context)?);
+        }
         let checks = tables(root, "check")?
             .iter()
             .map(|table| registry.checks.build(table, &context))
@@ -543,13 +545,21 @@ pub fn table<'a>(root: &Table<'a>, key: &str) -> Result<Option<Table<'a>>, Fault
     }
 }
 
-fn required<'a>(root: &Table<'a>, key: &str) -> Result<Table<'a>, Fault> {
+/// A top-level table that has to be there.
+///
+/// # Errors
+/// When it is not.
+pub(super) fn required<'a>(root: &Table<'a>, key: &str) -> Result<Table<'a>, Fault> {
     table(root, key)?.ok_or_else(|| {
         document::resolve(Fault::here(format!("missing key `{key}`")).help(format!("add a table [{key}]")), root)
     })
 }
 
-fn tables<'a>(root: &Table<'a>, key: &str) -> Result<Vec<Table<'a>>, Fault> {
+/// Top-level tables of one name, in their order; none where there is none.
+///
+/// # Errors
+/// When the key holds something else.
+pub(super) fn tables<'a>(root: &Table<'a>, key: &str) -> Result<Vec<Table<'a>>, Fault> {
     let Some(value) = root.get_ref().get(key) else { return Ok(Vec::new()) };
     let expected = |span, found: &str| Fault::span(span, format!("expected tables [[{key}]], found {found}"));
     match value.get_ref() {

@@ -163,9 +163,12 @@ fn diagnose_points(
     let effects = corrections(&changes(known, &found.diagnosis));
     let mut outcome = found.after;
     outcome.remarks.splice(0..0, found.diagnosis.warnings.iter().cloned());
+    let mut diagnosis = found.diagnosis;
+    diagnosis.lost_orders.clone_from(&outcome.lost_orders);
+    diagnosis.warnings.extend(outcome.notes.iter().cloned());
     let result = PointResult { outcome, remarks: None, effects };
     let finished = result.write(pipeline, &pipeline.diagnosed, points, observer)?;
-    commit(finished, pipeline.diagnosis_path(), found.diagnosis)
+    commit(finished, pipeline.diagnosis_path(), diagnosis)
 }
 
 /// Effects that are declared as known, each with the lines that declare it in a rig.

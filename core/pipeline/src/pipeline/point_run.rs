@@ -44,10 +44,12 @@ impl PointResult<'_> {
         points: &Points,
         observer: &dyn Observer,
     ) -> Result<Finished> {
-        let Outcome { convention, tables, values, form, mut remarks } = self.outcome;
+        let Outcome { convention, tables, values, form, lost_orders, mut remarks, notes } = self.outcome;
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
         writer.take_values(values, convention);
+        writer.lost_orders(lost_orders);
+        writer.note(notes);
         writer.write(&tables)?;
         let mut surface = None;
         if let Some(Form { sections, radius_mm }) = form {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use toml::{Spanned, de::DeTable};
 
 use super::{
@@ -116,6 +117,12 @@ impl<S> Plugin<S> {
     pub fn schema(&self) -> Schema {
         (self.schema)()
     }
+
+    /// The keys that it cannot do without.
+    pub fn needs(&self) -> impl Iterator<Item = String> {
+        let keys = self.schema().get("required").and_then(Value::as_array).cloned().unwrap_or_default();
+        keys.into_iter().filter_map(|key| key.as_str().map(str::to_owned))
+    }
 }
 
 impl<S> Catalogue<S> {
@@ -148,6 +155,13 @@ impl<S> Catalogue<S> {
             return Err(fault.help(known_names(text, known())));
         };
         (plugin.build)(&Spanned::new(table.span(), keys), context).map_err(|fault| document::resolve(fault, table))
+    }
+
+    /// Whether the plugin of a name has a key.
+    #[must_use]
+    pub fn knows(&self, name: &str, key: &str) -> bool {
+        let Some(plugin) = self.plugins.iter().find(|plugin| plugin.name == name) else { return false };
+        plugin.schema().get("properties").is_some_and(|properties| properties.get(key).is_some())
     }
 
     /// Builds the plugin of a name without any keys of its own; `None` where there is none.

@@ -13,7 +13,7 @@ use crate::{
     atomic_file::{PendingFile, commit_all},
     stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
 };
-use runout_closed_loop::diagnosis::Correction;
+use runout_closed_loop::diagnosis::{self, Correction};
 use runout_error::{Error, Result};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
@@ -165,6 +165,19 @@ impl ResultWriter {
     }
 
     /// Completes the exports.
+    /// Takes what the user should know and that is as it should be.
+    pub(super) fn note(&mut self, notes: Vec<String>) {
+        self.summary.warnings.extend(notes.iter().cloned());
+        self.summary.notes.extend(notes);
+    }
+
+    /// Takes the orders that points do not separate.
+    pub(super) fn lost_orders(&mut self, lost: Option<diagnosis::LostOrders>) {
+        if let Some(lost) = lost {
+            self.summary.lost_orders = lost.into();
+        }
+    }
+
     pub(super) fn finish(
         mut self,
         inputs: Vec<Input>,
@@ -249,6 +262,7 @@ impl Finished {
 fn begun(pipeline: &Pipeline) -> Summary {
     let notes = pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default();
     let of_points = pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default();
+    let notes: Vec<String> = notes.into_iter().chain(of_points).collect();
     Summary {
         title: pipeline.title.clone(),
         provenance: Provenance {
@@ -257,7 +271,8 @@ fn begun(pipeline: &Pipeline) -> Summary {
             inputs: Vec::new(),
         },
         lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
-        warnings: notes.into_iter().chain(of_points).collect(),
+        warnings: notes.clone(),
+        notes,
         ..Summary::default()
     }
 }

@@ -1,6 +1,6 @@
 //! What a run found, for people and programs.
 
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use super::{
     result::true_error,
 };
 use crate::stage::NamedValue;
-use runout_closed_loop::diagnosis::Correction;
+use runout_closed_loop::diagnosis::{self, Correction};
 use runout_standards::Value;
 use runout_turning::station::StationResult;
 use runout_turning::{
@@ -51,6 +51,9 @@ pub struct Summary {
     pub outputs: Vec<PathBuf>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Those of `warnings` that say nothing wrong: what the layout cannot separate, what the result is made of.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
 impl Summary {
@@ -76,11 +79,22 @@ pub struct LostOrders {
     pub form: Vec<usize>,
     /// At which a motion cannot be told.
     pub motion: Vec<usize>,
+    /// Of other quantities of a domain, by their names.
+    #[serde(flatten)]
+    pub others: BTreeMap<String, Vec<usize>>,
+}
+
+impl From<diagnosis::LostOrders> for LostOrders {
+    fn from(mut lost: diagnosis::LostOrders) -> Self {
+        let mut take = |name: &str| lost.0.remove(name).unwrap_or_default();
+        let (form, motion) = (take("form"), take("motion"));
+        Self { form, motion, others: lost.0 }
+    }
 }
 
 impl From<&Assessment> for LostOrders {
     fn from(assessment: &Assessment) -> Self {
-        Self { form: assessment.lost_form_orders(), motion: assessment.lost_motion_orders() }
+        Self { form: assessment.lost_form_orders(), motion: assessment.lost_motion_orders(), others: BTreeMap::new() }
     }
 }
 

@@ -3,11 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::plan::PointPlan;
 use crate::points::{PointColumn, Points};
 use runout_closed_loop::{
     Effect, Model,
     closed_loop::{self, Settings},
-    diagnosis::Diagnosis,
+    diagnosis::{Diagnosis, LostOrders},
     linear_terms::{LinearFit, LinearTerms},
 };
 use runout_error::Result;
@@ -49,6 +50,20 @@ pub trait PointSeparator: Send + Sync {
     /// What holds whatever the points are: what the method cannot observe.
     fn notes(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// Orders that its configuration does not separate; nothing where it has no orders.
+    fn lost_orders(&self) -> Option<LostOrders> {
+        None
+    }
+
+    /// What the layout would tell and how well, and what to add to it: of the points where they are there, else as the
+    /// configuration has it. Nothing where there is nothing to plan.
+    ///
+    /// # Errors
+    /// When the points do not hold what the method needs.
+    fn plan(&self, _points: Option<&Points>) -> Result<Option<PointPlan>> {
+        Ok(None)
     }
 
     /// Its model for the closed loop, where it has one.
@@ -102,8 +117,12 @@ pub struct Outcome {
     pub values: Vec<NamedValue>,
     /// Form, where there is one.
     pub form: Option<Form>,
-    /// What the user should know.
+    /// Orders that the points do not separate; nothing where the domain has no orders.
+    pub lost_orders: Option<LostOrders>,
+    /// What the user should know, as something may be wrong.
     pub remarks: Vec<String>,
+    /// What the user should know of the result that is as it should be: where its noise is from, what it contains.
+    pub notes: Vec<String>,
 }
 
 /// A value of a result.

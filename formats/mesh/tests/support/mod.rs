@@ -87,7 +87,7 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
             configuration: String::new(),
             inputs: vec![Input { path: "part.h5".into(), bytes: 3, blake3: "00ff".into() }],
         },
-        lost_orders: LostOrders { form: vec![1, 4, 500], motion: Vec::new() },
+        lost_orders: LostOrders { form: vec![1, 4, 500], motion: Vec::new(), ..LostOrders::default() },
         ..Summary::default()
     };
     commit_all(tables.finish(export, &summary, surface)?)

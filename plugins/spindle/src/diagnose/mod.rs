@@ -305,15 +305,15 @@ fn of_turns(model: &SpindleModel, place: &data::Place) -> bool {
 }
 
 fn lost_orders(fit: &SpindleFit) -> LostOrders {
-    let mut lost = LostOrders::default();
+    let (mut form, mut motion) = (Vec::new(), Vec::new());
     for layout in fit.layouts() {
         let assessment = layout.assess(TRACED_ORDERS.min(fit.max_order()));
-        lost.form.extend(assessment.lost_form_orders());
-        lost.motion.extend(assessment.lost_motion_orders());
+        form.extend(assessment.lost_form_orders());
+        motion.extend(assessment.lost_motion_orders());
     }
-    for orders in [&mut lost.form, &mut lost.motion] {
+    for orders in [&mut form, &mut motion] {
         orders.sort_unstable();
         orders.dedup();
     }
-    lost
+    LostOrders::of([("form", form), ("motion", motion)])
 }

@@ -82,8 +82,13 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
         points: scenario.simulate().points(),
         separator: Box::new(separator),
         planted,
-        truth: scenario.location.iter().map(|(symbol, value)| True::new(symbol, *value)).collect(),
+        truth: scenario.location.iter().map(|(symbol, value)| True::new(row_of(symbol), symbol, *value)).collect(),
     })
+}
+
+/// Offsets begin as EX, EY and EZ.
+fn row_of(symbol: &str) -> &'static str {
+    if symbol.starts_with("EX") || symbol.starts_with("EY") || symbol.starts_with("EZ") { "offsets" } else { "tilts" }
 }
 
 /// From (across, across, along) to the machine's coordinates.

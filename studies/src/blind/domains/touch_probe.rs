@@ -112,9 +112,9 @@ fn truth(scenario: &TouchProbeScenario) -> Vec<True> {
     };
     let amplitude = |order: usize| part(order, f64::cos).hypot(part(order, f64::sin));
     vec![
-        True::new("pretravel_mean", 0.5 * part(0, f64::cos)),
-        True::new("lobe_3_amplitude", amplitude(3)),
-        True::new("lobe_6_amplitude", amplitude(6)),
+        True::new("pretravel_mean", "pretravel_mean", 0.5 * part(0, f64::cos)),
+        True::new("lobe_3_amplitude", "lobe_3_amplitude", amplitude(3)),
+        True::new("lobe_6_amplitude", "lobe_6_amplitude", amplitude(6)),
     ]
 }
 

@@ -49,6 +49,8 @@ pub struct Traced {
 /// A value beside its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Valued {
+    /// Row of the report.
+    pub row: &'static str,
     /// Its symbol.
     pub symbol: String,
     /// Error over standard uncertainty with the declared model; NaN where it is lost.
@@ -82,6 +84,7 @@ pub fn judge(index: u64, kind: Kind, campaign: &Campaign) -> Result<Judged> {
     let false_alarms = diagnosis.added.iter().filter(there).map(name).collect();
     let declared = campaign.separator.separate(&campaign.points)?.values;
     let values = campaign.truth.iter().map(|truth| Valued {
+        row: truth.row,
         symbol: truth.symbol.clone(),
         declared: ratio(&declared, truth),
         last: ratio(&found.after.values, truth),

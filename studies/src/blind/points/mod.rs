@@ -62,6 +62,8 @@ impl Planted {
 /// A true value of a result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct True {
+    /// Row of the report: values of one kind together.
+    pub row: &'static str,
     /// The value's symbol.
     pub symbol: String,
     /// What it is of, where there are several.
@@ -73,8 +75,8 @@ pub struct True {
 impl True {
     /// Of a value of which there is one.
     #[must_use]
-    pub fn new(symbol: &str, value: f64) -> Self {
-        Self { symbol: symbol.into(), of: None, value }
+    pub fn new(row: &'static str, symbol: &str, value: f64) -> Self {
+        Self { row, symbol: symbol.into(), of: None, value }
     }
 }
 

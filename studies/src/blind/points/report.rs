@@ -128,11 +128,10 @@ fn values(all: &[Judged]) -> String {
         "| value, error over its std | clean: number, within 2 | effects visible, declared model: number, within 2 | final model: \
          number, within 2 | largest | lost |\n| --- | --- | --- | --- | --- | --- |\n",
     );
-    let symbols = distinct(all.iter().flat_map(|judged| judged.values.iter().map(|value| value.symbol.as_str())));
-    for symbol in symbols {
+    for row in distinct(all.iter().flat_map(|judged| judged.values.iter().map(|value| value.row))) {
         let ratios = |which: &dyn Fn(&Judged) -> bool, last: bool| -> Vec<f64> {
             let these = all.iter().filter(|judged| which(judged)).flat_map(|judged| &judged.values);
-            let own = these.filter(|value| value.symbol == symbol);
+            let own = these.filter(|value| value.row == row);
             own.map(|value| if last { value.last } else { value.declared }).collect()
         };
         let share = |ratios: &[f64]| {
@@ -147,7 +146,7 @@ fn values(all: &[Judged]) -> String {
         line(
             &mut text,
             format_args!(
-                "| {symbol} | {} | {} | {} | {largest:.1} | {} |",
+                "| {row} | {} | {} | {} | {largest:.1} | {} |",
                 share(&ratios(&clean, true)),
                 share(&ratios(&seen, false)),
                 share(&ratios(&seen, true)),

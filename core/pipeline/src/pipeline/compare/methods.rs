@@ -3,9 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue},
+};
+
 use crate::{
-    pipeline::{Registry, document::Table, registry::Context},
-    stage::{Separator, StationSeparator},
+    pipeline::{Registry, config, document::Table, registry::Context},
+    stage::{PointSeparator, Separator, StationSeparator},
 };
 use runout_error::fault::Fault;
 use runout_turning::separation::Assessment;
@@ -35,13 +40,16 @@ pub struct Refusal {
     pub reason: String,
     /// What to do.
     pub help: Option<String>,
+    /// Whether it takes another kind of data.
+    #[serde(skip)]
+    pub(super) unfit: bool,
 }
 
 impl Refusal {
     fn new(method: &str, fault: Fault) -> Self {
         // Faults name the plugin, for the file that they point into.
         let reason = fault.message.strip_prefix(method).map_or(fault.message.as_str(), str::trim_start);
-        Self { method: method.to_owned(), reason: reason.to_owned(), help: fault.help }
+        Self { method: method.to_owned(), reason: reason.to_owned(), help: fault.help, unfit: fault.unfit }
     }
 }
 
@@ -117,16 +125,108 @@ pub(super) fn choose(
 }
 
 /// Gives methods of the same name a number from the second on; all names, the reference's first.
-pub(super) fn told_apart(reference: &str, methods: &mut [Method]) -> Vec<String> {
+pub(super) fn told_apart<'a>(reference: &str, methods: impl Iterator<Item = &'a mut String>) -> Vec<String> {
     let mut names = vec![reference.to_owned()];
-    for method in methods {
-        let plugin = method.name.clone();
+    for name in methods {
+        let plugin = name.clone();
         let mut number = 1;
-        while names.contains(&method.name) {
+        while names.contains(name) {
             number += 1;
-            method.name = format!("{plugin} ({number})");
+            *name = format!("{plugin} ({number})");
         }
-        names.push(method.name.clone());
+        names.push(name.clone());
     }
     names
+}
+
+/// A separator of measured points that is meant to be compared.
+pub(super) struct PointCandidate {
+    pub name: String,
+    /// Whether somebody asked for it.
+    pub named: bool,
+    pub separator: Result<Box<dyn PointSeparator>, Refusal>,
+}
+
+impl PointCandidate {
+    fn new(name: &str, named: bool, built: Result<Separator, Fault>) -> Self {
+        let separator = match built {
+            Ok(Separator::Points(separator)) => Ok(separator),
+            Ok(Separator::Stations(_)) => Err(Fault::unfit("takes recorded turns, not measured points")),
+            Err(fault) => Err(fault),
+        };
+        Self { name: name.to_owned(), named, separator: separator.map_err(|fault| Refusal::new(name, fault)) }
+    }
+}
+
+/// A `[[compare]]` table of measured points with the keys of `[separate]` that its plugin knows and that it does not have.
+pub(crate) fn with_shared_keys<'t>(table: &Table<'t>, separate: &Table<'t>, registry: &Registry) -> Table<'t> {
+    let name = plugin_name(table);
+    let mut keys = table.get_ref().clone();
+    for (key, value) in separate.get_ref() {
+        let shared: &str = key.get_ref();
+        if !keys.contains_key(shared) && registry.separators.knows(&name, shared) {
+            keys.insert(key.clone(), value.clone());
+        }
+    }
+    Table::new(table.span(), keys)
+}
+
+/// `[separate]` with another plugin, and the keys that this one knows.
+fn in_place_of<'t>(name: &str, separate: &Table<'t>, registry: &Registry) -> Table<'t> {
+    let mut keys = DeTable::new();
+    for (key, value) in separate.get_ref() {
+        let shared: &str = key.get_ref();
+        if shared == "plugin" {
+            keys.insert(key.clone(), Spanned::new(value.span(), DeValue::String(name.to_owned().into())));
+        } else if registry.separators.knows(name, shared) {
+            keys.insert(key.clone(), value.clone());
+        }
+    }
+    Table::new(separate.span(), keys)
+}
+
+/// Those that are wanted for measured points.
+///
+/// # Errors
+/// When a `[[compare]]` table is wrong.
+pub(super) fn choose_points(
+    root: &Table,
+    with: &[String],
+    reference: &str,
+    registry: &Registry,
+    context: &Context,
+) -> Result<Vec<PointCandidate>, Fault> {
+    let separate = config::required(root, "separate")?;
+    let mut configured = Vec::new();
+    for table in config::tables(root, "compare")? {
+        let whole = with_shared_keys(&table, &separate, registry);
+        let built = match registry.separators.build(&whole, context) {
+            Err(fault) if !fault.unfit => return Err(fault),
+            built => built,
+        };
+        configured.push(PointCandidate::new(&plugin_name(&table), true, built));
+    }
+    let build = |name: &str| registry.separators.build(&in_place_of(name, &separate, registry), context);
+    if !with.is_empty() {
+        let mut chosen = Vec::new();
+        for name in with {
+            let (meant, others): (Vec<_>, Vec<_>) = configured.into_iter().partition(|known| known.name == *name);
+            configured = others;
+            if meant.is_empty() {
+                chosen.push(PointCandidate::new(name, true, build(name)));
+            }
+            chosen.extend(meant);
+        }
+        return Ok(chosen);
+    }
+    if !configured.is_empty() {
+        return Ok(configured);
+    }
+    // Separators that need other keys are of other data, and nobody asked for them.
+    let has = |key: &str| separate.get_ref().contains_key(key);
+    let alike =
+        registry.separators.iter().filter(|plugin| plugin.name != reference && plugin.needs().all(|key| has(&key)));
+    let built = alike.map(|plugin| PointCandidate::new(plugin.name, false, build(plugin.name)));
+    // Those of turns are no candidates at all.
+    Ok(built.filter(|one| one.separator.as_ref().map_or_else(|refusal| !refusal.unfit, |_| true)).collect())
 }

@@ -9,6 +9,7 @@
 mod difference;
 mod estimates;
 mod methods;
+mod points;
 mod report;
 
 use std::{
@@ -17,10 +18,11 @@ use std::{
 };
 
 pub use methods::{Candidate, Method, Refusal};
-pub(super) use methods::{candidate, plugin_name};
+pub(super) use methods::{candidate, plugin_name, with_shared_keys};
+pub use points::{ComparingPoints, PointMethod};
 pub use report::{
-    Comparison, Difference, DifferenceOrders, Harmonics, MethodSummary, MethodValue, QuantityComparison,
-    StationComparison, Worst,
+    ColumnComparison, ColumnDifference, Comparison, Difference, DifferenceOrders, Harmonics, MethodSummary,
+    MethodValue, QuantityComparison, StationComparison, ValueComparison, ValueDifference, ValueOf, Worst,
 };
 
 use super::{
@@ -73,8 +75,7 @@ impl<'a> Comparing<'a> {
         let pipeline = &*pipeline;
         let (Route::Turns { conditioners, averager, separator, .. }, Some(rig)) = (&pipeline.route, &pipeline.rig)
         else {
-            let fault = Fault::at("load", "compare takes recorded turns; [load] gives measured points");
-            return Err(fault.help("`runout run` separates measured points and traces"));
+            return Err(Fault::at("load", "[load] gives measured points, not recorded turns"));
         };
         let context = Context { folder, rig: Some(rig) };
         let candidates = methods::choose(configured, with, &pipeline.separator, registry, &context);
@@ -92,7 +93,7 @@ impl<'a> Comparing<'a> {
             let fault = Fault::at("separate", "no other separator can take this rig: there is nothing to compare");
             return Err(fault.help(reasons.join("; ")));
         }
-        let names = methods::told_apart(&pipeline.separator, &mut methods);
+        let names = methods::told_apart(&pipeline.separator, methods.iter_mut().map(|method| &mut method.name));
         let reference = &**separator;
         Ok(Self { pipeline, rig, conditioners, averager: &**averager, reference, methods, refused, names })
     }
@@ -142,6 +143,8 @@ impl<'a> Comparing<'a> {
             methods: methods.collect(),
             refused: self.refused.clone(),
             stations: Vec::new(),
+            values: Vec::new(),
+            columns: Vec::new(),
             outputs,
             warnings: recording.remarks(),
         })

@@ -25,8 +25,14 @@ pub struct Comparison {
     pub methods: Vec<MethodSummary>,
     /// Separators that cannot take the rig.
     pub refused: Vec<Refusal>,
-    /// One entry a station.
+    /// One entry a station; none of measured points.
     pub stations: Vec<StationComparison>,
+    /// Of measured points: every value that a method gives.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub values: Vec<ValueComparison>,
+    /// Of measured points: columns with standard uncertainties in tables that several methods give.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub columns: Vec<ColumnComparison>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
     /// What the user should know of the recording.
@@ -160,4 +166,76 @@ pub struct DifferenceOrders {
     pub std: Vec<Option<f64>>,
     /// difference / (2 std); 0 where both are equal to rounding, null where std is not known.
     pub e_n: Vec<Option<f64>>,
+}
+
+/// A value of measured points by every method that gives it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ValueComparison {
+    /// Its symbol.
+    pub symbol: String,
+    /// What it is of, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// Its unit.
+    pub unit: String,
+    /// What it is.
+    pub about: String,
+    /// By method.
+    pub values: Vec<ValueOf>,
+    /// Each other method minus the reference, where both give a number.
+    pub differences: Vec<ValueDifference>,
+}
+
+/// A value as one method gives it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ValueOf {
+    /// The method.
+    pub method: String,
+    /// The number; null where it is lost.
+    pub value: Option<f64>,
+    /// Its standard uncertainty; null where it is not known.
+    pub std: Option<f64>,
+}
+
+/// A value against the reference's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ValueDifference {
+    /// The method.
+    pub method: String,
+    /// The method's value less the reference's.
+    pub difference: f64,
+    /// |difference| / (2·√(u² + u²)), with both standard uncertainties as of independent results; null where one is not known.
+    pub e_n: Option<f64>,
+    /// The method's standard uncertainty over the reference's; null where one is not known.
+    pub std_ratio: Option<f64>,
+}
+
+/// A column of a table by every method that gives the same rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ColumnComparison {
+    /// The table.
+    pub table: String,
+    /// The column; its unit is part of the name.
+    pub column: String,
+    /// Each other method minus the reference.
+    pub differences: Vec<ColumnDifference>,
+}
+
+/// A column against the reference's, over the rows in which both give a number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ColumnDifference {
+    /// The method.
+    pub method: String,
+    /// Rows compared.
+    pub rows: usize,
+    /// Root mean square of the difference.
+    pub rms: f64,
+    /// The largest difference, without sign.
+    pub largest: f64,
+    /// The method's standard uncertainty over the reference's, root mean squares; null where one is not known.
+    pub std_ratio: Option<f64>,
+    /// Share of the rows with E_n ≤ 1; null where the uncertainties are not known.
+    pub share_within: Option<f64>,
+    /// The largest E_n.
+    pub worst_e_n: Option<f64>,
 }
