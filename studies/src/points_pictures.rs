@@ -102,7 +102,7 @@ pub fn pretravel(pipeline: &Path) -> Result<Vec<u8>> {
     let largest = travel.iter().zip(&std).map(|(value, std)| value.abs() + COVERAGE * std).fold(1.0, f64::max).ceil();
     let mut plot = PolarPlot::new().with_theta_start(90.0).with_clockwise(false).with_legend(true);
     // The middle is the largest travel inward; the circle half-way out is the mean.
-    plot = plot.with_r_min(-2.0 * largest).with_r_max(1.5 * largest);
+    plot = plot.with_r_min(-2.0 * largest).with_r_max(2.0 * largest);
     let mean = vec![0.0; around.len()];
     for (values, label, colour) in [
         (closed(travel.clone()), "pre-travel less its mean, µm", COLOURS[0]),
