@@ -239,10 +239,7 @@ impl Separability {
     pub(super) fn new(assessment: &Assessment, rig: Option<&Rig>) -> Self {
         let unknown = |quantity: &Quantity| Unknown {
             quantity: quantity.id(),
-            section: match quantity {
-                Quantity::Form(section) => rig.and_then(|rig| rig.sections.get(*section)).cloned(),
-                _ => None,
-            },
+            section: quantity.section().and_then(|section| rig?.sections.get(section).cloned()),
             along_deg: quantity.azimuth().map(Azimuth::degrees),
             unit: quantity.unit(),
         };

@@ -241,8 +241,10 @@ impl std::fmt::Display for DefectKind {
 /// The true form and motion at one station, on equally spaced angles from 0.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct StationTruth {
-    /// Form of each of the rig's sections over the part's angle, in µm.
+    /// Form of each of the rig's sections over the part's angle, in µm; of a face at the radius of its sensors, towards +z.
     pub form_um: Vec<Vec<f64>>,
     /// Error motion over the spindle's angle: x and y in µm, tilt about x and y in µrad.
     pub motion: Option<[Vec<f64>; 4]>,
+    /// Error motion along the axis over the spindle's angle, without its mean, in µm.
+    pub z_um: Option<Vec<f64>>,
 }

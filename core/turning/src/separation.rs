@@ -1,6 +1,9 @@
 //! Form and motion, one harmonic at a time: estimates, covariance, and what the layout cannot tell.
 
-use crate::{azimuth::Azimuth, smoothing::orders_beside};
+use crate::{
+    azimuth::{Azimuth, FacePlace},
+    smoothing::orders_beside,
+};
 use runout_numerics::Complex64;
 use runout_standards::{
     gaps::Gaps,
@@ -36,6 +39,12 @@ pub enum Quantity {
     Along(Azimuth),
     /// Tilt towards that line (right-handed about the direction a quarter turn further), µrad.
     TiltAlong(Azimuth),
+    /// Form of a face (the index of its section), µm, positive along +z; Re Σ c e^{+inα} over the part's angle α.
+    FaceForm(usize),
+    /// Error motion along the axis, µm.
+    Z,
+    /// Face error motion: that along the axis at a place of the face, z − ρ·(tilt towards the place), µm.
+    FaceMotion(FacePlace),
 }
 
 impl Quantity {
@@ -50,6 +59,9 @@ impl Quantity {
             Self::TiltY => "tilt_y",
             Self::Along(_) => "along",
             Self::TiltAlong(_) => "tilt_along",
+            Self::FaceForm(_) => "face",
+            Self::Z => "z",
+            Self::FaceMotion(_) => "face_motion",
         }
     }
 
@@ -62,7 +74,22 @@ impl Quantity {
     /// Whether it belongs to the part.
     #[must_use]
     pub fn is_form(self) -> bool {
-        matches!(self, Self::Form(_))
+        matches!(self, Self::Form(_) | Self::FaceForm(_))
+    }
+
+    /// Index of the section that it is the form of.
+    #[must_use]
+    pub fn section(self) -> Option<usize> {
+        match self {
+            Self::Form(section) | Self::FaceForm(section) => Some(section),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a motion along the axis.
+    #[must_use]
+    pub fn is_axial(self) -> bool {
+        matches!(self, Self::Z | Self::FaceMotion(_))
     }
 
     /// Whether it is a tilt of the axis.
@@ -71,7 +98,7 @@ impl Quantity {
         matches!(self, Self::TiltX | Self::TiltY | Self::TiltAlong(_))
     }
 
-    /// Whether it is a displacement of the axis.
+    /// Whether it is a displacement of the axis across itself.
     #[must_use]
     pub fn is_shift(self) -> bool {
         matches!(self, Self::X | Self::Y | Self::Along(_))
@@ -97,11 +124,11 @@ impl Quantity {
         }
     }
 
-    /// What a unit of it is in [x, y, tilt about x, tilt about y]; zeros of a form.
+    /// What a unit of it is in [x, y, tilt about x, tilt about y]; zeros of a form and of a motion along the axis.
     #[must_use]
     pub fn cartesian(self) -> [f64; 4] {
         match self {
-            Self::Form(_) => [0.0; 4],
+            Self::Form(_) | Self::FaceForm(_) | Self::Z | Self::FaceMotion(_) => [0.0; 4],
             Self::X => [1.0, 0.0, 0.0, 0.0],
             Self::Y => [0.0, 1.0, 0.0, 0.0],
             Self::TiltX => [0.0, 0.0, 1.0, 0.0],
@@ -133,9 +160,10 @@ pub struct MotionColumn {
 pub const ALONG_COLUMN: (&str, &str, &str) =
     ("along_deg", "deg", "the line of along_um and tilt_along_urad: its angle from x towards y");
 
-/// Columns of motion: those of x, y and the tilts about them always, and those along a line where motion is known there only.
+/// Columns of motion: those of x, y and the tilts about them always, those along a line where motion is known there only, and that
+/// along the axis where the rig has an axial sensor.
 #[must_use]
-pub fn motion_columns(line: Option<Azimuth>) -> Vec<MotionColumn> {
+pub fn motion_columns(line: Option<Azimuth>, axial: bool) -> Vec<MotionColumn> {
     let column = |quantity, name, about: &str| MotionColumn { quantity, name, about: about.into() };
     let mut columns = vec![
         column(Quantity::X, "x_um", "error motion along x"),
@@ -148,6 +176,9 @@ pub fn motion_columns(line: Option<Azimuth>) -> Vec<MotionColumn> {
         let tilt = format!("tilt towards {line} from x towards y: points at z > 0 move along the line");
         columns.push(column(Quantity::Along(line), "along_um", &along));
         columns.push(column(Quantity::TiltAlong(line), "tilt_along_urad", &tilt));
+    }
+    if axial {
+        columns.push(column(Quantity::Z, "z_um", "error motion along the axis, without its mean level"));
     }
     columns
 }
@@ -195,14 +226,19 @@ impl Assessment {
         self.lost(|quantity| !quantity.is_form())
     }
 
-    /// Whether no order (from 2) of any section's form is observable: readings are then form and motion together.
+    /// Whether no order (from 2) of any section's form is observable, nor any motion: readings are then form and motion together.
     #[must_use]
     pub fn tells_no_form(&self) -> bool {
-        let forms = |entry: &OrderAssessment| {
-            self.unknowns.iter().zip(&entry.observable).any(|(quantity, seen)| quantity.is_form() && *seen)
-        };
         let mut orders = self.orders.iter().filter(|entry| entry.order > 1).peekable();
-        orders.peek().is_some() && self.unknowns.iter().any(|unknown| unknown.is_form()) && !orders.any(forms)
+        let some = orders.peek().is_some() && self.unknowns.iter().any(|unknown| unknown.is_form());
+        some && !orders.any(|entry| entry.observable.contains(&true))
+    }
+
+    /// Orders at which one unknown cannot be told.
+    #[must_use]
+    pub fn lost_orders(&self, unknown: usize) -> Vec<usize> {
+        let lost = self.orders.iter().filter(|entry| entry.observable.get(unknown) == Some(&false));
+        lost.map(|entry| entry.order).collect()
     }
 
     fn lost(&self, of: impl Fn(Quantity) -> bool) -> Vec<usize> {
@@ -243,6 +279,9 @@ pub struct Separation {
     /// Where x and y are the axis's displacement, in mm along the spindle: 0 where tilt is told, the sensors' plane
     /// where it is not.
     pub motion_z_mm: f64,
+    /// By how much forms that were declared within a bound, and taken as 0, may move each unknown, peak to valley over a turn, in
+    /// its unit; not in `variance`. Empty where no bound was declared.
+    pub form_bound: Vec<f64>,
     /// What the fit leaves of the readings.
     pub residual: Residual,
     /// What the user should know.
@@ -433,13 +472,27 @@ impl Separation {
         self.max_order() > 0 && !seen.any(|seen| *seen)
     }
 
-    /// Whether no order (from 2) of any section's form is observable: readings are then form and motion together.
+    /// Whether no order (from 2) of any section's form is observable, nor any motion: readings are then form and motion together.
     #[must_use]
     pub fn tells_no_form(&self) -> bool {
         let width = self.unknowns.len();
         let seen = |unknown: usize| self.observable.iter().skip(unknown).step_by(width).skip(2).any(|seen| *seen);
-        let mut forms = (0..width).filter(|unknown| self.unknowns[*unknown].is_form()).peekable();
-        self.max_order() > 1 && forms.peek().is_some() && !forms.any(seen)
+        self.max_order() > 1 && self.unknowns.iter().any(|unknown| unknown.is_form()) && !(0..width).any(seen)
+    }
+
+    /// [`form_bound`](Self::form_bound) of an unknown; 0 where none was declared.
+    #[must_use]
+    pub fn bound_of(&self, unknown: usize) -> f64 {
+        self.form_bound.get(unknown).copied().unwrap_or(0.0)
+    }
+
+    /// √E|δ|² of an estimate `[order][unknown]`, with what declared forms may add: each part of a harmonic is then as likely
+    /// anywhere within half of the bound. NaN where no variance is known.
+    #[must_use]
+    pub fn coefficient_std(&self, place: usize) -> f64 {
+        let bound = self.bound_of(place % self.unknowns.len().max(1));
+        let variance = self.variance.get(place).copied().unwrap_or(f64::NAN);
+        (variance + bound * bound / 6.0).sqrt()
     }
 
     /// Orders (from 1) at which one unknown cannot be told.
@@ -450,7 +503,8 @@ impl Separation {
         seen.filter(|(order, seen)| *order > 0 && !**seen).map(|(order, _)| order).collect()
     }
 
-    /// Standard uncertainty of one unknown at any one angle, from the covariance of the averages.
+    /// Standard uncertainty of one unknown at any one angle, from the covariance of the averages and the bounds of declared forms,
+    /// as likely anywhere within them.
     ///
     /// With errors that do not favour a phase and do not couple orders, Var Re Σ δₙ e^{inα} = ½ Σ E|δₙ|², the same at
     /// every angle. NaN where no variance is known.
@@ -471,7 +525,8 @@ impl Separation {
             .filter(|(_, seen)| **seen)
             .map(|(variance, _)| variance)
             .sum();
-        (0.5 * sum).sqrt()
+        let bound = self.bound_of(unknown);
+        (0.5 * sum + bound * bound / 12.0).sqrt()
     }
 }
 

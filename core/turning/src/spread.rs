@@ -3,7 +3,10 @@
 //! Form and clamping add the same to a reading at an angle in every turn. In whatever combination of one setup's readings
 //! that gives motion, turns therefore differ by motion only, and by the sensors' noise and drift.
 
-use crate::{azimuth::Azimuth, separation::Quantity};
+use crate::{
+    azimuth::{Azimuth, FacePlace},
+    separation::{Quantity, UM_PER_MM_URAD},
+};
 
 /// A sensitive direction (ISO 230-7): where motion of the axis counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -24,6 +27,10 @@ pub enum Direction {
     Along(Azimuth),
     /// Fixed: tilt towards that line.
     TiltAlong(Azimuth),
+    /// Along the axis.
+    Axial,
+    /// Along the axis, at a place of the face.
+    Face(FacePlace),
 }
 
 impl Direction {
@@ -42,7 +49,15 @@ impl Direction {
             Self::RotatingTilt => (Quantity::TiltY, Some((Quantity::TiltX, -1.0))),
             Self::Along(azimuth) => (Quantity::Along(azimuth), None),
             Self::TiltAlong(azimuth) => (Quantity::TiltAlong(azimuth), None),
+            Self::Axial => (Quantity::Z, None),
+            Self::Face(place) => (Quantity::FaceMotion(place), None),
         }
+    }
+
+    /// Whether it is along the axis: its fundamental is error motion, its level and slow drift are not.
+    #[must_use]
+    pub fn is_axial(self) -> bool {
+        self.parts().0.is_axial()
     }
 
     /// Whether it is one of tilt, in µrad; the others are in µm.
@@ -97,6 +112,34 @@ impl Projection {
         self
     }
 
+    /// The same, and what it gives along the axis at these places of the face, where it gives z and the tilts towards them.
+    #[must_use]
+    pub fn with_faces(mut self, places: &[FacePlace]) -> Self {
+        let line = self.rows.iter().find_map(|(quantity, _)| quantity.azimuth());
+        for place in places {
+            let wanted = Quantity::FaceMotion(*place);
+            let shares = std::iter::once((Quantity::Z, 1.0)).chain(face_shares(*place, line));
+            let parts: Option<Vec<_>> = shares
+                .map(|(quantity, share)| {
+                    let (_, weights) = self.rows.iter().find(|(known, _)| *known == quantity)?;
+                    Some((weights, share))
+                })
+                .collect();
+            let Some(parts) = parts.filter(|_| self.rows.iter().all(|(known, _)| *known != wanted)) else { continue };
+            let mut sum: Vec<(usize, f64)> = Vec::new();
+            for (weights, share) in parts {
+                for (sensor, weight) in weights {
+                    match sum.iter_mut().find(|(known, _)| known == sensor) {
+                        Some((_, total)) => *total += share * weight,
+                        None => sum.push((*sensor, share * weight)),
+                    }
+                }
+            }
+            self.rows.push((wanted, sum));
+        }
+        self
+    }
+
     /// The directions in which it gives motion.
     #[must_use]
     pub fn directions(&self) -> Vec<Direction> {
@@ -104,6 +147,8 @@ impl Projection {
         let along = self.rows.iter().filter_map(|(quantity, _)| match quantity {
             Quantity::Along(azimuth) => Some(Direction::Along(*azimuth)),
             Quantity::TiltAlong(azimuth) => Some(Direction::TiltAlong(*azimuth)),
+            Quantity::Z => Some(Direction::Axial),
+            Quantity::FaceMotion(place) => Some(Direction::Face(*place)),
             _ => None,
         });
         let given = |direction: &Direction| {
@@ -113,6 +158,21 @@ impl Projection {
         Direction::ALL.into_iter().chain(along).filter(given).collect()
     }
 }
+
+/// What a unit of each tilt adds to motion along the axis at a place of the face, µm/µrad: −ρ·(ε_y cos θ − ε_x sin θ). Where tilt
+/// is known towards one line only, that of places on the line.
+pub(crate) fn face_shares(place: FacePlace, line: Option<Azimuth>) -> Vec<(Quantity, f64)> {
+    let (sine, cosine) = place.radians().sin_cos();
+    let lever = place.radius_mm() * UM_PER_MM_URAD;
+    if let Some(line) = line.filter(|line| (place.radians() - line.radians()).sin().abs() < ALONG_AXIS) {
+        return vec![(Quantity::TiltAlong(line), -lever * (place.radians() - line.radians()).cos())];
+    }
+    let shares = [(Quantity::TiltX, lever * sine), (Quantity::TiltY, -lever * cosine)];
+    shares.into_iter().filter(|(_, share)| share.abs() > ALONG_AXIS * lever).collect()
+}
+
+/// Sines and cosines below this are those of a place on the other axis.
+const ALONG_AXIS: f64 = 1e-9;
 
 /// How far the turns of one capture lie apart, on equal angles of the spindle from 0.
 #[derive(Debug, Clone, PartialEq)]

@@ -44,7 +44,7 @@ fn h5py_reads_measurements() {
             *value = ((index / 2) as f64 - 100.0) / 64.0;
         }
     }
-    memory.truth = Some(StationTruth { form_um: vec![vec![0.5; 36], vec![1.5; 36]], motion: None });
+    memory.truth = Some(StationTruth { form_um: vec![vec![0.5; 36], vec![1.5; 36]], motion: None, z_um: None });
     let formats = [
         SampleFormat::F64,
         SampleFormat::F32,

@@ -57,6 +57,7 @@ fn station(index: usize, motion: bool) -> StationResult {
         form_covariance: None,
         freedom: 0,
         equivalents: Vec::new(),
+        form_bound: Vec::new(),
         motion_z_mm: 0.0,
         residual: Residual::default(),
         warnings: Vec::new(),

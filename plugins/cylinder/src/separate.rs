@@ -393,6 +393,7 @@ impl LeastSquaresCylinder {
             form_covariance: None,
             freedom: 0,
             equivalents: Vec::new(),
+            form_bound: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual {
                 rms_um: fit.residual_rms_um,

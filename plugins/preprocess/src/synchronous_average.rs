@@ -11,6 +11,7 @@
 mod bridge;
 mod encoder;
 mod kernel;
+mod level;
 mod mean;
 mod outliers;
 mod resample;

@@ -30,15 +30,19 @@ pub(crate) const ALONG_AXIS: f64 = 1e-9;
 /// What each reading sees. Readings are ordered setup by setup, sensor by sensor.
 ///
 /// Row (k, c) of Aₙ, with θ' = θ_c + σ_k: [e^{±in(θ'−β_k)} at its section, cos θ', sin θ', −z sin θ', z cos θ'] for the
-/// unknowns H (conjugated where the part turns clockwise), X, Y, E_x, E_y. Motion is taken at the sensors' mean z, so
+/// unknowns H (conjugated where the part turns clockwise), X, Y, E_x, E_y. Motion is taken at the radial sensors' mean z, so
 /// that Aₙ is well conditioned and the same at every station.
+///
+/// An axial sensor at the radius ρ reads z − ρ·(tilt towards it) + the face's form: its row is
+/// [e^{±in(θ'−β)} at its face, 1 for Z, ρ sin θ', −ρ cos θ'], that of a lever −ρ. On the axis (ρ = 0) it looks at one point of the
+/// face, whatever the angle of the part: the form's entry is 1, as that of Z, so that no order of both is separated.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// Readings, in order.
     pub readings: Vec<Reading>,
     /// What is solved for at orders from 2: forms, then motions that some sensor sees.
     pub unknowns: Vec<Quantity>,
-    /// Mean z of the sensors, before the station's position is added, in mm.
+    /// Mean z of the radial sensors, before the station's position is added, in mm.
     pub mean_z_mm: f64,
     /// +1 where the part turns counter-clockwise.
     pub direction: f64,
@@ -46,6 +50,8 @@ pub struct Layout {
     pub max_noise_gain: f64,
     /// Sections that some sensor looks at.
     sections: Vec<usize>,
+    /// Of each section of the rig, the declared peak-to-valley bound of its form, in µm.
+    form_bounds_um: Vec<Option<f64>>,
     setups: usize,
     odd_motion: bool,
     systems: Systems,
@@ -64,7 +70,9 @@ pub struct Reading {
     pub angle_rad: f64,
     /// θ' − β: where on the part it looks at spindle angle 0, in rad.
     pub part_angle_rad: f64,
-    /// z minus the sensors' mean z, in mm.
+    /// Which way the sensor looks.
+    pub view: View,
+    /// z minus the sensors' mean z, in mm; of an axial sensor −ρ: what a tilt towards the sensor moves it by.
     pub lever_mm: f64,
     /// Synchronous motion in this setup over that in the first.
     pub motion_ratio: f64,
@@ -72,10 +80,29 @@ pub struct Reading {
     pub declared_sign: f64,
 }
 
+/// Which way a sensor looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum View {
+    /// Across the axis.
+    Radial,
+    /// Along it, off the axis.
+    Axial,
+    /// Along it, on the axis: at one point of the face.
+    OnAxis,
+}
+
+impl View {
+    /// Whether the sensor looks along the axis.
+    #[must_use]
+    pub fn is_axial(self) -> bool {
+        self != Self::Radial
+    }
+}
+
 /// The unknowns at order 1, where each clamping has an eccentricity of its own in each section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FirstOrder {
-    /// Eccentricity of a section in a setup: Re C e^{+iα}.
+    /// Eccentricity of a section in a setup, or how far its face is off square at the sensors' radius: Re C e^{+iα}.
     Eccentricity {
         /// Index of the setup.
         setup: usize,
@@ -86,6 +113,8 @@ pub enum FirstOrder {
     CounterRotatingShift,
     /// The part of the tilt that turns against the spindle: E_y, with E_x = iE_y.
     CounterRotatingTilt,
+    /// All of z: along the axis no clamping makes 1/rev.
+    Axial,
 }
 
 impl Layout {
@@ -94,7 +123,8 @@ impl Layout {
     /// setup but the first.
     #[must_use]
     pub fn new(rig: &Rig, odd_motion: bool) -> Self {
-        let mean_z_mm = rig.sensors.iter().map(|sensor| sensor.z_mm).sum::<f64>() / rig.sensors.len() as f64;
+        let radial = || rig.sensors.iter().filter(|sensor| sensor.axial_radius_mm.is_none());
+        let mean_z_mm = radial().map(|sensor| sensor.z_mm).sum::<f64>() / radial().count().max(1) as f64;
         let mut readings = Vec::with_capacity(rig.setups.len() * rig.sensors.len());
         for (setup, clamping) in rig.setups.iter().enumerate() {
             for (index, sensor) in rig.sensors.iter().enumerate() {
@@ -105,33 +135,45 @@ impl Layout {
                     section: sensor.section,
                     angle_rad,
                     part_angle_rad: angle_rad - clamping.part_rad,
-                    lever_mm: sensor.z_mm - mean_z_mm,
+                    view: match sensor.axial_radius_mm {
+                        None => View::Radial,
+                        Some(radius_mm) if radius_mm > 0.0 => View::Axial,
+                        Some(_) => View::OnAxis,
+                    },
+                    lever_mm: sensor.axial_radius_mm.map_or(sensor.z_mm - mean_z_mm, |radius_mm| 0.0 - radius_mm),
                     motion_ratio: 1.0,
                     declared_sign: sensor.sign,
                 });
             }
         }
-        let sees_x = readings.iter().any(|reading| reading.angle_rad.cos().abs() > ALONG_AXIS);
-        let sees_y = readings.iter().any(|reading| reading.angle_rad.sin().abs() > ALONG_AXIS);
-        let one_line = readings.first().map(|first| Azimuth::of(first.angle_rad)).filter(|_| {
-            let across = |reading: &Reading| (reading.angle_rad - readings[0].angle_rad).sin().abs();
-            sees_x && sees_y && readings.iter().all(|reading| across(reading) <= ALONG_AXIS)
-        });
-        let sees_tilt = readings.iter().any(|reading| reading.lever_mm != 0.0);
+        let looks = |wanted: fn(&Reading) -> bool, part: fn(f64) -> f64| {
+            readings.iter().any(|reading| wanted(reading) && part(reading.angle_rad).abs() > ALONG_AXIS)
+        };
+        let [across, tilted]: [fn(&Reading) -> bool; 2] =
+            [|reading| !reading.view.is_axial(), |reading| reading.lever_mm != 0.0];
+        let (sees_x, sees_y) = (looks(across, f64::cos), looks(across, f64::sin));
+        let of_tilt = readings.iter().filter(|reading| !reading.view.is_axial() || reading.lever_mm != 0.0);
+        let one_line = one_line(of_tilt, sees_x && sees_y);
+        let sees_tilt = readings.iter().any(tilted);
         let looked_at = |section: &usize| rig.sensors.iter().any(|sensor| sensor.section == *section);
         let sections: Vec<usize> = (0..rig.sections.len()).filter(looked_at).collect();
-        let mut unknowns: Vec<Quantity> = sections.iter().copied().map(Quantity::Form).collect();
+        // A form that is declared within a bound is not solved for.
+        let open = || sections.iter().copied().filter(|section| rig.form_bounds_um[*section].is_none());
+        let mut unknowns: Vec<Quantity> =
+            open().filter(|section| !rig.is_face(*section)).map(Quantity::Form).collect();
+        unknowns.extend(open().filter(|section| rig.is_face(*section)).map(Quantity::FaceForm));
         let motions = match one_line {
             // Neither x nor y is observable, but what is along the line.
             Some(line) => vec![(Quantity::Along(line), true), (Quantity::TiltAlong(line), sees_tilt)],
             None => vec![
                 (Quantity::X, sees_x),
                 (Quantity::Y, sees_y),
-                (Quantity::TiltX, sees_tilt && sees_y),
-                (Quantity::TiltY, sees_tilt && sees_x),
+                (Quantity::TiltX, looks(tilted, f64::sin)),
+                (Quantity::TiltY, looks(tilted, f64::cos)),
             ],
         };
-        unknowns.extend(motions.into_iter().filter(|(_, seen)| *seen).map(|(quantity, _)| quantity));
+        let motions = motions.into_iter().chain([(Quantity::Z, rig.has_axial())]);
+        unknowns.extend(motions.filter(|(_, seen)| *seen).map(|(quantity, _)| quantity));
         Self {
             readings,
             unknowns,
@@ -139,16 +181,31 @@ impl Layout {
             direction: rig.rotation.direction(),
             max_noise_gain: f64::INFINITY,
             sections,
+            form_bounds_um: rig.form_bounds_um.clone(),
             setups: rig.setups.len(),
             odd_motion,
             systems: Systems::default(),
         }
     }
 
+    /// Declared peak-to-valley bound of a section's form, in µm.
+    #[must_use]
+    pub fn form_bound_um(&self, section: usize) -> Option<f64> {
+        self.form_bounds_um.get(section).copied().flatten()
+    }
+
     /// The same layout, with a limit on the noise that an order may carry.
     #[must_use]
     pub fn limited_to(self, max_noise_gain: f64) -> Self {
         Self { max_noise_gain, systems: Systems::default(), ..self }
+    }
+
+    /// Places among the unknowns of the forms of circles around the part, and their sections.
+    pub fn circles(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.unknowns.iter().enumerate().filter_map(|(place, unknown)| match unknown {
+            Quantity::Form(section) => Some((place, *section)),
+            _ => None,
+        })
     }
 
     /// Places of the forms among the unknowns.
@@ -182,6 +239,7 @@ impl Layout {
                 alterations.clampings[reading.setup] * alterations.places.len() + alterations.places[reading.sensor];
             let declared = &self.readings[place];
             reading.section = declared.section;
+            reading.view = declared.view;
             reading.lever_mm = declared.lever_mm;
             reading.angle_rad = declared.angle_rad;
             reading.part_angle_rad = declared.part_angle_rad;
@@ -192,7 +250,9 @@ impl Layout {
             let turned = sensor.angle_rad + setup.sensors_rad;
             reading.angle_rad += turned;
             reading.part_angle_rad += turned - setup.part_rad;
-            reading.lever_mm += sensor.z_mm;
+            if !reading.view.is_axial() {
+                reading.lever_mm += sensor.z_mm;
+            }
             reading.motion_ratio *= 1.0 + setup.motion;
         }
         layout
@@ -208,8 +268,10 @@ impl Layout {
     #[must_use]
     pub fn coefficient(&self, reading: &Reading, quantity: Quantity, order: usize) -> Complex64 {
         match quantity {
-            Quantity::Form(section) if section == reading.section => self.part_phase(reading, order),
-            Quantity::Form(_) => Complex64::ZERO,
+            Quantity::Form(section) | Quantity::FaceForm(section) if section == reading.section => {
+                self.form_phase(reading, order)
+            }
+            Quantity::Form(_) | Quantity::FaceForm(_) => Complex64::ZERO,
             motion => self.motion_sign(reading.setup, order) * Complex64::from(Self::seen(reading, motion)),
         }
     }
@@ -219,16 +281,24 @@ impl Layout {
         // Both sines come from the same function, so that sensors at right angles are exactly so.
         let (cosine, sine) = (|| exact_cos(reading.angle_rad), || exact_cos(reading.angle_rad - FRAC_PI_2));
         let lever = reading.lever_mm * UM_PER_MM_URAD;
+        let across = |entry: f64| if reading.view.is_axial() { 0.0 } else { entry };
         let motion = match quantity {
-            Quantity::Form(_) => return 0.0,
-            Quantity::X => cosine(),
-            Quantity::Y => sine(),
+            Quantity::Form(_) | Quantity::FaceForm(_) | Quantity::FaceMotion(_) => return 0.0,
+            Quantity::X => across(cosine()),
+            Quantity::Y => across(sine()),
+            Quantity::Z => f64::from(reading.view.is_axial()),
             Quantity::TiltX => -lever * sine(),
             Quantity::TiltY => lever * cosine(),
-            Quantity::Along(azimuth) => exact_cos(reading.angle_rad - azimuth.radians()),
+            Quantity::Along(azimuth) => across(exact_cos(reading.angle_rad - azimuth.radians())),
             Quantity::TiltAlong(azimuth) => lever * exact_cos(reading.angle_rad - azimuth.radians()),
         };
         reading.motion_ratio * motion
+    }
+
+    /// What a reading sees of a unit of its section's form: the [phase](Self::part_phase), 1 on the axis.
+    #[must_use]
+    pub fn form_phase(&self, reading: &Reading, order: usize) -> Complex64 {
+        if reading.view == View::OnAxis { Complex64::ONE } else { self.part_phase(reading, order) }
     }
 
     /// e^{±in(θ'−β)}, + where the part turns counter-clockwise.
@@ -271,7 +341,7 @@ impl Layout {
         let row = |(reading, motions): (&Reading, &[f64])| -> Vec<Complex64> {
             let sign = self.motion_sign(reading.setup, order);
             let entry = |(unknown, motion): (&Quantity, &f64)| match unknown {
-                Quantity::Form(_) => self.coefficient(reading, *unknown, order),
+                Quantity::Form(_) | Quantity::FaceForm(_) => self.coefficient(reading, *unknown, order),
                 _ => Complex64::from(sign * motion),
             };
             self.unknowns.iter().zip(motions).map(entry).collect()
@@ -283,12 +353,23 @@ impl Layout {
     #[must_use]
     pub fn first_order_unknowns(&self) -> Vec<FirstOrder> {
         let setups = 0..self.setups;
-        let each =
-            |setup| self.sections.iter().map(move |section| FirstOrder::Eccentricity { setup, section: *section });
+        let on_axis = |section: usize| {
+            self.readings.iter().any(|reading| reading.section == section && reading.view == View::OnAxis)
+        };
+        // Whatever a bounded form on the axis adds to 1/rev is within its bound.
+        let sections = self.sections.iter().copied();
+        let clamped: Vec<usize> =
+            sections.filter(|section| !on_axis(*section) || self.form_bound_um(*section).is_none()).collect();
+        let each = |setup| clamped.iter().map(move |section| FirstOrder::Eccentricity { setup, section: *section });
         let mut unknowns: Vec<FirstOrder> = setups.flat_map(each).collect();
-        unknowns.push(FirstOrder::CounterRotatingShift);
+        if self.readings.iter().any(|reading| !reading.view.is_axial()) {
+            unknowns.push(FirstOrder::CounterRotatingShift);
+        }
         if self.unknowns.iter().any(|unknown| unknown.is_tilt()) {
             unknowns.push(FirstOrder::CounterRotatingTilt);
+        }
+        if self.unknowns.contains(&Quantity::Z) {
+            unknowns.push(FirstOrder::Axial);
         }
         unknowns
     }
@@ -302,15 +383,18 @@ impl Layout {
         let unknowns = self.first_order_unknowns();
         let row = |reading: &Reading| {
             let against = Complex64::from_polar(reading.motion_ratio, -self.direction * reading.angle_rad);
+            let axial = reading.view.is_axial();
             unknowns
                 .iter()
                 .map(|unknown| match unknown {
                     FirstOrder::Eccentricity { setup, section } => {
                         let seen = *setup == reading.setup && *section == reading.section;
-                        if seen { self.part_phase(reading, 1) } else { Complex64::ZERO }
+                        if seen { self.form_phase(reading, 1) } else { Complex64::ZERO }
                     }
+                    FirstOrder::CounterRotatingShift if axial => Complex64::ZERO,
                     FirstOrder::CounterRotatingShift => against,
                     FirstOrder::CounterRotatingTilt => against * reading.lever_mm * UM_PER_MM_URAD,
+                    FirstOrder::Axial => Complex64::from(if axial { reading.motion_ratio } else { 0.0 }),
                 })
                 .collect::<Vec<_>>()
         };
@@ -389,8 +473,13 @@ impl Layout {
             let told =
                 |wanted| !unknowns.contains(&wanted) || unknowns.iter().zip(&first).any(|(u, t)| *u == wanted && *t);
             for (quantity, observable) in self.unknowns.iter().zip(&mut observable) {
+                // Of the face, 1/rev is how it was clamped, in each setup by itself: the equations of order 1 say all of z.
+                if *quantity == Quantity::Z {
+                    *observable = told(FirstOrder::Axial);
+                    continue;
+                }
                 *observable &= match quantity {
-                    Quantity::Form(_) => true,
+                    Quantity::Form(_) | Quantity::FaceForm(_) => true,
                     motion if motion.is_tilt() => told(FirstOrder::CounterRotatingTilt),
                     _ => told(FirstOrder::CounterRotatingShift),
                 };
@@ -436,9 +525,13 @@ impl Layout {
         let noise_gain = told.map(|(seen, gain)| if *seen { gain.sqrt() } else { f64::NAN }).collect();
         let lost_because = observable.contains(&false).then(|| {
             let lost = self.unknowns.iter().zip(&observable).filter(|(_, seen)| !**seen);
-            let mut names: Vec<&str> = lost.map(|(quantity, _)| quantity.id()).collect();
+            let mut names: Vec<&str> = lost.clone().map(|(quantity, _)| quantity.id()).collect();
+            let along = |quantity: &Quantity| matches!(quantity, Quantity::Z | Quantity::FaceForm(_));
+            let lost_along_axis_only = lost.into_iter().all(|(quantity, _)| along(quantity));
             names.dedup();
-            if order == 1 {
+            if order == 1 && lost_along_axis_only {
+                format!("1/rev changes of {} can leave every reading as it is", names.join(", "))
+            } else if order == 1 {
                 "1/rev: eccentricity of the part and motion that turns with it are the same in every reading".to_owned()
             } else if qr.rank() == self.unknowns.len() {
                 let limit = self.max_noise_gain;
@@ -456,6 +549,13 @@ impl Layout {
             lost_because,
         }
     }
+}
+
+/// The line that all sensors look along, where that is neither x nor y; `off_axes` where some look across each of them.
+fn one_line<'a>(mut readings: impl Iterator<Item = &'a Reading>, off_axes: bool) -> Option<Azimuth> {
+    let first = readings.next().filter(|_| off_axes)?;
+    let across = |reading: &Reading| (reading.angle_rad - first.angle_rad).sin().abs();
+    readings.all(|reading| across(reading) <= ALONG_AXIS).then(|| Azimuth::of(first.angle_rad))
 }
 
 /// Moves motion along z: adds a multiple of a tilt to a shift.

@@ -114,7 +114,7 @@ fn closed_forms_equal_least_squares() {
 fn combined(motion: &[Sum; 4], quantity: Quantity) -> Sum {
     let (sine, cosine) = quantity.azimuth().map_or((0.0, 0.0), |line| line.degrees().to_radians().sin_cos());
     let shares = match quantity {
-        Quantity::Form(_) => [0.0; 4],
+        Quantity::Form(_) | Quantity::FaceForm(_) | Quantity::Z | Quantity::FaceMotion(_) => [0.0; 4],
         Quantity::X => [1.0, 0.0, 0.0, 0.0],
         Quantity::Y => [0.0, 1.0, 0.0, 0.0],
         Quantity::TiltX => [0.0, 0.0, 1.0, 0.0],

@@ -331,6 +331,7 @@ impl Found<'_> {
                 Noise::Residual => self.fit.solved.dof,
             },
             equivalents: Vec::new(),
+            form_bound: Vec::new(),
             observable,
             motion_z_mm: 0.0,
             residual: Residual {

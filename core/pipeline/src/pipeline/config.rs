@@ -368,6 +368,9 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
     };
     let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, check)).transpose()?;
     let mut evaluate = configured.unwrap_or_default();
+    if let Some(rig) = measures {
+        evaluate.add_faces(rig);
+    }
     for table in limits {
         let limit = checked::<Limit, _>(&table, |limit| limit.check(&evaluate, rig))?;
         evaluate.add_limit(limit);

@@ -60,11 +60,12 @@ fn true_motion(motion: &[Vec<f64>; 4], quantity: Quantity, z_mm: f64) -> Vec<f64
     sum
 }
 
-/// Root mean square of estimate minus truth over the orders from 2 that could be told.
+/// Root mean square of estimate minus truth over the orders from 2 that could be told; along the axis from 1.
 pub(super) fn true_error(result: &StationResult, quantity: Quantity) -> Option<f64> {
     let truth = result.truth.as_ref()?;
     let curve = match quantity {
-        Quantity::Form(section) => truth.form_um.get(section)?.clone(),
+        Quantity::Form(section) | Quantity::FaceForm(section) => truth.form_um.get(section)?.clone(),
+        Quantity::Z => truth.z_um.clone()?,
         motion => true_motion(truth.motion.as_ref()?, motion, result.separation.motion_z_mm),
     };
     let unknown = result.separation.position(quantity)?;
@@ -76,8 +77,10 @@ pub(super) fn true_error(result: &StationResult, quantity: Quantity) -> Option<f
     fourier.analyse(curve.iter().copied(), &mut harmonics);
     let width = result.separation.unknowns.len();
     let told = result.separation.observable.iter().skip(unknown).step_by(width);
+    // Along the axis, the fundamental is error motion.
+    let lowest = if quantity.is_axial() { 1 } else { 2 };
     let squares =
-        result.separation.coefficients(unknown).zip(told).enumerate().skip(2).filter(|(_, (_, told))| **told).map(
+        result.separation.coefficients(unknown).zip(told).enumerate().skip(lowest).filter(|(_, (_, told))| **told).map(
             |(order, (value, _))| {
                 let truth = harmonics.get(order).copied().unwrap_or_default();
                 let truth = if quantity.is_form() { truth } else { truth.conj() };
@@ -113,11 +116,12 @@ mod tests {
             form_covariance: None,
             freedom: 0,
             equivalents: Vec::new(),
+            form_bound: Vec::new(),
             motion_z_mm: 100.0,
             residual: Residual::default(),
             warnings: Vec::new(),
         };
-        let truth = StationTruth { form_um: Vec::new(), motion: Some([2.0, -0.5, 2.0, 5.0].map(cosine)) };
+        let truth = StationTruth { form_um: Vec::new(), z_um: None, motion: Some([2.0, -0.5, 2.0, 5.0].map(cosine)) };
         let evaluation = Evaluation { evaluate: &Evaluate::nothing(), radius_mm: 30.0, rig: None };
         let result = complete("s1".into(), 0.0, 32, separation, Vec::new(), Some(truth), evaluation);
         for quantity in [Quantity::X, Quantity::Y] {

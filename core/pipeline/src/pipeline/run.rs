@@ -32,6 +32,7 @@ use runout_turning::{
     error_motion::{Centre, ErrorMotion},
     measurement::Recording,
     rig::Rig,
+    separation::Quantity,
     spread::Projection,
 };
 
@@ -111,7 +112,11 @@ fn run_turns(
 pub(super) fn projections(pipeline: &Pipeline, separator: &dyn StationSeparator, rig: &Rig) -> Vec<Option<Projection>> {
     let wanted = pipeline.evaluate.has(Group::ErrorMotion);
     let directions = &pipeline.evaluate.directions;
-    let projection = |setup| separator.projection(setup).filter(|_| wanted).map(|found| found.with_lines(directions));
+    let faces = &pipeline.evaluate.faces;
+    let projection = |setup| {
+        let found = separator.projection(setup).filter(|_| wanted)?;
+        Some(found.with_lines(directions).with_faces(faces))
+    };
     (0..rig.setups.len()).map(projection).collect()
 }
 
@@ -126,7 +131,9 @@ fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f6
     if profiles.iter().all(|profile| profile.spread.is_none()) {
         return Vec::new();
     }
-    let forms = separation.unknowns.iter().enumerate().filter(|(_, quantity)| quantity.is_form());
+    // A face's slope around the axis is none of the circumference.
+    let circle = |(_, quantity): &(usize, &Quantity)| matches!(quantity, Quantity::Form(_));
+    let forms = separation.unknowns.iter().enumerate().filter(circle);
     let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
     let slope = steepest.to_degrees() / (1e3 * radius_mm);
     ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres)

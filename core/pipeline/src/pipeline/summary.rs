@@ -19,7 +19,7 @@ use runout_turning::{
     provenance::Provenance,
     reading::ReadingValues,
     rig::Rig,
-    separation::{Assessment, Quantity},
+    separation::{Assessment, Quantity, SectionAt},
     surface::Meeting,
 };
 
@@ -198,6 +198,9 @@ pub struct MotionTruth {
     /// Of the tilt towards `motion_along_deg`, in µrad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tilt_along_rms_error_urad: Option<f64>,
+    /// Of motion along the axis, from 1/rev on, in µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub z_rms_error_um: Option<f64>,
 }
 
 /// The surface of a [`Summary`].
@@ -219,7 +222,9 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
     let separation = &result.separation;
     let known = |value: f64| value.is_finite().then_some(value);
     let nothing = separation.tells_no_form();
-    let sections = separation.sections.iter().enumerate().map(|(section, at)| {
+    // A face has no form of a circle around the part: its harmonics are in the table.
+    let around = |(section, _): &(usize, &SectionAt)| rig.is_none_or(|rig| !rig.is_face(*section));
+    let sections = separation.sections.iter().enumerate().filter(around).map(|(section, at)| {
         let unknown = separation.position(Quantity::Form(section));
         SectionSummary {
             section: at.id.clone(),
@@ -250,6 +255,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
             y_rms_error_um: true_error(result, Quantity::Y),
             tilt_x_rms_error_urad: true_error(result, Quantity::TiltX),
             tilt_y_rms_error_urad: true_error(result, Quantity::TiltY),
+            z_rms_error_um: true_error(result, Quantity::Z),
             along_rms_error_um: azimuth.and_then(|azimuth| true_error(result, Quantity::Along(azimuth))),
             tilt_along_rms_error_urad: azimuth.and_then(|azimuth| true_error(result, Quantity::TiltAlong(azimuth))),
         }),

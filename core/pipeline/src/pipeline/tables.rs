@@ -44,6 +44,8 @@ pub struct StationTables {
     values: TableSpec,
     /// The line of the motion, where that is neither x nor y.
     line: Option<Azimuth>,
+    /// Whether there is motion along the axis.
+    axial: bool,
     rig: Option<Rig>,
     content: Content,
 }
@@ -54,13 +56,15 @@ impl StationTables {
     pub fn new(assessment: Option<&Assessment>, rig: Option<&Rig>) -> Self {
         let unknowns = || assessment.into_iter().flat_map(|found| &found.unknowns);
         let line = unknowns().find_map(|unknown| unknown.azimuth());
+        let axial = unknowns().any(|unknown| *unknown == Quantity::Z);
         Self {
             form: form(),
-            motion: motion(line),
+            motion: motion(line, axial),
             harmonics: harmonics(),
             reading: reading(),
             values: values(),
             line,
+            axial,
             rig: rig.cloned(),
             content: Content::default(),
         }
@@ -85,7 +89,7 @@ impl StationTables {
         let separation = &result.separation;
         let mut tables = vec![(&self.form, form_rows(result)), (&self.harmonics, harmonics_rows(result))];
         if separation.unknowns.iter().any(|unknown| !unknown.is_form()) {
-            tables.push((&self.motion, motion_rows(result, self.line)));
+            tables.push((&self.motion, motion_rows(result, self.line, self.axial)));
         }
         if separation.tells_no_form() {
             tables.push((&self.reading, reading_rows(result, self.rig.as_ref())));
@@ -187,15 +191,15 @@ fn form_rows(result: &StationResult) -> Vec<ArrayRef> {
     ]
 }
 
-/// `line` is that of the motion, where that is neither x nor y.
-fn motion(line: Option<Azimuth>) -> TableSpec {
+/// `line` is that of the motion, where that is neither x nor y; `axial` where there is motion along the axis.
+fn motion(line: Option<Azimuth>, axial: bool) -> TableSpec {
     let mut columns = vec![
         ColumnSpec::name("station", STATION),
         ColumnSpec::number("angle_deg", "deg", "the spindle's angle").repeating(),
     ];
     let (name, unit, about) = ALONG_COLUMN;
     columns.extend(line.map(|_| ColumnSpec::number(name, unit, about).repeating()));
-    let motions = motion_columns(line);
+    let motions = motion_columns(line, axial);
     let value = |MotionColumn { quantity, name, about }: &MotionColumn| {
         let about = format!("{about}; lost orders are left out; null where it was not solved for");
         ColumnSpec::number(*name, quantity.unit(), about).or_null()
@@ -216,10 +220,10 @@ fn motion(line: Option<Azimuth>) -> TableSpec {
     table
 }
 
-fn motion_rows(result: &StationResult, line: Option<Azimuth>) -> Vec<ArrayRef> {
+fn motion_rows(result: &StationResult, line: Option<Azimuth>, axial: bool) -> Vec<ArrayRef> {
     let angles = result.angles;
     let separation = &result.separation;
-    let motions = motion_columns(line).into_iter();
+    let motions = motion_columns(line, axial).into_iter();
     let unknowns: Vec<Option<usize>> = motions.map(|motion| separation.position(motion.quantity)).collect();
     let value = |unknown: &Option<usize>| {
         unknown.map_or_else(|| no_numbers(angles), |unknown| numbers(result.over_angle(unknown)))
@@ -239,7 +243,7 @@ fn harmonics() -> TableSpec {
         "harmonics",
         "coefficients c by order: form is Re Σ c e^{+inα}, motion Re Σ c e^{−inΦ}",
         vec![
-            ColumnSpec::name("quantity", "form, x, y, tilt_x, tilt_y, along or tilt_along"),
+            ColumnSpec::name("quantity", "form, face, x, y, tilt_x, tilt_y, along, tilt_along or z"),
             ColumnSpec::name("section", "id of the section; null for motion").or_null(),
             ColumnSpec::name("station", STATION),
             ColumnSpec::count("order", "1/rev", "undulations per revolution"),
@@ -275,10 +279,7 @@ fn harmonics_rows(result: &StationResult) -> Vec<ArrayRef> {
         .collect();
     let lengths = || rows.iter().map(ExactSizeIterator::len);
     let count = lengths().sum();
-    let section = |quantity: &Quantity| match quantity {
-        Quantity::Form(section) => separation.sections.get(*section).map(|at| at.id.as_str()),
-        _ => None,
-    };
+    let section = |quantity: &Quantity| separation.sections.get(quantity.section()?).map(|at| at.id.as_str());
     let observable = |place: usize| separation.observable.get(place).copied().unwrap_or(false);
     let number = |value: &dyn Fn(usize) -> f64| {
         let mut column = Vec::with_capacity(count);
@@ -295,7 +296,7 @@ fn harmonics_rows(result: &StationResult) -> Vec<ArrayRef> {
         counts(lengths().flat_map(|length| orders - length..orders)),
         number(&|place| separation.estimate[place].re),
         number(&|place| separation.estimate[place].im),
-        number(&|place| separation.variance.get(place).map_or(f64::NAN, |variance| variance.sqrt())),
+        number(&|place| separation.coefficient_std(place)),
         flags(rows.iter().cloned().flatten().map(observable)),
     ]
 }

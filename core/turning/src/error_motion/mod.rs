@@ -13,6 +13,7 @@
 //!
 //! x and y are those in the plane midway between the sensors, where noise is least.
 
+mod axial;
 mod polar;
 #[cfg(test)]
 mod tests;
@@ -22,11 +23,12 @@ pub use polar::Centre;
 use std::cell::RefCell;
 
 use crate::{
-    azimuth::Azimuth,
+    azimuth::{Azimuth, FacePlace},
     profile::Profile,
     separation::{Quantity, Separation},
     spread::{Direction, Spread},
 };
+use axial::bounded;
 use polar::{Motion, Synchronous, seen_from};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
@@ -63,7 +65,7 @@ const DIRECTIONS: [&str; 8] =
 
 /// Symbol and unit of every value that there may be, with those in chosen directions.
 #[must_use]
-pub fn symbols(lines: &[Azimuth]) -> Vec<(String, &'static str)> {
+pub fn symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<(String, &'static str)> {
     let chosen = lines.iter().flat_map(|line| [Direction::Along(*line), Direction::TiltAlong(*line)]).map(chosen_id);
     let mut symbols = Vec::new();
     for id in DIRECTIONS.into_iter().map(str::to_owned).chain(chosen) {
@@ -73,6 +75,13 @@ pub fn symbols(lines: &[Azimuth]) -> Vec<(String, &'static str)> {
             symbols.extend([format!("{kind}-{id}"), format!("{kind}-{id}-rms")].map(|symbol| (symbol, unit)));
         }
         symbols.push((format!("total-{id}{WITH_FUNDAMENTAL}"), unit));
+    }
+    let axial = std::iter::once(Direction::Axial).chain(faces.iter().copied().map(Direction::Face));
+    for id in axial.map(chosen_id) {
+        for kind in ["synchronous", RESIDUAL, "total", "asynchronous"] {
+            symbols.extend([format!("{kind}-{id}"), format!("{kind}-{id}-rms")].map(|symbol| (symbol, "µm")));
+        }
+        symbols.push((format!("fundamental-{id}"), "µm"));
     }
     symbols.extend([("fundamental-radial".to_owned(), "µm"), ("fundamental-tilt".to_owned(), "µrad")]);
     symbols
@@ -100,6 +109,11 @@ impl ErrorMotion<'_> {
             // Setups that do not tell a direction, as sensors that all look along another one, have no part in it.
             let told: Vec<&Spread> =
                 spreads.iter().copied().filter(|spread| spread.in_direction(direction).is_some()).collect();
+            if direction.is_axial() {
+                values.extend(self.axial(direction, z_mm, &told));
+                values.extend(self.asynchronous(direction, z_mm, &told));
+                continue;
+            }
             let synchronous = Synchronous::new(self.separation, &first.projection, direction, z_mm);
             if let Some(plot) = synchronous.filter(|plot| !plot.is_lost()) {
                 for centre in centres {
@@ -144,7 +158,7 @@ impl ErrorMotion<'_> {
         };
         let found = [ront_lsci_um(&seen), rms_about_mean(&seen)];
         let [(range, range_share, range_known), (rms, rms_share, rms_known)] =
-            match without_noise(found, &seen, &plot.variance, seed, values) {
+            match without_noise(found, &seen, &plot.variance, 2, seed, values) {
                 Some(known) => {
                     let mut found = found.into_iter();
                     known
@@ -199,14 +213,19 @@ impl ErrorMotion<'_> {
         );
         let total_rms = root_mean_square(&each_rms);
         Some(vec![
-            about(format!("{kind}-{id}"), &range_said, range, range_known),
-            about(format!("{kind}-{id}-rms"), &rms_said, rms, rms_known),
-            about(format!("total-{id}"), &total, all.1 - all.0, between_setups(&each, range_std)),
+            about(format!("{kind}-{id}"), &range_said, range, bounded(range_known, plot.bound)),
+            about(format!("{kind}-{id}-rms"), &rms_said, rms, bounded(rms_known, 0.5 * plot.bound)),
+            about(
+                format!("total-{id}"),
+                &total,
+                all.1 - all.0,
+                bounded(between_setups(&each, range_std), plot.bound),
+            ),
             about(
                 format!("total-{id}-rms"),
                 &format!("{total}, root mean square over angles and turns"),
                 total_rms,
-                between_setups(&each_rms, rms_std),
+                bounded(between_setups(&each_rms, rms_std), 0.5 * plot.bound),
             ),
         ])
     }
@@ -244,7 +263,7 @@ impl ErrorMotion<'_> {
             filter: "none".into(),
             reference: Centre::PolarChart.symbol().into(),
             coverage: 1.0,
-            uncertainty: between_setups(&each, self.carried(direction, spreads, widest)),
+            uncertainty: bounded(between_setups(&each, self.carried(direction, spreads, widest)), plot.bound),
         })
     }
 
@@ -252,7 +271,12 @@ impl ErrorMotion<'_> {
     /// at most the slope times what `across` is of motion across, in every sensor of the combination, and as likely to be
     /// anything below.
     fn carried(&self, direction: Direction, spreads: &[&Spread], across: fn(&Spread, Direction) -> f64) -> f64 {
-        let radial = directions(spreads).into_iter().filter(|direction| !direction.is_tilt());
+        // The form that an axial sensor sees is that of the face: no slope around the part carries it.
+        if direction.is_axial() {
+            return 0.0;
+        }
+        let radial =
+            directions(spreads).into_iter().filter(|direction| !direction.is_tilt() && !direction.is_axial());
         let across = radial.flat_map(|direction| spreads.iter().map(move |spread| across(spread, direction)));
         let reach = spreads.iter().map(|spread| spread.reach(direction)).fold(0.0, f64::max);
         self.slope * across.fold(0.0, f64::max) * reach / 3.0_f64.sqrt()
@@ -310,6 +334,7 @@ impl ErrorMotion<'_> {
         match direction {
             Direction::Along(line) if !separated(Quantity::Along(line)) => chosen_id(direction),
             Direction::TiltAlong(line) if !separated(Quantity::Along(line)) => chosen_id(direction),
+            Direction::Face(_) => chosen_id(direction),
             _ => id(direction).to_owned(),
         }
     }
@@ -341,6 +366,7 @@ impl ErrorMotion<'_> {
             filter: "none".into(),
             reference: "PC".into(),
             coverage: 1.0,
+            // Eccentricity is no form: at order 1 a declared form adds nothing.
             uncertainty: (std > 0.0)
                 .then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1))),
         })
@@ -353,17 +379,18 @@ fn without_noise(
     found: [f64; 2],
     plot: &[f64],
     variance: &[f64],
+    lowest: usize,
     seed: u64,
     values: impl Fn(&[f64]) -> [f64; 2],
 ) -> Option<[(f64, Uncertainty); 2]> {
     if plot.len() < 2 {
         return None;
     }
-    let mut errors = Errors::new(variance, 2, seed)?;
+    let mut errors = Errors::new(variance, lowest, seed)?;
     let mut fourier = Fourier::new(plot.len());
     let mut harmonics = vec![Complex64::ZERO; variance.len().min(fourier.max_order() + 1)];
     fourier.analyse(plot.iter().copied(), &mut harmonics);
-    let weights = stand_in(&harmonics, variance, 2);
+    let weights = stand_in(&harmonics, variance, lowest);
     // What is above the orders with a known variance stays.
     let noise: Vec<Complex64> = harmonics.iter().zip(weights).map(|(value, weight)| value * (1.0 - weight)).collect();
     let mut likely = plot.to_vec();
@@ -452,6 +479,7 @@ fn chosen_id(direction: Direction) -> String {
     match direction {
         Direction::Along(line) => format!("radial-at-{}deg", line.degrees()),
         Direction::TiltAlong(line) => format!("tilt-at-{}deg", line.degrees()),
+        Direction::Face(place) => format!("face-at-{place}"),
         _ => id(direction).to_owned(),
     }
 }
@@ -466,6 +494,8 @@ fn id(direction: Direction) -> &'static str {
         Direction::RotatingTilt => "tilt-rotating",
         Direction::Along(_) => "radial-along",
         Direction::TiltAlong(_) => "tilt-along",
+        Direction::Axial => "axial",
+        Direction::Face(_) => "face",
     }
 }
 
@@ -488,7 +518,18 @@ fn described(direction: Direction, z_mm: f64) -> String {
         Direction::TiltAlong(azimuth) => {
             format!("tilt towards the fixed sensitive direction at {azimuth} from x towards y")
         }
+        Direction::Axial => "axial, fixed sensitive direction".into(),
+        Direction::Face(place) => format!(
+            "face, fixed sensitive direction, {} mm from the axis at {}° from x towards y",
+            place.radius_mm(),
+            place.degrees()
+        ),
     }
+}
+
+/// What axial values are referred to.
+fn centre_of_chart() -> &'static str {
+    Centre::PolarChart.symbol()
 }
 
 /// To a micrometre, without trailing zeros.

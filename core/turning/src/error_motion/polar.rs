@@ -2,7 +2,7 @@
 
 use crate::{
     separation::{Quantity, Separation, UM_PER_MM_URAD},
-    spread::{Direction, Projection},
+    spread::{Direction, Projection, face_shares},
 };
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::roundness::{Angles, Points, Reference};
@@ -81,6 +81,8 @@ pub(super) struct Synchronous {
     pub band: [usize; 2],
     /// Orders of that band that the layout cannot tell.
     pub lost: Vec<usize>,
+    /// By how much declared forms may move the plot, peak to valley.
+    pub bound: f64,
 }
 
 impl Synchronous {
@@ -135,7 +137,10 @@ impl Synchronous {
                 }
             }
         }
+        let bounds = first.form_bound(separation)
+            + second.as_ref().map_or(0.0, |(factor, motion)| factor.abs() * motion.form_bound(separation));
         Some(Self {
+            bound: bounds,
             first: coefficients(&first),
             second: second.as_ref().map(|(factor, motion)| (*factor, coefficients(motion))),
             variance,
@@ -147,6 +152,11 @@ impl Synchronous {
     /// Whether no order of the band can be told.
     pub fn is_lost(&self) -> bool {
         self.lost.len() > self.band[1].saturating_sub(self.band[0])
+    }
+
+    /// The coefficient of an order in a direction that does not turn.
+    pub fn harmonic(&self, order: usize) -> Option<Complex64> {
+        self.first.get(order).copied().filter(|_| self.second.is_none())
     }
 
     /// The plot on equal angles of the spindle from 0.
@@ -172,6 +182,14 @@ pub(super) struct Motion {
 impl Motion {
     /// x + z·ε_y, y − z·ε_x, or a tilt; along a line that was not separated, the sum of what was along x and y.
     pub fn new(separation: &Separation, quantity: Quantity, z_mm: f64) -> Option<Self> {
+        if let Quantity::FaceMotion(place) = quantity {
+            let mut terms = Self::new(separation, Quantity::Z, z_mm)?.terms;
+            for (tilt, share) in face_shares(place, separation.azimuth()) {
+                let tilt = Self::new(separation, tilt, z_mm)?;
+                terms.extend(tilt.terms.into_iter().map(|(unknown, before, factor)| (unknown, before, share * factor)));
+            }
+            return Some(Self { terms });
+        }
         if separation.position(quantity).is_none() && quantity.azimuth().is_some() {
             let mut terms = Vec::new();
             let each =
@@ -190,6 +208,11 @@ impl Motion {
         };
         let tilt = quantity.moved_by_tilt().and_then(|(tilt, factor)| term(tilt, factor * lever));
         Some(Self { terms: std::iter::once(term(quantity, 1.0)?).chain(tilt).collect() })
+    }
+
+    /// By how much declared forms may move it, peak to valley.
+    pub fn form_bound(&self, separation: &Separation) -> f64 {
+        self.terms.iter().map(|(unknown, _, factor)| factor.abs() * separation.bound_of(*unknown)).sum()
     }
 
     pub fn lost_orders<'a>(&'a self, separation: &'a Separation) -> impl Iterator<Item = usize> + 'a {

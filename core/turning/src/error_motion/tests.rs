@@ -31,6 +31,7 @@ fn separation(harmonics: &[(usize, [Complex64; 4])]) -> Separation {
         form_covariance: None,
         freedom: 0,
         equivalents: Vec::new(),
+        form_bound: Vec::new(),
         motion_z_mm: 0.0,
         residual: Residual::default(),
         warnings: Vec::new(),
@@ -166,7 +167,7 @@ fn every_value_has_a_known_symbol_and_unit() {
     let mut found: Vec<(String, String)> =
         station.values(&[LSC]).into_iter().map(|value| (value.symbol, value.unit)).collect();
     // Along one line there is motion only where x and y are not observable (`plugins/spindle/tests/error_motion.rs`).
-    let symbols = symbols(&[Azimuth::of(LINE_DEG.to_radians())]);
+    let symbols = symbols(&[Azimuth::of(LINE_DEG.to_radians())], &[]);
     let of_plane = symbols.into_iter().filter(|(symbol, _)| !symbol.contains("-along"));
     let mut known: Vec<(String, String)> = of_plane.map(|(symbol, unit)| (symbol, unit.replace('µ', "u"))).collect();
     found.sort();

@@ -34,6 +34,17 @@ impl Rotation {
     }
 }
 
+/// Which way a sensor looks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Looks {
+    /// Across the axis, at the circumference.
+    #[default]
+    Radial,
+    /// Along the axis, at a face or at the pole of a ball.
+    Axial,
+}
+
 /// `[rig]` as it stands in a file.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -60,7 +71,7 @@ pub struct InterruptionConfig {
     pub from_deg: f64,
     /// The angle at which it ends, in degrees; with `from_deg` above, it passes through 0.
     pub to_deg: f64,
-    /// Ids of the sections that it crosses; without it, all.
+    /// Ids of the sections that it crosses; without it, all around the part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sections: Option<Vec<String>>,
 }
@@ -73,13 +84,25 @@ pub struct SensorConfig {
     pub id: String,
     /// Angle of the sensor about +z, in degrees.
     pub angle_deg: f64,
+    /// `radial` (across the axis, the default) or `axial` (along it, at a face or at the pole of a ball).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub looks: Looks,
+    /// Distance of an axial sensor from the axis, in mm: 0 on the axis, as at the pole of a ball.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f64>,
+    /// Largest form deviation of the sensor's section, peak to valley, in µm. The form is then taken as 0, and this bound is part
+    /// of the uncertainty of the motion: for a master ball of known roundness, where the layout cannot separate the form.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub form_um: Option<f64>,
     /// Axial position relative to the spindle reference, in mm; the station's position is added to it.
     #[serde(default)]
     pub z_mm: f64,
-    /// The section of the part that it looks at; sensors of one section see the same circle.
+    /// The section of the part that it looks at; sensors of one section see the same circle. Axial sensors need a section of
+    /// their own: the face.
     #[serde(default = "default_section")]
     pub section: String,
-    /// +1 where the reading grows when the surface comes nearer, −1 where it shrinks.
+    /// +1 where the reading grows when the surface comes nearer, −1 where it shrinks. Of an axial sensor, +1 where it grows when the
+    /// surface moves along +z.
     #[serde(default = "default_sign")]
     #[schemars(schema_with = "sign_schema")]
     pub sign: i8,
@@ -107,6 +130,9 @@ impl Default for SensorConfig {
         Self {
             id: String::new(),
             angle_deg: 0.0,
+            looks: Looks::default(),
+            radius_mm: None,
+            form_um: None,
             z_mm: 0.0,
             section: default_section(),
             sign: default_sign(),
@@ -173,6 +199,10 @@ pub struct Rig {
     pub sections: Vec<String>,
     /// Of each section, the part angles at which it is interrupted.
     pub gaps: Vec<Gaps>,
+    /// Of each section, the radius at which axial sensors look at it, in mm; `None` for a circle around the part.
+    pub faces: Vec<Option<f64>>,
+    /// Of each section, the declared peak-to-valley bound of its form, in µm; `None` where the form is to be found.
+    pub form_bounds_um: Vec<Option<f64>>,
 }
 
 /// A displacement sensor.
@@ -186,6 +216,8 @@ pub struct Sensor {
     pub z_mm: f64,
     /// Index into [`Rig::sections`].
     pub section: usize,
+    /// Distance from the axis of a sensor that looks along it, in mm; `None` where it looks across.
+    pub axial_radius_mm: Option<f64>,
     /// +1 or −1.
     pub sign: f64,
     /// From its numbers to displacements. Loaders give numbers with their sign; the pipeline calibrates them.
@@ -219,6 +251,7 @@ impl RigConfig {
             return Err(Fault::at("setups", "a rig needs at least one setup"));
         }
         let mut sections: Vec<String> = Vec::new();
+        let (mut faces, mut form_bounds_um) = (Vec::new(), Vec::new());
         let mut sensors = Vec::with_capacity(self.sensors.len());
         let mut ids = HashSet::new();
         for (index, sensor) in self.sensors.into_iter().enumerate() {
@@ -239,20 +272,34 @@ impl RigConfig {
                 return Err(fault("sign", format!("the sign must be 1 or -1, found {}", sensor.sign)));
             }
             let calibration = sensor.calibration().map_err(|fault| fault.under_item("sensors", index))?;
+            let axial_radius_mm = sensor.axial_radius_mm().map_err(|fault| fault.under_item("sensors", index))?;
             let section = sections.iter().position(|id| *id == sensor.section).unwrap_or_else(|| {
                 sections.push(sensor.section.clone());
+                faces.push(axial_radius_mm);
+                form_bounds_um.push(None);
                 sections.len() - 1
             });
+            same_face(&sensor, faces[section], axial_radius_mm).map_err(|fault| fault.under_item("sensors", index))?;
+            if let Some(bound_um) = sensor.form_um {
+                let declared = form_bounds_um[section].replace(bound_um);
+                if let Some(other) = declared.filter(|other: &f64| other.total_cmp(&bound_um).is_ne()) {
+                    let id = &sections[section];
+                    let message = format!("section `{id}` has one form: {other} µm is declared for it already");
+                    return Err(fault("form_um", message));
+                }
+            }
             let checked = Sensor {
                 id: sensor.id,
                 angle_rad: sensor.angle_deg.to_radians(),
                 z_mm: sensor.z_mm,
                 section,
+                axial_radius_mm,
                 sign: f64::from(sensor.sign),
                 calibration,
             };
             if let Some(first) = sensors.iter().find(|other: &&Sensor| other.section == section)
                 && (first.z_mm - checked.z_mm).abs() > SAME_SECTION_MM
+                && axial_radius_mm.is_none()
             {
                 return Err(fault(
                     "z_mm",
@@ -287,13 +334,61 @@ impl RigConfig {
                 sensors_rad: setup.sensors_deg.to_radians(),
             });
         }
-        let gaps = gaps_of(&self.interruptions, &sections)?;
-        Ok(Rig { part_radius_mm: self.part_radius_mm, rotation: self.rotation, sensors, setups, sections, gaps })
+        let gaps = gaps_of(&self.interruptions, &sections, &faces)?;
+        let (part_radius_mm, rotation) = (self.part_radius_mm, self.rotation);
+        Ok(Rig { part_radius_mm, rotation, sensors, setups, sections, gaps, faces, form_bounds_um })
+    }
+}
+
+impl SensorConfig {
+    /// Distance from the axis of a sensor that looks along it.
+    fn axial_radius_mm(&self) -> Result<Option<f64>, Fault> {
+        if let Some(bound_um) = self.form_um.filter(|bound_um| !(bound_um.is_finite() && *bound_um >= 0.0)) {
+            return Err(Fault::at("form_um", format!("the bound of the form must be 0 µm or more, found {bound_um}")));
+        }
+        match (self.looks, self.radius_mm) {
+            (Looks::Radial, None) => Ok(None),
+            (Looks::Radial, Some(_)) => Err(Fault::at("radius_mm", "only an axial sensor has a radius")
+                .help("add looks = \"axial\", or leave radius_mm out: the part's radius is part_radius_mm")),
+            (Looks::Axial, None) => {
+                let message = format!("the axial sensor `{}` needs `radius_mm`, its distance from the axis", self.id);
+                Err(Fault::at("looks", message).help("radius_mm = 0 on the axis, as at the pole of a ball"))
+            }
+            (Looks::Axial, Some(radius_mm)) if radius_mm.is_finite() && radius_mm >= 0.0 => Ok(Some(radius_mm)),
+            (Looks::Axial, Some(radius_mm)) => {
+                let message = format!("the sensor's distance from the axis must be 0 mm or more, found {radius_mm}");
+                Err(Fault::at("radius_mm", message).help("the side on which it stands is its angle_deg"))
+            }
+        }
+    }
+}
+
+/// Whether a sensor can look at a section, which its first sensor sees as a face at a radius or as a circle around the part.
+fn same_face(sensor: &SensorConfig, face: Option<f64>, axial_radius_mm: Option<f64>) -> Result<(), Fault> {
+    let own = "give the face a section of its own, as section = \"face\"";
+    match (face, axial_radius_mm) {
+        (None, None) => Ok(()),
+        (Some(one_mm), Some(other_mm)) if (one_mm - other_mm).abs() <= SAME_SECTION_MM => Ok(()),
+        (Some(one_mm), Some(other_mm)) => {
+            let message = format!(
+                "axial sensors of section `{}` must share one radius: it is seen at {one_mm} mm, by `{}` at {other_mm} mm",
+                sensor.section, sensor.id
+            );
+            Err(Fault::at("radius_mm", message).help("give the sensor a section of its own"))
+        }
+        _ => {
+            let message = format!("section `{}` is seen both radially and axially", sensor.section);
+            Err(Fault::at("looks", message).help(own))
+        }
     }
 }
 
 /// Of each section, where it is interrupted.
-fn gaps_of(interruptions: &[InterruptionConfig], sections: &[String]) -> Result<Vec<Gaps>, Fault> {
+fn gaps_of(
+    interruptions: &[InterruptionConfig],
+    sections: &[String],
+    faces: &[Option<f64>],
+) -> Result<Vec<Gaps>, Fault> {
     let mut gaps = vec![Gaps::default(); sections.len()];
     for (index, interruption) in interruptions.iter().enumerate() {
         let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("interruptions", index);
@@ -309,8 +404,9 @@ fn gaps_of(interruptions: &[InterruptionConfig], sections: &[String]) -> Result<
             let message = format!("expected at most {MOST_INTERRUPTED_DEG}° from `from_deg` on, found {length_deg}°");
             return Err(fault("to_deg", message));
         }
-        for (section, gaps) in sections.iter().zip(&mut gaps) {
-            if interruption.sections.as_ref().is_none_or(|named| named.contains(section)) {
+        for ((section, face), gaps) in sections.iter().zip(faces).zip(&mut gaps) {
+            // A keyway along the part is none of its face, unless that is named.
+            if interruption.sections.as_ref().map_or(face.is_none(), |named| named.contains(section)) {
                 gaps.add(interruption.from_deg.to_radians(), length_deg.to_radians());
             }
         }
@@ -344,6 +440,18 @@ impl Rig {
     #[must_use]
     pub fn section_z_mm(&self, section: usize) -> f64 {
         self.sensors.iter().find(|sensor| sensor.section == section).map_or(0.0, |sensor| sensor.z_mm)
+    }
+
+    /// Whether a section is a face that axial sensors look at.
+    #[must_use]
+    pub fn is_face(&self, section: usize) -> bool {
+        self.faces.get(section).is_some_and(Option::is_some)
+    }
+
+    /// Whether some sensor looks along the axis.
+    #[must_use]
+    pub fn has_axial(&self) -> bool {
+        self.sensors.iter().any(|sensor| sensor.axial_radius_mm.is_some())
     }
 
     /// Where a section is interrupted, by part angle; nowhere if there is no such section.

@@ -30,6 +30,7 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
             form_covariance: None,
             freedom: 0,
             equivalents: Vec::new(),
+            form_bound: Vec::new(),
             motion_z_mm: 0.0,
             residual: Residual::default(),
             warnings: Vec::new(),

@@ -11,6 +11,8 @@ use crate::node::{self, Place};
 const FORM: &str = "form_um";
 /// Motions in the order of [`StationTruth::motion`].
 const MOTION: [&str; 4] = ["x_um", "y_um", "tilt_x_urad", "tilt_y_urad"];
+/// Motion along the axis.
+const Z: &str = "z_um";
 /// More angles than any truth is given on.
 const MOST_ANGLES: usize = 1 << 24;
 
@@ -36,7 +38,8 @@ pub(super) fn read(root: &Group, place: &Place, rig: &Rig, station: &str) -> Res
     } else {
         None
     };
-    Ok(Some(StationTruth { form_um, motion }))
+    let z_um = if station.link_exists(Z) { Some(curve(&station, &place, Z)?) } else { None };
+    Ok(Some(StationTruth { form_um, motion, z_um }))
 }
 
 fn curve(group: &Group, place: &Place, name: &str) -> Result<Vec<f64>> {
@@ -63,6 +66,9 @@ pub(super) fn write(root: &Group, rig: &Rig, station: &str, truth: &StationTruth
     }
     for (name, curve) in MOTION.iter().zip(truth.motion.iter().flatten()) {
         group.new_dataset_builder().with_data(curve.as_slice()).create(*name)?;
+    }
+    if let Some(z_um) = &truth.z_um {
+        group.new_dataset_builder().with_data(z_um.as_slice()).create(Z)?;
     }
     Ok(())
 }

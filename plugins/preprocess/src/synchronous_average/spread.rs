@@ -7,6 +7,8 @@ use runout_core::{
     spread::{Direction, Projection, Spread},
 };
 
+use super::level::Levelled;
+
 /// Motion of the axis in one turn after the other.
 pub(super) struct Motion {
     projection: Projection,
@@ -57,7 +59,9 @@ impl Motion {
         let directions: Vec<Place> = self.projection.directions().into_iter().filter_map(places).collect();
         let angle = |step: usize| self.projection.rotation * TAU * step as f64 / self.angles as f64;
         let length = directions.len() * self.angles;
+        let along = |(row, (quantity, _)): (usize, &(Quantity, _))| quantity.is_axial().then_some(row);
         Extremes {
+            levelled: Levelled::new(rows.iter().enumerate().filter_map(along).collect(), self.angles),
             cos: (0..self.angles).map(|step| angle(step).cos()).collect(),
             sin: (0..self.angles).map(|step| angle(step).sin()).collect(),
             directions,
@@ -77,6 +81,8 @@ type Place = (Direction, usize, Option<(usize, f64)>);
 /// Lowest and highest turn at each angle, and the sum of all.
 pub(super) struct Extremes {
     projection: Projection,
+    /// Turns that wait for their level along the axis, where that is among the motions.
+    levelled: Option<Levelled>,
     directions: Vec<Place>,
     cos: Vec<f64>,
     sin: Vec<f64>,
@@ -93,6 +99,22 @@ pub(super) struct Extremes {
 impl Extremes {
     /// Takes the motion of a turn, `[motion][angle]`.
     pub(super) fn add(&mut self, motion: &[f64]) {
+        match &mut self.levelled {
+            None => self.take(motion),
+            Some(levelled) => {
+                levelled.add(motion);
+                self.take_levelled(false);
+            }
+        }
+    }
+
+    fn take_levelled(&mut self, end: bool) {
+        while let Some(motion) = self.levelled.as_mut().and_then(|levelled| levelled.next(end)) {
+            self.take(&motion);
+        }
+    }
+
+    fn take(&mut self, motion: &[f64]) {
         self.turns += 1;
         self.sum.iter_mut().zip(motion).for_each(|(sum, value)| *sum += value);
         let angles = self.cos.len();
@@ -124,6 +146,7 @@ impl Extremes {
 
     /// Extremes about the mean; `None` below two turns.
     pub(super) fn spread(mut self) -> Option<Spread> {
+        self.take_levelled(true);
         if self.turns < 2 {
             return None;
         }

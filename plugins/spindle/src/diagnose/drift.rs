@@ -276,11 +276,12 @@ pub fn say(diagnosis: &mut Diagnosis, shared: &Shared) {
 /// Drifts of several sensors that are one displacement of the part beside all sensors.
 fn one_displacement(drifts: &[f64], shared: &Shared) -> Option<String> {
     let sensors = &shared.selection.rig.sensors;
-    if drifts.iter().filter(|drift| **drift != 0.0).count() < 3 {
+    let (mut cc, mut cs, mut ss, mut c, mut s) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let across = || sensors.iter().zip(drifts).filter(|(sensor, _)| sensor.axial_radius_mm.is_none());
+    if across().filter(|(_, drift)| **drift != 0.0).count() < 3 {
         return None;
     }
-    let (mut cc, mut cs, mut ss, mut c, mut s) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (sensor, drift) in sensors.iter().zip(drifts) {
+    for (sensor, drift) in across() {
         let (sine, cosine) = sensor.angle_rad.sin_cos();
         (cc, cs, ss) = (cc + cosine * cosine, cs + cosine * sine, ss + sine * sine);
         (c, s) = (c + drift * cosine, s + drift * sine);
@@ -293,8 +294,8 @@ fn one_displacement(drifts: &[f64], shared: &Shared) -> Option<String> {
     let left = |(sensor, drift): (&runout_core::rig::Sensor, &f64)| {
         (drift - x * sensor.angle_rad.cos() - y * sensor.angle_rad.sin()).powi(2)
     };
-    let left: f64 = sensors.iter().zip(drifts).map(left).sum();
-    let all: f64 = drifts.iter().map(|drift| drift * drift).sum();
+    let left: f64 = across().map(left).sum();
+    let all: f64 = across().map(|(_, drift)| drift * drift).sum();
     (left < ONE_DISPLACEMENT * ONE_DISPLACEMENT * all).then(|| {
         format!(
             "the drifts of the sensors fit one displacement of the part beside all of them, x {x:+.3} µm and y {y:+.3} µm over each \

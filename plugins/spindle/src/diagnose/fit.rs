@@ -82,8 +82,8 @@ impl SpindleFit {
         let (mut squares, mut counts) = ([0.0; 2], [0_usize; 2]);
         for (unknown, quantity) in self.layout.unknowns.iter().enumerate() {
             let place = match quantity {
-                Quantity::Form(_) => 0,
-                Quantity::X | Quantity::Y => 1,
+                Quantity::Form(_) | Quantity::FaceForm(_) => 0,
+                Quantity::X | Quantity::Y | Quantity::Z => 1,
                 _ => continue,
             };
             counts[place] += self.stations.len();
@@ -390,15 +390,21 @@ impl Fit for SpindleFit {
         let Some(solved) = self.stations.first() else { return biases };
         for (partial, parameter) in self.partials(effect, 0).iter().zip(&place.effect.parameters) {
             let (mut form, mut shift, mut forms, mut shifts) = (0.0, 0.0, 0, 0);
+            // The face and z, where the rig has an axial sensor.
+            let (mut face, mut along, mut faces, mut alongs) = (0.0, 0.0, 0, 0);
             for (unknown, quantity) in self.layout.unknowns.iter().enumerate() {
                 let squares: f64 = solved.moved_by(partial, unknown).map(|(_, value)| value.norm_sqr()).sum();
                 match quantity {
                     Quantity::Form(_) => (form, forms) = (form + squares, forms + 1),
+                    Quantity::FaceForm(_) => (face, faces) = (face + squares, faces + 1),
+                    Quantity::Z => (along, alongs) = (along + squares, alongs + 1),
                     motion if motion.is_shift() => (shift, shifts) = (shift + squares, shifts + 1),
                     _ => {}
                 }
             }
-            for (on, squares, count) in [("form", form, forms), ("motion", shift, shifts)] {
+            let moved =
+                [("form", form, forms), ("motion", shift, shifts), ("face", face, faces), ("z", along, alongs)];
+            for (on, squares, count) in moved {
                 if count > 0 {
                     let value = (0.5 * squares / f64::from(count)).sqrt();
                     let unit = match parameter.unit.as_str() {

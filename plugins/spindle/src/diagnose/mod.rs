@@ -108,7 +108,8 @@ fn places(
         if effect.is_declared(layout, second_order) {
             continue;
         }
-        places.extend(targets(about.acts_on, rig).into_iter().map(|(index, targets)| data::Place {
+        let suited = targets(about.acts_on, rig).into_iter().filter(|(index, _)| effect.suits(*index, layout));
+        places.extend(suited.map(|(index, targets)| data::Place {
             kind,
             index,
             effect: Effect { id: about.id.into(), targets, parameters: about.parameters.clone() },

@@ -57,6 +57,11 @@ pub trait SpindleEffect: Send + Sync {
         false
     }
 
+    /// Whether it can act at a target of a layout: what a sensor's place across the axis does is nothing to one that looks along it.
+    fn suits(&self, _target: usize, _layout: &Layout) -> bool {
+        true
+    }
+
     /// ∂(mean creep of a sensor over one turn, in µm)/∂(parameter): the levels of the turns observe it besides the averaged turn.
     /// Nothing where the effect changes no level.
     fn creep_partials(&self, _target: usize, _sensor: usize) -> Vec<f64> {

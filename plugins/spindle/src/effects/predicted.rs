@@ -24,7 +24,7 @@ pub struct Predicted<'a> {
     pub along: Vec<Complex64>,
     /// Motion across the sensor, a quarter turn ahead of its direction, in µm.
     pub across: Vec<Complex64>,
-    /// Tilt that moves the part along the sensor with z, in µrad.
+    /// Tilt towards the sensor, which moves the part along it with z, in µrad.
     pub tilt: Vec<Complex64>,
     /// Displacements as the readings have them, with their level, in µm.
     pub readings: Vec<Complex64>,
@@ -82,17 +82,21 @@ impl<'a> Predicted<'a> {
                 motion.iter_mut().zip(shares).for_each(|(sum, share)| *sum += value * *share);
             }
             let [x, y, tilt_x, tilt_y] = motion;
+            let z = of(position(Quantity::Z));
             let form = |setup: usize, section: usize| {
-                if order == 1 { eccentricity(setup, section) } else { of(position(Quantity::Form(section))) }
+                let of_section = || position(Quantity::Form(section)).or_else(|| position(Quantity::FaceForm(section)));
+                if order == 1 { eccentricity(setup, section) } else { of(of_section()) }
             };
             for (index, (reading, ((sine, cosine), lever, neighbour))) in layout.readings.iter().zip(&fixed).enumerate()
             {
                 let at = order * count + index;
-                let phase = layout.part_phase(reading, order);
+                let phase = layout.form_phase(reading, order);
                 predicted.part[at] = form(reading.setup, reading.section) * phase;
                 let moves = layout.motion_sign(reading.setup, order) * reading.motion_ratio;
+                // An axial sensor reads z and, at its lever −ρ, the tilt towards it.
+                let [x, y, z] = if reading.view.is_axial() { [Complex64::ZERO, Complex64::ZERO, z] } else { [x, y, Complex64::ZERO] };
                 let (shift_x, shift_y) = (x + tilt_y * *lever, y - tilt_x * *lever);
-                predicted.along[at] = (shift_x * cosine + shift_y * sine) * moves;
+                predicted.along[at] = (shift_x * cosine + shift_y * sine + z) * moves;
                 predicted.across[at] = (shift_y * cosine - shift_x * sine) * moves;
                 predicted.tilt[at] = (tilt_y * *cosine - tilt_x * *sine) * moves;
                 if let Some((other, distance_mm)) = neighbour {
@@ -104,13 +108,11 @@ impl<'a> Predicted<'a> {
         predicted
     }
 
-    /// Another section and how far along z it is.
+    /// Another circle around the part and how far along z it is; nothing of a face.
     fn neighbour(&self, section: usize) -> Option<(usize, f64)> {
-        let z_mm = |wanted: usize| {
-            self.layout.readings.iter().find(|reading| reading.section == wanted).map(|reading| reading.lever_mm)
-        };
-        let here = z_mm(section)?;
-        let others = self.layout.readings.iter().filter(|reading| reading.section != section);
+        let radial = || self.layout.readings.iter().filter(|reading| !reading.view.is_axial());
+        let here = radial().find(|reading| reading.section == section).map(|reading| reading.lever_mm)?;
+        let others = radial().filter(|reading| reading.section != section);
         others
             .map(|reading| (reading.section, reading.lever_mm - here))
             .filter(|(_, distance)| distance.abs() > 1e-3)

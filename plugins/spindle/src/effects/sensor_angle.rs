@@ -4,6 +4,7 @@
 use runout_core::Complex64;
 
 use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, parameter};
+use crate::layout::{Layout, View};
 
 /// A sensor's angle.
 pub struct SensorAngle;
@@ -17,6 +18,11 @@ impl SpindleEffect for SensorAngle {
             acts_on: ActsOn::Sensor,
             parameters: vec![parameter("angle", "deg", 1.0)],
         }
+    }
+
+    /// On the axis a sensor has no angle.
+    fn suits(&self, target: usize, layout: &Layout) -> bool {
+        layout.readings.iter().any(|reading| reading.sensor == target && reading.view != View::OnAxis)
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

@@ -5,7 +5,7 @@
 use runout_core::Complex64;
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
-use crate::layout::UM_PER_MM_URAD;
+use crate::layout::{Layout, UM_PER_MM_URAD};
 
 /// A sensor's axial position.
 pub struct SensorAxialPosition {
@@ -22,6 +22,11 @@ impl SpindleEffect for SensorAxialPosition {
             acts_on: ActsOn::Sensor,
             parameters,
         }
+    }
+
+    /// An axial sensor's place along the axis is its level.
+    fn suits(&self, target: usize, layout: &Layout) -> bool {
+        layout.readings.iter().any(|reading| reading.sensor == target && !reading.view.is_axial())
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {

@@ -71,6 +71,8 @@ impl Score {
 /// With motion's columns B = Q·R (they do not depend on the order) and each section's phases aⱼ, the forms'
 /// information is S = diag(Nⱼ) − VᴴV with vⱼ = Qᵀaⱼ and Nⱼ the readings of section j; form j's noise gain is
 /// √(S⁻¹)ⱼⱼ, which is what [`Layout::assess`] finds from all of Aₙ.
+///
+/// Axial sensors are left out: what they say of tilt makes no order of a circle's form observable by itself.
 #[derive(Debug, Clone)]
 pub struct FormGain {
     readings: Vec<Reading>,
@@ -117,7 +119,8 @@ impl Tally {
 #[derive(Debug, Clone)]
 struct Reading {
     sensor: usize,
-    section: usize,
+    /// Its place among the sections whose form is to be found; none where a bound of the form is declared.
+    section: Option<usize>,
     /// σ and β of its setup.
     sensors_rad: f64,
     part_rad: f64,
@@ -130,15 +133,20 @@ impl FormGain {
     #[must_use]
     pub fn new(rig: &Rig) -> Self {
         let layout = Layout::new(rig, false);
-        let longest = layout.readings.iter().map(|reading| reading.lever_mm.abs()).fold(0.0, f64::max);
-        let mut counts = vec![0.0; rig.sections.len()];
+        let radial = || layout.readings.iter().filter(|reading| !reading.view.is_axial());
+        let longest = radial().map(|reading| reading.lever_mm.abs()).fold(0.0, f64::max);
+        let places: Vec<usize> = layout.circles().map(|(_, section)| section).collect();
+        let mut counts = vec![0.0; places.len()];
         let mut readings = Vec::with_capacity(layout.readings.len());
-        for reading in &layout.readings {
-            counts[reading.section] += 1.0;
+        for reading in radial() {
+            let section = places.iter().position(|section| *section == reading.section);
+            if let Some(section) = section {
+                counts[section] += 1.0;
+            }
             let setup = &rig.setups[reading.setup];
             readings.push(Reading {
                 sensor: reading.sensor,
-                section: reading.section,
+                section,
                 sensors_rad: setup.sensors_rad,
                 part_rad: setup.part_rad,
                 lever: if longest > 0.0 { reading.lever_mm / longest } else { 0.0 },
@@ -245,7 +253,8 @@ impl FormGain {
         self.seen.clear();
         self.seen.resize(sections * columns, Complex64::ZERO);
         for (row, (reading, (phase, _))) in self.readings.iter().zip(&self.phases).enumerate() {
-            let seen = &mut self.seen[reading.section * columns..][..columns];
+            let Some(section) = reading.section else { continue };
+            let seen = &mut self.seen[section * columns..][..columns];
             seen.iter_mut().zip(&self.basis[row * columns..]).for_each(|(seen, basis)| *seen += *phase * *basis);
         }
         if let [count] = self.counts[..] {

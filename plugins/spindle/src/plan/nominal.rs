@@ -59,7 +59,8 @@ pub fn station(selection: &Selection) -> Station {
     for (setup, profile) in profiles.iter_mut().enumerate() {
         let offset = ECCENTRICITY_UM * phase();
         for (index, reading) in layout.readings[setup * sensors..(setup + 1) * sensors].iter().enumerate() {
-            profile.mean[sensors + index] = offset * layout.part_phase(reading, 1);
+            let across = !reading.view.is_axial();
+            profile.mean[sensors + index] = if across { offset * layout.part_phase(reading, 1) } else { Complex64::ZERO };
         }
     }
     // Σ (A/n)²/2 over the orders is the mean square.
@@ -68,12 +69,17 @@ pub fn station(selection: &Selection) -> Station {
         let unit = (2.0 / squares).sqrt() / order as f64;
         let [common, along, across] = [(); 3].map(|()| phase());
         let motion = [(); 4].map(|()| phase());
+        // Drawn only where there is an axial sensor: other rigs keep their campaign.
+        let [face, axial] = if rig.has_axial() { [(); 2].map(|()| phase()) } else { [Complex64::ZERO; 2] };
         let value = |quantity: Quantity| match quantity {
             Quantity::Form(section) => {
                 let (sine, cosine) = (TAU * rig.section_z_mm(section) / WAVELENGTH_MM).sin_cos();
                 let own = along * cosine + across * sine;
                 (common * (1.0 - OWN_SHARE).sqrt() + own * OWN_SHARE.sqrt()) * FORM_UM
             }
+            Quantity::FaceForm(_) => face * FORM_UM,
+            Quantity::Z => axial * MOTION_UM,
+            Quantity::FaceMotion(_) => Complex64::ZERO,
             Quantity::X | Quantity::Along(_) => motion[0] * MOTION_UM,
             Quantity::Y => motion[1] * MOTION_UM,
             Quantity::TiltX => motion[2] * TILT_URAD,
@@ -101,7 +107,11 @@ fn profile(selection: &Selection, layout: &Layout, setup: usize) -> Profile {
         let moved = 2.0 * (ASYNCHRONOUS_UM / (turns * order.max(1) as f64)).powi(2);
         for (row, one) in readings.iter().enumerate() {
             for (column, other) in readings.iter().enumerate() {
-                let common = moved * (one.angle_rad - other.angle_rad).cos();
+                let common = match [one, other].map(|reading| reading.view.is_axial()) {
+                    [false, false] => moved * (one.angle_rad - other.angle_rad).cos(),
+                    [true, true] => moved,
+                    _ => 0.0,
+                };
                 covariance.push(Complex64::from(if row == column { noise + common } else { common }));
             }
         }

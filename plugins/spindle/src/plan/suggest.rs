@@ -119,6 +119,10 @@ impl Addition {
                 rig.setups.push(Setup { id: "added".into(), part_rad, sensors_rad });
             }
             Self::Sensor { section, angle_deg } => {
+                // On the axis there is one place.
+                if rig.faces[section] == Some(0.0) {
+                    return None;
+                }
                 let mut neighbours = rig.sensors.iter().filter(|sensor| sensor.section == section);
                 let smallest = clearance_deg.max(SAME_DEG) - SAME_DEG / 2.0;
                 if neighbours.any(|other| distance_deg(other.angle_rad.to_degrees(), angle_deg) < smallest) {
@@ -127,7 +131,8 @@ impl Addition {
                 let z_mm = rig.section_z_mm(section);
                 let id = "added".into();
                 let (angle_rad, calibration) = (angle_deg.to_radians(), Calibration::NONE);
-                rig.sensors.push(Sensor { id, angle_rad, z_mm, section, sign: 1.0, calibration });
+                let axial_radius_mm = rig.faces[section];
+                rig.sensors.push(Sensor { id, angle_rad, z_mm, section, axial_radius_mm, sign: 1.0, calibration });
             }
         }
         Some(rig)

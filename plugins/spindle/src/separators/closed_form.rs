@@ -144,6 +144,7 @@ impl ClosedFormSeparator {
         second_order: bool,
         max_noise_gain: f64,
     ) -> std::result::Result<Self, Fault> {
+        takes_sensors(&selection.rig).map_err(|problem| refusal(M::NAME, &problem))?;
         let method = M::new(&selection.rig).map_err(|problem| refusal(M::NAME, &problem))?;
         let layout = Layout::new(&selection.rig, false).limited_to(max_noise_gain);
         Ok(Self::new(selection, layout, second_order, Box::new(method)))
@@ -202,6 +203,24 @@ pub(super) fn refusal(method: &str, problem: &str) -> Fault {
     Fault::unfit(format!("{method} {problem}")).help("plugin = \"harmonic-least-squares\" takes any rig")
 }
 
+/// Whether a formula can take the sensors of a rig.
+///
+/// # Errors
+/// Where one looks along the axis, or its form is declared.
+pub(super) fn takes_sensors(rig: &Rig) -> std::result::Result<(), String> {
+    if let Some(axial) = rig.sensors.iter().find(|sensor| sensor.axial_radius_mm.is_some()) {
+        return Err(format!("cannot use the axial sensor `{}`: it takes sensors across the axis only", axial.id));
+    }
+    let declared = |sensor: &&runout_core::rig::Sensor| rig.form_bounds_um[sensor.section].is_some();
+    match rig.sensors.iter().find(declared) {
+        Some(sensor) => {
+            let section = &rig.sections[sensor.section];
+            Err(format!("finds the form of section `{section}` itself: it cannot take `form_um`"))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Whether two angles are the same direction.
 pub(super) fn same_angle(angle_rad: f64, other_rad: f64) -> bool {
     let difference = (angle_rad - other_rad).rem_euclid(TAU);
@@ -251,7 +270,8 @@ pub(super) fn add_motion(operator: &mut [Complex64], layout: &Layout, along: [f6
 /// The sensors of the first two sections at different z that `count` sensors or more look at.
 pub(super) fn sections_with(rig: &Rig, count: usize) -> Vec<Vec<usize>> {
     let of = |section: usize| -> Vec<usize> {
-        (0..rig.sensors.len()).filter(|sensor| rig.sensors[*sensor].section == section).collect()
+        let radial = |sensor: &usize| rig.sensors[*sensor].axial_radius_mm.is_none();
+        (0..rig.sensors.len()).filter(radial).filter(|sensor| rig.sensors[*sensor].section == section).collect()
     };
     let mut chosen: Vec<Vec<usize>> = Vec::new();
     for sensors in (0..rig.sections.len()).map(of).filter(|sensors| sensors.len() >= count) {

@@ -21,7 +21,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::closed_form::{
-    ClosedForm, ClosedFormSeparator, SectionMotion, add_motion, refusal, same_angle, sections_with, yes,
+    ClosedForm, ClosedFormSeparator, SectionMotion, add_motion, refusal, same_angle, sections_with, takes_sensors, yes,
 };
 use crate::{layout::Layout, selection::Selection};
 
@@ -68,6 +68,7 @@ pub fn separator(
     second_order: bool,
     assume_odd_motion: bool,
 ) -> Result<ClosedFormSeparator, Fault> {
+    takes_sensors(&selection.rig).map_err(|problem| refusal(NAME, &problem))?;
     let method =
         FourSensorReversal::new(&selection.rig, assume_odd_motion).map_err(|problem| refusal(NAME, &problem))?;
     if assume_odd_motion && method.sensors_reversed {
@@ -87,6 +88,7 @@ pub fn choose(rig: &Rig) -> (Vec<usize>, Vec<usize>) {
         setups.clone().flat_map(|first| (first + 1..setups.end).map(move |second| [first, second])).collect();
     let pair = (pairs.iter().find(|pair| reversal(rig, **pair) == Some(true)))
         .or_else(|| pairs.iter().find(|pair| reversal(rig, **pair).is_some()));
+    let radial = (0..rig.sensors.len()).filter(|sensor| rig.sensors[*sensor].axial_radius_mm.is_none());
     let mut sensors: Vec<usize> = match &sections_with(rig, 2)[..] {
         [near, far] => square_pairs(rig, near)
             .find_map(|[along, across]| {
@@ -95,8 +97,8 @@ pub fn choose(rig: &Rig) -> (Vec<usize>, Vec<usize>) {
                     same.find(|[other, _]| same_angle(rig.sensors[*other].angle_rad, rig.sensors[along].angle_rad));
                 parallel.map(|[first, second]| vec![along, across, first, second])
             })
-            .unwrap_or_else(|| (0..rig.sensors.len()).collect()),
-        _ => (0..rig.sensors.len()).collect(),
+            .unwrap_or_else(|| radial.collect()),
+        _ => radial.collect(),
     };
     sensors.sort_unstable();
     (sensors, pair.map_or_else(|| setups.collect(), |pair| pair.to_vec()))

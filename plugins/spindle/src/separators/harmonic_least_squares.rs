@@ -18,6 +18,7 @@ use serde::Deserialize;
 
 use super::{
     closed_form::{checked_gain, yes},
+    face_notes,
     operators::Operators,
     projection::projection,
     readings::Readings,
@@ -106,6 +107,7 @@ impl HarmonicLeastSquares {
 impl StationSeparator for HarmonicLeastSquares {
     fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
         let mut assessment = self.layout.assess(max_order);
+        assessment.notes.extend(face_notes::notes(&self.selection.rig, &assessment));
         self.selection.tell(&mut assessment);
         Ok(assessment)
     }

@@ -60,9 +60,11 @@ impl<'a> Carried<'a> {
     fn new(layout: &'a Layout, part_radius_mm: f64, readings: &Readings) -> Self {
         let sections = layout.readings.iter().map(|reading| reading.section + 1).max().unwrap_or(0);
         let systems = layout.systems(readings.max_order);
-        let is_lost = |order: usize| order > 1 && layout.forms().any(|form| !systems[order - 1].observable[form]);
+        let is_lost =
+            |order: usize| order > 1 && layout.circles().any(|(form, _)| !systems[order - 1].observable[form]);
+        let radial = |index: usize| !layout.readings[index].view.is_axial();
         let mean_of = |order: usize, of: &dyn Fn(usize) -> bool| {
-            let seen = readings.order(order).iter().enumerate().filter(|(index, _)| of(*index));
+            let seen = readings.order(order).iter().enumerate().filter(|(index, _)| radial(*index) && of(*index));
             let (sum, count) = seen.fold((0.0, 0.0), |(sum, count), (_, value)| (sum + value.norm_sqr(), count + 1.0));
             if count > 0.0 { sum / count } else { 0.0 }
         };
@@ -91,6 +93,9 @@ impl<'a> Carried<'a> {
         let mut block = vec![Complex64::ZERO; sensors * sensors];
         for row in 0..sensors {
             let (one, place) = (&self.layout.readings[setup * sensors + row], setup * sensors + row);
+            if one.view.is_axial() {
+                continue;
+            }
             for column in 0..sensors {
                 let other = &self.layout.readings[setup * sensors + column];
                 if one.section != other.section {

@@ -65,6 +65,12 @@ impl<'a> SecondOrder<'a> {
         let mut curve = vec![0.0; samples];
         self.met_rad.clear();
         for (index, reading) in layout.readings.iter().enumerate() {
+            // What the face does where it moves sideways is left linear: its slope across the axis is not known.
+            if reading.view.is_axial() {
+                self.met_rad.extend((0..samples).map(|step| layout.part_angle_rad(reading, step, samples)));
+                excess.iter_mut().skip(index).step_by(count).for_each(|value| *value = Complex64::ZERO);
+                continue;
+            }
             if motions.get(reading.setup).is_none() {
                 motions.push(self.motion(estimate, reading.setup, max_order));
             }
@@ -110,7 +116,8 @@ impl<'a> SecondOrder<'a> {
         self.table.clear();
         for section in 0..sections {
             let Some(unknown) = layout.unknowns.iter().position(|known| *known == Quantity::Form(section)) else {
-                self.table.push(Vec::new());
+                // A form that is taken as 0.
+                self.table.push(vec![0.0; self.fine.length()]);
                 continue;
             };
             let forms = (0..=max_order)

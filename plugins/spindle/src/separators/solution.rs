@@ -18,7 +18,7 @@ use super::{
     weights, wiring,
 };
 use crate::{
-    layout::{FirstOrder, Layout},
+    layout::{FirstOrder, Layout, ToReference},
     selection::Selection,
 };
 
@@ -110,7 +110,7 @@ impl Solver<'_> {
 
     /// Where exact geometry does not settle.
     fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
-        let (eccentricity_um, radius_mm) = (eccentricity_um(readings), self.selection.rig.part_radius_mm);
+        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
         let ratio = format!("an eccentricity of {eccentricity_um:.0} µm on a radius of {radius_mm} mm");
         let (problem, help) = if estimate.moved_um.is_finite() {
             let moved_um = estimate.moved_um;
@@ -132,7 +132,7 @@ impl Solver<'_> {
     /// under the sensor by e/R, and order n is then seen by n·e/R of its amplitude one order lower and higher.
     fn carried(&self, readings: &Readings, separation: &Separation) -> Option<String> {
         let width = separation.unknowns.len();
-        let eccentricity_um = eccentricity_um(readings);
+        let eccentricity_um = self.eccentricity_um(readings);
         let share = eccentricity_um / (1e3 * self.selection.rig.part_radius_mm);
         let sees = |wanted| self.layout.unknowns.contains(&wanted);
         // What lost orders carry is in the readings' uncertainty.
@@ -140,7 +140,7 @@ impl Solver<'_> {
             return None;
         }
         let mut worst: f64 = 0.0;
-        for unknown in self.layout.forms() {
+        for (unknown, _) in self.layout.circles() {
             let at = |order: usize| order * width + unknown;
             let told = |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
             for order in 2..=readings.max_order {
@@ -211,7 +211,7 @@ impl Solver<'_> {
     /// Whether the eccentricity takes the highest order to the orders beside it by so much that they do not settle one by
     /// one.
     fn couples(&self, readings: &Readings) -> bool {
-        let share = eccentricity_um(readings) / (1e3 * self.selection.rig.part_radius_mm);
+        let share = self.eccentricity_um(readings) / (1e3 * self.selection.rig.part_radius_mm);
         self.second_order && share * readings.max_order as f64 > COUPLED
     }
 
@@ -312,14 +312,14 @@ impl Solver<'_> {
         let width = layout.unknowns.len();
         let is_lost = |order: usize, form: usize| !told[order * width + form];
         let lost: Vec<(usize, usize)> =
-            (2..=max_order).flat_map(|order| layout.forms().map(move |form| (order, form))).collect();
+            (2..=max_order).flat_map(|order| layout.circles().map(move |(form, _)| (order, form))).collect();
         let lost: Vec<(usize, usize)> = lost.into_iter().filter(|(order, form)| is_lost(*order, *form)).collect();
         if lost.is_empty() {
             return Vec::new();
         }
         let shift = |unknown: &usize| {
             let quantity = layout.unknowns[*unknown];
-            !quantity.is_form() && !matches!(quantity, Quantity::TiltX | Quantity::TiltY)
+            !quantity.is_form() && !matches!(quantity, Quantity::TiltX | Quantity::TiltY | Quantity::Z)
         };
         let shifts: Vec<usize> = (0..width).filter(shift).collect();
         let mut likely = vec![Complex64::ZERO; values.len()];
@@ -352,7 +352,8 @@ impl Solver<'_> {
         let tilt = of(FirstOrder::CounterRotatingTilt);
         let quarter = Complex64::I * self.layout.direction;
         let value = |quantity: &Quantity| match quantity {
-            Quantity::Form(_) => Complex64::ZERO,
+            Quantity::Form(_) | Quantity::FaceForm(_) | Quantity::FaceMotion(_) => Complex64::ZERO,
+            Quantity::Z => of(FirstOrder::Axial),
             Quantity::X => shift,
             Quantity::Y => -quarter * shift,
             Quantity::TiltX => quarter * tilt,
@@ -435,10 +436,41 @@ impl Solver<'_> {
             form_covariance,
             freedom: freedom(station, &self.selection.setups),
             equivalents: Vec::new(),
+            form_bound: self.form_bound(operators, &to_reference),
             motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
             warnings: Vec::new(),
         }
+    }
+
+    /// By how much forms declared within bounds may move each unknown, peak to valley: each reading of such a section by its bound, at
+    /// the order where that moves the unknown most. Empty where none is declared.
+    fn form_bound(&self, operators: &Operators, to_reference: &ToReference) -> Vec<f64> {
+        let layout = self.layout;
+        let bounds: Vec<f64> =
+            layout.readings.iter().map(|reading| layout.form_bound_um(reading.section).unwrap_or(0.0)).collect();
+        if bounds.iter().all(|bound| *bound <= 0.0) {
+            return Vec::new();
+        }
+        let (width, count) = (layout.unknowns.len(), layout.readings.len());
+        let mut largest = vec![0.0_f64; width];
+        // At order 1 form is clamping, but for what is seen on the axis, which has the same share of z at every order.
+        for order in 2..=operators.orders.len() {
+            let mut rows = self.order_operator(operators, order, count);
+            to_reference.apply(&mut rows);
+            let told = rows.chunks_exact(count).zip(&mut largest).zip(operators.observable(order));
+            for ((row, largest), _) in told.filter(|(_, told)| **told) {
+                let moved: f64 = row.iter().zip(&bounds).map(|(entry, bound)| entry.norm() * bound).sum();
+                *largest = largest.max(moved);
+            }
+        }
+        largest
+    }
+
+    /// The largest reading of order 1 across the axis: the largest eccentricity, but for motion.
+    fn eccentricity_um(&self, readings: &Readings) -> f64 {
+        let radial = readings.order(1).iter().zip(&self.layout.readings).filter(|(_, at)| !at.view.is_axial());
+        radial.map(|(reading, _)| reading.norm()).fold(0.0, f64::max)
     }
 
     /// The operator of an order, with the unknowns of orders from 2 as rows.
@@ -472,11 +504,6 @@ fn freedom(station: &Station, setups: &[usize]) -> usize {
         turns => 4 * NEIGHBOURS.min((turns - 1) / 2),
     };
     used.map(of).sum()
-}
-
-/// The largest reading of order 1: the largest eccentricity, but for motion.
-fn eccentricity_um(readings: &Readings) -> f64 {
-    readings.order(1).iter().map(|reading| reading.norm()).fold(0.0, f64::max)
 }
 
 /// What the solution leaves of linear readings, `[order][reading]`, and what noise lets expect of that.

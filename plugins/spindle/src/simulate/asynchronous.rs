@@ -6,7 +6,7 @@ use runout_core::{Complex64, pipeline::error::Fault};
 
 use super::{
     check,
-    config::{AsynchronousConfig, LineConfig},
+    config::{AsynchronousConfig, AxialLineConfig, LineConfig},
     motion::Displacement,
     random::{Place, Purpose, phase, stream},
     series::LANES,
@@ -16,8 +16,8 @@ use super::{
 #[derive(Debug, Clone)]
 pub(super) struct Asynchronous {
     tones: Vec<Tone>,
-    /// Root mean square of x, y in µm, tilt about x and y in µrad, relative to the tones' amplitudes.
-    scales: [f64; 4],
+    /// Root mean square of x, y in µm, tilt about x and y in µrad, z in µm, relative to the tones' amplitudes.
+    scales: [f64; 5],
     lines: Vec<Line>,
 }
 
@@ -31,8 +31,8 @@ struct Tone {
 #[derive(Debug, Clone, Copy)]
 struct Line {
     order: f64,
-    /// x and y, in µm.
-    amplitude_um: [f64; 2],
+    /// x, y and z, in µm.
+    amplitude_um: [f64; 3],
 }
 
 /// Terms that a fractal may have: γ so near 1 that it needs more is a mistake.
@@ -42,11 +42,15 @@ const AFRESH: u64 = 256;
 
 impl Asynchronous {
     pub fn new(config: &AsynchronousConfig, sample_rate_hz: f64, samples: u64) -> Result<Self, Fault> {
-        let mut asynchronous = Self { tones: Vec::new(), scales: [0.0; 4], lines: Vec::new() };
+        let mut asynchronous = Self { tones: Vec::new(), scales: [0.0; 5], lines: Vec::new() };
         for (index, line) in config.lines.iter().enumerate() {
             asynchronous.add_line(line).map_err(|fault| fault.under_item("lines", index))?;
         }
+        for (index, line) in config.z_lines.iter().enumerate() {
+            asynchronous.add_axial_line(line).map_err(|fault| fault.under_item("z_lines", index))?;
+        }
         check::not_negative("tilt_rms_urad", config.tilt_rms_urad)?;
+        check::not_negative("z_rms_um", config.z_rms_um)?;
         if let Some(rms) = config.rms_um {
             check::not_negative("rms_um", rms)?;
         }
@@ -82,7 +86,10 @@ impl Asynchronous {
             })
             .collect();
         let drawn_rms = (0.5 * asynchronous.tones.iter().map(|tone| tone.amplitude.powi(2)).sum::<f64>()).sqrt();
-        let wanted = config.rms_um.unwrap_or(0.0) > 0.0 || config.scale_mm.is_some() || config.tilt_rms_urad > 0.0;
+        let wanted = config.rms_um.unwrap_or(0.0) > 0.0
+            || config.scale_mm.is_some()
+            || config.tilt_rms_urad > 0.0
+            || config.z_rms_um > 0.0;
         if !wanted {
             asynchronous.tones.clear();
         } else if drawn_rms <= 0.0 {
@@ -93,7 +100,7 @@ impl Asynchronous {
                 None => config.rms_um.unwrap_or(0.0) / drawn_rms,
             };
             let tilt = config.tilt_rms_urad / drawn_rms;
-            asynchronous.scales = [across, across, tilt, tilt];
+            asynchronous.scales = [across, across, tilt, tilt, config.z_rms_um / drawn_rms];
         }
         Ok(asynchronous)
     }
@@ -107,11 +114,20 @@ impl Asynchronous {
                 .help("put it into [motion]"));
         }
         let (sin, cos) = line.direction_deg.to_radians().sin_cos();
-        self.lines.push(Line { order: line.order, amplitude_um: [line.amplitude_um * cos, line.amplitude_um * sin] });
+        let amplitude_um = [line.amplitude_um * cos, line.amplitude_um * sin, 0.0];
+        self.lines.push(Line { order: line.order, amplitude_um });
         Ok(())
     }
 
-    /// No displacement (µm) and no tilt (µrad) is larger.
+    fn add_axial_line(&mut self, line: &AxialLineConfig) -> Result<(), Fault> {
+        self.add_line(&LineConfig { order: line.order, amplitude_um: line.amplitude_um, direction_deg: 0.0 })?;
+        if let Some(added) = self.lines.last_mut() {
+            added.amplitude_um = [0.0, 0.0, line.amplitude_um];
+        }
+        Ok(())
+    }
+
+    /// No displacement across the axis (µm) and no tilt (µrad) is larger.
     pub fn bounds(&self) -> (f64, f64) {
         let tones: f64 = self.tones.iter().map(|tone| tone.amplitude).sum();
         let lines: f64 = self.lines.iter().map(|line| line.amplitude_um[0].hypot(line.amplitude_um[1])).sum();
@@ -122,7 +138,7 @@ impl Asynchronous {
     pub fn capture(&self, seed: u64, setup: usize, station: usize) -> Wandering {
         let mut wandering = Wandering {
             cycles_per_sample: self.tones.iter().map(|tone| tone.cycles_per_sample).collect(),
-            amplitudes: [const { Vec::new() }; 4],
+            amplitudes: [const { Vec::new() }; 5],
             rotors: vec![Complex64::ONE; self.tones.len()],
             steps: self.tones.iter().map(|tone| Complex64::cis(TAU * tone.cycles_per_sample)).collect(),
             lines: Vec::new(),
@@ -144,8 +160,8 @@ impl Asynchronous {
 /// Asynchronous motion of one capture, sample after sample from the first.
 pub(super) struct Wandering {
     cycles_per_sample: Vec<f64>,
-    /// Of x, y, tilt about x and y; empty where there is none.
-    amplitudes: [Vec<Complex64>; 4],
+    /// Of x, y, tilt about x and y, z; empty where there is none.
+    amplitudes: [Vec<Complex64>; 5],
     rotors: Vec<Complex64>,
     steps: Vec<Complex64>,
     lines: Vec<(Line, f64)>,
@@ -172,6 +188,7 @@ impl Wandering {
                 let swing = (TAU * cycles + phase).cos();
                 displacement[0][lane] += line.amplitude_um[0] * swing;
                 displacement[1][lane] += line.amplitude_um[1] * swing;
+                displacement[4][lane] += line.amplitude_um[2] * swing;
             }
         }
     }
@@ -193,12 +210,12 @@ impl Wandering {
 mod tests {
     use super::*;
 
-    fn series(config: &AsynchronousConfig, samples: u64) -> Vec<[f64; 4]> {
+    fn series(config: &AsynchronousConfig, samples: u64) -> Vec<[f64; 5]> {
         let asynchronous = Asynchronous::new(config, 1000.0, samples).unwrap();
         let mut capture = asynchronous.capture(3, 0, 0);
         (0..samples)
             .map(|sample| {
-                let mut displacement = [[0.0; LANES]; 4];
+                let mut displacement = [[0.0; LANES]; 5];
                 let turns = [(sample as f64 * 0.01, 0.0); LANES];
                 capture.add(sample, 1, &turns, &mut displacement);
                 displacement.map(|axis| axis[0])

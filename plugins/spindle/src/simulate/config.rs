@@ -26,6 +26,9 @@ pub struct SpindleConfig {
     /// The part.
     #[serde(default)]
     pub form: FormConfig,
+    /// Faces that axial sensors look at; those that are not named are flat.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub face: Vec<FaceConfig>,
     /// The spindle's synchronous error motion.
     #[serde(default)]
     pub motion: MotionConfig,
@@ -53,6 +56,7 @@ impl SpindleConfig {
             rig,
             recording: RecordingConfig::default(),
             form: FormConfig::default(),
+            face: Vec::new(),
             motion: MotionConfig::default(),
             eccentricity: EccentricityConfig::default(),
             asynchronous: AsynchronousConfig::default(),
@@ -233,6 +237,42 @@ pub struct FormHarmonic {
     pub twist_deg_per_mm: f64,
 }
 
+/// `[[face]]`: deviation of a face from a plane square to the part's axis, along the circle under its axial sensors, positive
+/// towards +z. On the axis it is what the spot there adds over a turn, which each clamping turns by an angle of its own.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FaceConfig {
+    /// Id of its section in the rig.
+    pub section: String,
+    /// Root mean square of the random form, in µm.
+    #[serde(default)]
+    pub rms_um: f64,
+    /// The random form has orders 2 to this one.
+    #[serde(default = "usual_face_orders")]
+    pub max_order: usize,
+    /// Amplitudes fall with order^-slope.
+    #[serde(default = "usual_slope")]
+    pub slope: f64,
+    /// Harmonics in addition, amplitude · cos(order·α + phase), α the part's angle; order 1 on the axis only.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub harmonics: Vec<MotionHarmonic>,
+}
+
+impl Default for FaceConfig {
+    fn default() -> Self {
+        let (max_order, slope) = (usual_face_orders(), usual_slope());
+        Self { section: String::new(), rms_um: 0.0, max_order, slope, harmonics: Vec::new() }
+    }
+}
+
+fn usual_face_orders() -> usize {
+    20
+}
+
+fn usual_slope() -> f64 {
+    1.0
+}
+
 /// `[motion]`: synchronous error motion, the same in every setup and at every station.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -241,6 +281,9 @@ pub struct MotionConfig {
     pub x_rms_um: f64,
     /// Along y, in µm.
     pub y_rms_um: f64,
+    /// Along the axis, in µm.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub z_rms_um: f64,
     /// Root mean square of the random tilt about x and about y, in µrad each.
     pub tilt_rms_urad: f64,
     /// The random motion has orders 2 to this one.
@@ -255,6 +298,9 @@ pub struct MotionConfig {
     /// Harmonics of y in addition.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub y: Vec<MotionHarmonic>,
+    /// Harmonics of z in addition.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub z: Vec<MotionHarmonic>,
     /// Harmonics of the tilt about x in addition.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tilt_x: Vec<TiltHarmonic>,
@@ -268,12 +314,14 @@ impl Default for MotionConfig {
         Self {
             x_rms_um: 0.0,
             y_rms_um: 0.0,
+            z_rms_um: 0.0,
             tilt_rms_urad: 0.0,
             max_order: 20,
             slope: 1.0,
             orders: Orders::default(),
             x: Vec::new(),
             y: Vec::new(),
+            z: Vec::new(),
             tilt_x: Vec::new(),
             tilt_y: Vec::new(),
         }
@@ -297,7 +345,8 @@ pub enum Orders {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotionHarmonic {
-    /// Per turn, 1 or more. Of order 1 only what turns against the spindle counts as error motion; the rest is clamping.
+    /// Per turn, 1 or more. Of order 1 only what turns against the spindle counts as error motion across the axis; the rest is
+    /// clamping. Along the axis all of it counts.
     pub order: usize,
     /// In µm.
     pub amplitude_um: f64,
@@ -352,9 +401,15 @@ pub struct AsynchronousConfig {
     pub max_frequency_hz: Option<f64>,
     /// Root mean square of the same kind of tilt about x and about y, in µrad each.
     pub tilt_rms_urad: f64,
+    /// Root mean square of the same kind of motion along the axis, in µm.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub z_rms_um: f64,
     /// Single lines in addition, at orders that are not whole.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<LineConfig>,
+    /// The same along the axis.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub z_lines: Vec<AxialLineConfig>,
 }
 
 impl Default for AsynchronousConfig {
@@ -367,7 +422,9 @@ impl Default for AsynchronousConfig {
             longest_period_s: None,
             max_frequency_hz: None,
             tilt_rms_urad: 0.0,
+            z_rms_um: 0.0,
             lines: Vec::new(),
+            z_lines: Vec::new(),
         }
     }
 }
@@ -383,6 +440,21 @@ pub struct LineConfig {
     /// Direction of the motion about +z from x, in degrees.
     #[serde(default)]
     pub direction_deg: f64,
+}
+
+/// Motion to and fro along the axis at an order that is not whole, its phase random in each capture.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AxialLineConfig {
+    /// Periods per turn, not a whole number.
+    pub order: f64,
+    /// In µm.
+    pub amplitude_um: f64,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// `[noise]`

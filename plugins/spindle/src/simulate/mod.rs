@@ -15,6 +15,7 @@ mod chain;
 mod check;
 mod config;
 mod effects;
+mod face;
 mod form;
 mod geometry;
 mod measured;
@@ -40,7 +41,7 @@ use runout_core::{
 };
 
 pub use config::{
-    AsynchronousConfig, EccentricityConfig, FormConfig, FormHarmonic, Geometry, LineConfig, MotionConfig,
+    AsynchronousConfig, AxialLineConfig, EccentricityConfig, FaceConfig, FormConfig, FormHarmonic, Geometry, LineConfig, MotionConfig,
     MotionHarmonic, NoiseConfig, Orders, Phase, RecordingConfig, SampleFormat, SpindleConfig, StationsConfig,
     TiltHarmonic,
 };

@@ -9,14 +9,14 @@ use super::{
     series::{self, Phasor, Series},
 };
 
-/// Harmonics over the spindle's angle, Re Σ cₙ e^{−inΦ}: x and y in µm, tilt about x and y in µrad.
+/// Harmonics over the spindle's angle, Re Σ cₙ e^{−inΦ}: x and y in µm, tilt about x and y in µrad, z in µm.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Motion {
-    pub axes: [Vec<Complex64>; 4],
+    pub axes: [Vec<Complex64>; 5],
 }
 
-/// Displacement and tilt of the axis at some instants: x, y in µm, tilt about x and y in µrad.
-pub(super) type Displacement<const L: usize> = [[f64; L]; 4];
+/// Displacement and tilt of the axis at some instants: x, y in µm, tilt about x and y in µrad, z in µm.
+pub(super) type Displacement<const L: usize> = [[f64; L]; 5];
 
 impl Motion {
     /// `orders` is the first order that cannot be sampled.
@@ -27,6 +27,7 @@ impl Motion {
             ("y_rms_um", config.y_rms_um),
             ("tilt_rms_urad", config.tilt_rms_urad),
             ("tilt_rms_urad", config.tilt_rms_urad),
+            ("z_rms_um", config.z_rms_um),
         ];
         let mut motion = Self::default();
         for (item, (key, rms)) in rms.into_iter().enumerate() {
@@ -53,6 +54,7 @@ impl Motion {
             ("y", "amplitude_um", micrometres(&config.y)),
             ("tilt_x", "amplitude_urad", microradians(&config.tilt_x)),
             ("tilt_y", "amplitude_urad", microradians(&config.tilt_y)),
+            ("z", "amplitude_um", micrometres(&config.z)),
         ];
         for (axis, (list, key, harmonics)) in motion.axes.iter_mut().zip(lists) {
             for (index, (order, amplitude, phase_deg)) in harmonics.into_iter().enumerate() {
@@ -70,15 +72,15 @@ impl Motion {
     }
 
     /// What a separation can find of it: of order 1 only the part that turns against the spindle, since the part that
-    /// turns with it is how the workpiece is clamped.
+    /// turns with it is how the workpiece is clamped. Along the axis it finds all.
     pub fn error_motion(&self, direction: f64) -> Self {
-        let [mut x, mut y, mut tilt_x, mut tilt_y] = self.axes.clone();
+        let [mut x, mut y, mut tilt_x, mut tilt_y, z] = self.axes.clone();
         keep_counter_rotating(&mut x, &mut y, direction);
         // A tilt (εx, εy) displaces the axis at z by z·(εy, −εx).
         tilt_x = negated(tilt_x);
         keep_counter_rotating(&mut tilt_y, &mut tilt_x, direction);
         tilt_x = negated(tilt_x);
-        Self { axes: [x, y, tilt_x, tilt_y] }
+        Self { axes: [x, y, tilt_x, tilt_y, z] }
     }
 }
 

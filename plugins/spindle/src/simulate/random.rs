@@ -19,6 +19,8 @@ pub(super) enum Purpose {
     Noise,
     Wobble,
     PickUp,
+    Face,
+    Pole,
 }
 
 /// Where a stream is used; what does not matter stays 0.

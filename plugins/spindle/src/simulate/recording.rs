@@ -46,13 +46,21 @@ impl Recording for SpindleRecording<'_> {
         let world = self.world;
         let key = world.stations.get(station).ok_or_else(|| missing("station", station))?;
         let circle = |section: usize| {
+            if world.rig.is_face(section) {
+                return series::turn(&world.faces[section], world.samples_per_rev, false);
+            }
             let harmonics = world.form.at(key.z_mm + world.rig.section_z_mm(section));
             series::turn(&harmonics, world.samples_per_rev, false)
         };
-        let motion = world.motion.error_motion(world.rig.rotation.direction());
+        let [x, y, tilt_x, tilt_y, mut z] = world.motion.error_motion(world.rig.rotation.direction()).axes;
+        for (order, value) in world.axial_um.iter().enumerate() {
+            series::add(&mut z, order, *value);
+        }
+        let turn = |axis: &[Complex64]| series::turn(axis, world.samples_per_rev, true);
         Ok(Some(StationTruth {
             form_um: (0..world.rig.sections.len()).map(circle).collect(),
-            motion: Some(motion.axes.map(|axis| series::turn(&axis, world.samples_per_rev, true))),
+            motion: Some([x, y, tilt_x, tilt_y].map(|axis| turn(&axis))),
+            z_um: world.rig.has_axial().then(|| turn(&z)),
         }))
     }
 }
@@ -78,6 +86,8 @@ struct SimulatedStream<'a> {
 struct Looking<'a> {
     stance: Stance,
     z_mm: f64,
+    /// What a sensor that looks along the axis sees.
+    face: Option<Face<'a>>,
     /// The part's axis in the part's own coordinates, in µm.
     clamped: Complex64,
     /// h at its z.
@@ -86,6 +96,17 @@ struct Looking<'a> {
     moved: Vec<Phasor<LANES>>,
     strangers: Vec<Acting>,
     channel: Channel<'a>,
+}
+
+/// A face under a sensor that looks along the axis.
+struct Face<'a> {
+    radius_um: f64,
+    /// Deviation under the sensor's circle, in µm.
+    harmonics: &'a [Complex64],
+    /// How far the part's axis leans in the part's own coordinates, in µrad.
+    lean_urad: Complex64,
+    /// By which angle the surface on the axis is turned.
+    pole: Complex64,
 }
 
 /// Where a sensor looks from.
@@ -102,6 +123,7 @@ struct Instants {
     /// e^{iΦ} turned the way the part turns.
     turned: Phasor<LANES>,
     displacement: Displacement<LANES>,
+    /// Displacement of the part along the axis, where there is any.
     axial_um: Option<[f64; LANES]>,
     /// Its angle in turns: whole ones and the rest.
     turns: [(f64, f64); LANES],
@@ -120,6 +142,12 @@ impl<'a> SimulatedStream<'a> {
             Looking {
                 stance: Stance { line: Complex64::cis(angle), toward: Complex64::cis(angle - clamped_in.part_rad) },
                 z_mm,
+                face: sensor.axial_radius_mm.map(|radius_mm| Face {
+                    radius_um: 1e3 * radius_mm,
+                    harmonics: &world.faces[sensor.section],
+                    lean_urad: clamped_in.clamping.get(sensor.section).map_or(Complex64::ZERO, |one| one.tilt_urad),
+                    pole: clamped_in.pole,
+                }),
                 clamped: world.clamped_at(clamped_in, sensor, z_mm),
                 harmonics: world.form.at(z_mm),
                 moved: Vec::new(),
@@ -175,7 +203,11 @@ impl<'a> SimulatedStream<'a> {
         }
         self.wandering.add(start, count, &turns, &mut displacement);
         let axial = &self.world.axial_um;
-        let axial_um = (!axial.is_empty()).then(|| axial.as_slice().sum(&turn.conj()));
+        let mut axial_um = (!axial.is_empty()).then(|| axial.as_slice().sum(&turn.conj()));
+        if displacement[4].iter().any(|z| *z != 0.0) {
+            let sum = axial_um.get_or_insert([0.0; LANES]);
+            sum.iter_mut().zip(&displacement[4]).for_each(|(sum, z)| *sum += z);
+        }
         let turned = if self.world.rig.rotation.direction() > 0.0 { turn } else { turn.conj() };
         Instants { turned, displacement, axial_um, turns }
     }
@@ -211,9 +243,12 @@ impl Looking<'_> {
     fn see(&mut self, world: &World, instants: &Instants, stance: Stance) -> [f64; LANES] {
         // α₀ = θ′ − direction·Φ − β.
         let toward = instants.turned.conj().times(stance.toward);
+        if let Some(face) = &self.face {
+            return self.see_face(world, instants, stance, face);
+        }
         let lever = UM_PER_MM_URAD * self.z_mm;
         let (mut along, mut across) = ([0.0; LANES], [0.0; LANES]);
-        let [x, y, tilt_x, tilt_y] = &instants.displacement;
+        let [x, y, tilt_x, tilt_y, _] = &instants.displacement;
         for lane in 0..LANES {
             let axis = Complex64::new(x[lane] + lever * tilt_y[lane], y[lane] - lever * tilt_x[lane]);
             // The part's own x axis stands at angle −α₀ in the sensor's frame.
@@ -235,6 +270,37 @@ impl Looking<'_> {
                 *seen -= world.form.groove_um(Complex64::new(sight.toward.re[lane], sight.toward.im[lane]));
             }
         }
+        seen
+    }
+}
+
+impl Looking<'_> {
+    /// How far the face stands out towards +z under the sensor, in µm: the place of the face there in the part's own coordinates, the
+    /// height of that place, and how the part is displaced and tilted.
+    fn see_face(&self, world: &World, instants: &Instants, stance: Stance, face: &Face) -> [f64; LANES] {
+        let [x, y, tilt_x, tilt_y, _] = &instants.displacement;
+        let lever = UM_PER_MM_URAD * self.z_mm;
+        let mut seen = instants.axial_um.unwrap_or([0.0; LANES]);
+        let mut under = Phasor::<LANES>::ZERO;
+        for lane in 0..LANES {
+            let turned = Complex64::new(instants.turned.re[lane], instants.turned.im[lane]);
+            // Where the sensor stands, from the part's axis.
+            let axis = Complex64::new(x[lane] + lever * tilt_y[lane], y[lane] - lever * tilt_x[lane]);
+            let from_axis = match world.geometry {
+                Geometry::Exact => stance.line * face.radius_um - axis,
+                Geometry::Linear => stance.line * face.radius_um,
+            };
+            // The plane z = ε_x·y − ε_y·x of a part that is tilted, and that of a part whose own axis leans.
+            seen[lane] += 1e-6 * (tilt_x[lane] * from_axis.im - tilt_y[lane] * from_axis.re);
+            let own_zero = stance.line.conj() * stance.toward;
+            let place = from_axis * own_zero * turned.conj()
+                - if world.geometry == Geometry::Exact { self.clamped } else { Complex64::ZERO };
+            seen[lane] -= 1e-6 * (face.lean_urad.conj() * place).re;
+            let direction = if face.radius_um > 0.0 { place / place.norm() } else { turned.conj() * face.pole };
+            (under.re[lane], under.im[lane]) = (direction.re, direction.im);
+        }
+        let height = face.harmonics.sum(&under);
+        seen.iter_mut().zip(height).for_each(|(seen, height)| *seen += height);
         seen
     }
 }

@@ -12,6 +12,7 @@ use super::{
     chain::{Chain, Converter},
     check,
     config::{Geometry, Phase, SpindleConfig, StationsConfig},
+    face,
     form::Form,
     geometry::Reach,
     motion::Motion,
@@ -36,6 +37,8 @@ pub(super) struct World {
     pub phase: Phase,
     pub course: Course,
     pub form: Form,
+    /// Of each section, the harmonics of the face there, in µm, from order 0; empty of a circle around the part.
+    pub faces: Vec<Vec<Complex64>>,
     pub motion: Motion,
     /// Axial motion, Re Σ a e^{−inΦ}, in µm.
     pub axial_um: Vec<Complex64>,
@@ -51,6 +54,8 @@ pub(super) struct World {
 pub(super) struct TrueSensor {
     pub angle_rad: f64,
     pub z_mm: f64,
+    /// Distance from the axis of a sensor that looks along it.
+    pub axial_radius_mm: Option<f64>,
     pub section: usize,
     pub chain: Chain,
     pub strangers: Vec<Stranger>,
@@ -64,6 +69,8 @@ pub(super) struct TrueSetup {
     pub motion_ratio: f64,
     /// One a section.
     pub clamping: Vec<Clamping>,
+    /// By which angle the surface under a sensor on the axis is turned, as e^{iψ}.
+    pub pole: Complex64,
 }
 
 /// How the part's axis runs in the part's own coordinates: offset where z is [`World::clamping_z_mm`], and its growth.
@@ -103,9 +110,13 @@ impl World {
 
         let sections_mm: Vec<f64> = stations
             .iter()
-            .flat_map(|station| (0..rig.sections.len()).map(|section| station.z_mm + rig.section_z_mm(section)))
+            .flat_map(|station| {
+                let around = (0..rig.sections.len()).filter(|section| !rig.is_face(*section));
+                around.map(|section| station.z_mm + rig.section_z_mm(section))
+            })
             .collect();
         let form = Form::new(&config.form, config.seed, &sections_mm, orders).map_err(|fault| fault.under("form"))?;
+        let faces = face::harmonics(&config.face, &rig, config.seed, orders)?;
         let motion = Motion::new(&config.motion, config.seed, orders).map_err(|fault| fault.under("motion"))?;
         let asynchronous = Asynchronous::new(&config.asynchronous, sample_rate_hz, course.samples())
             .map_err(|fault| fault.under("asynchronous"))?;
@@ -117,6 +128,7 @@ impl World {
         let sensor = |sensor: &Sensor| TrueSensor {
             angle_rad: sensor.angle_rad,
             z_mm: sensor.z_mm,
+            axial_radius_mm: sensor.axial_radius_mm,
             section: sensor.section,
             chain: Chain::new(config.noise.rms_um, sensor.sign, converter),
             strangers: Vec::new(),
@@ -132,6 +144,7 @@ impl World {
                 sensors_rad: setup.sensors_rad,
                 motion_ratio: 1.0,
                 clamping: vec![clamping; rig.sections.len()],
+                pole: phase(&mut stream(config.seed, Purpose::Pole, Place { setup: index, ..Place::default() })),
             }
         });
         let mut world = Self {
@@ -145,6 +158,7 @@ impl World {
             phase: recording.phase,
             course,
             form,
+            faces,
             motion,
             axial_um: Vec::new(),
             asynchronous,
@@ -187,7 +201,7 @@ impl World {
     fn reach(&self) -> Reach {
         let ends = [self.stations.first(), self.stations.last()];
         let mut displacement_um = 0.0_f64;
-        let [x, y, tilt_x, tilt_y] = self.motion.axes.each_ref().map(|axis| series::bound(axis));
+        let [x, y, tilt_x, tilt_y, _] = self.motion.axes.each_ref().map(|axis| series::bound(axis));
         let (wandering_um, wandering_urad) = self.asynchronous.bounds();
         for station in ends.into_iter().flatten() {
             for sensor in &self.sensors {

@@ -45,15 +45,15 @@ pub(super) fn quantities(
         Quantity::TiltX => (4, 0),
         Quantity::TiltY => (5, 0),
         Quantity::TiltAlong(_) => (6, 0),
+        Quantity::FaceForm(section) => (7, *section),
+        Quantity::Z => (8, 0),
+        Quantity::FaceMotion(_) => (9, 0),
     });
     let compare = |quantity: Quantity| QuantityComparison {
         quantity: quantity.id().to_owned(),
-        section: match quantity {
-            Quantity::Form(section) => {
-                results.iter().find_map(|result| Some(result.separation.sections.get(section)?.id.clone()))
-            }
-            _ => None,
-        },
+        section: quantity.section().and_then(|section| {
+            results.iter().find_map(|result| Some(result.separation.sections.get(section)?.id.clone()))
+        }),
         unit: quantity.unit().to_owned(),
         values: (names.iter().zip(results).zip(&estimates))
             .filter_map(|((name, result), one)| value(name, quantity, result, one))
@@ -92,7 +92,9 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
     Some(MethodValue {
         method: name.to_owned(),
         z_mm: match quantity {
-            Quantity::Form(section) => result.separation.sections.get(section).map(|at| at.z_mm),
+            Quantity::Form(section) | Quantity::FaceForm(section) => {
+                result.separation.sections.get(section).map(|at| at.z_mm)
+            }
             motion => motion.is_shift().then_some(one.motion_z_mm),
         },
         rms: rms(counted().map(|(value, _)| value.norm_sqr()).sum()),

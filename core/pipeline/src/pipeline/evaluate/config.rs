@@ -14,7 +14,7 @@ use runout_error::fault::{Fault, Place, known_names};
 use runout_numerics::filter::Kind as FilterKind;
 use runout_standards::{areal, roundness::Reference, texture::Kind, twist};
 use runout_turning::{
-    azimuth::Azimuth,
+    azimuth::{Azimuth, FacePlace},
     error_motion::{self, Centre},
     rig::Rig,
 };
@@ -56,12 +56,39 @@ pub struct EvaluateConfig {
     /// Fixed sensitive directions of error motion besides x and y, in degrees from x towards y, above -360 and below 360:
     /// where the tool stands. A direction and its opposite are one, 0 to below 180°.
     pub directions_deg: Option<Vec<f64>>,
+    /// Places of a face at which face error motion is evaluated, besides those of the rig's axial sensors off the axis: where
+    /// a tool stands.
+    pub faces: Option<Vec<FacePlaceConfig>>,
     /// What texture values are of, besides λs and λc.
     #[serde(default)]
     pub texture: TextureConfig,
     /// How areal and twist values are made of the surface, besides λs and λc.
     #[serde(default)]
     pub areal: ArealConfig,
+}
+
+/// A place of a face.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FacePlaceConfig {
+    /// Distance from the axis, in mm.
+    pub radius_mm: f64,
+    /// Angle from x towards y, in degrees.
+    pub angle_deg: f64,
+}
+
+impl FacePlaceConfig {
+    fn check(&self) -> Result<FacePlace, Fault> {
+        if !(self.radius_mm.is_finite() && self.radius_mm > 0.0) {
+            let message = format!("a place of a face is above 0 mm from the axis, found {}", self.radius_mm);
+            return Err(Fault::at("radius_mm", message).help("on the axis, face error motion is axial error motion"));
+        }
+        if !(self.angle_deg.abs() < 360.0) {
+            let message = format!("the angle must lie between -360 and 360 degrees, found {}", self.angle_deg);
+            return Err(Fault::at("angle_deg", message));
+        }
+        Ok(FacePlace::of(self.radius_mm, self.angle_deg.to_radians()))
+    }
 }
 
 /// `[evaluate.texture]`: which profiles have texture values, and what the standard leaves to the one who evaluates.
@@ -368,6 +395,7 @@ pub struct Evaluate {
     pub(super) texture: Texture,
     pub(super) areal: Areal,
     pub(crate) directions: Vec<Azimuth>,
+    pub(crate) faces: Vec<FacePlace>,
     limits: Vec<Limit>,
 }
 
@@ -390,6 +418,7 @@ impl Default for Evaluate {
             texture: Texture::default(),
             areal: Areal::default(),
             directions: Vec::new(),
+            faces: Vec::new(),
             limits: Vec::new(),
         }
     }
@@ -487,6 +516,10 @@ impl EvaluateConfig {
             }
         }
         let directions = self.directions_deg.unwrap_or_default();
+        let faces = self.faces.unwrap_or_default().into_iter().enumerate().map(|(index, place)| {
+            place.check().map_err(|fault| fault.under_item("faces", index))
+        });
+        let faces = faces.collect::<Result<Vec<FacePlace>, Fault>>()?;
         let usual = Evaluate::default();
         Ok(Evaluate {
             all: self.values == Some(Groups::All),
@@ -513,6 +546,7 @@ impl EvaluateConfig {
             directions: once_each(
                 directions.into_iter().map(|angle_deg| Azimuth::of(angle_deg.to_radians())).collect(),
             ),
+            faces: once_each(faces),
             limits: Vec::new(),
         })
     }
@@ -551,6 +585,17 @@ impl Evaluate {
     #[must_use]
     pub fn nothing() -> Self {
         Self { groups: Vec::new(), ..Self::default() }
+    }
+
+    /// Adds the places of a rig's axial sensors off the axis, as they stand in its first setup.
+    pub(crate) fn add_faces(&mut self, rig: &Rig) {
+        let turned_rad = rig.setups.first().map_or(0.0, |setup| setup.sensors_rad);
+        let off_axis = rig.sensors.iter().filter_map(|sensor| {
+            let radius_mm = sensor.axial_radius_mm.filter(|radius_mm| *radius_mm > 0.0)?;
+            Some(FacePlace::of(radius_mm, sensor.angle_rad + turned_rad))
+        });
+        self.faces.extend(off_axis);
+        self.faces = once_each(std::mem::take(&mut self.faces));
     }
 
     pub(crate) fn add_limit(&mut self, limit: Limit) {
@@ -638,7 +683,7 @@ impl Evaluate {
         let mut symbols: Vec<(String, &'static str)> =
             symbols.into_iter().map(|(symbol, unit)| (symbol.to_owned(), unit)).collect();
         if self.has(Group::ErrorMotion) {
-            symbols.extend(error_motion::symbols(&self.directions));
+            symbols.extend(error_motion::symbols(&self.directions, &self.faces));
         }
         symbols
     }

@@ -45,6 +45,7 @@ pub(super) fn station(
         form_covariance: None,
         freedom: 0,
         equivalents: Vec::new(),
+        form_bound: Vec::new(),
         motion_z_mm: 0.0,
         residual: Residual::default(),
         warnings: Vec::new(),

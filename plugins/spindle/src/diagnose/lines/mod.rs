@@ -361,7 +361,7 @@ fn along(found: &[Vec<Complex64>], layout: &Layout) -> Option<[f64; 2]> {
         let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
         let (mut c, mut s) = (Complex64::ZERO, Complex64::ZERO);
         let readings = layout.readings.iter().filter(|reading| reading.setup == setup);
-        for (reading, amplitude) in readings.zip(amplitudes) {
+        for (reading, amplitude) in readings.zip(amplitudes).filter(|(reading, _)| !reading.view.is_axial()) {
             let (sine, cosine) = reading.angle_rad.sin_cos();
             (cc, cs, ss) = (cc + cosine * cosine, cs + cosine * sine, ss + sine * sine);
             (c, s) = (c + amplitude * cosine, s + amplitude * sine);

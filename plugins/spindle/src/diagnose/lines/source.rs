@@ -64,8 +64,15 @@ pub(super) fn source(found: &[Vec<Complex64>], noise: &[f64], layout: &Layout, s
     };
     let readings = |setup: usize| layout.readings.iter().filter(move |reading| reading.setup == setup);
     let displacement = |setup: usize| {
-        let of = |part: fn(f64) -> f64| readings(setup).map(|reading| part(reading.angle_rad)).collect::<Vec<f64>>();
-        vec![of(f64::cos), of(f64::sin)]
+        let across = |reading: &crate::layout::Reading, entry: f64| if reading.view.is_axial() { 0.0 } else { entry };
+        let of = |part: fn(f64) -> f64| {
+            readings(setup).map(|reading| across(reading, part(reading.angle_rad))).collect::<Vec<f64>>()
+        };
+        let mut columns = vec![of(f64::cos), of(f64::sin)];
+        if readings(setup).any(|reading| reading.view.is_axial()) {
+            columns.push(readings(setup).map(|reading| f64::from(reading.view.is_axial())).collect());
+        }
+        columns
     };
     let tilted = |setup: usize| {
         let tilt = |part: fn(f64) -> f64| {

@@ -1,0 +1,168 @@
+//! Axial and face error motion values.
+//!
+//! Along the axis the fundamental is error motion: 1/rev of the spindle's z is no matter of clamping, as it is across the axis
+//! (ISO 230-7, 3.2 and 5.4; ASME B89.3.4, 7.3). *Synchronous* motion has all orders from 1, *residual synchronous* motion those
+//! from 2, *fundamental* is twice the amplitude of order 1. All are referred to the centre of the polar chart, since any other
+//! centre moves with the fundamental. Order 0 and slow drift are the level of z and no motion.
+//!
+//! *Face* error motion at a place (ρ, θ) is z − ρ·(tilt towards θ). Of order 1, the part of the tilt that turns with the part is
+//! how the face was clamped, and is left out.
+
+use super::{
+    ErrorMotion, RESIDUAL, SAID, STANDARD, between_setups, of_all_turns, over, polar::Synchronous, rms_about_mean,
+    root_mean_square, widest, rms_across, without_noise, unit, described, centre_of_chart,
+};
+use crate::spread::{Direction, Spread};
+use runout_standards::{
+    Value,
+    roundness::{Angles, ront_lsci_um},
+    uncertainty::{self, Uncertainty},
+};
+
+impl ErrorMotion<'_> {
+    /// Synchronous, total, residual synchronous and fundamental values along the axis; without those of order 1 where it is lost.
+    pub(super) fn axial(&self, direction: Direction, z_mm: f64, spreads: &[&Spread]) -> Vec<Value> {
+        let Some(first) = spreads.first() else { return Vec::new() };
+        let from = |lowest: usize| {
+            let plot = Synchronous::from_order(lowest, self.separation, &first.projection, direction, z_mm);
+            plot.filter(|plot| !plot.is_lost())
+        };
+        let mut values = Vec::new();
+        if let Some(whole) = from(1).filter(|plot| plot.lost.first() != Some(&1)) {
+            values.extend(self.synchronous("synchronous", "synchronous error motion value", direction, &whole, z_mm));
+            values.extend(self.total_axial(direction, &whole, spreads, z_mm).into_iter().flatten());
+            values.extend(self.fundamental_axial(direction, &whole, z_mm));
+        }
+        if let Some(residual) = from(2) {
+            let what = "residual synchronous error motion value, without the fundamental";
+            values.extend(self.synchronous(RESIDUAL, what, direction, &residual, z_mm));
+        }
+        values
+    }
+
+    /// Range of what repeats, and its root mean square.
+    fn synchronous(
+        &self,
+        kind: &str,
+        what: &str,
+        direction: Direction,
+        plot: &Synchronous,
+        z_mm: f64,
+    ) -> [Value; 2] {
+        let drawn = plot.over_angle(&Angles::equal(self.angles));
+        let found = [ront_lsci_um(&drawn), rms_about_mean(&drawn)];
+        let seed = uncertainty::seed(&[self.station, &self.id(direction), kind]);
+        let measure = |plot: &[f64]| [ront_lsci_um(plot), rms_about_mean(plot)];
+        let known = without_noise(found, &drawn, &plot.variance, plot.band[0], seed, measure);
+        let [range, rms] = match known {
+            Some([(range_share, range), (rms_share, rms)]) => {
+                [(found[0], range_share, Some(range)), (found[1], rms_share, Some(rms))]
+            }
+            None => found.map(|found| (found, 0.0, None)),
+        };
+        let id = self.id(direction);
+        let value = |symbol: String, what: String, (found, share, known): (f64, f64, Option<Uncertainty>), bound: f64| {
+            let noise = if known.is_some() && share >= SAID {
+                format!(", without {share:.3} {} that noise adds to it", unit(direction))
+            } else {
+                String::new()
+            };
+            let value = (found - share).max(0.0);
+            self.axial_value(symbol, &format!("{what}{noise}"), direction, plot, z_mm, value, bounded(known, bound))
+        };
+        [
+            value(format!("{kind}-{id}"), what.to_owned(), range, plot.bound),
+            // The root mean square of what lies within a range of B is B/2 at most.
+            value(format!("{kind}-{id}-rms"), format!("{what}, root mean square over the angles"), rms, 0.5 * plot.bound),
+        ]
+    }
+
+    /// Range of all turns, and their root mean square.
+    fn total_axial(
+        &self,
+        direction: Direction,
+        plot: &Synchronous,
+        spreads: &[&Spread],
+        z_mm: f64,
+    ) -> Option<[Value; 2]> {
+        let (mut all, mut each, mut each_rms) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new(), Vec::new());
+        let rms = rms_about_mean(&plot.over_angle(&Angles::equal(self.angles)));
+        for spread in spreads {
+            let drawn = plot.over_angle(&Angles::equal(spread.angles));
+            let (inner, outer) = of_all_turns(&drawn, spread.in_direction(direction)?);
+            all = (all.0.min(inner), all.1.max(outer));
+            each.push(outer - inner);
+            each_rms.push(rms.hypot(spread.rms(direction)?));
+        }
+        let std = (0.5 * plot.variance.iter().sum::<f64>()).sqrt();
+        let (id, total) = (self.id(direction), format!("total error motion value, {}", over(spreads)));
+        let (across, across_rms) =
+            (self.carried(direction, spreads, widest), self.carried(direction, spreads, rms_across));
+        let rms_what = format!("{total}, root mean square over angles and turns");
+        let range_known = bounded(between_setups(&each, std.hypot(across)), plot.bound);
+        let rms_known = bounded(between_setups(&each_rms, std.hypot(across_rms)), 0.5 * plot.bound);
+        let total_rms = root_mean_square(&each_rms);
+        Some([
+            self.axial_value(format!("total-{id}"), &total, direction, plot, z_mm, all.1 - all.0, range_known),
+            self.axial_value(format!("total-{id}-rms"), &rms_what, direction, plot, z_mm, total_rms, rms_known),
+        ])
+    }
+
+    /// Twice the amplitude of order 1.
+    fn fundamental_axial(&self, direction: Direction, plot: &Synchronous, z_mm: f64) -> Option<Value> {
+        let value = 2.0 * plot.harmonic(1)?.norm();
+        // The part of an error E|δ|² along the phasor is half of it.
+        let std = (2.0 * plot.variance.get(1).copied().unwrap_or(0.0)).sqrt();
+        let known =
+            (std > 0.0).then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1)));
+        let what = "fundamental error motion value, peak to valley of 1/rev";
+        let symbol = format!("fundamental-{}", self.id(direction));
+        let known = bounded(known, plot.bound);
+        let mut value = self.axial_value(symbol, what, direction, plot, z_mm, value, known);
+        (value.band_upr, value.lost_orders) = ([1, 1], Vec::new());
+        Some(value)
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "what differs between the values of one plot")]
+    fn axial_value(
+        &self,
+        symbol: String,
+        what: &str,
+        direction: Direction,
+        plot: &Synchronous,
+        z_mm: f64,
+        value: f64,
+        uncertainty: Option<Uncertainty>,
+    ) -> Value {
+        let bound = if plot.bound > 0.0 {
+            format!("; the form declared within its bound may add up to {:.3} {}", plot.bound, unit(direction))
+        } else {
+            String::new()
+        };
+        Value {
+            symbol,
+            unit: unit(direction),
+            value,
+            source: format!("{STANDARD}, {what}, {}{bound}", described(direction, z_mm)),
+            band_upr: plot.band,
+            lost_orders: plot.lost.clone(),
+            weakened_above_upr: None,
+            absent_above_upr: None,
+            no_uncertainty: None,
+            filter: "none".into(),
+            reference: centre_of_chart().into(),
+            coverage: 1.0,
+            uncertainty,
+        }
+    }
+}
+
+/// The uncertainty of a value that a declared form may move by up to `bound` either way, as likely to anything within it; the
+/// interval reaches as far.
+pub(super) fn bounded(known: Option<Uncertainty>, bound: f64) -> Option<Uncertainty> {
+    let mut known = known?;
+    known.std = known.std.hypot(bound / 3.0_f64.sqrt());
+    let [low, high] = known.interval_95;
+    known.interval_95 = [(low - bound).max(0.0), high + bound];
+    Some(known)
+}
