@@ -11,6 +11,7 @@ use runout_core::{
     profile::Profile,
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     separation::{Quantity, Separation},
+    spread::Projection,
     stage::{AverageRequest, Averager, Conditioner, Preprocessor, Station, StationSeparator},
 };
 use runout_preprocess::{SynchronousAverageConfig, TrimConfig};
@@ -102,13 +103,29 @@ pub fn station_holding_out(
     [samples_per_rev, turns]: [usize; 2],
     share: Option<f64>,
 ) -> Result<(Station, StationTruth)> {
+    station_with_spread(simulator, rig, station, [samples_per_rev, turns], share, &[])
+}
+
+/// The same, with the spread of the turns where a projection of the setup is there.
+///
+/// # Errors
+/// When a stage fails.
+pub fn station_with_spread(
+    simulator: &SpindleSimulator,
+    rig: &Rig,
+    station: usize,
+    [samples_per_rev, turns]: [usize; 2],
+    share: Option<f64>,
+    projections: &[Option<Projection>],
+) -> Result<(Station, StationTruth)> {
     let recording = simulator.spindle_recording();
     let averager = averager(samples_per_rev)?;
     let profile = |setup: usize| -> Result<Profile> {
         let stream = recording.open(station, setup)?;
         let recorded = stream.capture().marks.len().saturating_sub(1);
         let trim = trim(recorded.saturating_sub(turns))?;
-        let wanted = AverageRequest { hold_out: share, ..AverageRequest::default() };
+        let projection = projections.get(setup).and_then(Option::as_ref);
+        let wanted = AverageRequest { hold_out: share, projection, ..AverageRequest::default() };
         averager.average_requested(trim.attach(Box::new(Inspection::new(stream)))?, wanted)
     };
     let profiles: Result<Vec<Profile>> = (0..rig.setups.len()).map(profile).collect();

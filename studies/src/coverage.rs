@@ -38,7 +38,7 @@ pub struct Row {
 }
 
 impl Row {
-    fn new(name: String) -> Self {
+    pub(crate) fn new(name: String) -> Self {
         Self { name, inside: 0, all: 0, squares: 0.0, stated: 0.0 }
     }
 
@@ -46,7 +46,7 @@ impl Row {
         self.add_interval(error, std, error.abs() <= NORMAL_95 * std);
     }
 
-    fn add_interval(&mut self, error: f64, std: f64, holds: bool) {
+    pub(crate) fn add_interval(&mut self, error: f64, std: f64, holds: bool) {
         self.all += 1;
         self.inside += usize::from(holds);
         self.squares += error * error;
@@ -170,7 +170,7 @@ fn look(separation: &Separation, truth: &StationTruth, rows: &mut Vec<Row>) {
             let truth = if quantity.is_form() { truth } else { truth.conj() };
             *error = separation.estimate[index] - truth;
             // Half the variance is the real part's, half the imaginary part's.
-            let std = (0.5 * separation.variance[index]).sqrt();
+            let std = separation.coefficient_std(index) / 2.0_f64.sqrt();
             let band = if order <= 15 { "orders to 15" } else { "orders from 16" };
             let row = entry(rows, of(band));
             row.add(error.re, std);
@@ -222,7 +222,9 @@ fn true_curve(truth: &StationTruth, quantity: Quantity) -> Option<&[f64]> {
         Quantity::Y => 1,
         Quantity::TiltX => 2,
         Quantity::TiltY => 3,
-        Quantity::Along(_) | Quantity::TiltAlong(_) => return None,
+        Quantity::Z => return truth.z_um.as_deref(),
+        Quantity::FaceForm(section) => return truth.form_um.get(section).map(Vec::as_slice),
+        Quantity::Along(_) | Quantity::TiltAlong(_) | Quantity::FaceMotion(_) => return None,
     };
     Some(&truth.motion.as_ref()?[axis])
 }

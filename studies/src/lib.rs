@@ -1,6 +1,7 @@
 //! Figures that the READMEs print: simulated campaigns, separated in memory.
 
 pub mod averaging;
+pub mod axial;
 pub mod blind;
 pub mod campaign;
 pub mod coverage;

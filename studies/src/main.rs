@@ -6,7 +6,7 @@ use std::{path::Path, process::ExitCode};
 
 use runout_core::{Error, Result, atomic_file};
 use runout_studies::{
-    averaging,
+    averaging, axial,
     blind::{self, domains, draw::Layout, points::Domain},
     coverage, eccentricity,
     minimum_zone_cylinder::{self, Wall},
@@ -16,6 +16,7 @@ use runout_studies::{
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
+       runout-studies axial [CAMPAIGNS [SEED]]   the same of axial error motion, from a seed on
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
        runout-studies value-coverage [CAMPAIGNS [SEED [LAYOUT]]]   the same of every value of the standards, two rigs and two
                                              spectra, from a seed on; LAYOUT is four or six
@@ -60,6 +61,10 @@ fn main() -> ExitCode {
         ["eccentricity"] => eccentricity::rows(20).map(|rows| println!("{}", eccentricity::table(&rows))),
         ["eccentricity", seeds] if seeds.parse::<u64>().is_ok() => {
             eccentricity::rows(seeds.parse().unwrap_or_default()).map(|rows| println!("{}", eccentricity::table(&rows)))
+        }
+        ["axial", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [200, 0]).is_some() => {
+            let [campaigns, seed] = sizes(rest, [200, 0]).unwrap_or_default();
+            axial(campaigns, seed)
         }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
@@ -167,6 +172,14 @@ fn coverage(campaigns: u64) -> Result<()> {
     for setting in coverage::Setting::ALL {
         println!("{campaigns} campaigns, simulated: {}\n", setting.name());
         println!("{}", coverage::table(&coverage::rows(&setting.campaigns(0, campaigns))?));
+    }
+    Ok(())
+}
+
+fn axial(campaigns: u64, seed: u64) -> Result<()> {
+    for layout in axial::Layout::ALL {
+        println!("{campaigns} campaigns from seed {seed}, simulated: {}\n", layout.name());
+        println!("{}", coverage::table(&axial::rows(&layout.campaigns(seed, campaigns))?));
     }
     Ok(())
 }

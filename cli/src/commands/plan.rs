@@ -17,6 +17,8 @@ use runout_core::{
 };
 use runout_spindle::{
     layout::Layout,
+    selection::Selection,
+    separators::face_notes,
     plan::{self, Change, Optimum, Search, Suggestion, TooTight, optimise},
 };
 
@@ -41,14 +43,16 @@ pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), F
     }
     let rig = rig(&sources)?;
     map::refuse(args.map.as_deref(), &sources)?;
-    let optimum = args.optimise.map(|Optimise::Angles| better_angles(&rig, args)).transpose()?;
+    let across = across(&rig);
+    let optimum = args.optimise.map(|Optimise::Angles| better_angles(&across, args)).transpose()?;
     let suggestions = plan::suggest(&rig, &args.orders, args.clearance);
     let foresight = plan::foresee_rig(&rig)?;
     let changes = plan::changes(&rig, &foresight, &suggestions, args.clearance)?;
     let mut report = Report::new(&rig, assess(&rig, &args.orders), foresight);
+    report.notes = notes(&rig, &args.orders);
     report.suggestions = suggested(&rig, &args.orders, &suggestions, &changes.found);
     report.unresolved = Unresolved { blind_to: changes.still_blind, confounded: changes.still_confounded };
-    report.optimised = optimum.as_ref().map(|optimum| Optimised::new(optimum, &rig, args));
+    report.optimised = optimum.as_ref().map(|optimum| Optimised::new(optimum, &across, args));
     if let Some(path) = &args.map {
         report.map = Some(map::write(path, &rig, &args.orders, &suggestions, optimum.as_ref())?);
     }
@@ -87,6 +91,17 @@ fn rig(sources: &Sources) -> Result<Rig, Failure> {
     checked.map_err(|fault| document.diagnose(fault).into())
 }
 
+/// The rig without its axial sensors, whose angles say nothing of a circle's form.
+fn across(rig: &Rig) -> Rig {
+    let radial = (0..rig.sensors.len()).filter(|sensor| rig.sensors[*sensor].axial_radius_mm.is_none());
+    Selection::new(rig, radial.collect(), (0..rig.setups.len()).collect()).rig
+}
+
+/// What to know of axial sensors and declared forms.
+fn notes(rig: &Rig, orders: &RangeInclusive<usize>) -> Vec<String> {
+    face_notes::notes(rig, &Layout::new(rig, false).assess(*orders.end()))
+}
+
 /// What a rig can and cannot separate at these orders.
 fn assess(rig: &Rig, orders: &RangeInclusive<usize>) -> Separability {
     let mut assessment = Layout::new(rig, false).assess(*orders.end());
@@ -100,7 +115,7 @@ const MOST_TURNED_DEG: f64 = 45.0;
 fn better_angles(rig: &Rig, args: &PlanArgs) -> Result<Optimum, Failure> {
     if rig.sensors.len() < 2 {
         return Err(Failure::Name {
-            message: "one sensor has no angle to choose: the first sensor stays where it is".into(),
+            message: "one radial sensor has no angle to choose: the first sensor stays where it is".into(),
             help: "add sensors to the rig, or leave out --optimise to see which one helps most".into(),
         });
     }

@@ -70,8 +70,19 @@ pub(super) fn orders(page: &mut Page, separability: &Separability) {
 
 pub(super) fn lost_orders(page: &mut Page, separability: &Separability) {
     page.heading("Lost orders");
-    page.line(format_args!("  form    {}", ranges(&separability.lost_orders.form)));
-    page.line(format_args!("  motion  {}", ranges(&separability.lost_orders.motion)));
+    if separability.unknowns.iter().any(|unknown| unknown.quantity == "z") {
+        // Along the axis other orders are lost than across it.
+        let names: Vec<String> = separability.unknowns.iter().map(Unknown::name).collect();
+        let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+        for (index, name) in names.iter().enumerate() {
+            let lost = separability.orders.iter().filter(|order| order.observable.get(index) == Some(&false));
+            let lost: Vec<usize> = lost.map(|order| order.order).collect();
+            page.line(format_args!("  {name:width$}  {}", ranges(&lost)));
+        }
+    } else {
+        page.line(format_args!("  form    {}", ranges(&separability.lost_orders.form)));
+        page.line(format_args!("  motion  {}", ranges(&separability.lost_orders.motion)));
+    }
     let mut reasons: Vec<(String, &str, Vec<usize>)> = Vec::new();
     for order in &separability.orders {
         let Some(reason) = &order.lost_because else { continue };

@@ -27,6 +27,7 @@ pub fn text(report: &Report) -> String {
     if let Some(optimised) = &report.optimised {
         angles(&mut page, optimised);
     }
+    page.bullets("Notes", &report.notes);
     if let Some(map) = &report.map {
         page.heading(format_args!("written: {}", map.display()));
     }

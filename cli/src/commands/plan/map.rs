@@ -46,7 +46,8 @@ pub(super) fn write(
     add(&mut text, "declared", rig, orders);
     for (place, found) in (1..).zip(optimum.into_iter().flat_map(|optimum| &optimum.found)) {
         let mut placed = rig.clone();
-        for (sensor, angle_deg) in placed.sensors.iter_mut().zip(&found.angles_deg) {
+        let radial = placed.sensors.iter_mut().filter(|sensor| sensor.axial_radius_mm.is_none());
+        for (sensor, angle_deg) in radial.zip(&found.angles_deg) {
             sensor.angle_rad = angle_deg.to_radians();
         }
         add(&mut text, &format!("found {place}"), &placed, orders);

@@ -32,6 +32,9 @@ pub struct Report {
     pub suggestions: Vec<Suggested>,
     /// What stays blind or confounded with every single addition that was tried.
     pub unresolved: Unresolved,
+    /// What to know of axial sensors and of forms that are declared.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Better angles, where they were asked for.
     pub optimised: Option<Optimised>,
     /// The map that was written.
@@ -125,7 +128,7 @@ pub struct Optimised {
     pub angle_tolerance_deg: f64,
     /// Seed of the search.
     pub seed: u64,
-    /// The sensors' ids, in the order of all `angles_deg`.
+    /// Ids of the radial sensors, in the order of all `angles_deg`.
     pub sensors: Vec<String>,
     /// The rig's own angles.
     pub declared: Arrangement,
@@ -184,6 +187,7 @@ impl Report {
             foresight,
             suggestions: Vec::new(),
             unresolved: Unresolved::default(),
+            notes: Vec::new(),
             optimised: None,
             map: None,
         }

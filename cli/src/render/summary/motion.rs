@@ -25,7 +25,9 @@ pub fn section(page: &mut Page, stations: &[StationSummary]) {
         }
     }
     let line = stations.iter().find_map(|station| station.motion_along_deg);
+    let about = &first.reference;
     let named = |direction: &str| match line {
+        _ if is_axial(direction) && about != "PC" => format!("{direction} (PC)"),
         Some(line_deg) => direction.replace("along", &format!("along {line_deg}°")),
         None => direction.to_owned(),
     };
@@ -38,7 +40,6 @@ pub fn section(page: &mut Page, stations: &[StationSummary]) {
         table.row(std::iter::once(format!("{} {unit}", named(direction))).chain(KINDS.map(cell)));
     }
     let of = if stations.len() > 1 { ", lowest to highest of the stations" } else { "" };
-    let about = &first.reference;
     page.headed_table(format_args!("Error motion of the axis about {about}, peak to valley and rms{of}"), &table);
 }
 
@@ -49,14 +50,25 @@ fn is_plot(value: &Value) -> bool {
 
 /// Whether it has no centre, or that of `first`.
 fn is_about(value: &Value, first: &Value) -> bool {
-    !is_plot(value) || value.reference == first.reference
+    !is_plot(value) || value.reference == first.reference || is_axial(&parts(value).1)
+}
+
+/// Whether a direction is along the axis: its values have a centre of their own.
+fn is_axial(direction: &str) -> bool {
+    ["axial", "face"].iter().any(|along| direction.starts_with(along))
 }
 
 /// Kind and direction: "synchronous", "radial x". The fundamental is synchronous motion at 1/rev.
 fn parts(value: &Value) -> (&str, String) {
-    let symbol = value.symbol.strip_prefix("residual-").unwrap_or(&value.symbol);
+    let residual = value.symbol.strip_prefix("residual-");
+    let symbol = residual.unwrap_or(&value.symbol);
     let (kind, direction) = symbol.split_once('-').unwrap_or((symbol, ""));
     match kind {
+        // Along the axis there are both: with the fundamental and without it.
+        _ if residual.is_some() && is_axial(direction) => {
+            let (direction, rms) = direction.strip_suffix("-rms").map_or((direction, ""), |one| (one, " rms"));
+            (kind, format!("{} residual{rms}", direction.replace('-', " ")))
+        }
         "fundamental" => ("synchronous", format!("{direction} fundamental")),
         _ => (kind, direction.replace('-', " ")),
     }

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     effects::{ActsOn, Alterations, Predicted},
-    layout::Layout,
+    layout::{FirstOrder, Layout},
     separators::{Estimate, Operators, Propagation, Readings, Solver, apply, leftover, residual},
 };
 
@@ -397,7 +397,11 @@ impl Fit for SpindleFit {
                 match quantity {
                     Quantity::Form(_) => (form, forms) = (form + squares, forms + 1),
                     Quantity::FaceForm(_) => (face, faces) = (face + squares, faces + 1),
-                    Quantity::Z => (along, alongs) = (along + squares, alongs + 1),
+                    // Along the axis, the fundamental is motion.
+                    Quantity::Z => {
+                        let first = solved.first_moved_by(partial, &self.layout).map_or(0.0, |value| value.norm_sqr());
+                        (along, alongs) = (along + squares + first, alongs + 1);
+                    }
                     motion if motion.is_shift() => (shift, shifts) = (shift + squares, shifts + 1),
                     _ => {}
                 }
@@ -452,7 +456,16 @@ impl Fit for SpindleFit {
                 .iter()
                 .map(|partial| (0..width).map(|unknown| solved.moved_by(partial, unknown).collect()).collect())
                 .collect();
+            let along_axis = self.layout.unknowns.contains(&Quantity::Z);
+            let first: Vec<Vec<Complex64>> =
+                partials.iter().filter(|_| along_axis).map(|partial| solved.first_moved(partial)).collect();
             let Some(propagation) = &mut solved.propagation else { continue };
+            for (of_i, row) in first.iter().zip(covariance) {
+                for (of_j, entry) in first.iter().zip(row) {
+                    let products = of_i.iter().flat_map(|a| of_j.iter().map(move |b| a * b.conj() * *entry));
+                    propagation.covariance[0].iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+                }
+            }
             for (of_i, row) in moved.iter().zip(covariance) {
                 for (of_j, entry) in moved.iter().zip(row) {
                     add_products(&mut propagation.covariance, [of_i, of_j], *entry);
@@ -545,6 +558,19 @@ impl Solved {
             let readings = &partial[order * count..(order + 1) * count];
             (order, row.iter().zip(readings).map(|(a, b)| a * b).sum())
         })
+    }
+
+    /// How the unknowns of order 1 move with a parameter.
+    fn first_moved(&self, partial: &[Complex64]) -> Vec<Complex64> {
+        let count = self.corrected.count;
+        apply(&self.operators.orders[0].operator, &partial[count..2 * count])
+    }
+
+    /// How z at 1/rev moves with a parameter, where it can be told.
+    fn first_moved_by(&self, partial: &[Complex64], layout: &Layout) -> Option<Complex64> {
+        let z = layout.unknowns.iter().position(|unknown| *unknown == Quantity::Z)?;
+        let place = layout.first_order_unknowns().iter().position(|unknown| *unknown == FirstOrder::Axial)?;
+        self.operators.observable(1)[z].then(|| self.first_moved(partial)[place])
     }
 
     /// Orders from 2 at which an unknown can be told.

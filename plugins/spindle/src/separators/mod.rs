@@ -3,7 +3,7 @@
 mod algebra;
 pub mod closed_form;
 pub mod donaldson_reversal;
-mod face_notes;
+pub mod face_notes;
 pub mod four_sensor_reversal;
 pub mod harmonic_least_squares;
 mod joint;
