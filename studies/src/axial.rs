@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64, Error, Result,
+    azimuth::FacePlace,
     evaluate::{
         Value,
         error_motion::{CENTRE, ErrorMotion},
@@ -37,6 +38,11 @@ pub enum Layout {
     /// Three at a face of unknown form, at a radius of 20 mm.
     Face,
 }
+
+/// Where face motion is looked at: distance from the axis in mm, angle in degrees.
+const TOOL: (f64, f64) = (25.0, 200.0);
+/// The same in symbols.
+const AT_TOOL: &str = "face-at-25mm-200deg";
 
 /// Bound of the form at the pole, peak to valley, in µm.
 const BOUND_UM: f64 = 0.05;
@@ -154,8 +160,10 @@ fn looked_at(config: &SpindleConfig) -> Result<Vec<Looked>> {
     let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
     let selection = Selection::new(&rig, (0..rig.sensors.len()).collect(), (0..SETUPS).collect());
     let separator = HarmonicLeastSquares::of(selection, true, Weighting::TurnCovariance, f64::INFINITY);
-    let projections: Vec<_> =
-        (0..rig.setups.len()).map(|setup| separator.projection(if setup < SETUPS { setup } else { 0 })).collect();
+    let tool = FacePlace::of(TOOL.0, TOOL.1.to_radians());
+    let projections: Vec<_> = (0..rig.setups.len())
+        .map(|setup| Some(separator.projection(if setup < SETUPS { setup } else { 0 })?.with_faces(&[tool])))
+        .collect();
     let sizes = [config.recording.samples_per_rev, config.recording.revolutions];
     let (mut station, truth) = campaign::station_with_spread(&simulator, &rig, 0, sizes, None, &projections)?;
     let another = station.profiles.pop();
@@ -168,8 +176,11 @@ fn looked_at(config: &SpindleConfig) -> Result<Vec<Looked>> {
     let (found, other) = (values(&station.profiles), values(another.as_slice()));
     let mut all = at_angles(&separation, &truth)?;
     let value = |values: &[Value], symbol: &str| values.iter().find(|value| value.symbol == symbol).cloned();
-    for (symbol, true_value) in true_values(&truth) {
-        all.extend(value(&found, symbol).and_then(|value| beside(&value, true_value)));
+    for (place, curve) in [("axial", truth.z_um.clone().unwrap_or_default()), (AT_TOOL, at_tool(&truth))] {
+        for (kind, end, true_value) in true_values(&curve) {
+            let symbol = format!("{kind}-{place}{end}");
+            all.extend(value(&found, &symbol).and_then(|value| beside(&value, true_value)));
+        }
     }
     for symbol in ["asynchronous-axial", "asynchronous-axial-rms", "total-axial"] {
         let true_value = value(&other, symbol).map_or(f64::NAN, |value| value.value);
@@ -184,9 +195,16 @@ fn beside(value: &Value, truth: f64) -> Option<Looked> {
     Some(Looked { name: value.symbol.clone(), error: value.value - truth, std: known.std, holds })
 }
 
-/// Values of the true motion along the axis.
-fn true_values(truth: &StationTruth) -> Vec<(&'static str, f64)> {
-    let z_um = truth.z_um.clone().unwrap_or_default();
+/// True motion along the axis at the tool: that of a point of a rigid body.
+fn at_tool(truth: &StationTruth) -> Vec<f64> {
+    let (sine, cosine) = TOOL.1.to_radians().sin_cos();
+    let [at_x, at_y] = [1e-3 * TOOL.0 * cosine, 1e-3 * TOOL.0 * sine];
+    let (Some(z_um), Some([_, _, tilt_x, tilt_y])) = (&truth.z_um, &truth.motion) else { return Vec::new() };
+    z_um.iter().zip(tilt_x.iter().zip(tilt_y)).map(|(z, (tilt_x, tilt_y))| z + tilt_x * at_y - tilt_y * at_x).collect()
+}
+
+/// Values of a true motion along the axis: kind, end of the symbol, value.
+fn true_values(z_um: &[f64]) -> Vec<(&'static str, &'static str, f64)> {
     let count = z_um.len().max(1) as f64;
     let part = |with: fn(f64) -> f64| {
         let each = z_um.iter().enumerate().map(|(index, z)| z * with(TAU * index as f64 / count));
@@ -208,11 +226,11 @@ fn true_values(truth: &StationTruth) -> Vec<(&'static str, f64)> {
         (curve.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
     };
     vec![
-        ("fundamental-axial", 2.0 * cosine.hypot(sine)),
-        ("synchronous-axial", range(&z_um)),
-        ("synchronous-axial-rms", rms(&z_um)),
-        ("residual-synchronous-axial", range(&residual)),
-        ("residual-synchronous-axial-rms", rms(&residual)),
+        ("fundamental", "", 2.0 * cosine.hypot(sine)),
+        ("synchronous", "", range(z_um)),
+        ("synchronous", "-rms", rms(z_um)),
+        ("residual-synchronous", "", range(&residual)),
+        ("residual-synchronous", "-rms", rms(&residual)),
     ]
 }
 

@@ -1,7 +1,7 @@
 //! Axial and face error motion values.
 //!
 //! Along the axis the fundamental is error motion: 1/rev of the spindle's z is no matter of clamping, as it is across the axis
-//! (ISO 230-7, 3.2 and 5.4; ASME B89.3.4, 7.3). *Synchronous* motion has all orders from 1, *residual synchronous* motion those
+//! (ISO 230-7, ASME B89.3.4). *Synchronous* motion has all orders from 1, *residual synchronous* motion those
 //! from 2, *fundamental* is twice the amplitude of order 1. All are referred to the centre of the polar chart, since any other
 //! centre moves with the fundamental. Order 0 and slow drift are the level of z and no motion.
 //!
