@@ -15,7 +15,13 @@ fn stated_intervals_of_axial_motion_hold_the_truth() {
         let rows = rows(&layout.campaigns(0, 120)).unwrap();
         println!("{}\n{}", layout.name(), table(&rows));
         let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
-        for symbol in ["z at angles", "fundamental-axial", "synchronous-axial", "asynchronous-axial", "synchronous-face-at-25mm-200deg"] {
+        for symbol in [
+            "z at angles",
+            "fundamental-axial",
+            "synchronous-axial",
+            "asynchronous-axial",
+            "synchronous-face-at-25mm-200deg",
+        ] {
             assert!(names.contains(&symbol), "{symbol}: {names:?}");
         }
         assert_eq!(names.contains(&"face at angles"), layout == Layout::Face);

@@ -17,9 +17,9 @@ use runout_core::{
 };
 use runout_spindle::{
     layout::Layout,
+    plan::{self, Change, Optimum, Search, Suggestion, TooTight, optimise},
     selection::Selection,
     separators::face_notes,
-    plan::{self, Change, Optimum, Search, Suggestion, TooTight, optimise},
 };
 
 use super::{check::Separability, print};

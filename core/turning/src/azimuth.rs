@@ -96,7 +96,9 @@ mod tests {
         {
             assert_eq!(Azimuth::of(f64::to_radians(angle_deg)).to_string(), line);
         }
-        for (radius_mm, angle_deg, place) in [(20.0, -90.0, "20mm-270deg"), (12.5, 720.0, "12.5mm-0deg"), (0.0, 30.0, "0mm-0deg")] {
+        for (radius_mm, angle_deg, place) in
+            [(20.0, -90.0, "20mm-270deg"), (12.5, 720.0, "12.5mm-0deg"), (0.0, 30.0, "0mm-0deg")]
+        {
             assert_eq!(FacePlace::of(radius_mm, f64::to_radians(angle_deg)).to_string(), place);
         }
         assert!((Azimuth::of(-1.0).radians() - (std::f64::consts::PI - 1.0)).abs() < 1e-10);

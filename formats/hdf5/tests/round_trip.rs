@@ -146,8 +146,11 @@ fn the_truth_comes_back() {
     let path = folder.path().join("truth.h5");
     let mut memory = Memory::new(&rig, &[("s", 0.0)], 100, false);
     let curve = |seed: u64| noise(seed).take(360).collect::<Vec<f64>>();
-    let truth =
-        StationTruth { form_um: vec![curve(1), curve(2)], motion: Some([curve(3), curve(4), curve(5), curve(6)]), z_um: Some(curve(7)) };
+    let truth = StationTruth {
+        form_um: vec![curve(1), curve(2)],
+        motion: Some([curve(3), curve(4), curve(5), curve(6)]),
+        z_um: Some(curve(7)),
+    };
     memory.truth = Some(truth.clone());
     let scenario = "seed = 7\n".repeat(20_000);
     write(&memory, &rig, &path, &WriteOptions { scenario: Some(&scenario), ..WriteOptions::default() }).unwrap();

@@ -159,8 +159,7 @@ impl Layout {
         let sections: Vec<usize> = (0..rig.sections.len()).filter(looked_at).collect();
         // A form that is declared within a bound is not solved for.
         let open = || sections.iter().copied().filter(|section| rig.form_bounds_um[*section].is_none());
-        let mut unknowns: Vec<Quantity> =
-            open().filter(|section| !rig.is_face(*section)).map(Quantity::Form).collect();
+        let mut unknowns: Vec<Quantity> = open().filter(|section| !rig.is_face(*section)).map(Quantity::Form).collect();
         unknowns.extend(open().filter(|section| rig.is_face(*section)).map(Quantity::FaceForm));
         let motions = match one_line {
             // Neither x nor y is observable, but what is along the line.

@@ -25,6 +25,7 @@ use runout_spindle::{
     diagnose::{SpindleModel, diagnose},
     effects,
     layout::Layout,
+    selection::Selection,
     separators::{
         closed_form::{ClosedFormSeparator, Method},
         donaldson_reversal::DonaldsonReversal,
@@ -33,7 +34,6 @@ use runout_spindle::{
         multi_step::MultiStep,
         three_point::ThreePoint,
     },
-    selection::Selection,
     simulate::{FaceConfig, MotionHarmonic, SpindleConfig},
 };
 
@@ -127,7 +127,8 @@ impl Truth {
                 let form_at = if on_axis { -rig.rotation.direction() * turn } else { part };
                 along + clamped + value(&self.form_um[sensor.section], form_at)
             };
-            let channel = |sensor| (0..SAMPLES).map(|step| reading(sensor, TAU * step as f64 / SAMPLES as f64)).collect();
+            let channel =
+                |sensor| (0..SAMPLES).map(|step| reading(sensor, TAU * step as f64 / SAMPLES as f64)).collect();
             profile(setup, &rig.sensors.iter().map(channel).collect::<Vec<_>>(), SAMPLES)
         });
         Station { name: "s1".into(), z_mm: 0.0, profiles: profiles.collect() }
@@ -195,7 +196,11 @@ fn the_fundamental_from_two_opposite_sensors() {
     let truth = Truth::new(3);
     let found = separated(&rig, &truth.station(&rig, 8.0));
     assert!(truth.error(&found, Quantity::Z, 1) < 1e-9);
-    let one = { let mut sensors = four(); sensors.push(axial("A1", 30.0, 25.0, "face")); sensors };
+    let one = {
+        let mut sensors = four();
+        sensors.push(axial("A1", 30.0, 25.0, "face"));
+        sensors
+    };
     let rig = self::rig(one, &TURNED);
     let found = separated(&rig, &truth.station(&rig, 8.0));
     let z = found.position(Quantity::Z).unwrap();
@@ -214,7 +219,11 @@ fn on_the_axis_z_and_form_are_one_thing() {
         assert_eq!(assessment.lost_orders(of(Quantity::Z)), every);
         assert_eq!(assessment.lost_orders(of(Quantity::FaceForm(2))), every);
         assert_eq!((assessment.lost_form_orders(), assessment.lost_motion_orders()), (every.clone(), every.clone()));
-        assert!(assessment.notes.iter().any(|note| note.contains("`pole`") && note.contains("form_um")), "{:?}", assessment.notes);
+        assert!(
+            assessment.notes.iter().any(|note| note.contains("`pole`") && note.contains("form_um")),
+            "{:?}",
+            assessment.notes
+        );
         // What is across the axis does not suffer from it.
         let lost = assessment.lost_orders(of(Quantity::X));
         assert_eq!(lost.is_empty(), part_deg.len() > 1, "{lost:?}");
@@ -340,11 +349,7 @@ fn what_a_rig_file_can_get_wrong() {
         (|s| s[4].section = "near".into(), "both radially and axially", "looks"),
         (|s| s[4].form_um = Some(-1.0), "0 µm or more", "form_um"),
         (|s| s[4].form_um = Some(f64::INFINITY), "0 µm or more", "form_um"),
-        (
-            |s| (s[0].form_um, s[1].form_um) = (Some(0.1), Some(0.2)),
-            "0.1 µm is declared for it already",
-            "form_um",
-        ),
+        (|s| (s[0].form_um, s[1].form_um) = (Some(0.1), Some(0.2)), "0.1 µm is declared for it already", "form_um"),
         (|s| s.push(axial("A", 0.0, 20.0, "pole")), "must share one radius", "radius_mm"),
     ] {
         let (found, place) = faulty(change);
@@ -375,7 +380,8 @@ fn diagnosed(config: &SpindleConfig) -> (Diagnosis, Separation, Separation, Stat
     let rig = config.rig.clone().check().unwrap();
     let (station, truth) = averaged(config, &rig);
     let layout = Layout::new(&rig, false);
-    let found = diagnose(Selection::whole(&rig), layout, true, effects::all(), &[station], &Settings::default()).unwrap();
+    let found =
+        diagnose(Selection::whole(&rig), layout, true, effects::all(), &[station], &Settings::default()).unwrap();
     (found.diagnosis, found.before[0].clone(), found.after[0].clone(), truth)
 }
 
@@ -407,7 +413,8 @@ fn simulated_axial_motion_comes_back_within_its_uncertainty() {
                 let face = found.position(Quantity::FaceForm(3)).unwrap();
                 let harmonics = |curve: &[f64]| {
                     let mut harmonics = vec![Complex64::ZERO; 21];
-                    runout_core::numerics::fourier::Fourier::new(curve.len()).analyse(curve.iter().copied(), &mut harmonics);
+                    runout_core::numerics::fourier::Fourier::new(curve.len())
+                        .analyse(curve.iter().copied(), &mut harmonics);
                     harmonics
                 };
                 let width = found.unknowns.len();
@@ -440,8 +447,11 @@ fn a_hidden_gain_of_an_axial_sensor() {
     assert!(after_error < before && after_error < 2.0 * std, "{before} → {after_error}, stated {std}");
 
     // With one axial sensor only, its gain changes nothing but z.
+    for seed in 5..8 {
+        let (found, ..) = diagnosed(&simulated(seed, Rotation::Ccw, false, effect));
+        assert!(found.added.is_empty(), "{:?}", found.added);
+    }
     let (found, ..) = diagnosed(&simulated(5, Rotation::Ccw, false, effect));
-    assert!(found.added.is_empty(), "{:?}", found.added);
     let blind = found.blind_to.iter().find(|blind| blind.effect == "sensor-gain" && blind.targets == ["Z"]);
     let bias = &blind.unwrap_or_else(|| panic!("{:?}", found.blind_to)).bias_per_unit;
     assert!(bias.on == "z" && bias.value > 0.3, "{bias:?}");
@@ -474,7 +484,10 @@ fn other_effects_on_an_axial_sensor() {
 /// Partials of the effects on a rig with axial sensors against finite differences: the signature is what a small effect leaves.
 #[test]
 fn partials_on_axial_sensors() {
-    let config = simulated(2, Rotation::Cw, true, "[]");
+    // Little noise: what it leaves of the residual turns with the layout, which partials leave out.
+    let mut config = simulated(2, Rotation::Cw, true, "[]");
+    config.noise.rms_um = 1e-3;
+    (config.asynchronous.rms_um, config.asynchronous.z_rms_um) = (Some(1e-3), 1e-3);
     let rig = config.rig.clone().check().unwrap();
     let (station, _) = averaged(&config, &rig);
     let model =
@@ -496,9 +509,10 @@ fn partials_on_axial_sensors() {
             };
             let (ahead, behind) = (moved(1.0), moved(-1.0));
             let size = signature.iter().map(|value| value * value).sum::<f64>().sqrt();
-            let apart = signature.iter().zip(ahead.iter().zip(&behind)).map(|(signature, (ahead, behind))| {
-                ((ahead - behind) / (2.0 * step) - signature).powi(2)
-            });
+            let apart = signature
+                .iter()
+                .zip(ahead.iter().zip(&behind))
+                .map(|(signature, (ahead, behind))| ((ahead - behind) / (2.0 * step) - signature).powi(2));
             let apart = apart.sum::<f64>().sqrt();
             // The weights change a little with an effect, which partials leave out.
             assert!(apart < 0.02 * size, "{} {:?}: {apart} of {size}", about.id, about.targets);

@@ -9,8 +9,8 @@
 //! how the face was clamped, and is left out.
 
 use super::{
-    ErrorMotion, RESIDUAL, SAID, STANDARD, between_setups, of_all_turns, over, polar::Synchronous, rms_about_mean,
-    root_mean_square, widest, rms_across, without_noise, unit, described, centre_of_chart,
+    ErrorMotion, RESIDUAL, SAID, STANDARD, between_setups, centre_of_chart, described, of_all_turns, over,
+    polar::Synchronous, rms_about_mean, rms_across, root_mean_square, unit, widest, without_noise,
 };
 use crate::spread::{Direction, Spread};
 use runout_standards::{
@@ -41,14 +41,7 @@ impl ErrorMotion<'_> {
     }
 
     /// Range of what repeats, and its root mean square.
-    fn synchronous(
-        &self,
-        kind: &str,
-        what: &str,
-        direction: Direction,
-        plot: &Synchronous,
-        z_mm: f64,
-    ) -> [Value; 2] {
+    fn synchronous(&self, kind: &str, what: &str, direction: Direction, plot: &Synchronous, z_mm: f64) -> [Value; 2] {
         let drawn = plot.over_angle(&Angles::equal(self.angles));
         let found = [ront_lsci_um(&drawn), rms_about_mean(&drawn)];
         let seed = uncertainty::seed(&[self.station, &self.id(direction), kind]);
@@ -61,19 +54,25 @@ impl ErrorMotion<'_> {
             None => found.map(|found| (found, 0.0, None)),
         };
         let id = self.id(direction);
-        let value = |symbol: String, what: String, (found, share, known): (f64, f64, Option<Uncertainty>), bound: f64| {
-            let noise = if known.is_some() && share >= SAID {
-                format!(", without {share:.3} {} that noise adds to it", unit(direction))
-            } else {
-                String::new()
+        let value =
+            |symbol: String, what: String, (found, share, known): (f64, f64, Option<Uncertainty>), bound: f64| {
+                let noise = if known.is_some() && share >= SAID {
+                    format!(", without {share:.3} {} that noise adds to it", unit(direction))
+                } else {
+                    String::new()
+                };
+                let value = (found - share).max(0.0);
+                self.axial_value(symbol, &format!("{what}{noise}"), direction, plot, z_mm, value, bounded(known, bound))
             };
-            let value = (found - share).max(0.0);
-            self.axial_value(symbol, &format!("{what}{noise}"), direction, plot, z_mm, value, bounded(known, bound))
-        };
         [
             value(format!("{kind}-{id}"), what.to_owned(), range, plot.bound),
             // The root mean square of what lies within a range of B is B/2 at most.
-            value(format!("{kind}-{id}-rms"), format!("{what}, root mean square over the angles"), rms, 0.5 * plot.bound),
+            value(
+                format!("{kind}-{id}-rms"),
+                format!("{what}, root mean square over the angles"),
+                rms,
+                0.5 * plot.bound,
+            ),
         ]
     }
 
@@ -113,8 +112,7 @@ impl ErrorMotion<'_> {
         let value = 2.0 * plot.harmonic(1)?.norm();
         // The part of an error E|δ|² along the phasor is half of it.
         let std = (2.0 * plot.variance.get(1).copied().unwrap_or(0.0)).sqrt();
-        let known =
-            (std > 0.0).then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1)));
+        let known = (std > 0.0).then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1)));
         let what = "fundamental error motion value, peak to valley of 1/rev";
         let symbol = format!("fundamental-{}", self.id(direction));
         let known = bounded(known, plot.bound);

@@ -215,12 +215,7 @@ impl ErrorMotion<'_> {
         Some(vec![
             about(format!("{kind}-{id}"), &range_said, range, bounded(range_known, plot.bound)),
             about(format!("{kind}-{id}-rms"), &rms_said, rms, bounded(rms_known, 0.5 * plot.bound)),
-            about(
-                format!("total-{id}"),
-                &total,
-                all.1 - all.0,
-                bounded(between_setups(&each, range_std), plot.bound),
-            ),
+            about(format!("total-{id}"), &total, all.1 - all.0, bounded(between_setups(&each, range_std), plot.bound)),
             about(
                 format!("total-{id}-rms"),
                 &format!("{total}, root mean square over angles and turns"),
@@ -275,8 +270,7 @@ impl ErrorMotion<'_> {
         if direction.is_axial() {
             return 0.0;
         }
-        let radial =
-            directions(spreads).into_iter().filter(|direction| !direction.is_tilt() && !direction.is_axial());
+        let radial = directions(spreads).into_iter().filter(|direction| !direction.is_tilt() && !direction.is_axial());
         let across = radial.flat_map(|direction| spreads.iter().map(move |spread| across(spread, direction)));
         let reach = spreads.iter().map(|spread| spread.reach(direction)).fold(0.0, f64::max);
         self.slope * across.fold(0.0, f64::max) * reach / 3.0_f64.sqrt()

@@ -406,8 +406,7 @@ impl Fit for SpindleFit {
                     _ => {}
                 }
             }
-            let moved =
-                [("form", form, forms), ("motion", shift, shifts), ("face", face, faces), ("z", along, alongs)];
+            let moved = [("form", form, forms), ("motion", shift, shifts), ("face", face, faces), ("z", along, alongs)];
             for (on, squares, count) in moved {
                 if count > 0 {
                     let value = (0.5 * squares / f64::from(count)).sqrt();

@@ -94,7 +94,11 @@ impl<'a> Predicted<'a> {
                 predicted.part[at] = form(reading.setup, reading.section) * phase;
                 let moves = layout.motion_sign(reading.setup, order) * reading.motion_ratio;
                 // An axial sensor reads z and, at its lever −ρ, the tilt towards it.
-                let [x, y, z] = if reading.view.is_axial() { [Complex64::ZERO, Complex64::ZERO, z] } else { [x, y, Complex64::ZERO] };
+                let [x, y, z] = if reading.view.is_axial() {
+                    [Complex64::ZERO, Complex64::ZERO, z]
+                } else {
+                    [x, y, Complex64::ZERO]
+                };
                 let (shift_x, shift_y) = (x + tilt_y * *lever, y - tilt_x * *lever);
                 predicted.along[at] = (shift_x * cosine + shift_y * sine + z) * moves;
                 predicted.across[at] = (shift_y * cosine - shift_x * sine) * moves;

@@ -4,6 +4,10 @@ use runout_core::Complex64;
 
 use super::{About, ActsOn, Alterations, Predicted, RigKey, SpindleEffect, parameter};
 
+/// Largest coefficients, in 1/µm and 1/µm²: a hundred and a thousand times what is usual. Where a characteristic leaves next to no
+/// trace, as of a sensor that nothing but itself checks, a far larger one can reproduce noise.
+const LARGEST: f64 = 0.1;
+
 /// A sensor's characteristic.
 pub struct SensorNonlinearity;
 
@@ -33,6 +37,10 @@ impl SpindleEffect for SensorNonlinearity {
             predicted.curves(&predicted.readings, on, |_, u| u * u / slope(u)),
             predicted.curves(&predicted.readings, on, |_, u| u * u * u / slope(u)),
         ]
+    }
+
+    fn is_possible(&self, values: &[f64]) -> bool {
+        values.iter().all(|value| value.abs() <= LARGEST)
     }
 
     fn rig_key(&self) -> Option<RigKey> {

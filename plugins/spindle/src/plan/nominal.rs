@@ -60,7 +60,8 @@ pub fn station(selection: &Selection) -> Station {
         let offset = ECCENTRICITY_UM * phase();
         for (index, reading) in layout.readings[setup * sensors..(setup + 1) * sensors].iter().enumerate() {
             let across = !reading.view.is_axial();
-            profile.mean[sensors + index] = if across { offset * layout.part_phase(reading, 1) } else { Complex64::ZERO };
+            profile.mean[sensors + index] =
+                if across { offset * layout.part_phase(reading, 1) } else { Complex64::ZERO };
         }
     }
     // Σ (A/n)²/2 over the orders is the mean square.

@@ -28,13 +28,7 @@ pub(super) fn harmonics(
     Ok(all)
 }
 
-fn of_face(
-    face: &FaceConfig,
-    rig: &Rig,
-    seed: u64,
-    orders: usize,
-    all: &mut [Vec<Complex64>],
-) -> Result<(), Fault> {
+fn of_face(face: &FaceConfig, rig: &Rig, seed: u64, orders: usize, all: &mut [Vec<Complex64>]) -> Result<(), Fault> {
     let is_face = |place: &usize| rig.sections[*place] == face.section && rig.is_face(*place);
     let Some(section) = (0..rig.sections.len()).find(is_face) else {
         let ids = (0..rig.sections.len()).filter(|place| rig.is_face(*place)).map(|place| rig.sections[place].as_str());

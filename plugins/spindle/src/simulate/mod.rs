@@ -41,9 +41,9 @@ use runout_core::{
 };
 
 pub use config::{
-    AsynchronousConfig, AxialLineConfig, EccentricityConfig, FaceConfig, FormConfig, FormHarmonic, Geometry, LineConfig, MotionConfig,
-    MotionHarmonic, NoiseConfig, Orders, Phase, RecordingConfig, SampleFormat, SpindleConfig, StationsConfig,
-    TiltHarmonic,
+    AsynchronousConfig, AxialLineConfig, EccentricityConfig, FaceConfig, FormConfig, FormHarmonic, Geometry,
+    LineConfig, MotionConfig, MotionHarmonic, NoiseConfig, Orders, Phase, RecordingConfig, SampleFormat, SpindleConfig,
+    StationsConfig, TiltHarmonic,
 };
 pub use effects::{
     AsynchronousLine, AxialMotion, Backlash, Dent, Effect, EvenOrderMotion, FilterAttenuation, PartAngleSign,

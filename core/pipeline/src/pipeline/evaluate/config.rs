@@ -516,9 +516,12 @@ impl EvaluateConfig {
             }
         }
         let directions = self.directions_deg.unwrap_or_default();
-        let faces = self.faces.unwrap_or_default().into_iter().enumerate().map(|(index, place)| {
-            place.check().map_err(|fault| fault.under_item("faces", index))
-        });
+        let faces = self
+            .faces
+            .unwrap_or_default()
+            .into_iter()
+            .enumerate()
+            .map(|(index, place)| place.check().map_err(|fault| fault.under_item("faces", index)));
         let faces = faces.collect::<Result<Vec<FacePlace>, Fault>>()?;
         let usual = Evaluate::default();
         Ok(Evaluate {

@@ -10,7 +10,9 @@ mod section;
 mod texture;
 
 pub(super) use areal::add_areal;
-pub use config::{ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FacePlaceConfig, FormRemoval, Group, Groups, TextureConfig};
+pub use config::{
+    ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FacePlaceConfig, FormRemoval, Group, Groups, TextureConfig,
+};
 pub(super) use generatrix::add_generatrices;
 pub(super) use limit::decide;
 pub use limit::{Decision, Limit, LimitSummary, LimitValue};
