@@ -457,7 +457,7 @@ impl Simulated {
         ];
         let labels = vec![Labels { name: "ball".into(), values: self.ball.clone() }];
         let whole = Trace { id: "points".into(), kind: "points".into(), points: 0..self.ball.len() };
-        Points { input: "simulated.csv".into(), columns, labels, traces: vec![whole] }
+        Points { input: "simulated.csv".into(), columns, labels, traces: vec![whole], ..Points::default() }
     }
 
     fn table(&self) -> TableSpec {

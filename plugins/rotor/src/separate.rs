@@ -181,8 +181,8 @@ impl Solution {
                 .into(),
             tables: self.rows()?,
             values: self.values(),
-            form: None,
             remarks,
+            ..Outcome::default()
         })
     }
 

@@ -569,7 +569,7 @@ mod tests {
             Column { name: "z_mm".into(), values: z_mm },
             Column { name: "reading_um".into(), values: reading_um },
         ];
-        Points { input: "made.csv".into(), columns, labels: Vec::new(), traces }
+        Points { input: "made.csv".into(), columns, traces, ..Points::default() }
     }
 
     fn model(slide_cutoff_mm: Option<f64>) -> TracesModel {

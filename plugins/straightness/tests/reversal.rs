@@ -37,12 +37,12 @@ impl File {
         });
         Points {
             input: "made.csv".into(),
-            labels: Vec::new(),
             traces: traces.collect(),
             columns: vec![
                 column("z_mm", rows().map(|row| row.0).collect()),
                 column("reading_um", rows().map(|row| row.1).collect()),
             ],
+            ..Points::default()
         }
     }
 

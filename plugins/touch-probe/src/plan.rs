@@ -80,7 +80,7 @@ impl TouchProbe {
             Column { name: "radius_mm".into(), values: vec![config.ring_radius_mm; count] },
         ];
         let labels = vec![Labels { name: "setup".into(), values: labels }];
-        let points = Points { input: "plan".into(), columns, labels, traces: Vec::new() };
+        let points = Points { input: "plan".into(), columns, labels, ..Points::default() };
         let terms = Self(config).linear_terms(&points);
         terms.and_then(|terms| foresee(&terms)).unwrap_or_default()
     }

@@ -234,7 +234,7 @@ impl Touched {
                 numbers("time_s", self.time_s.clone()),
             ],
             labels: vec![Labels { name: "setup".into(), values: self.setup.clone() }],
-            traces: Vec::new(),
+            ..Points::default()
         }
     }
 }

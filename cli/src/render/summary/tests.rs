@@ -95,6 +95,7 @@ fn summary(stations: usize) -> Summary {
             chi2_per_dof: Some(1.02),
             residual_orders: None,
             truth: Some(MotionTruth {
+                z_rms_error_um: None,
                 x_rms_error_um: Some(0.012),
                 y_rms_error_um: Some(0.013),
                 tilt_x_rms_error_urad: None,

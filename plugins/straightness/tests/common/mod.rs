@@ -103,7 +103,7 @@ impl Campaign {
         if flag.iter().any(|flag| *flag > 0.0) {
             columns.push(Column { name: "flag".into(), values: flag });
         }
-        Points { input: "simulated.csv".into(), columns, labels: Vec::new(), traces }
+        Points { input: "simulated.csv".into(), columns, traces, ..Points::default() }
     }
 
     /// Root mean square errors of part and slide on these positions.
