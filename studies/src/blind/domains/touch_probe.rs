@@ -124,7 +124,8 @@ fn plant(id: &'static str, large: bool, scenario: &mut TouchProbeScenario, chanc
     match id {
         "axis-scale" => {
             let size = chance.signed(15.0 * noise, 800.0, large);
-            scenario.machine.scale_x = size;
+            // What both scales have in common is the ring's radius.
+            (scenario.machine.scale_x, scenario.machine.scale_y) = (0.5 * size, -0.5 * size);
             Planted::effect(id, "", format!("{size:.1} µm/m"), vec![("scale", size)])
         }
         "axis-squareness" => {
