@@ -1,0 +1,279 @@
+//! From rows of a table to distinct places, their readings and their noise.
+
+use std::collections::HashMap;
+
+use faer::Mat;
+use nalgebra::{DMatrix, DVector};
+use runout_core::{
+    Error, Result,
+    points::{PointColumn, PointKind::Number, Points},
+};
+
+use crate::{
+    joint::{Data, Observed, Within},
+    noise::{Noise, of_repeats},
+    span::Span,
+    terms::{Term, Volume},
+};
+
+/// Commands that differ by less than this, in mm, are one place.
+const SAME_MM: f64 = 1e-6;
+/// A median deviation above this, in µm, looks like another unit.
+const LARGE_UM: f64 = 2000.0;
+/// The largest deviation below this, in µm, looks like another unit.
+const SMALL_UM: f64 = 0.02;
+
+/// Columns of a campaign.
+pub const COLUMNS: [PointColumn; 9] = [
+    PointColumn::needed("x_mm", Number, "mm", "command of X"),
+    PointColumn::needed("y_mm", Number, "mm", "command of Y"),
+    PointColumn::needed("z_mm", Number, "mm", "command of Z"),
+    PointColumn::needed("dx_um", Number, "um", "actual less commanded place along x"),
+    PointColumn::needed("dy_um", Number, "um", "actual less commanded place along y"),
+    PointColumn::needed("dz_um", Number, "um", "actual less commanded place along z"),
+    PointColumn::optional("time_s", Number, "s", "time; without it the rows are in the order of time, evenly"),
+    PointColumn::optional("repeat", Number, "", "number of the pass"),
+    PointColumn::optional("std_um", Number, "um", "standard uncertainty of one coordinate of this row"),
+];
+
+/// Readings of a campaign.
+#[derive(Debug, Clone)]
+pub struct Campaign {
+    /// The file.
+    pub file: String,
+    /// Distinct places, in mm, in the order of their first readings.
+    pub places_mm: Vec<[f64; 3]>,
+    /// Place of each reading.
+    pub place_of: Vec<usize>,
+    /// Deviations of each reading, in µm.
+    pub readings_um: Vec<[f64; 3]>,
+    /// Time of each reading, 0 at the first and 1 at the last.
+    pub time: Vec<f64>,
+    /// Number of the pass of each reading, counted where the file does not say it.
+    pub repeat: Vec<usize>,
+    /// What is known of the noise.
+    pub noise: Noise,
+    /// The measured volume.
+    pub volume: Volume,
+    /// The line, plane or space that the places span.
+    pub span: Span,
+    /// What looks wrong.
+    pub remarks: Vec<String>,
+}
+
+impl Campaign {
+    /// The readings of points.
+    ///
+    /// # Errors
+    /// When a column is missing, or a number cannot be.
+    pub fn of(points: &Points, std_um: Option<f64>, tool_mm: [f64; 3], chain: [usize; 3]) -> Result<Self> {
+        let file = points.input.display().to_string();
+        let refuse = |problem: String| Error::new("read", &file, problem);
+        let optional = |name: &str| points.columns.iter().find(|column| column.name == name);
+        let commands = [points.column("x_mm")?, points.column("y_mm")?, points.column("z_mm")?];
+        let deviations = [points.column("dx_um")?, points.column("dy_um")?, points.column("dz_um")?];
+        let count = commands[0].len();
+        for column in &points.columns {
+            if let Some(row) = column.values.iter().position(|value| !value.is_finite()) {
+                let problem = format!("row {} of the column `{}` is no finite number", row + 1, column.name);
+                return Err(refuse(problem));
+            }
+        }
+        if count == 0 {
+            return Err(refuse("it holds no reading".into()));
+        }
+        let at = |columns: &[&[f64]; 3], row: usize| [0, 1, 2].map(|axis| columns[axis][row]);
+        let rows: Vec<[f64; 3]> = (0..count).map(|row| at(&commands, row)).collect();
+        let (places_mm, place_of) = distinct(&rows);
+        let readings_um: Vec<[f64; 3]> = (0..count).map(|row| at(&deviations, row)).collect();
+        let time = scaled(optional("time_s").map(|column| column.values.as_slice()), count);
+        let repeat = match optional("repeat") {
+            Some(column) => column
+                .values
+                .iter()
+                .enumerate()
+                .map(|(row, value)| {
+                    let problem = || refuse(format!("row {}: `repeat` is a whole number from 0, found {value}", row + 1));
+                    if *value >= 0.0 && value.fract() == 0.0 { Ok(*value as usize) } else { Err(problem()) }
+                })
+                .collect::<Result<Vec<usize>>>()?,
+            None => occurrences(&place_of, places_mm.len()),
+        };
+        let stated = optional("std_um").map(|column| column.values.as_slice());
+        if let Some(row) = stated.and_then(|values| values.iter().position(|value| *value <= 0.0)) {
+            return Err(refuse(format!("row {} of the column `std_um` must be above 0 µm", row + 1)));
+        }
+        let mut remarks = looks_wrong(&rows, &readings_um, optional("time_s").is_some());
+        let noise = match (stated, std_um) {
+            (Some(stated), _) => Noise::Column(stated.to_vec()),
+            (None, Some(std_um)) => Noise::Stated(std_um),
+            (None, None) => of_repeats(&place_of, places_mm.len(), &readings_um, &time),
+        };
+        if place_of.len() > places_mm.len() && noise == Noise::Unknown {
+            remarks.push(format!(
+                "{} readings are at a place that was read before; they are too few, or copies, and do not give the noise: readings of \
+                 one place are averaged",
+                place_of.len() - places_mm.len()
+            ));
+        }
+        let volume = Volume::around(&places_mm, tool_mm, chain);
+        let span = Span::of(&places_mm);
+        Ok(Self { file, places_mm, place_of, readings_um, time, repeat, noise, volume, span, remarks })
+    }
+
+    /// Variance of the noise of a reading, in µm²; `None` where it is not known.
+    #[must_use]
+    pub fn variance_um2(&self, row: usize, axis: usize) -> Option<f64> {
+        match &self.noise {
+            Noise::Column(each) => Some(each[row] * each[row]),
+            Noise::Stated(std_um) => Some(std_um * std_um),
+            Noise::Repeats { std_um, .. } => Some(std_um[axis] * std_um[axis]),
+            Noise::Unknown => None,
+        }
+    }
+
+    /// What the noise is expected to be of one reading along an axis, root mean square; NaN where it is not known.
+    #[must_use]
+    pub fn noise_um(&self, axis: usize) -> f64 {
+        let each = (0..self.place_of.len()).map(|row| self.variance_um2(row, axis).unwrap_or(f64::NAN));
+        (each.sum::<f64>() / self.place_of.len() as f64).sqrt()
+    }
+
+    /// Means of some places (all without `some`), and the columns of the trend.
+    #[must_use]
+    pub fn data(&self, terms: &[Term], some: Option<&[usize]>) -> Data {
+        let all: Vec<usize> = (0..self.places_mm.len()).collect();
+        let chosen = some.unwrap_or(&all);
+        let mut position = vec![usize::MAX; self.places_mm.len()];
+        chosen.iter().enumerate().for_each(|(index, place)| position[*place] = index);
+        let places: Vec<[f64; 3]> = chosen.iter().map(|place| self.places_mm[*place]).collect();
+        let (count, columns) = (chosen.len(), terms.len());
+        let known = self.noise != Noise::Unknown;
+        let mut within = Within {
+            design: DMatrix::zeros(columns, columns),
+            readings: DVector::zeros(columns),
+            squares: 0.0,
+            dof: 0,
+        };
+        let mut observed = Vec::new();
+        let mut design = Vec::new();
+        let at = |row: usize, axis: usize, term: Term| {
+            term.at(&self.volume, self.places_mm[self.place_of[row]], self.time[row])[axis]
+        };
+        for axis in 0..3 {
+            let mut weights = vec![0.0; count];
+            let mut repeats = vec![0_usize; count];
+            let mut mean_um = vec![0.0; count];
+            let mut means = Mat::<f64>::zeros(count, columns);
+            for (row, place) in self.place_of.iter().enumerate() {
+                let index = position[*place];
+                if index == usize::MAX {
+                    continue;
+                }
+                let weight = self.variance_um2(row, axis).map_or(1.0, f64::recip);
+                weights[index] += weight;
+                repeats[index] += 1;
+                mean_um[index] += weight * self.readings_um[row][axis];
+                for (column, term) in terms.iter().enumerate().filter(|(_, term)| term.moves_in_time()) {
+                    means[(index, column)] += weight * at(row, axis, *term);
+                }
+            }
+            for index in 0..count {
+                mean_um[index] /= weights[index];
+                for (column, term) in terms.iter().enumerate() {
+                    if term.moves_in_time() {
+                        means[(index, column)] /= weights[index];
+                    } else {
+                        means[(index, column)] = term.at(&self.volume, places[index], 0.0)[axis];
+                    }
+                }
+            }
+            for (row, place) in self.place_of.iter().enumerate().filter(|_| known) {
+                let index = position[*place];
+                if index == usize::MAX || repeats[index] < 2 {
+                    continue;
+                }
+                let weight = self.variance_um2(row, axis).map_or(1.0, f64::recip);
+                let reading = self.readings_um[row][axis] - mean_um[index];
+                let moving = |column: usize| {
+                    let term: Term = terms[column];
+                    if term.moves_in_time() { at(row, axis, term) - means[(index, column)] } else { 0.0 }
+                };
+                let left = DVector::from_fn(columns, |column, _| moving(column));
+                within.squares += weight * reading * reading;
+                within.readings += weight * reading * &left;
+                within.design += weight * &left * left.transpose();
+            }
+            within.dof += repeats.iter().map(|repeats| repeats.saturating_sub(1)).sum::<usize>();
+            let share = repeats.iter().map(|repeats| if known { 1.0 } else { 1.0 / *repeats as f64 }).collect();
+            let noise_um2 = weights.iter().map(|weight| if known { 1.0 / weight } else { 0.0 }).collect();
+            observed.push(Observed { mean_um, noise_um2, share });
+            design.push(means);
+        }
+        let within = (known && within.dof > 0).then_some(within);
+        Data { places, observed, design, within }
+    }
+}
+
+/// Distinct places, and the place of each row.
+fn distinct(rows: &[[f64; 3]]) -> (Vec<[f64; 3]>, Vec<usize>) {
+    let mut known: HashMap<[i64; 3], usize> = HashMap::new();
+    let mut places = Vec::new();
+    let numbers = rows.iter().map(|row| {
+        let key = row.map(|value| (value / SAME_MM).round() as i64);
+        *known.entry(key).or_insert_with(|| {
+            places.push(*row);
+            places.len() - 1
+        })
+    });
+    let numbers = numbers.collect();
+    (places, numbers)
+}
+
+fn occurrences(place_of: &[usize], places: usize) -> Vec<usize> {
+    let mut seen = vec![0; places];
+    let number = |place: &usize| {
+        seen[*place] += 1;
+        seen[*place]
+    };
+    place_of.iter().map(number).collect()
+}
+
+/// Time from 0 to 1.
+fn scaled(time: Option<&[f64]>, count: usize) -> Vec<f64> {
+    let rows: Vec<f64> = (0..count).map(|row| row as f64).collect();
+    let time = time.unwrap_or(&rows);
+    let first = time.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = time.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    time.iter().map(|at| if last > first { (at - first) / (last - first) } else { 0.0 }).collect()
+}
+
+fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]], has_time: bool) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let mut sizes: Vec<f64> = readings_um.iter().flatten().map(|value| value.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let median = sizes[sizes.len() / 2];
+    let largest = sizes.last().copied().unwrap_or(0.0);
+    if median > LARGE_UM {
+        remarks.push(format!("the median deviation is {median:.0} µm: are `dx_um`, `dy_um`, `dz_um` in nm or places themselves?"));
+    }
+    if largest > 0.0 && largest < SMALL_UM {
+        remarks.push(format!("the largest deviation is {largest:.2e} µm: are `dx_um`, `dy_um`, `dz_um` in mm?"));
+    }
+    let extent = (0..3)
+        .map(|axis| {
+            let each = || places.iter().map(|place| place[axis]);
+            each().fold(f64::NEG_INFINITY, f64::max) - each().fold(f64::INFINITY, f64::min)
+        })
+        .fold(0.0, f64::max);
+    if extent > 0.0 && extent < 10.0 && largest > 1.0 {
+        remarks.push(format!("all places are within {extent:.3} mm: are `x_mm`, `y_mm`, `z_mm` in m?"));
+    }
+    if extent > 50_000.0 {
+        remarks.push(format!("the places are {extent:.0} mm apart: are `x_mm`, `y_mm`, `z_mm` in µm?"));
+    }
+    if !has_time {
+        remarks.push("no column `time_s`: rows count as evenly spaced in time".into());
+    }
+    remarks
+}

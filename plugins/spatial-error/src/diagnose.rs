@@ -1,0 +1,375 @@
+//! The spatial error as a model for the closed loop.
+
+use runout_core::{
+    Error, Result,
+    model::{
+        Effect,
+        closed_loop::Settings,
+        diagnosis::{
+            Added, BiasPerUnit, Blind, Diagnosis, Estimated, Level, Moved, Refused, Step, Unexplained, Verdict,
+        },
+    },
+    points::Points,
+    stage::{NamedValue, Outcome, PointDiagnosis, PointModel},
+};
+
+use crate::{
+    campaign::Campaign,
+    effects::{Candidate, candidates, jumps, missing},
+    likelihood::Prior,
+    noise::Noise,
+    outcome::{Conclusion, residual_um},
+    separate::SpatialError,
+    solve::{Solution, families, prior, solve},
+    terms::Term,
+    trace::{Found, Tracing, is_observable},
+};
+
+/// Effects at most.
+const MOST_ADDED: usize = 12;
+/// An effect of its usual size that is this many times its standard uncertainty, or less, is not seen.
+const VISIBLE: f64 = 3.0;
+
+impl PointModel for SpatialError {
+    fn effects(&self) -> Vec<Effect> {
+        missing().into_iter().map(crate::effects::Missing::effect).collect()
+    }
+
+    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
+        let mut campaign = self.campaign(points)?;
+        self.subtract_known(&mut campaign, settings)?;
+        let before = solve(&campaign, &self.config, &[])?;
+        let candidates = candidates();
+        let jumps = jumps(&campaign);
+        let kinds = missing();
+        let effects = self.effects();
+        let declared = before.terms.clone();
+        let chosen = |candidate: &Candidate| {
+            let wanted = settings.effects.as_ref().is_none_or(|ids| ids.contains(&effects[candidate.effect].id));
+            wanted && !settings.left_out.contains(&candidate.effect)
+        };
+        let observable: Vec<bool> =
+            candidates.iter().map(|candidate| is_observable(&campaign, &declared, &candidate.terms)).collect();
+        let allowed =
+            candidates.iter().zip(&observable).map(|(candidate, observable)| *observable && chosen(candidate)).collect();
+        let families = match self.config.kriging.fixed() {
+            Some(covariance) => vec![covariance.family],
+            None => families(&self.config.kriging),
+        };
+        let given = self.given(&campaign, &before);
+        let mut tracing =
+            Tracing::new(&campaign, declared.clone(), &candidates, &jumps, &families, given.as_ref(), allowed);
+        let found = tracing.run(settings.max_added.min(MOST_ADDED)).unwrap_or_default();
+        let doubts = std::mem::take(&mut tracing.doubts);
+        let (strangers, added): (Vec<Found>, Vec<Found>) = found.into_iter().partition(|found| found.jump);
+        let terms_of = |found: &Found| candidates[found.members[0]].terms.clone();
+        let terms: Vec<Term> = added.iter().flat_map(terms_of).collect();
+        let after = if terms.is_empty() { before.clone() } else { solve(&campaign, &self.config, &terms)? };
+        let name = |candidate: &Candidate| {
+            let effect = &effects[candidate.effect];
+            let order = candidate.order.map_or_else(String::new, |order| format!(" order {order}"));
+            (effect.id.clone(), format!("{}{order}", effect.targets.join(" ")))
+        };
+        let names: Vec<(String, String, Term)> = added
+            .iter()
+            .flat_map(|found| {
+                let candidate = &candidates[found.members[0]];
+                let (id, target) = name(candidate);
+                candidate.terms.iter().map(move |term| (id.clone(), target.clone(), *term))
+            })
+            .collect();
+        let declared_outcome = Conclusion { separator: self, campaign: &campaign, solution: &before, names: &[] }.outcome()?;
+        let mut outcome = Conclusion { separator: self, campaign: &campaign, solution: &after, names: &names }.outcome()?;
+        let unexplained: Vec<Unexplained> =
+            strangers.iter().map(|found| self.unexplained(&campaign, &terms, &jumps[found.members[0]])).collect::<Result<_>>()?;
+        let levels = [&before, &after].map(|solution| level(&campaign, solution));
+        let steps = self.steps(&campaign, &added, &candidates, &levels)?;
+        let mut diagnosis = Diagnosis {
+            verdict: verdict(&campaign, added.is_empty(), unexplained.is_empty()),
+            before: levels[0].clone(),
+            added: added
+                .iter()
+                .zip(steps.windows(2))
+                .map(|(found, pair)| {
+                    let effect = &effects[candidates[found.members[0]].effect];
+                    let others = found.members[1..].iter().map(|member| {
+                        let (id, target) = name(&candidates[*member]);
+                        format!("{id} {target}")
+                    });
+                    let confounded_with: Vec<String> = others.collect();
+                    let alone = confounded_with.is_empty();
+                    Added {
+                        effect: effect.id.clone(),
+                        targets: effect.targets.clone(),
+                        told_apart_by: (!alone).then(|| TOLD_APART_BY.to_owned()),
+                        confounded_with,
+                        parameters: parameters(&candidates[found.members[0]], effect, &after, alone),
+                        change: None,
+                        residual_rms_um: Step { before: Some(pair[0].residual_rms_um), after: Some(pair[1].residual_rms_um) },
+                        held_out_rms_um: Step { before: pair[0].held_out_rms_um, after: pair[1].held_out_rms_um },
+                        held_out_expected_rms_um: pair[1].held_out_expected_rms_um,
+                        delta_bic: found.gain.bic,
+                        p_value: found.gain.p,
+                    }
+                })
+                .collect(),
+            after: levels[1].clone(),
+            nothing_separated: false,
+            moved: moved(&declared_outcome, &outcome),
+            unexplained,
+            blind_to: blind(&campaign, &before, &candidates, &observable, &effects, &kinds.len()),
+            refused: doubts
+                .into_iter()
+                .map(|doubt| {
+                    let effect = &effects[candidates[doubt.candidate].effect];
+                    Refused { effect: effect.id.clone(), targets: effect.targets.clone(), reason: doubt.reason }
+                })
+                .collect(),
+            lost_orders: None,
+            truth: None,
+            warnings: Vec::new(),
+            outputs: Vec::new(),
+        };
+        diagnosis.warnings.append(&mut outcome.remarks);
+        Ok(PointDiagnosis { diagnosis, after: outcome })
+    }
+}
+
+/// What separates effects that one layout confounds.
+const TOLD_APART_BY: &str = "a second campaign with another `tool_mm`, or in another order of the places";
+
+impl SpatialError {
+    /// Takes effects that are declared with their values out of the readings.
+    fn subtract_known(&self, campaign: &mut Campaign, settings: &Settings) -> Result<()> {
+        let kinds = missing();
+        for setting in &settings.known {
+            let kind = kinds[setting.effect];
+            let (order, values) = match (kind.has_order(), setting.values.split_first()) {
+                (true, Some((order, rest))) => {
+                    let orders = kind.orders();
+                    let is_one = order.fract() == 0.0 && *order >= *orders.start() as f64 && *order <= *orders.end() as f64;
+                    if !is_one {
+                        let effect = kind.effect();
+                        let problem = format!("its order is a whole number from {} to {}, found {order}", orders.start(), orders.end());
+                        return Err(Error::new("take out the known effect", effect.name(), problem));
+                    }
+                    (*order as usize, rest.to_vec())
+                }
+                _ => (1, setting.values.clone()),
+            };
+            for (term, value) in kind.terms(order).into_iter().zip(values) {
+                for row in 0..campaign.place_of.len() {
+                    let place = campaign.places_mm[campaign.place_of[row]];
+                    let adds = term.at(&campaign.volume, place, campaign.time[row]);
+                    campaign.readings_um[row].iter_mut().zip(adds).for_each(|(reading, adds)| *reading -= value * adds);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The covariance that is given, as a prior that leaves nothing free.
+    fn given(&self, campaign: &Campaign, before: &Solution) -> Option<Prior> {
+        let covariance = self.config.kriging.fixed()?;
+        let mut prior = prior(campaign, &before.data);
+        for (index, (centre, precision)) in prior.centre.iter_mut().zip(prior.precision.iter_mut()).enumerate() {
+            *centre = match index % crate::likelihood::PARAMETERS {
+                0 => covariance.sill_um,
+                4 => covariance.nugget_um.max(1e-12),
+                axis => covariance.range_mm[axis - 1],
+            }
+            .ln();
+            *precision = f64::INFINITY;
+        }
+        Some(prior)
+    }
+
+    /// Size and place of a jump.
+    fn unexplained(&self, campaign: &Campaign, terms: &[Term], jump: &crate::effects::Jump) -> Result<Unexplained> {
+        let all: Vec<Term> = terms.iter().chain(&jump.terms).copied().collect();
+        let solution = solve(campaign, &self.config, &all)?;
+        let mut sizes = [f64::NAN; 3];
+        let mut squares = 0.0;
+        for (size, wanted) in sizes.iter_mut().zip(&jump.terms) {
+            let Some(column) = solution.terms.iter().position(|term| term == wanted) else { continue };
+            *size = solution.joint.trend[column];
+            let adds = campaign.places_mm.iter().map(|place| wanted.at(&campaign.volume, *place, 0.0));
+            squares += adds.flatten().map(|adds| (adds * *size).powi(2)).sum::<f64>();
+        }
+        let [x, y, z] = sizes;
+        Ok(Unexplained {
+            sensor: None,
+            setup: None,
+            orders: [0, 0],
+            rms_um: (squares / (3 * campaign.places_mm.len()) as f64).sqrt(),
+            place: format!("a jump by ({x:.1}, {y:.1}, {z:.1}) µm {}", jump.place),
+        })
+    }
+
+    /// Levels after each effect.
+    fn steps(
+        &self,
+        campaign: &Campaign,
+        added: &[Found],
+        candidates: &[Candidate],
+        levels: &[Level; 2],
+    ) -> Result<Vec<Level>> {
+        let mut steps = vec![levels[0].clone()];
+        let mut terms = Vec::new();
+        for (index, found) in added.iter().enumerate() {
+            terms.extend(candidates[found.members[0]].terms.iter().copied());
+            if index + 1 == added.len() {
+                steps.push(levels[1].clone());
+            } else {
+                steps.push(level(campaign, &solve(campaign, &self.config, &terms)?));
+            }
+        }
+        Ok(steps)
+    }
+}
+
+fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone: bool) -> Vec<Estimated> {
+    let names = &effect.parameters;
+    let mut all = Vec::new();
+    if let Some(order) = candidate.order {
+        all.push(Estimated { name: names[0].name.clone(), value: order as f64, std: None, unit: names[0].unit.clone() });
+    }
+    let rest = &names[usize::from(candidate.order.is_some())..];
+    for (parameter, wanted) in rest.iter().zip(&candidate.terms) {
+        let Some(column) = solution.terms.iter().position(|term| term == wanted) else { continue };
+        let std = solution.joint.trend_covariance[(column, column)].sqrt();
+        all.push(Estimated {
+            name: parameter.name.clone(),
+            value: solution.joint.trend[column],
+            std: alone.then_some(std),
+            unit: parameter.unit.clone(),
+        });
+    }
+    all
+}
+
+/// How far a fit is from its readings.
+fn level(campaign: &Campaign, solution: &Solution) -> Level {
+    let residual = residual_um(campaign, solution);
+    let readings = (3 * residual.len()) as f64;
+    let squares: f64 = residual.iter().flatten().map(|left| left * left).sum();
+    let left_out = solution.left_out();
+    let each = || left_out.iter().flatten().filter(|one| one.std_um.is_finite());
+    let count = each().count().max(1) as f64;
+    let known = campaign.noise != Noise::Unknown;
+    let expected = known.then(|| expected_squares(campaign, solution)).flatten();
+    let finite = |value: f64| value.is_finite().then_some(value);
+    Level {
+        residual_rms_um: (squares / readings).sqrt(),
+        degrees_of_freedom: (3 * residual.len()).saturating_sub(solution.terms.len()),
+        noise_floor_um: expected.and_then(|expected| finite((expected / readings).sqrt())),
+        chi2_per_dof: expected.and_then(|expected| finite(squares / expected)),
+        held_out_rms_um: finite((each().map(|one| one.residual_um.powi(2)).sum::<f64>() / count).sqrt()),
+        held_out_expected_rms_um: known
+            .then(|| (each().map(|one| one.std_um.powi(2)).sum::<f64>() / count).sqrt())
+            .and_then(finite),
+        unit: None,
+        orders: None,
+    }
+}
+
+/// What the noise lets the squares of the residual be: of the mean at a place v²·P, of its repeats their scatter. `None` where
+/// predictions use neighbours.
+fn expected_squares(campaign: &Campaign, solution: &Solution) -> Option<f64> {
+    if solution.fitted.is_some() {
+        return None;
+    }
+    let projections = solution.projections();
+    let mut repeats = vec![0.0; campaign.places_mm.len()];
+    campaign.place_of.iter().for_each(|place| repeats[*place] += 1.0);
+    let mut expected = 0.0;
+    for axis in 0..3 {
+        for (place, projection) in projections.iter().enumerate() {
+            let noise = solution.noise_um2(campaign, place, axis);
+            expected += repeats[place] * noise * noise * projection[(axis, axis)];
+            // Scatter within a place: (n − 1)·σ², and σ² is n times the variance of the mean.
+            expected += (repeats[place] - 1.0) * repeats[place] * noise;
+        }
+    }
+    Some(expected)
+}
+
+fn verdict(campaign: &Campaign, nothing_added: bool, nothing_strange: bool) -> Verdict {
+    match (nothing_strange, campaign.noise != Noise::Unknown, nothing_added) {
+        (false, ..) => Verdict::Unexplained,
+        (true, true, true) => Verdict::AtNoiseFloor,
+        (true, true, false) => Verdict::Explained,
+        (true, false, true) => Verdict::NothingFound,
+        (true, false, false) => Verdict::Improved,
+    }
+}
+
+/// Effects that these places do not show, at any order.
+fn blind(
+    campaign: &Campaign,
+    solution: &Solution,
+    candidates: &[Candidate],
+    observable: &[bool],
+    effects: &[Effect],
+    kinds: &usize,
+) -> Vec<Blind> {
+    let all: Vec<Term> = candidates.iter().flat_map(|candidate| candidate.terms.iter().copied()).collect();
+    let terms: Vec<Term> = solution.terms.iter().chain(&all).copied().collect();
+    let (normal, _) = solution.joint.equations(&campaign.data(&terms, solution.fitted.as_deref()));
+    let fitted = solution.terms.len();
+    let mut blind = Vec::new();
+    for effect in 0..*kinds {
+        let tolerance = effects[effect].parameters.last().map_or(1.0, |parameter| parameter.tolerance);
+        let mut visible = false;
+        let mut largest: f64 = 0.0;
+        let mut first = fitted;
+        for (candidate, observable) in candidates.iter().zip(observable) {
+            let columns = first..first + candidate.terms.len();
+            first = columns.end;
+            if candidate.effect != effect {
+                continue;
+            }
+            for (column, term) in columns.zip(&candidate.terms) {
+                let across = normal.view((0, column), (fitted, 1)).into_owned();
+                let taken = (across.transpose() * &solution.joint.trend_covariance * &across)[(0, 0)];
+                let information = normal[(column, column)] - taken;
+                visible |= *observable && information.max(0.0).sqrt() * tolerance > VISIBLE;
+                let adds = campaign.places_mm.iter().map(|place| term.at(&campaign.volume, *place, 1.0));
+                let squares: f64 = adds.flatten().map(|adds| adds * adds).sum();
+                largest = largest.max((squares / (3 * campaign.places_mm.len()) as f64).sqrt());
+            }
+        }
+        if !visible {
+            let unit = effects[effect].parameters.last().map_or("", |parameter| &parameter.unit);
+            // Without an arm it displaces no measured point, and another tool by 1 nm per mm of its offset.
+            let bias_per_unit = if largest > 0.0 {
+                BiasPerUnit { value: largest, unit: format!("um/({unit})"), on: "readings".into() }
+            } else {
+                BiasPerUnit { value: 0.1, unit: format!("um/({unit})"), on: "a point at another tool offset, 100 mm away".into() }
+            };
+            blind.push(Blind { effect: effects[effect].id.clone(), targets: effects[effect].targets.clone(), bias_per_unit });
+        }
+    }
+    blind
+}
+
+/// Values that both results have.
+fn moved(before: &Outcome, after: &Outcome) -> Vec<Moved> {
+    let number = |values: &[NamedValue], like: &NamedValue| {
+        values.iter().find(|one| one.symbol == like.symbol && one.of == like.of).and_then(|one| one.value)
+    };
+    let of = |value: &NamedValue| {
+        Some(Moved {
+            value: value.symbol.clone(),
+            section: value.of.clone(),
+            before: number(&before.values, value)?,
+            after: value.value?,
+            std: value.std,
+            unit: value.unit.clone(),
+            reference: None,
+            filter: None,
+            lost_orders: Vec::new(),
+        })
+    };
+    after.values.iter().filter_map(of).collect()
+}

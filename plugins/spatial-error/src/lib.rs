@@ -1,0 +1,38 @@
+//! Spatial error of a machine tool: kriging of what a tracker reads over the travel of the axes, and its compensation.
+//!
+//! The separator `spatial-error` fits the placement of the tracker and a random field together, predicts the error anywhere with its
+//! standard uncertainty, and computes what the axes have to add. Its loop finds errors of single axes. The simulator of the same
+//! name moves a chain of rigid bodies.
+
+mod campaign;
+pub mod compensate;
+mod config;
+pub mod correlation;
+mod diagnose;
+mod effects;
+pub mod joint;
+pub mod likelihood;
+mod neighbours;
+mod noise;
+mod outcome;
+mod query;
+mod remarks;
+mod separate;
+pub mod simulate;
+mod solve;
+mod span;
+mod terms;
+mod trace;
+mod variogram;
+
+use runout_core::pipeline::registry::{Plugin, Registry};
+
+pub use config::{Compensate, Declared, Kriging, Letter, SpatialErrorConfig, Variogram};
+pub use query::Query;
+pub use separate::SpatialError;
+
+/// Adds the separator and the simulator `spatial-error`.
+pub fn register(registry: &mut Registry) {
+    registry.separators.add(Plugin::of::<SpatialErrorConfig>());
+    registry.simulators.add(Plugin::of::<simulate::Scenario>());
+}

@@ -1,0 +1,171 @@
+//! What the user should know of a result.
+
+use rand::{SeedableRng, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{
+    campaign::Campaign,
+    joint::{Joint, Predictor, Query},
+    neighbours::Neighbours,
+    noise::Noise,
+    outcome::{At, COMPONENTS, Conclusion},
+    solve::{LeftOut, Solution, estimated_from},
+    terms::Term,
+};
+
+/// Places on which predictions from neighbours are compared with the full solution, and how many are predicted.
+const COMPARED: [usize; 2] = [1200, 200];
+/// A left-out residual of more than this many standard deviations is worth a word.
+const FAR: f64 = 5.5;
+
+/// All remarks.
+pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[LeftOut; 3]]) -> Vec<String> {
+    let Conclusion { separator, campaign, solution, .. } = conclusion;
+    let mut all = campaign.remarks.clone();
+    all.extend(of_span(campaign, solution, queries));
+    all.push(of_field(campaign, solution));
+    all.extend(of_noise(campaign));
+    all.extend(of_numbers(campaign, solution));
+    let extrapolated = queries.iter().filter(|query| query.extrapolated).count();
+    if extrapolated > 0 {
+        all.push(format!("{extrapolated} of {} predictions are extrapolations, which the table flags", queries.len()));
+    }
+    let limited = queries.iter().filter(|query| query.correction.as_ref().is_some_and(|one| one.limited)).count();
+    if limited > 0 {
+        all.push(format!("{limited} of {} corrections are at the limit of an axis: an error remains there", queries.len()));
+    }
+    if separator.config.kriging.fixed().is_some() {
+        all.push("the covariance is given, not estimated: standard uncertainties hold as far as it does".into());
+    }
+    all.extend(far_readings(campaign, left_out));
+    all
+}
+
+/// Places that the others do not predict by far.
+fn far_readings(campaign: &Campaign, left_out: &[[LeftOut; 3]]) -> Option<String> {
+    let size = |one: &[LeftOut; 3]| {
+        one.iter().map(|one| (one.residual_um / one.std_um).abs()).filter(|size| size.is_finite()).fold(0.0, f64::max)
+    };
+    let far: Vec<usize> = (0..left_out.len()).filter(|place| size(&left_out[*place]) > FAR).collect();
+    let worst = far.iter().copied().max_by(|a, b| size(&left_out[*a]).total_cmp(&size(&left_out[*b])))?;
+    let row = campaign.place_of.iter().position(|place| *place == worst).unwrap_or(0);
+    let [x, y, z] = campaign.places_mm[worst];
+    Some(format!(
+        "{} places are more than {FAR} standard deviations from what the others predict, the worst by {:.0} at ({x}, {y}, {z}) mm, row \
+         {}: a bad reading, or an error that is not smooth",
+        far.len(),
+        size(&left_out[worst]),
+        row + 1
+    ))
+}
+
+fn of_span(campaign: &Campaign, solution: &Solution, queries: &[At]) -> Vec<String> {
+    let mut all = Vec::new();
+    let what = match campaign.span.dimensions() {
+        0 => Some("at one point"),
+        1 => Some("on one line"),
+        2 => Some("in one plane"),
+        _ => None,
+    };
+    if let Some(what) = what {
+        let lost = queries.iter().filter(|query| query.correction.is_none()).count();
+        all.push(format!(
+            "all places are {what}: nothing is predicted off it, and ranges across it are not observable ({lost} predictions are lost)"
+        ));
+    }
+    if !solution.lost.is_empty() {
+        let names: Vec<String> = solution.lost.iter().map(|term| name(*term)).collect();
+        all.push(format!("the places do not determine {}", names.join(", ")));
+    }
+    all
+}
+
+fn name(term: Term) -> String {
+    let letters = ["x", "y", "z"];
+    match term {
+        Term::Shift(axis) => format!("the displacement of the placement along {}", letters[axis]),
+        Term::Turn(axis) => format!("the rotation of the placement about {}", letters[axis]),
+        _ => "an effect".into(),
+    }
+}
+
+fn of_field(campaign: &Campaign, solution: &Solution) -> String {
+    let sizes: Vec<String> =
+        (0..3).map(|axis| format!("{} {:.2}", COMPONENTS[axis], solution.covariances[axis].sill_um)).collect();
+    let nuggets: Vec<String> =
+        (0..3).map(|axis| format!("{} {:.2}", COMPONENTS[axis], solution.covariances[axis].nugget_um)).collect();
+    let what = if Solution::nugget_counts(campaign) { "from place to place beyond noise" } else { "nugget, noise included" };
+    format!(
+        "smooth field beside the trend, {}: standard deviation {} µm; {what}: {} µm",
+        solution.family.name(),
+        sizes.join(", "),
+        nuggets.join(", ")
+    )
+}
+
+fn of_noise(campaign: &Campaign) -> Option<String> {
+    match &campaign.noise {
+        Noise::Repeats { std_um: [x, y, z], dof } => Some(format!(
+            "noise of one reading from repeats, after a common smooth drift: {x:.2}, {y:.2}, {z:.2} µm ({dof} degrees of freedom each)"
+        )),
+        Noise::Unknown => Some("the noise is not known: it is in the nugget, which predictions do not include".into()),
+        Noise::Column(_) | Noise::Stated(_) => {
+            let known = crate::noise::of_repeats(
+                &campaign.place_of,
+                campaign.places_mm.len(),
+                &campaign.readings_um,
+                &campaign.time,
+            );
+            let Noise::Repeats { std_um, .. } = known else { return None };
+            let ratios = [0, 1, 2].map(|axis| std_um[axis] / campaign.noise_um(axis));
+            let worst = ratios.into_iter().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs())).unwrap_or(1.0);
+            (!(0.6..1.7).contains(&worst))
+                .then(|| format!("repeats scatter {worst:.2} times as much as the stated uncertainty: is `std_um` right?"))
+        }
+    }
+}
+
+fn of_numbers(campaign: &Campaign, solution: &Solution) -> Vec<String> {
+    let mut all = Vec::new();
+    let count = campaign.places_mm.len();
+    if let (Some(some), Some(_)) = (estimated_from(campaign), &solution.estimate) {
+        all.push(format!("the covariance is estimated from {} of {count} places, drawn at random with close pairs", some.len()));
+    }
+    if let Some(fitted) = &solution.fitted {
+        all.push(format!("{count} places: predictions use the 96 nearest ones, and the trend {} places", fitted.len()));
+        all.extend(against_full(campaign, solution));
+    }
+    all
+}
+
+/// Predictions from neighbours beside the full solution, both of the same places.
+fn against_full(campaign: &Campaign, solution: &Solution) -> Option<String> {
+    let mut order: Vec<usize> = (0..campaign.places_mm.len()).collect();
+    order.shuffle(&mut ChaCha8Rng::seed_from_u64(2));
+    let [known, asked] = COMPARED;
+    let some = order.get(..known.min(order.len() / 2))?;
+    let queries: Vec<[f64; 3]> = order[some.len()..].iter().take(asked).map(|place| campaign.places_mm[*place]).collect();
+    let data = campaign.data(&solution.terms, Some(some));
+    let joint = Joint::new(&data, &solution.covariances)?;
+    let near = Neighbours::new(&data, &solution.covariances);
+    let predictor = Predictor::new(&joint, &data.places, true);
+    let (mut squares, mut worst, mut ratio) = (0.0, 0.0_f64, 1.0_f64);
+    for axis in 0..3 {
+        let design = solution.design(campaign, &queries, axis);
+        let nugget_counts = Solution::nugget_counts(campaign);
+        let query = Query { places: &queries, design: design.as_ref(), nugget_counts };
+        for (full, part) in predictor.predict(axis, &query).iter().zip(near.predict(&data, &joint, axis, &query)) {
+            let difference = (full.mean_um - part.mean_um).abs();
+            squares += difference * difference;
+            worst = worst.max(difference);
+            ratio = ratio.max((part.variance_um2 / full.variance_um2).sqrt());
+        }
+    }
+    let rms = (squares / (3 * queries.len()) as f64).sqrt();
+    Some(format!(
+        "beside the full solution of {} of these places, predictions from neighbours differ by {rms:.2e} µm rms and {worst:.2e} µm at \
+         most, and their standard uncertainty is up to {:.2} % larger",
+        some.len(),
+        100.0 * (ratio - 1.0)
+    ))
+}

@@ -1,0 +1,101 @@
+//! The separator `spatial-error`.
+
+use runout_core::{
+    Result,
+    pipeline::{
+        error::Fault,
+        registry::{Context, StageConfig},
+    },
+    points::{PointColumn, Points},
+    stage::{Outcome, PointModel, PointSeparator, Separator},
+    table::TableSpec,
+};
+
+use crate::{
+    campaign::{COLUMNS, Campaign},
+    compensate::Chain,
+    config::{Declared, SpatialErrorConfig},
+    outcome::{Conclusion, tables},
+    query::Query,
+    solve::solve,
+};
+
+/// Universal kriging of the spatial error, and its compensation.
+#[derive(Debug, Clone)]
+pub struct SpatialError {
+    pub(crate) config: SpatialErrorConfig,
+    pub(crate) chain: Chain,
+    pub(crate) query: Query,
+}
+
+impl StageConfig for SpatialErrorConfig {
+    type Stage = Separator;
+
+    const NAME: &'static str = "spatial-error";
+    const ABOUT: &'static str = "spatial error of a machine by kriging, and its compensation";
+
+    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        Ok(Separator::Points(Box::new(self.separator(context)?)))
+    }
+}
+
+impl SpatialErrorConfig {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// The first that cannot be, with its key.
+    pub fn separator(self, context: &Context) -> std::result::Result<SpatialError, Fault> {
+        let chain = self.checked(context)?;
+        let query = self.query.resolved(context);
+        Ok(SpatialError { config: self, chain, query })
+    }
+}
+
+impl PointSeparator for SpatialError {
+    fn columns(&self) -> Vec<PointColumn> {
+        COLUMNS.into()
+    }
+
+    fn tables(&self) -> Vec<TableSpec> {
+        tables(&self.chain)
+    }
+
+    fn separate(&self, points: &Points) -> Result<Outcome> {
+        let campaign = self.campaign(points)?;
+        let solution = solve(&campaign, &self.config, &[])?;
+        Conclusion { separator: self, campaign: &campaign, solution: &solution, names: &[] }.outcome()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![
+            "with one pass, a drift in time is confounded with the errors of the axis that moves slowest".to_owned(),
+            "the error of the machine is known but for a displacement and a rotation, which are those of the tracker too".to_owned(),
+        ];
+        if self.config.std_um.is_none() {
+            notes.push("without repeats, `std_um` or a column `std_um`, noise and what varies from place to place are one: the nugget".into());
+        }
+        if self.config.tool_mm == [0.0; 3] {
+            let [.., last] = self.config.chain_axes();
+            let (axis, before) = (["X", "Y", "Z"][last], ["X", "Y", "Z"][self.config.chain_axes()[1]]);
+            notes.push(format!(
+                "with `tool_mm` 0, rotations EA{axis}, EB{axis}, EC{axis} and E{}{before} displace no measured point: they are not \
+                 observable",
+                ["A", "B", "C"][last]
+            ));
+        }
+        if self.config.declared.contains(&Declared::Translation) && self.config.declared.contains(&Declared::Rigid) {
+            notes.push("`rigid` holds `translation`".into());
+        }
+        notes
+    }
+
+    fn model(&self) -> Option<&dyn PointModel> {
+        Some(self)
+    }
+}
+
+impl SpatialError {
+    pub(crate) fn campaign(&self, points: &Points) -> Result<Campaign> {
+        Campaign::of(points, self.config.std_um, self.config.tool_mm, self.config.chain_axes())
+    }
+}
