@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// `[separate] plugin = "spatial-error"`.
-#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpatialErrorConfig {
     /// What is always fitted: `rigid` (how the tracker stood: three displacements, three rotations), `translation` (ordinary
@@ -41,6 +41,20 @@ pub struct SpatialErrorConfig {
     /// nugget is noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std_um: Option<f64>,
+}
+
+impl Default for SpatialErrorConfig {
+    fn default() -> Self {
+        Self {
+            declared: rigid(),
+            kriging: Kriging::default(),
+            tool_mm: [0.0; 3],
+            chain: xyz(),
+            query: Query::default(),
+            compensate: Compensate::default(),
+            std_um: None,
+        }
+    }
 }
 
 /// What is always fitted.

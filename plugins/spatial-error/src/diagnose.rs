@@ -117,7 +117,7 @@ impl PointModel for SpatialError {
             nothing_separated: false,
             moved: moved(&declared_outcome, &outcome),
             unexplained,
-            blind_to: blind(&campaign, &before, &candidates, &observable, &effects, &kinds.len()),
+            blind_to: blind(&campaign, &before, &candidates, &observable, &effects, kinds.len()),
             refused: doubts
                 .into_iter()
                 .map(|doubt| {
@@ -311,14 +311,14 @@ fn blind(
     candidates: &[Candidate],
     observable: &[bool],
     effects: &[Effect],
-    kinds: &usize,
+    kinds: usize,
 ) -> Vec<Blind> {
     let all: Vec<Term> = candidates.iter().flat_map(|candidate| candidate.terms.iter().copied()).collect();
     let terms: Vec<Term> = solution.terms.iter().chain(&all).copied().collect();
     let (normal, _) = solution.joint.equations(&campaign.data(&terms, solution.fitted.as_deref()));
     let fitted = solution.terms.len();
     let mut blind = Vec::new();
-    for effect in 0..*kinds {
+    for effect in 0..kinds {
         let tolerance = effects[effect].parameters.last().map_or(1.0, |parameter| parameter.tolerance);
         let mut visible = false;
         let mut largest: f64 = 0.0;
