@@ -18,6 +18,7 @@ pub fn registry() -> Registry {
         runout_rotary_axis::register,
         runout_touch_probe::register,
         runout_rotor::register,
+        runout_spatial_error::register,
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,

@@ -21,6 +21,7 @@ const ROUNDNESS: [[&str; 2]; 6] = [
     ["cv2", "opencv-python-headless"],
     ["shapely"; 2],
 ];
+const KRIGING: [[&str; 2]; 4] = [["numpy"; 2], ["scipy"; 2], ["sklearn", "scikit-learn"], ["pykrige"; 2]];
 /// Samples a turn and turns of a section, as in the record that the peers are measured with.
 const SAMPLES_PER_REV: usize = 2560;
 const TURNS: usize = 120;
@@ -168,6 +169,16 @@ pub fn roundness() -> Outcome {
     let mut compare = Command::new(python(&ROUNDNESS)?);
     compare.arg("-B").arg("benchmarks/roundness/compare.py");
     run(compare.arg(target().join("release/examples/reference_circles")).arg(&peers).arg(target().join("bench")))
+}
+
+/// Times predictions of 100 000 places from 1000 of runout, scikit-learn and pykrige, one thread; `words` may hold other numbers.
+pub fn kriging(words: &[&str]) -> Outcome {
+    run(&mut cargo(&["build", "--release", "--package", "runout-spatial-error", "--example", "spatial_error_bench"])?)?;
+    let Some(peers) = peers(&["kriging_bench.py", "common.py"]) else { return Ok(()) };
+    let mut compare = Command::new(python(&KRIGING)?);
+    compare.arg("-B").arg("benchmarks/kriging/compare.py");
+    compare.arg(target().join("release/examples/spatial_error_bench")).arg(&peers).arg(target().join("bench"));
+    run(compare.args(words))
 }
 
 /// The folder of the peers, if it holds these files; says why not.

@@ -7,7 +7,17 @@ use crate::{
     setup,
 };
 
-const PYTHON_PACKAGES: [&str; 6] = ["numpy", "scipy", "h5py", "pyarrow", "trimesh", "pymeshlab"];
+/// Modules, and the packages that bring them.
+const PYTHON_PACKAGES: [[&str; 2]; 8] = [
+    ["numpy"; 2],
+    ["scipy"; 2],
+    ["h5py"; 2],
+    ["pyarrow"; 2],
+    ["trimesh"; 2],
+    ["pymeshlab"; 2],
+    ["sklearn", "scikit-learn"],
+    ["pykrige"; 2],
+];
 /// The Khronos validator's releases are pre-releases to npm: the version has to be named.
 const NODE_PACKAGES: [&str; 1] = ["gltf-validator@2.0.0-dev.3.10"];
 
@@ -16,8 +26,9 @@ pub fn equip(tests: &mut Command) -> Outcome {
     let python = tools().join("python-venv");
     setup::python_environment(&python)?;
     let interpreter = python.join("bin/python");
-    if answer(&interpreter, &["-c", &format!("import {}", PYTHON_PACKAGES.join(", "))]).is_none() {
-        run(Command::new(python.join("bin/pip")).args(["install", "--quiet"]).args(PYTHON_PACKAGES))?;
+    let [modules, packages] = [0, 1].map(|part| PYTHON_PACKAGES.map(|names| names[part]));
+    if answer(&interpreter, &["-c", &format!("import {}", modules.join(", "))]).is_none() {
+        run(Command::new(python.join("bin/pip")).args(["install", "--quiet"]).args(packages))?;
     }
     let node = tools().join("node");
     if answer("node", &["--version"]).is_none() {

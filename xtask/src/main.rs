@@ -39,6 +39,8 @@ cargo xtask COMMAND
                 each stage and the peers' side by side, one thread; the table goes into benchmarks/README.md
   bench-roundness
                 time reference circles of 2560 and 36 000 points beside SciPy and others
+  bench-kriging [POINTS QUERIES ROUNDS]
+                time predictions from 1000 measured points beside scikit-learn and pykrige, one thread
   areal-peers [RINGS POINTS ROUNDS]
                 print areal and profile values of one surface beside surfalize's, with both times
   record-results FOLDER [PROGRAM]
@@ -89,6 +91,7 @@ fn main() -> ExitCode {
         ["bench-peers", ref rest @ ..] => bench::all_peers(rest),
         ["bench-stages", ref rest @ ..] => bench::stages(rest),
         ["bench-roundness"] => bench::roundness(),
+        ["bench-kriging", ref rest @ ..] => bench::kriging(rest),
         ["studies", ref arguments @ ..] => chores::studies(arguments),
         _ => {
             say(&format!("unknown command `{}`\n\n{HELP}", words.join(" ")));
