@@ -1,4 +1,4 @@
-//! Studies of simulated machines: `coverage [MACHINES [SEED]]`, `blind [CAMPAIGNS [SEED]]`.
+//! Studies of simulated machines: `coverage [MACHINES [SEED]]`, `blind [CAMPAIGNS [SEED]]`, `many [PLACES]`.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program that prints figures")]
 
@@ -14,6 +14,7 @@ fn main() {
     match words.first().map(String::as_str) {
         Some("coverage") => study::coverage(number(1, 100) as usize, number(2, 1)).print(),
         Some("blind") => study::blind(number(1, 100) as usize, number(2, 1)).print(),
-        _ => println!("spatial_error_study coverage [MACHINES [SEED]] | blind [CAMPAIGNS [SEED]]"),
+        Some("many") => study::many(number(1, 10_000) as usize),
+        _ => println!("spatial_error_study coverage [MACHINES [SEED]] | blind [CAMPAIGNS [SEED]] | many [PLACES]"),
     }
 }

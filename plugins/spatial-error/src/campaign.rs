@@ -149,6 +149,8 @@ impl Campaign {
         let places: Vec<[f64; 3]> = chosen.iter().map(|place| self.places_mm[*place]).collect();
         let (count, columns) = (chosen.len(), terms.len());
         let known = self.noise != Noise::Unknown;
+        // Only these differ between the readings of one place.
+        let moving: Vec<usize> = (0..columns).filter(|column| terms[*column].moves_in_time()).collect();
         let mut within = Within {
             design: DMatrix::zeros(columns, columns),
             readings: DVector::zeros(columns),
@@ -195,14 +197,15 @@ impl Campaign {
                 }
                 let weight = self.variance_um2(row, axis).map_or(1.0, f64::recip);
                 let reading = self.readings_um[row][axis] - mean_um[index];
-                let moving = |column: usize| {
-                    let term: Term = terms[column];
-                    if term.moves_in_time() { at(row, axis, term) - means[(index, column)] } else { 0.0 }
-                };
-                let left = DVector::from_fn(columns, |column, _| moving(column));
+                let left: Vec<f64> =
+                    moving.iter().map(|column| at(row, axis, terms[*column]) - means[(index, *column)]).collect();
                 within.squares += weight * reading * reading;
-                within.readings += weight * reading * &left;
-                within.design += weight * &left * left.transpose();
+                for (one, first) in left.iter().zip(&moving) {
+                    within.readings[*first] += weight * reading * one;
+                    for (other, second) in left.iter().zip(&moving) {
+                        within.design[(*first, *second)] += weight * one * other;
+                    }
+                }
             }
             within.dof += repeats.iter().map(|repeats| repeats.saturating_sub(1)).sum::<usize>();
             let share = repeats.iter().map(|repeats| if known { 1.0 } else { 1.0 / *repeats as f64 }).collect();

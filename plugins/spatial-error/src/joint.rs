@@ -294,6 +294,7 @@ impl<'a> Predictor<'a> {
         };
         let count = known.cloud.len();
         let same = if query.nugget_counts && nugget > 0.0 { self.same(query.places) } else { Vec::new() };
+        let alpha = faer::ColRef::from_slice(&known.alpha);
         let mut block = Mat::<f64>::zeros(count, BLOCK);
         let mut white = Mat::<f64>::zeros(count, BLOCK);
         let mut predicted = Vec::with_capacity(queries.len());
@@ -311,12 +312,14 @@ impl<'a> Predictor<'a> {
                 block[(*place, row - start)] += nugget;
             }
             multiply_lower(inverse.as_ref(), block.rb(), white.rb_mut());
+            let mut means = Mat::<f64>::zeros(width, 1);
+            matmul(means.as_mut(), Accum::Replace, block.rb().transpose(), alpha.as_mat(), 1.0, Par::Seq);
             // L⁻¹X against L⁻¹k: what the trend's uncertainty adds.
             let mut shared = Mat::<f64>::zeros(columns, width);
             matmul(shared.as_mut(), Accum::Replace, known.white.transpose(), white.rb(), 1.0, Par::Seq);
             for column in 0..width {
                 let row = start + column;
-                let mean: f64 = (0..count).map(|place| block[(place, column)] * known.alpha[place]).sum();
+                let mean = means[(column, 0)];
                 let trend: f64 = (0..columns).map(|at| query.design[(row, at)] * self.joint.trend[at]).sum();
                 let left = DVector::from_fn(columns, |at, _| query.design[(row, at)] - shared[(at, column)]);
                 let of_trend = if columns == 0 { 0.0 } else { (&self.joint.trend_covariance * &left).dot(&left) };

@@ -27,7 +27,7 @@ pub const PARAMETERS: usize = 5;
 /// Steps of an estimate at most.
 const STEPS: usize = 60;
 /// A step that raises ln of the likelihood by less is the last.
-const ENOUGH: f64 = 1e-4;
+const ENOUGH: f64 = 1e-3;
 /// Longest step of a logarithm.
 const LONGEST: f64 = 1.5;
 

@@ -233,7 +233,7 @@ fn a_query_that_cannot_be_is_refused() {
         ("x_mm,y_mm,z_mm\n1,2,3\n1,two,3\n", "row 2 of the column `y_mm`"),
         ("x_mm,y_mm,z_mm\n1,2,nan\n", "row 1 of the column `z_mm`"),
         ("x_mm,y_mm,z_mm\n", "no place"),
-        ("x_mm,y_mm,z_mm\n1,2\n", "unequal"),
+        ("x_mm,y_mm,z_mm\n1,2\n", "2 fields"),
     ] {
         std::fs::write(&path, content).unwrap();
         let text = message(&good, &format!("query = {{ path = {path:?} }}"));

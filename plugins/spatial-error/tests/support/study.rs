@@ -463,3 +463,24 @@ fn judge(
         sum.misses.push(format!("more than there is: {said}"));
     }
 }
+
+/// One campaign of many places: seconds, memory, and what is said of the approximation.
+pub fn many(count: usize) {
+    let layout = Layout::Scattered { from_mm: [0.0; 3], to_mm: TRAVEL_MM, count };
+    let made = Scenario { layout, passes: 1, ..super::support::scenario(1) }.simulate();
+    let points = made.points();
+    let start = std::time::Instant::now();
+    let outcome = separator("query = { grid_mm = [50.0, 50.0, 50.0] }").separate(&points).unwrap();
+    println!("{count} places: {:.1} s", start.elapsed().as_secs_f64());
+    let rows = table(&outcome, "prediction");
+    let place = ["x_mm", "y_mm", "z_mm"].map(|name| column(&rows, name));
+    let (mean, std) = (column(&rows, "dx_um"), column(&rows, "std_dx_um"));
+    let z = |row: usize| (mean[row] - made.truth_um([0, 1, 2].map(|axis: usize| place[axis][row]))[0]) / std[row];
+    let squares: f64 = (0..mean.len()).map(|row| z(row).powi(2)).sum();
+    println!("mean square of error/std of {} predictions: {:.2}", mean.len(), squares / mean.len() as f64);
+    for remark in &outcome.remarks {
+        println!("- {remark}");
+    }
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    println!("{}", status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or("peak memory is not known here"));
+}
