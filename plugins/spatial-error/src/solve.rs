@@ -11,7 +11,7 @@ use crate::{
     config::{Kriging, SpatialErrorConfig},
     correlation::Family,
     joint::{Covariance, Data, Joint, Predicted, Predictor, Query, inverse},
-    likelihood::{Criterion, Estimate, PARAMETERS, Prior, estimate},
+    likelihood::{Criterion, Estimate, PARAMETERS, Prior, covariances, estimate},
     neighbours::Neighbours,
     noise::Noise,
     terms::Term,
@@ -25,6 +25,10 @@ const TREND_FROM: usize = 1500;
 const FEWEST: usize = 10;
 /// Share of a column outside the span of those before it, below which it is none of its own.
 const INDEPENDENT: f64 = 1e-6;
+/// Products of places and predictions up to which each prediction is widened by itself.
+const WIDENED: usize = 20_000_000;
+/// Largest move of the logarithm of a parameter: beyond, it is not known at all.
+const LARGEST_MOVE: f64 = 1.0;
 /// Places predicted in one go.
 const CHUNK: usize = 8192;
 
@@ -345,11 +349,72 @@ impl Solution {
         })
     }
 
-    /// What would be read at places, without noise.
+    /// What would be read at places, without noise. The variance contains what is not known of estimated covariances.
     #[must_use]
     pub fn predict(&self, campaign: &Campaign, places: &[[f64; 3]], variance: bool) -> Vec<[Predicted; 3]> {
+        let mut all = self.plain(campaign, &self.joint, places, variance);
+        if variance && self.neighbours.is_none() && self.estimate.is_some() {
+            self.widen(campaign, places, &mut all);
+        }
+        all
+    }
+
+    /// Adds what is not known of the covariances, to first order in the mean and to second order in the variance, along the
+    /// directions in which the parameters of each field are independent (Harville, Jeske, J. Am. Stat. Assoc. 87 (1992) 724).
+    /// Where predictions are many, every so many are computed, and the others are widened by their mean ratio.
+    fn widen(&self, campaign: &Campaign, places: &[[f64; 3]], all: &mut [[Predicted; 3]]) {
+        let every = (places.len() * self.data.places.len()).div_ceil(WIDENED).max(1);
+        let some: Vec<usize> = (0..places.len()).step_by(every).collect();
+        let asked: Vec<[f64; 3]> = some.iter().map(|index| places[*index]).collect();
+        let mut extra = vec![[0.0; 3]; asked.len()];
+        for pair in self.alternatives() {
+            let [above, below] = pair.map(|joint| self.plain(campaign, &joint, &asked, true));
+            for (index, extra) in extra.iter_mut().enumerate() {
+                let at = &all[some[index]];
+                for axis in 0..3 {
+                    let (a, b) = (above[index][axis], below[index][axis]);
+                    extra[axis] += (0.5 * (a.mean_um - b.mean_um)).powi(2)
+                        + (0.5 * (a.variance_um2 + b.variance_um2) - at[axis].variance_um2);
+                }
+            }
+        }
+        for axis in 0..3 {
+            let plain: f64 = some.iter().map(|index| all[*index][axis].variance_um2).sum();
+            let ratio = 1.0 + extra.iter().map(|extra| extra[axis].max(0.0)).sum::<f64>() / plain.max(f64::MIN_POSITIVE);
+            for (index, at) in all.iter_mut().enumerate() {
+                let variance = &mut at[axis].variance_um2;
+                *variance =
+                    if index % every == 0 { *variance + extra[index / every][axis].max(0.0) } else { *variance * ratio };
+            }
+        }
+    }
+
+    /// Fits with the parameters of all fields moved by their standard uncertainty, to both sides of each independent direction.
+    fn alternatives(&self) -> Vec<[Joint; 2]> {
+        let Some(estimate) = &self.estimate else { return Vec::new() };
+        let fields = self.covariances.len();
+        let directions: Vec<_> = (0..fields)
+            .map(|field| {
+                let first = field * PARAMETERS;
+                let block = estimate.covariance.view((first, first), (PARAMETERS, PARAMETERS)).into_owned();
+                nalgebra::SymmetricEigen::new(block)
+            })
+            .collect();
+        let moved = |direction: usize, sign: f64| {
+            let mut parameters = estimate.parameters.clone();
+            for (field, known) in directions.iter().enumerate() {
+                let size = known.eigenvalues[direction].max(0.0).sqrt().min(LARGEST_MOVE);
+                let mut part = parameters.rows_mut(field * PARAMETERS, PARAMETERS);
+                part.axpy(sign * size, &known.eigenvectors.column(direction), 1.0);
+            }
+            Joint::new(&self.data, &covariances(self.family, &parameters))
+        };
+        (0..PARAMETERS).filter_map(|direction| Some([moved(direction, 1.0)?, moved(direction, -1.0)?])).collect()
+    }
+
+    fn plain(&self, campaign: &Campaign, joint: &Joint, places: &[[f64; 3]], variance: bool) -> Vec<[Predicted; 3]> {
         let nugget_counts = Self::nugget_counts(campaign);
-        let predictor = self.neighbours.is_none().then(|| Predictor::new(&self.joint, &self.data.places, variance));
+        let predictor = self.neighbours.is_none().then(|| Predictor::new(joint, &self.data.places, variance));
         let mut all = Vec::with_capacity(places.len());
         for places in places.chunks(CHUNK) {
             let axes = [0, 1, 2].map(|axis| {
@@ -357,7 +422,7 @@ impl Solution {
                 let query = Query { places, design: design.as_ref(), nugget_counts };
                 match (&predictor, &self.neighbours) {
                     (Some(predictor), _) => predictor.predict(axis, &query),
-                    (None, Some(near)) => near.predict(&self.data, &self.joint, axis, &query),
+                    (None, Some(near)) => near.predict(&self.data, joint, axis, &query),
                     (None, None) => Vec::new(),
                 }
             });
