@@ -234,14 +234,14 @@ fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone
     if let Some(order) = candidate.order {
         all.push(Estimated { name: names[0].name.clone(), value: order as f64, std: None, unit: names[0].unit.clone() });
     }
+    let trend_std = solution.trend_std();
     let rest = &names[usize::from(candidate.order.is_some())..];
     for (parameter, wanted) in rest.iter().zip(&candidate.terms) {
         let Some(column) = solution.terms.iter().position(|term| term == wanted) else { continue };
-        let std = solution.joint.trend_covariance[(column, column)].sqrt();
         all.push(Estimated {
             name: parameter.name.clone(),
             value: solution.joint.trend[column],
-            std: alone.then_some(std),
+            std: alone.then_some(trend_std[column]),
             unit: parameter.unit.clone(),
         });
     }

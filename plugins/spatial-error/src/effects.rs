@@ -14,7 +14,7 @@ const ORDERS: [std::ops::RangeInclusive<usize>; 2] = [2..=5, 1..=3];
 /// The first axis moves with the second.
 const SQUARENESS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 /// Planes of a step along an axis at most, and cuts of a box along each.
-const CUTS: [usize; 2] = [20, 3];
+const CUTS: [usize; 2] = [40, 6];
 /// Places that a jump needs on each side.
 const FEWEST: usize = 4;
 

@@ -177,10 +177,10 @@ impl Conclusion<'_> {
     fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]]) -> Vec<NamedValue> {
         let (campaign, solution) = (self.campaign, self.solution);
         let mut values = Vec::new();
-        let std = |column: usize| solution.joint.trend_covariance[(column, column)].sqrt();
+        let trend_std = solution.trend_std();
         let fitted = |wanted: Term| {
             let column = solution.terms.iter().position(|term| *term == wanted);
-            column.map_or([f64::NAN; 2], |column| [solution.joint.trend[column], std(column)])
+            column.map_or([f64::NAN; 2], |column| [solution.joint.trend[column], trend_std[column]])
         };
         for wanted in self.separator.config.declared_terms() {
             let [number, std] = fitted(wanted);

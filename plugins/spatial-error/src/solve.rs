@@ -27,6 +27,8 @@ const FEWEST: usize = 10;
 const INDEPENDENT: f64 = 1e-6;
 /// Products of places and predictions up to which each prediction is widened by itself.
 const WIDENED: usize = 20_000_000;
+/// Places up to which the uncertainty of the trend is widened: of more, covariances are known well.
+const WIDENED_TREND: usize = 1000;
 /// Largest move of the logarithm of a parameter: beyond, it is not known at all.
 const LARGEST_MOVE: f64 = 1.0;
 /// Places predicted in one go.
@@ -410,6 +412,21 @@ impl Solution {
             Joint::new(&self.data, &covariances(self.family, &parameters))
         };
         (0..PARAMETERS).filter_map(|direction| Some([moved(direction, 1.0)?, moved(direction, -1.0)?])).collect()
+    }
+
+    /// Standard uncertainty of each column of the trend, with what is not known of estimated covariances.
+    #[must_use]
+    pub fn trend_std(&self) -> Vec<f64> {
+        let plain = self.joint.trend_covariance.diagonal();
+        let mut variance = plain.clone();
+        if self.neighbours.is_none() && self.data.places.len() <= WIDENED_TREND {
+            for [above, below] in self.alternatives() {
+                let (a, b) = (above.trend_covariance.diagonal(), below.trend_covariance.diagonal());
+                let moved = (above.trend - below.trend) * 0.5;
+                variance += moved.component_mul(&moved) + (0.5 * (a + b) - &plain).map(|more| more.max(0.0));
+            }
+        }
+        variance.iter().map(|variance| variance.sqrt()).collect()
     }
 
     fn plain(&self, campaign: &Campaign, joint: &Joint, places: &[[f64; 3]], variance: bool) -> Vec<[Predicted; 3]> {

@@ -26,6 +26,8 @@ const TRIED: [usize; 2] = [8, 4];
 const SAME_BIC: f64 = 10.0;
 /// Share of its gain that is left of a candidate beside another one with which it is confounded, at most.
 const LEFT: f64 = 0.15;
+/// Jumps that are listed at once.
+const AT_ONCE: usize = 40;
 /// Jumps at most.
 const MOST_JUMPS: usize = 4;
 /// What a column adds beside others, as a share of its own square, to be more than rounding.
@@ -199,22 +201,29 @@ impl<'a> Tracing<'a> {
             (0..self.candidates.len()).filter(|index| effects && self.allowed[*index] && !used(index, false)).collect();
         let fewer = state.found.iter().filter(|found| found.jump).count() < MOST_JUMPS;
         let steps: Vec<usize> = (0..self.jumps.len()).filter(|index| jumps && fewer && !used(index, true)).collect();
-        let sums = Sums::of(self, state, &own, &steps);
-        let list = |indices: &[usize], jump: bool, most: usize| {
-            let mut ranked: Vec<(usize, f64)> =
-                indices.iter().filter_map(|index| Some((*index, sums.gain(*index, jump)?))).collect();
+        let sums = Sums::of(self, state, &own, false);
+        let effects_by_gain = own.iter().filter_map(|index| Some((*index, sums.gain(*index)?))).collect();
+        // Products of all jumps with each other are not needed.
+        let of_jumps = steps.chunks(AT_ONCE).flat_map(|some| {
+            let sums = Sums::of(self, state, some, true);
+            some.iter().filter_map(|index| Some((*index, sums.gain(*index)?))).collect::<Vec<_>>()
+        });
+        let jumps_by_gain: Vec<(usize, f64)> = of_jumps.collect();
+        let list = |mut ranked: Vec<(usize, f64)>, most: usize| {
             ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
             ranked.truncate(most);
             ranked
         };
         let mut trials: Vec<(bool, usize, Gain, Estimate)> = Vec::new();
-        for (jump, indices, most) in [(false, &own, TRIED[0]), (true, &steps, TRIED[1])] {
-            for (index, _) in list(indices, jump, most) {
+        for (jump, total, ranked, most) in
+            [(false, own.len(), effects_by_gain, TRIED[0]), (true, steps.len(), jumps_by_gain, TRIED[1])]
+        {
+            for (index, _) in list(ranked, most) {
                 let added = if jump { &self.jumps[index].terms } else { &self.candidates[index].terms };
                 let terms: Vec<Term> = self.terms(&state.found).into_iter().chain(added.iter().copied()).collect();
                 let Some(estimate) = self.refit(&terms, state) else { continue };
                 let likelihood = 2.0 * (estimate.ln_likelihood - state.estimate.ln_likelihood);
-                let gain = self.gain(likelihood, added.len(), indices.len());
+                let gain = self.gain(likelihood, added.len(), total);
                 trials.push((jump, index, gain, estimate));
             }
         }
@@ -262,8 +271,8 @@ impl<'a> Tracing<'a> {
 
 /// Normal equations of all candidates beside what is fitted, with the covariance held: what each would gain to first order.
 struct Sums {
-    /// Of candidates and jumps, the columns.
-    places: Vec<((bool, usize), std::ops::Range<usize>)>,
+    /// The columns of each.
+    places: Vec<(usize, std::ops::Range<usize>)>,
     /// Products of the columns outside the span of what is fitted.
     normal: DMatrix<f64>,
     right: DVector<f64>,
@@ -271,14 +280,13 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(tracing: &Tracing, state: &State, own: &[usize], steps: &[usize]) -> Self {
+    fn of(tracing: &Tracing, state: &State, all: &[usize], jump: bool) -> Self {
         let base = tracing.terms(&state.found);
         let mut terms = base.clone();
         let mut places = Vec::new();
-        let all = own.iter().map(|index| (false, *index)).chain(steps.iter().map(|index| (true, *index)));
-        for (jump, index) in all {
-            let added = if jump { &tracing.jumps[index].terms } else { &tracing.candidates[index].terms };
-            places.push(((jump, index), terms.len() - base.len()..terms.len() - base.len() + added.len()));
+        for index in all {
+            let added = if jump { &tracing.jumps[*index].terms } else { &tracing.candidates[*index].terms };
+            places.push((*index, terms.len() - base.len()..terms.len() - base.len() + added.len()));
             terms.extend(added);
         }
         let (normal, right) = state.estimate.joint.equations(&tracing.data(&terms));
@@ -295,8 +303,8 @@ impl Sums {
         Self { places, normal: outside, right: left, whole }
     }
 
-    fn range(&self, jump: bool, index: usize) -> Option<std::ops::Range<usize>> {
-        self.places.iter().find(|(known, _)| *known == (jump, index)).map(|(_, range)| range.clone())
+    fn range(&self, index: usize) -> Option<std::ops::Range<usize>> {
+        self.places.iter().find(|(known, _)| *known == index).map(|(_, range)| range.clone())
     }
 
     /// What columns gain beside others; `None` where they are in the span of what is fitted.
@@ -310,13 +318,13 @@ impl Sums {
         Some(Cholesky::new(normal)?.solve(&right).dot(&right))
     }
 
-    fn gain(&self, index: usize, jump: bool) -> Option<f64> {
-        self.quadratic(&self.range(jump, index)?.collect::<Vec<_>>())
+    fn gain(&self, index: usize) -> Option<f64> {
+        self.quadratic(&self.range(index)?.collect::<Vec<_>>())
     }
 
     /// Share of a candidate's gain that another one leaves.
     fn left(&self, index: usize, other: usize) -> f64 {
-        let (Some(own), Some(others)) = (self.range(false, index), self.range(false, other)) else { return 1.0 };
+        let (Some(own), Some(others)) = (self.range(index), self.range(other)) else { return 1.0 };
         let both: Vec<usize> = others.clone().chain(own.clone()).collect();
         let alone = self.quadratic(&own.collect::<Vec<_>>());
         // Columns that are the same leave nothing.

@@ -451,8 +451,12 @@ fn judge(
                     && !drifts
                     && let Some(std) = last.std
                 {
-                    sum.parameter_squares += ((last.value - value) / std).powi(2);
+                    let z = (last.value - value) / std;
+                    sum.parameter_squares += z * z;
                     sum.parameters += 1;
+                    if z.abs() > 3.0 {
+                        sum.misses.push(format!("{name}: {:.2} ± {std:.2} is {value:.2} ({:?}) {said}", last.value, scenario.field));
+                    }
                 }
             }
         }
