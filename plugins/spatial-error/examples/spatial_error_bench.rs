@@ -50,7 +50,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn write(path: &Path, found: &[Predicted]) -> std::io::Result<()> {
     let means = found.iter().map(|one| one.mean_um);
-    let bytes: Vec<u8> =
-        means.chain(found.iter().map(|one| one.variance_um2)).flat_map(f64::to_le_bytes).collect();
+    let bytes: Vec<u8> = means.chain(found.iter().map(|one| one.variance_um2)).flat_map(f64::to_le_bytes).collect();
     std::fs::write(path, bytes)
 }

@@ -93,7 +93,8 @@ impl Campaign {
                 .iter()
                 .enumerate()
                 .map(|(row, value)| {
-                    let problem = || refuse(format!("row {}: `repeat` is a whole number from 0, found {value}", row + 1));
+                    let problem =
+                        || refuse(format!("row {}: `repeat` is a whole number from 0, found {value}", row + 1));
                     if *value >= 0.0 && value.fract() == 0.0 { Ok(*value as usize) } else { Err(problem()) }
                 })
                 .collect::<Result<Vec<usize>>>()?,
@@ -258,7 +259,9 @@ fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]], has_time: bool) ->
     let median = sizes[sizes.len() / 2];
     let largest = sizes.last().copied().unwrap_or(0.0);
     if median > LARGE_UM {
-        remarks.push(format!("the median deviation is {median:.0} µm: are `dx_um`, `dy_um`, `dz_um` in nm or places themselves?"));
+        remarks.push(format!(
+            "the median deviation is {median:.0} µm: are `dx_um`, `dy_um`, `dz_um` in nm or places themselves?"
+        ));
     }
     if largest > 0.0 && largest < SMALL_UM {
         remarks.push(format!("the largest deviation is {largest:.2e} µm: are `dx_um`, `dy_um`, `dz_um` in mm?"));

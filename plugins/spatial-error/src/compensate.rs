@@ -138,8 +138,11 @@ impl Chain {
             Kind::Rotary => axis.limit_urad.unwrap_or(f64::INFINITY),
         };
         let limits = axes.iter().map(limit).collect();
-        let linear: Vec<Vector3<f64>> =
-            axes.iter().filter(|axis| axis.kind == Kind::Linear).map(|axis| Vector3::from(axis.direction).normalize()).collect();
+        let linear: Vec<Vector3<f64>> = axes
+            .iter()
+            .filter(|axis| axis.kind == Kind::Linear)
+            .map(|axis| Vector3::from(axis.direction).normalize())
+            .collect();
         let commands = if linear.is_empty() {
             DMatrix::zeros(0, 3)
         } else {
@@ -209,7 +212,8 @@ impl Chain {
             }
             free.iter().zip(&solved).for_each(|(axis, value)| add[*axis] = *value);
             let left = wanted - &jacobian * &add;
-            let inward = |axis: &usize| held[*axis] && left.dot(&jacobian.column(*axis)) * add[*axis] < -1e-9 * left.norm();
+            let inward =
+                |axis: &usize| held[*axis] && left.dot(&jacobian.column(*axis)) * add[*axis] < -1e-9 * left.norm();
             let Some(released) = (0..count).find(inward) else { break };
             held[released] = false;
             add[released] = 0.0;
@@ -258,7 +262,10 @@ mod tests {
     fn three_linear_axes_take_all_away() {
         let chain = Chain::new(Axis::xyz([2, 0, 1]), None, [0.0; 3]).unwrap();
         let found = chain.correct([10.0, 20.0, 30.0], [3.0, -4.0, 5.0]);
-        assert_eq!(chain.axes().iter().map(Axis::column).collect::<Vec<_>>(), ["correct_z_um", "correct_x_um", "correct_y_um"]);
+        assert_eq!(
+            chain.axes().iter().map(Axis::column).collect::<Vec<_>>(),
+            ["correct_z_um", "correct_x_um", "correct_y_um"]
+        );
         for (add, wanted) in found.add.iter().zip([-5.0, -3.0, 4.0]) {
             assert!((add - wanted).abs() < 1e-12);
         }

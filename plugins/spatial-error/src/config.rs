@@ -192,7 +192,11 @@ impl Kriging {
         let above = |key: &str, value: f64, least: bool, unit: &str| {
             let right = value.is_finite() && (value > 0.0 || (least && value == 0.0));
             let bound = if least { "0 or above" } else { "above 0" };
-            if right { Ok(()) } else { Err(Fault::at(key, format!("expected a number of {unit} {bound}, found {value}"))) }
+            if right {
+                Ok(())
+            } else {
+                Err(Fault::at(key, format!("expected a number of {unit} {bound}, found {value}")))
+            }
         };
         if let Some(sill_um) = self.sill_um {
             above("sill_um", sill_um, false, "µm")?;
@@ -216,10 +220,13 @@ impl Kriging {
         let first = keys[given.iter().position(|given| *given).unwrap_or(0)];
         if self.variogram == Variogram::Auto {
             let message = "a covariance that is given needs its family in `variogram`, and that is `auto`";
-            return Err(Fault::at(first, message).help("take one of exponential, gaussian, spherical, matern-3/2, matern-5/2"));
+            return Err(
+                Fault::at(first, message).help("take one of exponential, gaussian, spherical, matern-3/2, matern-5/2")
+            );
         }
         if !(given[0] && given[1]) {
-            let message = "a covariance is given by `variogram`, `sill_um`, `range_mm` and `nugget_um`, or estimated as a whole";
+            let message =
+                "a covariance is given by `variogram`, `sill_um`, `range_mm` and `nugget_um`, or estimated as a whole";
             return Err(Fault::at(first, message));
         }
         Ok(())

@@ -50,8 +50,11 @@ impl PointModel for SpatialError {
         };
         let observable: Vec<bool> =
             candidates.iter().map(|candidate| is_observable(&campaign, &declared, &candidate.terms)).collect();
-        let allowed =
-            candidates.iter().zip(&observable).map(|(candidate, observable)| *observable && chosen(candidate)).collect();
+        let allowed = candidates
+            .iter()
+            .zip(&observable)
+            .map(|(candidate, observable)| *observable && chosen(candidate))
+            .collect();
         let families = match self.config.kriging.fixed() {
             Some(covariance) => vec![covariance.family],
             None => families(&self.config.kriging),
@@ -78,10 +81,14 @@ impl PointModel for SpatialError {
                 candidate.terms.iter().map(move |term| (id.clone(), target.clone(), *term))
             })
             .collect();
-        let declared_outcome = Conclusion { separator: self, campaign: &campaign, solution: &before, names: &[] }.outcome()?;
-        let mut outcome = Conclusion { separator: self, campaign: &campaign, solution: &after, names: &names }.outcome()?;
-        let unexplained: Vec<Unexplained> =
-            strangers.iter().map(|found| self.unexplained(&campaign, &terms, &jumps[found.members[0]])).collect::<Result<_>>()?;
+        let declared_outcome =
+            Conclusion { separator: self, campaign: &campaign, solution: &before, names: &[] }.outcome()?;
+        let mut outcome =
+            Conclusion { separator: self, campaign: &campaign, solution: &after, names: &names }.outcome()?;
+        let unexplained: Vec<Unexplained> = strangers
+            .iter()
+            .map(|found| self.unexplained(&campaign, &terms, &jumps[found.members[0]]))
+            .collect::<Result<_>>()?;
         let levels = [&before, &after].map(|solution| level(&campaign, solution));
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
         let mut diagnosis = Diagnosis {
@@ -105,7 +112,10 @@ impl PointModel for SpatialError {
                         confounded_with,
                         parameters: parameters(&candidates[found.members[0]], effect, &after, alone),
                         change: None,
-                        residual_rms_um: Step { before: Some(pair[0].residual_rms_um), after: Some(pair[1].residual_rms_um) },
+                        residual_rms_um: Step {
+                            before: Some(pair[0].residual_rms_um),
+                            after: Some(pair[1].residual_rms_um),
+                        },
                         held_out_rms_um: Step { before: pair[0].held_out_rms_um, after: pair[1].held_out_rms_um },
                         held_out_expected_rms_um: pair[1].held_out_expected_rms_um,
                         delta_bic: found.gain.bic,
@@ -117,7 +127,12 @@ impl PointModel for SpatialError {
             nothing_separated: false,
             moved: moved(&declared_outcome, &outcome),
             unexplained,
-            blind_to: blind(&campaign, &before, &candidates, &observable, &effects, kinds.len()),
+            blind_to: {
+                let known: Vec<usize> =
+                    added.iter().flat_map(|found| &found.members).map(|member| candidates[*member].effect).collect();
+                let others: Vec<usize> = (0..kinds.len()).filter(|effect| !known.contains(effect)).collect();
+                blind(&campaign, &after, &candidates, &observable, &effects, &others)
+            },
             refused: doubts
                 .into_iter()
                 .map(|doubt| {
@@ -147,10 +162,15 @@ impl SpatialError {
             let (order, values) = match (kind.has_order(), setting.values.split_first()) {
                 (true, Some((order, rest))) => {
                     let orders = kind.orders();
-                    let is_one = order.fract() == 0.0 && *order >= *orders.start() as f64 && *order <= *orders.end() as f64;
+                    let is_one =
+                        order.fract() == 0.0 && *order >= *orders.start() as f64 && *order <= *orders.end() as f64;
                     if !is_one {
                         let effect = kind.effect();
-                        let problem = format!("its order is a whole number from {} to {}, found {order}", orders.start(), orders.end());
+                        let problem = format!(
+                            "its order is a whole number from {} to {}, found {order}",
+                            orders.start(),
+                            orders.end()
+                        );
                         return Err(Error::new("take out the known effect", effect.name(), problem));
                     }
                     (*order as usize, rest.to_vec())
@@ -232,7 +252,12 @@ fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone
     let names = &effect.parameters;
     let mut all = Vec::new();
     if let Some(order) = candidate.order {
-        all.push(Estimated { name: names[0].name.clone(), value: order as f64, std: None, unit: names[0].unit.clone() });
+        all.push(Estimated {
+            name: names[0].name.clone(),
+            value: order as f64,
+            std: None,
+            unit: names[0].unit.clone(),
+        });
     }
     let trend_std = solution.trend_std();
     let rest = &names[usize::from(candidate.order.is_some())..];
@@ -311,14 +336,14 @@ fn blind(
     candidates: &[Candidate],
     observable: &[bool],
     effects: &[Effect],
-    kinds: usize,
+    asked: &[usize],
 ) -> Vec<Blind> {
     let all: Vec<Term> = candidates.iter().flat_map(|candidate| candidate.terms.iter().copied()).collect();
     let terms: Vec<Term> = solution.terms.iter().chain(&all).copied().collect();
     let (normal, _) = solution.joint.equations(&campaign.data(&terms, solution.fitted.as_deref()));
     let fitted = solution.terms.len();
     let mut blind = Vec::new();
-    for effect in 0..kinds {
+    for effect in asked.iter().copied() {
         let tolerance = effects[effect].parameters.last().map_or(1.0, |parameter| parameter.tolerance);
         let mut visible = false;
         let mut largest: f64 = 0.0;
@@ -345,9 +370,17 @@ fn blind(
             let bias_per_unit = if largest > 0.0 {
                 BiasPerUnit { value: largest, unit: format!("um/({unit})"), on: "readings".into() }
             } else {
-                BiasPerUnit { value: 0.1, unit: format!("um/({unit})"), on: "a point at another tool offset, 100 mm away".into() }
+                BiasPerUnit {
+                    value: 0.1,
+                    unit: format!("um/({unit})"),
+                    on: "a point at another tool offset, 100 mm away".into(),
+                }
             };
-            blind.push(Blind { effect: effects[effect].id.clone(), targets: effects[effect].targets.clone(), bias_per_unit });
+            blind.push(Blind {
+                effect: effects[effect].id.clone(),
+                targets: effects[effect].targets.clone(),
+                bias_per_unit,
+            });
         }
     }
     blind

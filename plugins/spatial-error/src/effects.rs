@@ -169,7 +169,8 @@ pub fn jumps(campaign: &Campaign) -> Vec<Jump> {
             for y in &wide[1][usize::from(above[1])] {
                 for z in &wide[2][usize::from(above[2])] {
                     let limit_mm = [*x, *y, *z];
-                    let inside = |place: &&[f64; 3]| axes.iter().all(|axis| (place[*axis] > limit_mm[*axis]) == above[*axis]);
+                    let inside =
+                        |place: &&[f64; 3]| axes.iter().all(|axis| (place[*axis] > limit_mm[*axis]) == above[*axis]);
                     let count = places.iter().filter(inside).count();
                     if count < FEWEST || 2 * count > places.len() {
                         continue;

@@ -287,7 +287,8 @@ impl<'a> Predictor<'a> {
                 .iter()
                 .enumerate()
                 .map(|(row, field_um)| {
-                    let trend: f64 = (0..columns).map(|column| query.design[(row, column)] * self.joint.trend[column]).sum();
+                    let trend: f64 =
+                        (0..columns).map(|column| query.design[(row, column)] * self.joint.trend[column]).sum();
                     Predicted { mean_um: trend + field_um, variance_um2: f64::NAN }
                 })
                 .collect();

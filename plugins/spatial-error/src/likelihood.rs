@@ -158,7 +158,10 @@ fn step(slope: &Slope, prior: &Prior, damping: f64) -> Option<DVector<f64>> {
         }
     }
     let gradient =
-        DVector::from_fn(slope.gradient.len(), |index, _| if prior.is_free(index) { slope.gradient[index] } else { 0.0 });
+        DVector::from_fn(
+            slope.gradient.len(),
+            |index, _| if prior.is_free(index) { slope.gradient[index] } else { 0.0 },
+        );
     let mut step = Cholesky::new(system)?.solve(&gradient);
     let longest = step.amax();
     if longest > LONGEST {

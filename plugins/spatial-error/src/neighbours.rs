@@ -97,11 +97,8 @@ impl Local<'_> {
         let places: Vec<[f64; 3]> = near.iter().map(|index| self.data.places[*index]).collect();
         let observed = &self.data.observed[self.field];
         let of = |values: &[f64]| near.iter().map(|index| values[*index]).collect::<Vec<f64>>();
-        let part = Observed {
-            mean_um: of(&observed.mean_um),
-            noise_um2: of(&observed.noise_um2),
-            share: of(&observed.share),
-        };
+        let part =
+            Observed { mean_um: of(&observed.mean_um), noise_um2: of(&observed.noise_um2), share: of(&observed.share) };
         let cloud = Scaled::of(&places, self.covariance.range_mm);
         let Some(lower) = factor(matrix(self.covariance, &cloud, &part)) else { return lost };
         let columns = design.len();

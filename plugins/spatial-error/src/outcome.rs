@@ -33,7 +33,8 @@ pub fn tables(chain: &Chain) -> Vec<TableSpec> {
     let places = || ["x", "y", "z"].map(|axis| of(&format!("{axis}_mm"), "mm", "command").repeating());
     let each = |before: &str, about: &str| COMPONENTS.map(|one| of(&format!("{before}{one}_um"), "um", about));
     let extrapolated = || {
-        let about = "outside the hull of the measured places, or a standard deviation above 0.8 of that before any reading";
+        let about =
+            "outside the hull of the measured places, or a standard deviation above 0.8 of that before any reading";
         ColumnSpec::flag("extrapolated", about)
     };
     let mut prediction: Vec<ColumnSpec> = places().into();
@@ -130,8 +131,7 @@ impl Conclusion<'_> {
             let held = campaign.span.holds(place_mm);
             let predicted = if held { predicted } else { [lost; 3] };
             let uncertain = (0..3).any(|axis| {
-                prior[axis] >= SMALL * largest
-                    && predicted[axis].variance_um2 > UNCERTAIN * UNCERTAIN * prior[axis]
+                prior[axis] >= SMALL * largest && predicted[axis].variance_um2 > UNCERTAIN * UNCERTAIN * prior[axis]
             });
             let extrapolated = !held || uncertain || campaign.span.is_outside(place_mm);
             let placement = solution.placement_um(campaign, place_mm);
@@ -160,7 +160,9 @@ impl Conclusion<'_> {
         let mut columns: Vec<ArrayRef> =
             [0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.place_mm[axis]))).into();
         let of = |number: &dyn Fn(&Correction) -> f64| {
-            numbers(queries.iter().map(|query| query.correction.as_ref().map_or(f64::NAN, number)).collect::<Vec<f64>>())
+            numbers(
+                queries.iter().map(|query| query.correction.as_ref().map_or(f64::NAN, number)).collect::<Vec<f64>>(),
+            )
         };
         for index in 0..self.separator.chain.axes().len() {
             columns.push(of(&|correction| correction.add[index]));
@@ -186,7 +188,9 @@ impl Conclusion<'_> {
             let [number, std] = fitted(wanted);
             let (symbol, about) = match wanted {
                 Term::Turn(axis) => (["RX", "RY", "RZ"][axis], "rotation of the placement about the axis"),
-                Term::Shift(axis) => (["TX", "TY", "TZ"][axis], "displacement of the placement, at the middle of the volume"),
+                Term::Shift(axis) => {
+                    (["TX", "TY", "TZ"][axis], "displacement of the placement, at the middle of the volume")
+                }
                 _ => continue,
             };
             values.push(value(symbol, number, std, wanted.unit(), about));
@@ -237,7 +241,8 @@ impl Conclusion<'_> {
         }
         let known = || queries.iter().filter_map(|query| Some((query, query.correction.as_ref()?)));
         let rms = |of: &dyn Fn(&At, &Correction) -> [f64; 3]| {
-            let sum: f64 = known().map(|(query, correction)| of(query, correction).iter().map(|e| e * e).sum::<f64>()).sum();
+            let sum: f64 =
+                known().map(|(query, correction)| of(query, correction).iter().map(|e| e * e).sum::<f64>()).sum();
             (sum / known().count() as f64).sqrt()
         };
         let about = "root mean square length of the predicted error without the placement, at the places of the query";
@@ -257,17 +262,15 @@ pub fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64; 3]> {
     let of_mean: Vec<[f64; 3]> = match &solution.fitted {
         None => (0..campaign.places_mm.len())
             .map(|place| {
-                [0, 1, 2].map(|axis| {
-                    solution.noise_um2(campaign, place, axis) * solution.joint.fields[axis].alpha[place]
-                })
+                [0, 1, 2]
+                    .map(|axis| solution.noise_um2(campaign, place, axis) * solution.joint.fields[axis].alpha[place])
             })
             .collect(),
         Some(_) => {
             let predicted = solution.predict(campaign, &campaign.places_mm, false);
             let mean = |place: usize, axis: usize| {
-                let of_trend: f64 = (0..terms.len())
-                    .map(|column| solution.data.design[axis][(place, column)] * trend[column])
-                    .sum();
+                let of_trend: f64 =
+                    (0..terms.len()).map(|column| solution.data.design[axis][(place, column)] * trend[column]).sum();
                 let at_first: f64 = terms
                     .iter()
                     .zip(trend.iter())
@@ -299,7 +302,8 @@ fn prediction_columns(queries: &[At]) -> Vec<ArrayRef> {
     let mut columns: Vec<ArrayRef> =
         [0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.place_mm[axis]))).into();
     columns.extend([0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.predicted[axis].mean_um))));
-    columns.extend([0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.predicted[axis].variance_um2.sqrt()))));
+    columns
+        .extend([0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.predicted[axis].variance_um2.sqrt()))));
     columns.push(flags(queries.iter().map(|query| query.extrapolated)));
     columns
 }

@@ -67,12 +67,11 @@ fn grid(campaign: &Campaign, step_mm: [f64; 3]) -> Result<Vec<[f64; 3]>> {
     let counts = [0, 1, 2].map(|axis| (2.0 * volume.half_mm[axis] / step_mm[axis] * (1.0 + 1e-9)).floor() + 1.0);
     let total = counts.iter().product::<f64>();
     if total > MOST as f64 {
-        let problem = format!("`query.grid_mm` gives {total:.0} places in the measured volume: at most {MOST} are predicted");
+        let problem =
+            format!("`query.grid_mm` gives {total:.0} places in the measured volume: at most {MOST} are predicted");
         return Err(Error::new("predict", &campaign.file, problem).help("take a wider grid, or a file of places"));
     }
-    let at = |axis: usize, index: usize| {
-        volume.middle_mm[axis] - volume.half_mm[axis] + step_mm[axis] * index as f64
-    };
+    let at = |axis: usize, index: usize| volume.middle_mm[axis] - volume.half_mm[axis] + step_mm[axis] * index as f64;
     let [nx, ny, nz] = counts.map(|count| count as usize);
     let mut places = Vec::with_capacity(nx * ny * nz);
     for z in 0..nz {

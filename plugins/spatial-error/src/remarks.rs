@@ -32,7 +32,10 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
     }
     let limited = queries.iter().filter(|query| query.correction.as_ref().is_some_and(|one| one.limited)).count();
     if limited > 0 {
-        all.push(format!("{limited} of {} corrections are at the limit of an axis: an error remains there", queries.len()));
+        all.push(format!(
+            "{limited} of {} corrections are at the limit of an axis: an error remains there",
+            queries.len()
+        ));
     }
     if separator.config.kriging.fixed().is_some() {
         all.push("the covariance is given, not estimated: standard uncertainties hold as far as it does".into());
@@ -94,7 +97,8 @@ fn of_field(campaign: &Campaign, solution: &Solution) -> String {
         (0..3).map(|axis| format!("{} {:.2}", COMPONENTS[axis], solution.covariances[axis].sill_um)).collect();
     let nuggets: Vec<String> =
         (0..3).map(|axis| format!("{} {:.2}", COMPONENTS[axis], solution.covariances[axis].nugget_um)).collect();
-    let what = if Solution::nugget_counts(campaign) { "from place to place beyond noise" } else { "nugget, noise included" };
+    let what =
+        if Solution::nugget_counts(campaign) { "from place to place beyond noise" } else { "nugget, noise included" };
     format!(
         "smooth field beside the trend, {}: standard deviation {} µm; {what}: {} µm",
         solution.family.name(),
@@ -119,8 +123,9 @@ fn of_noise(campaign: &Campaign) -> Option<String> {
             let Noise::Repeats { std_um, .. } = known else { return None };
             let ratios = [0, 1, 2].map(|axis| std_um[axis] / campaign.noise_um(axis));
             let worst = ratios.into_iter().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs())).unwrap_or(1.0);
-            (!(0.6..1.7).contains(&worst))
-                .then(|| format!("repeats scatter {worst:.2} times as much as the stated uncertainty: is `std_um` right?"))
+            (!(0.6..1.7).contains(&worst)).then(|| {
+                format!("repeats scatter {worst:.2} times as much as the stated uncertainty: is `std_um` right?")
+            })
         }
     }
 }
@@ -129,7 +134,10 @@ fn of_numbers(campaign: &Campaign, solution: &Solution) -> Vec<String> {
     let mut all = Vec::new();
     let count = campaign.places_mm.len();
     if let (Some(some), Some(_)) = (estimated_from(campaign), &solution.estimate) {
-        all.push(format!("the covariance is estimated from {} of {count} places, drawn at random with close pairs", some.len()));
+        all.push(format!(
+            "the covariance is estimated from {} of {count} places, drawn at random with close pairs",
+            some.len()
+        ));
     }
     if let Some(fitted) = &solution.fitted {
         all.push(format!("{count} places: predictions use the 96 nearest ones, and the trend {} places", fitted.len()));
@@ -144,7 +152,8 @@ fn against_full(campaign: &Campaign, solution: &Solution) -> Option<String> {
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(2));
     let [known, asked] = COMPARED;
     let some = order.get(..known.min(order.len() / 2))?;
-    let queries: Vec<[f64; 3]> = order[some.len()..].iter().take(asked).map(|place| campaign.places_mm[*place]).collect();
+    let queries: Vec<[f64; 3]> =
+        order[some.len()..].iter().take(asked).map(|place| campaign.places_mm[*place]).collect();
     let data = campaign.data(&solution.terms, Some(some));
     let joint = Joint::new(&data, &solution.covariances)?;
     let near = Neighbours::new(&data, &solution.covariances);

@@ -53,8 +53,13 @@ impl Scenario {
         let machine = Machine { scenario: self.clone(), waves };
         let places = self.places(&mut random);
         let total = places.len() * self.passes;
-        let mut made =
-            Simulated { commands_mm: vec![], readings_um: vec![], time_s: vec![], repeat: vec![], machine: machine.clone() };
+        let mut made = Simulated {
+            commands_mm: vec![],
+            readings_um: vec![],
+            time_s: vec![],
+            repeat: vec![],
+            machine: machine.clone(),
+        };
         for pass in 0..self.passes {
             let mut order: Vec<usize> = (0..places.len()).collect();
             if self.random_order {
@@ -191,8 +196,12 @@ impl Machine {
         for effect in &self.scenario.effect {
             let (target, order, amplitude) = match effect {
                 SimulatedEffect::Positioning { targets: [target], order, amplitude_um }
-                | SimulatedEffect::Straightness { targets: [target], order, amplitude_um } => (target, *order, *amplitude_um),
-                SimulatedEffect::Angular { targets: [target], order, amplitude_urad } => (target, *order, *amplitude_urad),
+                | SimulatedEffect::Straightness { targets: [target], order, amplitude_um } => {
+                    (target, *order, *amplitude_um)
+                }
+                SimulatedEffect::Angular { targets: [target], order, amplitude_urad } => {
+                    (target, *order, *amplitude_urad)
+                }
                 _ => continue,
             };
             let mut letters = target.chars().skip(1);
@@ -312,7 +321,9 @@ impl Simulator for SpatialErrorSimulator {
         );
         // To 0.01 µm, as trackers write them.
         let rounded = |value: f64| (value * 100.0).round() / 100.0;
-        let place = |axis: usize| numbers(made.commands_mm.iter().map(|all| (all[axis] * 1e3).round() / 1e3).collect::<Vec<_>>());
+        let place = |axis: usize| {
+            numbers(made.commands_mm.iter().map(|all| (all[axis] * 1e3).round() / 1e3).collect::<Vec<_>>())
+        };
         let reading = |axis: usize| numbers(made.readings_um.iter().map(|all| rounded(all[axis])).collect::<Vec<_>>());
         let rows = table.rows(vec![
             place(0),

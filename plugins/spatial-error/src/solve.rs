@@ -243,8 +243,9 @@ pub fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[Term]) -
             let found = most_likely(&data, &prior, &families(&config.kriging), Criterion::Restricted, None);
             let (family, estimate) = found.ok_or_else(|| {
                 let problem = "no covariance with a positive definite matrix was found".to_owned();
-                Error::new("estimate the covariance of", &campaign.file, problem)
-                    .help("are places or readings far out of their usual size? `kriging` takes a covariance of your own")
+                Error::new("estimate the covariance of", &campaign.file, problem).help(
+                    "are places or readings far out of their usual size? `kriging` takes a covariance of your own",
+                )
             })?;
             let covariances = estimate.covariances.clone();
             (family, Some(estimate), covariances)
@@ -382,11 +383,15 @@ impl Solution {
         }
         for axis in 0..3 {
             let plain: f64 = some.iter().map(|index| all[*index][axis].variance_um2).sum();
-            let ratio = 1.0 + extra.iter().map(|extra| extra[axis].max(0.0)).sum::<f64>() / plain.max(f64::MIN_POSITIVE);
+            let ratio =
+                1.0 + extra.iter().map(|extra| extra[axis].max(0.0)).sum::<f64>() / plain.max(f64::MIN_POSITIVE);
             for (index, at) in all.iter_mut().enumerate() {
                 let variance = &mut at[axis].variance_um2;
-                *variance =
-                    if index % every == 0 { *variance + extra[index / every][axis].max(0.0) } else { *variance * ratio };
+                *variance = if index % every == 0 {
+                    *variance + extra[index / every][axis].max(0.0)
+                } else {
+                    *variance * ratio
+                };
             }
         }
     }

@@ -139,7 +139,11 @@ impl<'a> Tracing<'a> {
     }
 
     fn terms(&self, found: &[Found]) -> Vec<Term> {
-        self.declared.iter().copied().chain(found.iter().flat_map(|found| self.terms_of(found).iter().copied())).collect()
+        self.declared
+            .iter()
+            .copied()
+            .chain(found.iter().flat_map(|found| self.terms_of(found).iter().copied()))
+            .collect()
     }
 
     fn data(&self, terms: &[Term]) -> Data {

@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
 #[path = "support/study.rs"]
 mod study;
+mod support;
 
 use runout_core::{
     model::{
@@ -36,8 +36,12 @@ fn rigid_and_field_alone_are_at_the_noise_floor() {
     let chi2 = found.after.chi2_per_dof.unwrap();
     assert!((0.7..1.4).contains(&chi2), "{chi2}");
     // Without a tool offset, four rotations displace no measured point.
-    let blind: Vec<&str> =
-        found.blind_to.iter().filter(|blind| blind.effect == "angular").map(|blind| blind.targets[0].as_str()).collect();
+    let blind: Vec<&str> = found
+        .blind_to
+        .iter()
+        .filter(|blind| blind.effect == "angular")
+        .map(|blind| blind.targets[0].as_str())
+        .collect();
     for target in ["ECY", "EAZ", "EBZ", "ECZ"] {
         assert!(blind.contains(&target), "{blind:?}");
     }
@@ -49,16 +53,36 @@ fn effects_are_found_with_their_values() {
     let cases = [
         (SimulatedEffect::Scale { targets: target("Y"), scale_um_per_m: 150.0 }, "scale", "Y", 150.0),
         (SimulatedEffect::Squareness { targets: target("XZ"), angle_urad: -120.0 }, "squareness", "XZ", -120.0),
-        (SimulatedEffect::Positioning { targets: target("EXX"), order: 3, amplitude_um: 15.0 }, "positioning", "EXX", 15.0),
-        (SimulatedEffect::Straightness { targets: target("EZX"), order: 2, amplitude_um: -20.0 }, "straightness", "EZX", -20.0),
+        (
+            SimulatedEffect::Positioning { targets: target("EXX"), order: 3, amplitude_um: 15.0 },
+            "positioning",
+            "EXX",
+            15.0,
+        ),
+        (
+            SimulatedEffect::Straightness { targets: target("EZX"), order: 2, amplitude_um: -20.0 },
+            "straightness",
+            "EZX",
+            -20.0,
+        ),
         (SimulatedEffect::Angular { targets: target("EBY"), order: 1, amplitude_urad: 110.0 }, "angular", "EBY", 110.0),
-        (SimulatedEffect::ThermalDrift { targets: target("z"), drift_um: 12.0, time_constant: None }, "thermal-drift", "z", 12.0),
+        (
+            SimulatedEffect::ThermalDrift { targets: target("z"), drift_um: 12.0, time_constant: None },
+            "thermal-drift",
+            "z",
+            12.0,
+        ),
     ];
     for (index, (effect, id, target, value)) in cases.into_iter().enumerate() {
         let found = diagnose(&with(20 + index as u64, effect), COARSE);
         assert_eq!(found.verdict, Verdict::Explained, "{id} {target}: {:?}", found.added);
         let added = &found.added[0];
-        assert_eq!((found.added.len(), added.effect.as_str(), added.targets[0].as_str()), (1, id, target), "{:?}", found.added);
+        assert_eq!(
+            (found.added.len(), added.effect.as_str(), added.targets[0].as_str()),
+            (1, id, target),
+            "{:?}",
+            found.added
+        );
         let parameter = added.parameters.iter().find(|parameter| parameter.name != "order").unwrap();
         if let Some(std) = parameter.std {
             assert!((parameter.value - value).abs() < 4.0 * std, "{id}: {parameter:?}");

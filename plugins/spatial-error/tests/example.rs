@@ -64,5 +64,8 @@ fn the_pipeline_finds_the_hidden_errors() {
     assert_eq!(found.verdict, Verdict::Explained);
     let names: Vec<String> =
         found.added.iter().map(|added| format!("{} {}", added.effect, added.targets.join(" "))).collect();
-    assert!(names.contains(&"scale X".into()) && names.contains(&"angular EBY".into()) && names.len() == 2, "{names:?}");
+    assert!(
+        names.contains(&"scale X".into()) && names.contains(&"angular EBY".into()) && names.len() == 2,
+        "{names:?}"
+    );
 }

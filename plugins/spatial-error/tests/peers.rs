@@ -50,7 +50,10 @@ fn compare(golden: &Value) -> [f64; 2] {
                 of_case[1] = of_case[1].max((found[1][row] / std[row] - 1.0).abs());
             }
         }
-        eprintln!("{} {} nugget {}: mean {:.1e}, std {:.1e}", case["peer"], case["variogram"], case["nugget_um"], of_case[0], of_case[1]);
+        eprintln!(
+            "{} {} nugget {}: mean {:.1e}, std {:.1e}",
+            case["peer"], case["variogram"], case["nugget_um"], of_case[0], of_case[1]
+        );
         worst = [0, 1].map(|part| worst[part].max(of_case[part]));
     }
     worst

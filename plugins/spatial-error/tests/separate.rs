@@ -66,7 +66,8 @@ fn extrapolation_is_flagged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("targets.csv");
     std::fs::write(&path, "# targets\nx_mm;y_mm;z_mm\n300,5;200;100\n900;200;100\n300;200;360\n").unwrap();
-    let outcome = separator(&format!("query = {{ path = {path:?} }}")).separate(&scenario(5).simulate().points()).unwrap();
+    let outcome =
+        separator(&format!("query = {{ path = {path:?} }}")).separate(&scenario(5).simulate().points()).unwrap();
     let rows = table(&outcome, "prediction");
     assert_eq!(flags(&rows, "extrapolated"), [false, true, true]);
     assert!((column(&rows, "x_mm")[0] - 300.5).abs() < 1e-12);
@@ -157,7 +158,9 @@ fn duplicates_are_averaged_or_named() {
     values.push(values[10].map(|value| value + 1.0));
     let points = readings(&places, &values);
     let fixed = |nugget: f64| {
-        format!("declared = []\nkriging = {{ variogram = \"matern-3/2\", sill_um = 3.0, range_mm = [60, 60, 60], nugget_um = {nugget:?} }}")
+        format!(
+            "declared = []\nkriging = {{ variogram = \"matern-3/2\", sill_um = 3.0, range_mm = [60, 60, 60], nugget_um = {nugget:?} }}"
+        )
     };
     let text = message(&points, &fixed(0.0));
     assert!(text.contains("rows 11 and 51") && text.contains("nugget_um"), "{text}");
@@ -253,8 +256,9 @@ fn axes_of_a_file_correct() {
         { id = "B", kind = "rotary", direction = [0, 1, 0], point_mm = [0, 0, 400], limit_urad = 10 },
     ]"#;
     std::fs::write(&path, text).unwrap();
-    let outcome =
-        separator(&format!("compensate = {{ axes = {path:?}, limit_um = 50 }}")).separate(&scenario(8).simulate().points()).unwrap();
+    let outcome = separator(&format!("compensate = {{ axes = {path:?}, limit_um = 50 }}"))
+        .separate(&scenario(8).simulate().points())
+        .unwrap();
     let rows = table(&outcome, "compensation");
     let add = ["correct_x_um", "correct_y_um", "correct_z_um", "correct_b_urad"].map(|name| column(&rows, name));
     assert!(add[1].iter().all(|add| add.abs() <= 1.5 + 1e-9) && add[3].iter().all(|add| add.abs() <= 10.0 + 1e-9));

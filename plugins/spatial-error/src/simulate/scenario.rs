@@ -280,9 +280,7 @@ impl SimulatedEffect {
             Self::Scale { targets, .. } => ("targets", &targets[0], &["X", "Y", "Z"]),
             Self::Squareness { targets, .. } => ("targets", &targets[0], &["XY", "XZ", "YZ"]),
             Self::Positioning { targets, .. } => ("targets", &targets[0], &["EXX", "EYY", "EZZ"]),
-            Self::Straightness { targets, .. } => {
-                ("targets", &targets[0], &["EYX", "EZX", "EXY", "EZY", "EXZ", "EYZ"])
-            }
+            Self::Straightness { targets, .. } => ("targets", &targets[0], &["EYX", "EZX", "EXY", "EZY", "EXZ", "EYZ"]),
             Self::Angular { targets, .. } => {
                 ("targets", &targets[0], &["EAX", "EBX", "ECX", "EAY", "EBY", "ECY", "EAZ", "EBZ", "ECZ"])
             }

@@ -81,8 +81,17 @@ impl Coverage {
         chi2.sort_by(f64::total_cmp);
         let quantile = |share: f64| chi2[((chi2.len() - 1) as f64 * share) as usize];
         println!("machines {}, predictions at unseen places {}", self.machines, self.predictions);
-        println!("mean square of error/std {:.3}; 95 % intervals hold {:.1} %", self.chi2(), 100.0 * self.share_inside());
-        println!("of single machines: 10 % below {:.2}, median {:.2}, 90 % below {:.2}", quantile(0.1), quantile(0.5), quantile(0.9));
+        println!(
+            "mean square of error/std {:.3}; 95 % intervals hold {:.1} %",
+            self.chi2(),
+            100.0 * self.share_inside()
+        );
+        println!(
+            "of single machines: 10 % below {:.2}, median {:.2}, 90 % below {:.2}",
+            quantile(0.1),
+            quantile(0.5),
+            quantile(0.9)
+        );
         let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
         println!(
             "compensation removes {:.0} % on average; it leaves {:.2} times what the best predictor leaves; right for {} of {}",
@@ -101,8 +110,9 @@ pub fn coverage(machines: usize, seed: u64) -> Coverage {
     for _ in 0..machines {
         let scenario = draw(&mut random);
         let made = scenario.simulate();
-        let unseen: Vec<[f64; 3]> =
-            (0..UNSEEN).map(|_| [0, 1, 2].map(|axis: usize| TRAVEL_MM[axis] * random.random_range(0.02..0.98))).collect();
+        let unseen: Vec<[f64; 3]> = (0..UNSEEN)
+            .map(|_| [0, 1, 2].map(|axis: usize| TRAVEL_MM[axis] * random.random_range(0.02..0.98)))
+            .collect();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("unseen.csv");
         let lines: String = unseen.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
@@ -135,7 +145,12 @@ pub fn coverage(machines: usize, seed: u64) -> Coverage {
 }
 
 /// Error before and after compensation, and what the best predictor leaves, each without the best rigid motion.
-fn compensated(scenario: &Scenario, made: &Simulated, unseen: &[[f64; 3]], outcome: &runout_core::stage::Outcome) -> [f64; 3] {
+fn compensated(
+    scenario: &Scenario,
+    made: &Simulated,
+    unseen: &[[f64; 3]],
+    outcome: &runout_core::stage::Outcome,
+) -> [f64; 3] {
     let rows = table(outcome, "compensation");
     let add = ["correct_x_um", "correct_y_um", "correct_z_um"].map(|name| column(&rows, name));
     let error: Vec<Vector3<f64>> = unseen.iter().map(|place| Vector3::from(made.error_um(*place))).collect();
@@ -279,7 +294,11 @@ impl Blind {
         println!("effects named that were not there: {}", self.wrong);
         println!("clean campaigns with an effect or a stranger: {} of {}", self.false_alarms, self.clean);
         println!("strangers said to be unexplained: {} of {}", self.unexplained, self.strangers);
-        println!("mean square of (value - truth)/std: {:.2} of {}", self.parameter_squares / self.parameters.max(1) as f64, self.parameters);
+        println!(
+            "mean square of (value - truth)/std: {:.2} of {}",
+            self.parameter_squares / self.parameters.max(1) as f64,
+            self.parameters
+        );
         for miss in &self.misses {
             println!("  {miss}");
         }
@@ -298,12 +317,20 @@ fn effect(random: &mut impl Rng, noise_um: f64) -> (SimulatedEffect, String, f64
         0 => {
             let target = one(&mut pick, &["X", "Y", "Z"]);
             let value = 4.0 * size;
-            (SimulatedEffect::Scale { targets: [target.clone()], scale_um_per_m: value }, format!("scale {target}"), value)
+            (
+                SimulatedEffect::Scale { targets: [target.clone()], scale_um_per_m: value },
+                format!("scale {target}"),
+                value,
+            )
         }
         1 => {
             let target = one(&mut pick, &["XY", "XZ", "YZ"]);
             let value = 4.0 * size;
-            (SimulatedEffect::Squareness { targets: [target.clone()], angle_urad: value }, format!("squareness {target}"), value)
+            (
+                SimulatedEffect::Squareness { targets: [target.clone()], angle_urad: value },
+                format!("squareness {target}"),
+                value,
+            )
         }
         2 => {
             let target = one(&mut pick, &["EXX", "EYY", "EZZ"]);
@@ -325,7 +352,8 @@ fn effect(random: &mut impl Rng, noise_um: f64) -> (SimulatedEffect, String, f64
         }
         _ => {
             let target = one(&mut pick, &["x", "y", "z"]);
-            let effect = SimulatedEffect::ThermalDrift { targets: [target.clone()], drift_um: size, time_constant: None };
+            let effect =
+                SimulatedEffect::ThermalDrift { targets: [target.clone()], drift_um: size, time_constant: None };
             (effect, format!("thermal-drift {target}"), size)
         }
     }
@@ -356,7 +384,8 @@ pub fn blind(campaigns: usize, seed: u64) -> Blind {
             _ => {
                 stranger = true;
                 let size = scenario.field.as_ref().unwrap().std_um.iter().copied().fold(3.0 * noise_um, f64::max);
-                let mut by = || 3.0 * size * random.random_range(0.5..1.5) * if random.random_bool(0.5) { 1.0 } else { -1.0 };
+                let mut by =
+                    || 3.0 * size * random.random_range(0.5..1.5) * if random.random_bool(0.5) { 1.0 } else { -1.0 };
                 let by_um = [by(), by(), by()];
                 scenario.effect.push(if kind == 17 {
                     let axis = random.random_range(0..3);
@@ -364,7 +393,11 @@ pub fn blind(campaigns: usize, seed: u64) -> Blind {
                     SimulatedEffect::Step { axis: ["X", "Y", "Z"][axis].into(), at_mm, by_um }
                 } else {
                     let share = random.random_range(0.35..0.55);
-                    SimulatedEffect::DisplacedBox { from_mm: [-1.0; 3], to_mm: TRAVEL_MM.map(|length| share * length), by_um }
+                    SimulatedEffect::DisplacedBox {
+                        from_mm: [-1.0; 3],
+                        to_mm: TRAVEL_MM.map(|length| share * length),
+                        by_um,
+                    }
                 });
             }
         }
@@ -402,7 +435,11 @@ fn judge(
             std::iter::once(first).chain(added.confounded_with.iter().cloned()).collect()
         })
         .collect();
-    let said = format!("{campaign}: {truths:?} said {names:?} {:?} {:?}", found.verdict, found.unexplained.iter().map(|one| &one.place).collect::<Vec<_>>());
+    let said = format!(
+        "{campaign}: {truths:?} said {names:?} {:?} {:?}",
+        found.verdict,
+        found.unexplained.iter().map(|one| &one.place).collect::<Vec<_>>()
+    );
     if stranger {
         sum.strangers += 1;
         let right = found.verdict == Verdict::Unexplained;
@@ -455,7 +492,10 @@ fn judge(
                     sum.parameter_squares += z * z;
                     sum.parameters += 1;
                     if z.abs() > 3.0 {
-                        sum.misses.push(format!("{name}: {:.2} ± {std:.2} is {value:.2} ({:?}) {said}", last.value, scenario.field));
+                        sum.misses.push(format!(
+                            "{name}: {:.2} ± {std:.2} is {value:.2} ({:?}) {said}",
+                            last.value, scenario.field
+                        ));
                     }
                 }
             }
