@@ -297,14 +297,14 @@ struct Slopes<'a, S> {
     axes: [&'a [f64]; 3],
     at: [f64; 3],
     values: &'a mut [f64],
-    slopes: &'a mut [f64],
+    rates: &'a mut [f64],
     shape: std::marker::PhantomData<S>,
 }
 
 impl<'a, S: Shape> Slopes<'a, S> {
-    fn run(places: &'a Scaled, at: [f64; 3], values: &'a mut [f64], slopes: &'a mut [f64]) {
+    fn run(places: &'a Scaled, at: [f64; 3], values: &'a mut [f64], rates: &'a mut [f64]) {
         let axes = places.from(0);
-        fused(Self { axes, at, values, slopes, shape: std::marker::PhantomData });
+        fused(Self { axes, at, values, rates, shape: std::marker::PhantomData });
     }
 }
 
@@ -312,7 +312,7 @@ impl<S: Shape> FusedWork for Slopes<'_, S> {
     #[inline(always)]
     fn call<A: Arithmetic>(self) {
         let [x, y, z] = self.axes;
-        let out = self.values.iter_mut().zip(self.slopes);
+        let out = self.values.iter_mut().zip(self.rates);
         for ((((value, slope), x), y), z) in out.zip(x).zip(y).zip(z) {
             (*value, *slope) = S::slope::<A>(square::<A>(*x, *y, *z, self.at));
         }

@@ -35,9 +35,10 @@ impl PointModel for SpatialError {
         missing().into_iter().map(crate::effects::Missing::effect).collect()
     }
 
+    #[allow(clippy::too_many_lines, reason = "one part of the diagnosis after the other")]
     fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
         let mut campaign = self.campaign(points)?;
-        self.subtract_known(&mut campaign, settings)?;
+        subtract_known(&mut campaign, settings)?;
         let before = solve(&campaign, &self.config, &[])?;
         let candidates = candidates();
         let jumps = jumps(&campaign);
@@ -154,40 +155,6 @@ impl PointModel for SpatialError {
 const TOLD_APART_BY: &str = "a second campaign with another `tool_mm`, or in another order of the places";
 
 impl SpatialError {
-    /// Takes effects that are declared with their values out of the readings.
-    fn subtract_known(&self, campaign: &mut Campaign, settings: &Settings) -> Result<()> {
-        let kinds = missing();
-        for setting in &settings.known {
-            let kind = kinds[setting.effect];
-            let (order, values) = match (kind.has_order(), setting.values.split_first()) {
-                (true, Some((order, rest))) => {
-                    let orders = kind.orders();
-                    let is_one =
-                        order.fract() == 0.0 && *order >= *orders.start() as f64 && *order <= *orders.end() as f64;
-                    if !is_one {
-                        let effect = kind.effect();
-                        let problem = format!(
-                            "its order is a whole number from {} to {}, found {order}",
-                            orders.start(),
-                            orders.end()
-                        );
-                        return Err(Error::new("take out the known effect", effect.name(), problem));
-                    }
-                    (*order as usize, rest.to_vec())
-                }
-                _ => (1, setting.values.clone()),
-            };
-            for (term, value) in kind.terms(order).into_iter().zip(values) {
-                for row in 0..campaign.place_of.len() {
-                    let place = campaign.places_mm[campaign.place_of[row]];
-                    let adds = term.at(&campaign.volume, place, campaign.time[row]);
-                    campaign.readings_um[row].iter_mut().zip(adds).for_each(|(reading, adds)| *reading -= value * adds);
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// The covariance that is given, as a prior that leaves nothing free.
     fn given(&self, campaign: &Campaign, before: &Solution) -> Option<Prior> {
         let covariance = self.config.kriging.fixed()?;
@@ -246,6 +213,39 @@ impl SpatialError {
         }
         Ok(steps)
     }
+}
+
+/// Takes effects that are declared with their values out of the readings.
+fn subtract_known(campaign: &mut Campaign, settings: &Settings) -> Result<()> {
+    let kinds = missing();
+    for setting in &settings.known {
+        let kind = kinds[setting.effect];
+        let (order, values) = match (kind.has_order(), setting.values.split_first()) {
+            (true, Some((order, rest))) => {
+                let orders = kind.orders();
+                let is_one = order.fract() == 0.0 && *order >= *orders.start() as f64 && *order <= *orders.end() as f64;
+                if !is_one {
+                    let effect = kind.effect();
+                    let problem = format!(
+                        "its order is a whole number from {} to {}, found {order}",
+                        orders.start(),
+                        orders.end()
+                    );
+                    return Err(Error::new("take out the known effect", effect.name(), problem));
+                }
+                (*order as usize, rest.to_vec())
+            }
+            _ => (1, setting.values.clone()),
+        };
+        for (term, value) in kind.terms(order).into_iter().zip(values) {
+            for row in 0..campaign.place_of.len() {
+                let place = campaign.places_mm[campaign.place_of[row]];
+                let adds = term.at(&campaign.volume, place, campaign.time[row]);
+                campaign.readings_um[row].iter_mut().zip(adds).for_each(|(reading, adds)| *reading -= value * adds);
+            }
+        }
+    }
+    Ok(())
 }
 
 fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone: bool) -> Vec<Estimated> {

@@ -136,7 +136,7 @@ impl Joint {
         let mut white_readings = Vec::with_capacity(covariances.len());
         for ((covariance, observed), design) in covariances.iter().zip(&data.observed).zip(&data.design) {
             let cloud = Scaled::of(&data.places, covariance.range_mm);
-            let factor = factor(matrix(covariance, &cloud, observed))?;
+            let factor = factor(&matrix(covariance, &cloud, observed))?;
             let count = data.places.len();
             let mut white = Mat::<f64>::zeros(count, columns + 1);
             for row in 0..count {
@@ -211,7 +211,7 @@ impl Joint {
 }
 
 /// L of a positive definite matrix of which the lower half is given.
-pub(crate) fn factor(matrix: Mat<f64>) -> Option<Mat<f64>> {
+pub(crate) fn factor(matrix: &Mat<f64>) -> Option<Mat<f64>> {
     // A matrix with something that is not a number has no factor.
     let all = matrix.llt(Side::Lower).ok()?.L().to_owned();
     (0..all.nrows()).all(|row| all[(row, row)].is_finite() && all[(row, row)] > 0.0).then_some(all)
@@ -226,7 +226,7 @@ fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<(DVector<f64>, D
     let scaled = DMatrix::from_diagonal(&scale) * normal * DMatrix::from_diagonal(&scale);
     let factored = Cholesky::new(scaled)?;
     let diagonal = factored.l_dirty().diagonal();
-    if diagonal.iter().any(|entry| !(entry * entry > SINGULAR)) {
+    if diagonal.iter().any(|entry| entry.is_nan() || entry * entry <= SINGULAR) {
         return None;
     }
     let inverse = DMatrix::from_diagonal(&scale) * factored.inverse() * DMatrix::from_diagonal(&scale);

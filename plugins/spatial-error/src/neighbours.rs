@@ -100,7 +100,7 @@ impl Local<'_> {
         let part =
             Observed { mean_um: of(&observed.mean_um), noise_um2: of(&observed.noise_um2), share: of(&observed.share) };
         let cloud = Scaled::of(&places, self.covariance.range_mm);
-        let Some(lower) = factor(matrix(self.covariance, &cloud, &part)) else { return lost };
+        let Some(lower) = factor(&matrix(self.covariance, &cloud, &part)) else { return lost };
         let columns = design.len();
         let known = &self.data.design[self.field];
         let trend = &self.joint.trend;
@@ -110,7 +110,7 @@ impl Local<'_> {
         let mut to_place = vec![0.0; near.len()];
         self.covariance.family.correlations(cloud.from(0), sill, scaled(place, self.covariance), &mut to_place);
         for (row, index) in near.iter().enumerate() {
-            let same = nugget_counts && self.data.places[*index] == *place;
+            let same = nugget_counts && (0..3).all(|axis| (self.data.places[*index][axis] - place[axis]).abs() < 5e-7);
             white[(row, 0)] = to_place[row] + if same { nugget } else { 0.0 };
             let of_trend: f64 = (0..columns).map(|column| known[(*index, column)] * trend[column]).sum();
             white[(row, 1)] = part.mean_um[row] - of_trend;

@@ -259,27 +259,26 @@ pub fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64; 3]> {
     let terms = &solution.terms;
     let trend = &solution.joint.trend;
     // What noise is taken to be of the mean at each place.
-    let of_mean: Vec<[f64; 3]> = match &solution.fitted {
-        None => (0..campaign.places_mm.len())
+    let of_mean: Vec<[f64; 3]> = if solution.fitted.is_none() {
+        (0..campaign.places_mm.len())
             .map(|place| {
                 [0, 1, 2]
                     .map(|axis| solution.noise_um2(campaign, place, axis) * solution.joint.fields[axis].alpha[place])
             })
-            .collect(),
-        Some(_) => {
-            let predicted = solution.predict(campaign, &campaign.places_mm, false);
-            let mean = |place: usize, axis: usize| {
-                let of_trend: f64 =
-                    (0..terms.len()).map(|column| solution.data.design[axis][(place, column)] * trend[column]).sum();
-                let at_first: f64 = terms
-                    .iter()
-                    .zip(trend.iter())
-                    .map(|(term, value)| value * term.at(&campaign.volume, campaign.places_mm[place], 0.0)[axis])
-                    .sum();
-                solution.data.observed[axis].mean_um[place] - predicted[place][axis].mean_um - of_trend + at_first
-            };
-            (0..campaign.places_mm.len()).map(|place| [0, 1, 2].map(|axis| mean(place, axis))).collect()
-        }
+            .collect()
+    } else {
+        let predicted = solution.predict(campaign, &campaign.places_mm, false);
+        let mean = |place: usize, axis: usize| {
+            let of_trend: f64 =
+                (0..terms.len()).map(|column| solution.data.design[axis][(place, column)] * trend[column]).sum();
+            let at_first: f64 = terms
+                .iter()
+                .zip(trend.iter())
+                .map(|(term, value)| value * term.at(&campaign.volume, campaign.places_mm[place], 0.0)[axis])
+                .sum();
+            solution.data.observed[axis].mean_um[place] - predicted[place][axis].mean_um - of_trend + at_first
+        };
+        (0..campaign.places_mm.len()).map(|place| [0, 1, 2].map(|axis| mean(place, axis))).collect()
     };
     let moving: Vec<usize> = (0..terms.len()).filter(|column| terms[*column].moves_in_time()).collect();
     let one = |(row, place): (usize, &usize)| {

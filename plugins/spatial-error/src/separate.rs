@@ -74,7 +74,7 @@ impl PointSeparator for SpatialError {
         if self.config.std_um.is_none() {
             notes.push("without repeats, `std_um` or a column `std_um`, noise and what varies from place to place are one: the nugget".into());
         }
-        if self.config.tool_mm == [0.0; 3] {
+        if self.config.tool_mm.iter().all(|length| length.abs() < 1e-12) {
             let [.., last] = self.config.chain_axes();
             let (axis, before) = (["X", "Y", "Z"][last], ["X", "Y", "Z"][self.config.chain_axes()[1]]);
             notes.push(format!(

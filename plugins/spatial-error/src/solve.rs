@@ -206,7 +206,9 @@ pub fn estimated_from(campaign: &Campaign) -> Option<Vec<usize>> {
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(count as u64));
     let mut chosen = order[..all - pairs].to_vec();
     let mut used = vec![false; count];
-    chosen.iter().for_each(|place| used[*place] = true);
+    for place in &chosen {
+        used[*place] = true;
+    }
     let apart = |a: usize, b: usize| {
         let [a, b] = [a, b].map(|place| Vector3::from(campaign.places_mm[place]));
         (a - b).norm_squared()
@@ -231,26 +233,22 @@ pub fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[Term]) -
     let wanted: Vec<Term> = config.declared_terms().into_iter().chain(added.iter().copied()).collect();
     let (terms, lost) = independent(campaign, &wanted);
     has_enough(campaign, config, &terms)?;
-    let (family, estimate, covariances) = match config.kriging.fixed() {
-        Some(covariance) => {
-            no_contradiction(campaign, &covariance)?;
-            (covariance.family, None, vec![covariance; 3])
-        }
-        None => {
-            let some = estimated_from(campaign);
-            let data = campaign.data(&terms, some.as_deref());
-            let prior = prior(campaign, &data);
-            let found = most_likely(&data, &prior, &families(&config.kriging), Criterion::Restricted, None);
-            let (family, estimate) = found.ok_or_else(|| {
-                let problem = "no covariance with a positive definite matrix was found".to_owned();
-                Error::new("estimate the covariance of", &campaign.file, problem).help(
-                    "are places or readings far out of their usual size? `kriging` takes a covariance of your own",
-                )
-            })?;
-            let covariances = estimate.covariances.clone();
-            (family, Some(estimate), covariances)
-        }
-    };
+    if let Some(covariance) = config.kriging.fixed() {
+        no_contradiction(campaign, &covariance)?;
+        let (family, covariances) = (covariance.family, vec![covariance; 3]);
+        return complete(campaign, config, Found { family, estimate: None, covariances, terms, lost });
+    }
+    let some = estimated_from(campaign);
+    let data = campaign.data(&terms, some.as_deref());
+    let prior = prior(campaign, &data);
+    let found = most_likely(&data, &prior, &families(&config.kriging), Criterion::Restricted, None);
+    let (family, estimate) = found.ok_or_else(|| {
+        let problem = "no covariance with a positive definite matrix was found".to_owned();
+        Error::new("estimate the covariance of", &campaign.file, problem)
+            .help("are places or readings far out of their usual size? `kriging` takes a covariance of your own")
+    })?;
+    let covariances = estimate.covariances.clone();
+    let estimate = Some(estimate);
     complete(campaign, config, Found { family, estimate, covariances, terms, lost })
 }
 
@@ -312,6 +310,10 @@ fn has_enough(campaign: &Campaign, config: &SpatialErrorConfig, terms: &[Term]) 
     Err(Error::new("fit", &campaign.file, problem).help("`kriging` with `sill_um` and `range_mm` needs fewer places"))
 }
 
+fn differ(one: [f64; 3], other: [f64; 3]) -> bool {
+    one.iter().zip(other).any(|(one, other)| (one - other).abs() > 0.0)
+}
+
 /// Readings of one place that differ, with a covariance that says that they cannot.
 fn no_contradiction(campaign: &Campaign, covariance: &Covariance) -> Result<()> {
     if covariance.nugget_um > 0.0 || campaign.noise != Noise::Unknown {
@@ -321,7 +323,7 @@ fn no_contradiction(campaign: &Campaign, covariance: &Covariance) -> Result<()> 
     for (row, place) in campaign.place_of.iter().enumerate() {
         match first[*place] {
             None => first[*place] = Some(row),
-            Some(other) if campaign.readings_um[other] != campaign.readings_um[row] => {
+            Some(other) if differ(campaign.readings_um[other], campaign.readings_um[row]) => {
                 let [x, y, z] = campaign.places_mm[*place];
                 let problem = format!(
                     "rows {} and {} are at one place ({x}, {y}, {z} mm) and read differently, and the covariance has no nugget",

@@ -32,7 +32,7 @@ impl Span {
             points.iter().map(|point| (point - middle).dot(direction).abs()).fold(0.0, f64::max)
         };
         let extent = points.iter().map(|point| (point - middle).norm()).fold(0.0, f64::max);
-        let all = directions.column_iter().map(|column| Vector3::from(column));
+        let all = directions.column_iter().map(Vector3::from);
         let missing = all.filter(|direction| thickness(direction) <= THIN * extent).collect();
         Self { middle, missing, extent, corners: corners(points) }
     }
@@ -74,7 +74,9 @@ fn corners(mut points: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
         points.sort_by(|one, other| {
             one[a].total_cmp(&other[a]).then(one[b].total_cmp(&other[b])).then(one[axis].total_cmp(&other[axis]))
         });
-        let same = |one: &Vector3<f64>, other: &Vector3<f64>| one[a] == other[a] && one[b] == other[b];
+        let same = |one: &Vector3<f64>, other: &Vector3<f64>| {
+            one[a].to_bits() == other[a].to_bits() && one[b].to_bits() == other[b].to_bits()
+        };
         let is_end = |index: usize| {
             let first = index == 0 || !same(&points[index - 1], &points[index]);
             first || index + 1 == points.len() || !same(&points[index + 1], &points[index])

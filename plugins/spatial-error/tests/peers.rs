@@ -1,6 +1,12 @@
 //! Equality with scikit-learn and pykrige, which are asked again where Python has them.
 
-#![allow(clippy::unwrap_used, clippy::print_stderr, reason = "tests")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    clippy::format_collect,
+    clippy::unnecessary_debug_formatting,
+    reason = "tests"
+)]
 
 mod support;
 

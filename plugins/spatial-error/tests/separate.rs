@@ -1,6 +1,6 @@
 //! Predictions, what a layout loses, and bad input.
 
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::single_match_else, clippy::unnecessary_debug_formatting, reason = "tests")]
 
 mod support;
 

@@ -1,6 +1,14 @@
 //! Simulated machines, and what the separator says of them.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, dead_code, reason = "tests")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::format_collect,
+    clippy::unnecessary_debug_formatting,
+    clippy::float_cmp,
+    dead_code,
+    reason = "tests"
+)]
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::{Rng, RngExt, SeedableRng, seq::IndexedRandom};
@@ -486,6 +494,8 @@ fn judge(
             Some(at) => {
                 if let [.., last] = &found.added[at].parameters[..]
                     && !drifts
+                    // Orders count over the measured volume, which scattered places do not fill.
+                    && matches!(scenario.layout, Layout::Grid { .. })
                     && let Some(std) = last.std
                 {
                     let z = (last.value - value) / std;
