@@ -109,8 +109,8 @@ impl Conclusion<'_> {
                 .into(),
             tables,
             values: self.values(&queries, &left_out),
-            form: None,
             remarks: remarks::remarks(self, &queries, &left_out),
+            ..Outcome::default()
         })
     }
 
