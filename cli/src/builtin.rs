@@ -19,6 +19,7 @@ pub fn registry() -> Registry {
         runout_touch_probe::register,
         runout_rotor::register,
         runout_spatial_error::register,
+        runout_fly_cutting::register,
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,

@@ -16,7 +16,7 @@ use runout_core::{
     rig::Rig,
     stage::{Simulation, Simulator},
 };
-use runout_hdf5::{SampleFormat, Scale, WriteOptions, write_measurement};
+use runout_hdf5::{SampleFormat, Scale, WriteOptions, write_height_map, write_measurement};
 use serde::Serialize;
 
 use super::print;
@@ -39,6 +39,7 @@ struct Report {
 enum Made {
     Turns { setups: usize, stations: usize, sensors: usize, samples_per_capture: u64, turns_per_capture: usize },
     Points { points: usize, columns: Vec<String> },
+    Heights { points: usize, rows: usize, columns: usize, holes: usize },
 }
 
 /// Computes a campaign and writes it.
@@ -114,6 +115,11 @@ fn write(scenario: &Scenario) -> Result<Report, Error> {
             let columns = table.columns.iter().map(|column| column.name.clone()).collect();
             Made::Points { points: rows.num_rows(), columns }
         }
+        Simulation::Heights(grid) => {
+            write_height_map(&grid, &scenario.output, &scenario.title, Some(scenario.simulator.scenario()))?;
+            let (points, rows, columns) = (grid.height_nm.len(), grid.rows(), grid.columns);
+            Made::Heights { points, rows, columns, holes: grid.holes() }
+        }
     };
     let output = scenario.output.clone();
     let bytes = std::fs::metadata(&output).map_err(|error| Error::new("read", output.display().to_string(), error))?;
@@ -153,10 +159,14 @@ fn text(report: &Report) -> String {
         Made::Points { points, columns } => {
             format!("{} with the columns {}", count(*points, "point"), columns.join(", "))
         }
+        Made::Heights { points, rows, columns, holes } => {
+            let holes = if *holes > 0 { format!(", {holes} of them without a height") } else { String::new() };
+            format!("{} on {rows} rows and {columns} columns{holes}", count(*points, "point"))
+        }
     };
     let effects = match (report.effects, &report.made) {
         (0, _) => String::new(),
-        (effects, Made::Turns { .. }) => {
+        (effects, Made::Turns { .. } | Made::Heights { .. }) => {
             format!("  {} in it, kept with the truth in the file\n", count(effects, "effect"))
         }
         (effects, Made::Points { .. }) => format!("  {} in it\n", count(effects, "effect")),

@@ -4,6 +4,7 @@
 //! micrometres, geometry in millimetres, angles in radians inside the code (`_deg` in files).
 
 pub mod atomic_file;
+pub mod height_grid;
 pub mod pipeline;
 pub mod points;
 pub mod stage;

@@ -19,12 +19,14 @@
 //! The C library behind it is not safe for threads; the `hdf5-metno` crate lets one thread in at a time.
 
 mod heaps;
+mod height_map;
 mod inspect;
 mod measurement;
 mod node;
 mod result;
 mod text;
 
+pub use height_map::{HeightMapConfig, read_height_map, write_height_map};
 pub use inspect::{CaptureReport, FileReport, StationReport, TableReport, inspect};
 pub use measurement::{
     loader::Hdf5Config,
@@ -38,11 +40,14 @@ use runout_core::pipeline::registry::{Plugin, Registry};
 pub const MEASUREMENT_FORMAT: &str = "runout-measurement";
 /// `format` of a result file.
 pub const RESULT_FORMAT: &str = "runout-result";
-/// `version` of both.
+/// `format` of a height map.
+pub const SURFACE_FORMAT: &str = "runout-surface";
+/// `version` of all of them.
 pub const VERSION: u64 = 1;
 
-/// Adds the loader and the exporter, both named `hdf5`.
+/// Adds the loader and the exporter, both named `hdf5`, and the loader `height-map`.
 pub fn register(registry: &mut Registry) {
     registry.loaders.add(Plugin::of::<Hdf5Config>());
+    registry.loaders.add(Plugin::of::<HeightMapConfig>());
     registry.exporters.add(Plugin::of::<ResultConfig>());
 }

@@ -1,5 +1,6 @@
 //! Simulation: what would be measured, computed from a declared truth.
 
+use crate::height_grid::HeightGrid;
 use runout_error::Result;
 use runout_table::{RecordBatch, TableSpec};
 use runout_turning::{measurement::Recording, rig::Rig};
@@ -32,4 +33,6 @@ pub enum Simulation<'a> {
         /// The points.
         rows: RecordBatch,
     },
+    /// Heights of a surface.
+    Heights(HeightGrid),
 }

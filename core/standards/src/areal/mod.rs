@@ -103,6 +103,12 @@ pub struct Areal {
     pub features: Features,
 }
 
+/// Height parameters alone (clause 4.2), about the mean of the points measured.
+#[must_use]
+pub fn heights(map: &HeightMap) -> Height {
+    Height::of(&map.with(height::centred(map.heights_um())))
+}
+
 /// Evaluates a map. Form is removed before, by [`without_cylinder`] or [`without_polynomial`], and wavelengths by
 /// [`areal_gaussian`](runout_numerics::filter::areal_gaussian).
 #[must_use]

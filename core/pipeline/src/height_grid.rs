@@ -1,0 +1,62 @@
+//! Heights on a plane: what an interferometer gives of a surface.
+
+use std::path::PathBuf;
+
+use crate::points::{Column, Points};
+
+/// Heights at the nodes of a rectangular grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightGrid {
+    /// Nodes along x.
+    pub columns: usize,
+    /// Distance of columns, in mm.
+    pub step_x_mm: f64,
+    /// Distance of rows, in mm.
+    pub step_y_mm: f64,
+    /// x of the first column, in mm.
+    pub origin_x_mm: f64,
+    /// y of the first row, in mm.
+    pub origin_y_mm: f64,
+    /// Standard uncertainty of a height, in nm, where it is known.
+    pub std_nm: Option<f64>,
+    /// Heights in nm, row by row; NaN where there is none.
+    pub height_nm: Vec<f64>,
+}
+
+impl HeightGrid {
+    /// Names of the columns of [`points`](Self::points); the last one is there where the uncertainty is known.
+    pub const COLUMNS: [&'static str; 4] = ["x_mm", "y_mm", "height_nm", "std_nm"];
+
+    /// Nodes along y.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.height_nm.len() / self.columns.max(1)
+    }
+
+    /// Nodes without a height.
+    #[must_use]
+    pub fn holes(&self) -> usize {
+        self.height_nm.iter().filter(|height| !height.is_finite()).count()
+    }
+
+    /// The nodes with a height, row by row, as points of a file.
+    #[must_use]
+    pub fn points(self, input: PathBuf) -> Points {
+        let count = self.height_nm.len() - self.holes();
+        let [mut x, mut y] = [Vec::with_capacity(count), Vec::with_capacity(count)];
+        for (row, heights) in self.height_nm.chunks(self.columns.max(1)).enumerate() {
+            let row_y_mm = self.origin_y_mm + self.step_y_mm * row as f64;
+            for (column, _) in heights.iter().enumerate().filter(|(_, height)| height.is_finite()) {
+                x.push(self.origin_x_mm + self.step_x_mm * column as f64);
+                y.push(row_y_mm);
+            }
+        }
+        let mut heights = self.height_nm;
+        heights.retain(|height| height.is_finite());
+        let std = self.std_nm.map(|std| vec![std; heights.len()]);
+        let values = [Some(x), Some(y), Some(heights), std];
+        let columns = Self::COLUMNS.iter().zip(values);
+        let columns = columns.filter_map(|(name, values)| Some(Column { name: (*name).into(), values: values? }));
+        Points { input, columns: columns.collect(), ..Points::default() }
+    }
+}

@@ -1,0 +1,391 @@
+//! A cut with its effects, as a model for the closed loop.
+
+use std::{
+    f64::consts::TAU,
+    sync::{Arc, OnceLock},
+};
+
+use runout_core::{
+    Error, Result,
+    model::{
+        Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
+        diagnosis::{Estimated, Unexplained},
+        fit::refit,
+    },
+};
+
+use crate::{
+    config::FlyCuttingConfig,
+    effects::{MISSING, Missing, applied, tidy},
+    heights::Heights,
+    passes::{Cut, Line},
+    phase::{self, Phased, dot, without_mean},
+    search::Left,
+};
+
+/// Points that the search looks at, and those of the final fit.
+const SEARCHED: usize = 160_000;
+const FITTED: usize = 640_000;
+/// Points by which the phase of the scallops is found.
+const SAMPLED: usize = 4_000;
+/// Every so many rows one is held out.
+const HELD_OUT: usize = 5;
+/// Δχ² below which a line is not tried: less is no evidence for its three parameters in any map.
+const LEAST_GAIN: f64 = 25.0;
+/// Factors of the amplitude that a spectrum shows, where passes bury others.
+const ENLARGED: [f64; 3] = [1.0, 2.0, 4.0];
+/// Lines that look alike, of which a refit decides.
+const ALIKE: usize = 4;
+/// Harmonics of a line that passes which bury others may show instead of it.
+const HARMONICS: usize = 3;
+/// A line is taken as its spectrum shows it where its amplitude is below this share of the height that buries a pass.
+const LINEAR: f64 = 0.2;
+/// Parts of the map that have to agree on an effect where the noise is not known.
+const PARTS: usize = 8;
+
+/// The data of a model.
+#[derive(Debug)]
+struct Data {
+    config: FlyCuttingConfig,
+    fitted: Heights,
+    held_out: Heights,
+    sample: Heights,
+    extent_mm: [[f64; 2]; 2],
+    /// Effects that are declared with their values.
+    known: Vec<usize>,
+}
+
+/// The model.
+#[derive(Debug, Clone)]
+pub(crate) struct CutModel {
+    data: Arc<Data>,
+    whole: Option<Arc<CutModel>>,
+    effects: Vec<Effect>,
+}
+
+impl CutModel {
+    /// Of a map, whose points are thinned for the search; every fifth row is held out.
+    pub fn new(config: &FlyCuttingConfig, heights: &Heights, known: &[Setting]) -> Self {
+        let known: Vec<usize> = known.iter().map(|setting| setting.effect).collect();
+        let extent_mm = heights.extent_mm();
+        let of = |fitted: Heights, held_out: Heights, whole: Option<CutModel>| {
+            let sample = fitted.thinned(SAMPLED);
+            let data = Data { config: config.clone(), fitted, held_out, sample, extent_mm, known: known.clone() };
+            let effects = MISSING.iter().map(|missing| missing.effect()).collect();
+            Self { data: Arc::new(data), whole: whole.map(Arc::new), effects }
+        };
+        let whole = of(heights.thinned(FITTED), heights.part(|_, _| false), None);
+        let searched = heights.thinned(SEARCHED);
+        let by_row = searched.rows.len() >= 2 * HELD_OUT;
+        let is_held = |row: usize, point: usize| {
+            let number = if by_row { row } else { point / 16 };
+            number % HELD_OUT == HELD_OUT / 2
+        };
+        let fitted = searched.part(|row, point| !is_held(row, point));
+        let held_out = searched.part(is_held);
+        of(fitted, held_out, Some(whole))
+    }
+
+    /// A cut with some effects applied.
+    pub fn cut(&self, settings: &[Setting]) -> Result<Cut> {
+        Cut::new(&self.data.config, self.data.extent_mm, applied(settings))
+            .ok_or_else(|| Error::new("fit", "the cut", "a feed or a nose radius is beyond all bounds"))
+    }
+}
+
+impl CutModel {
+    /// Of lines that look alike on a sample of the points, the one with which least is left of all.
+    fn best_start(&self, effect: usize, applied: &[Setting], starts: &[[f64; 3]]) -> Option<Vec<f64>> {
+        if let [only] = starts {
+            return Some(only.to_vec());
+        }
+        let refined = starts.iter().filter_map(|start| {
+            let mut settings = applied.to_vec();
+            settings.push(Setting { effect, values: start.to_vec() });
+            let refit = refit(self, settings, applied.len()).ok()?;
+            Some((refit.chi2, refit.settings.last()?.values.clone()))
+        });
+        refined.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, values)| values)
+    }
+}
+
+impl Model for CutModel {
+    type Fit = CutFit;
+
+    fn effects(&self) -> &[Effect] {
+        &self.effects
+    }
+
+    fn fit(&self, applied: &[Setting]) -> Result<CutFit> {
+        if applied.iter().flat_map(|setting| &setting.values).any(|value| !value.is_finite()) {
+            return Err(Error::new("fit", "the cut", "a parameter is no finite number"));
+        }
+        let cut = self.cut(applied)?;
+        let phased = phase::fit(&cut, &self.data.fitted, &self.data.sample);
+        Ok(CutFit::new(Arc::clone(&self.data), cut, phased, applied))
+    }
+
+    fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
+        match (MISSING.get(effect).map(|missing| missing.line()), values) {
+            (Some(Some(_)), [ratio, ..]) => *ratio > 0.0 && *ratio <= self.data.config.max_frequency_ratio as f64 + 0.5,
+            _ => true,
+        }
+    }
+
+    fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {
+        let missing = MISSING.get(effect)?;
+        match missing {
+            Missing::FeedScale => {
+                let fit = self.fit(applied).ok()?;
+                fit.left().feed_scale(&fit.cut).map(|scale| vec![1e6 * scale])
+            }
+            Missing::SpindleLine(_) | Missing::TiltLine => {
+                self.best_start(effect, applied, self.fit(applied).ok()?.starts(*missing))
+            }
+            _ => None,
+        }
+    }
+
+    fn whole(&self) -> &Self {
+        self.whole.as_deref().unwrap_or(self)
+    }
+
+    fn present(&self, effect: usize, mut estimated: Vec<Estimated>) -> Vec<Estimated> {
+        // A parameter that no datum moves has no uncertainty that says anything.
+        for one in &mut estimated {
+            one.std = one.std.filter(|std| *std > 0.0);
+        }
+        if MISSING.get(effect).is_some_and(|missing| missing.line().is_some())
+            && let [ratio, amplitude, phase] = &mut estimated[..]
+        {
+            [ratio.value, amplitude.value, phase.value] = tidy([ratio.value, amplitude.value, phase.value]);
+            let turns_hz = self.data.config.speed_rpm / 60.0;
+            let frequency = Estimated {
+                name: "frequency".into(),
+                value: turns_hz * ratio.value,
+                std: ratio.std.map(|std| turns_hz * std),
+                unit: "Hz".into(),
+            };
+            estimated.push(frequency);
+        }
+        estimated
+    }
+}
+
+/// A fitted cut.
+#[derive(Debug)]
+pub(crate) struct CutFit {
+    data: Arc<Data>,
+    pub cut: Cut,
+    pub phased: Phased,
+    settings: Vec<Setting>,
+    remainder: Remainder,
+    /// Starts of a line in the height and in the tilt, once they were asked for.
+    starts: [OnceLock<Vec<[f64; 3]>>; 2],
+}
+
+impl CutFit {
+    fn new(data: Arc<Data>, cut: Cut, phased: Phased, applied: &[Setting]) -> Self {
+        let std_um = data.fitted.std_nm.map(|std_nm| 1e-3 * std_nm);
+        let count = data.fitted.len();
+        let free = applied.iter().filter(|setting| !data.known.contains(&setting.effect));
+        let parameters =
+            1 + usize::from(!phased.direction.is_empty()) + free.map(|setting| setting.values.len()).sum::<usize>();
+        let dof = count.saturating_sub(parameters);
+        let scale = 1e-3 / std_um.unwrap_or(1.0);
+        let residual: Vec<f64> = phased.residual_nm.iter().map(|value| value * scale).collect();
+        let held_out = cut.surface(&data.held_out, phased.phase_mm);
+        let left = data.held_out.height_nm.iter().zip(&held_out.height_nm);
+        let held_out_chi2: f64 = left.map(|(height, model)| ((height - model - phased.level_nm) * scale).powi(2)).sum();
+        let rms = |chi2: f64, count: usize| (chi2 / count as f64).sqrt() * std_um.unwrap_or(1.0);
+        let remainder = Remainder {
+            rms: rms(dot(&residual, &residual), count),
+            noise_floor: std_um.map_or(f64::NAN, |std| std * (dof as f64 / count.max(1) as f64).sqrt()),
+            held_out_rms: rms(held_out_chi2, data.held_out.len()),
+            held_out_expected_rms: std_um
+                .map_or(f64::NAN, |std| std * (1.0 + parameters as f64 / count.max(1) as f64).sqrt()),
+            held_out_chi2: if data.held_out.len() > 0 { held_out_chi2 } else { f64::NAN },
+            disturbed_chi2: 0.0,
+            stretches: if std_um.is_some() { Vec::new() } else { parts(count) },
+            residual,
+            dof,
+            unit: "um".into(),
+        };
+        Self { data, cut, phased, settings: applied.to_vec(), remainder, starts: [OnceLock::new(), OnceLock::new()] }
+    }
+
+    pub fn left(&self) -> Left<'_> {
+        Left { heights: &self.data.fitted, surface: &self.phased.surface, residual_nm: &self.phased.residual_nm }
+    }
+
+    /// Values of an effect that are applied.
+    fn values(&self, missing: Missing) -> Option<&[f64]> {
+        let is = |setting: &&Setting| MISSING.get(setting.effect) == Some(&missing);
+        self.settings.iter().find(is).map(|setting| setting.values.as_slice())
+    }
+
+    /// Values at which the search of a line begins, the best first. One after the other: the second line is looked for beside the first.
+    fn starts(&self, missing: Missing) -> &[[f64; 3]] {
+        let Some(tilts) = missing.line() else { return &[] };
+        if let Missing::SpindleLine(number) = missing
+            && number > 0
+            && self.values(Missing::SpindleLine(number - 1)).is_none()
+        {
+            return &[];
+        }
+        let values = |line: Line| [line.ratio, line.amplitude, line.phase.to_degrees()];
+        self.starts[usize::from(tilts)].get_or_init(|| self.best_lines(tilts).into_iter().map(values).collect())
+    }
+
+    /// Phase of the scallops and its standard uncertainty, in µm, where it shows.
+    pub fn phase_um(&self) -> Option<[f64; 2]> {
+        let norm = self.phased.norm_nm_per_mm?;
+        let level = self.remainder.chi2_per_dof();
+        let noise_nm = match self.data.fitted.std_nm {
+            Some(std_nm) => std_nm * level.max(1.0).sqrt(),
+            None => 1e3 * level.sqrt(),
+        };
+        Some([1e3 * self.phased.phase_mm, 1e3 * noise_nm / norm])
+    }
+
+    /// Whether a line may earn its place, by what its spectrum shows: a refit beside it may gain for other reasons.
+    fn promises(&self, line: &Line) -> bool {
+        let weight: f64 =
+            self.data.fitted.rows.iter().map(|row| line.lever(row).powi(2) * row.points.len() as f64).sum();
+        let left = dot(&self.phased.residual_nm, &self.phased.residual_nm) / self.data.fitted.len().max(1) as f64;
+        0.5 * weight * line.amplitude * line.amplitude >= LEAST_GAIN * left
+    }
+
+    /// The lines with which least is left, the best first: one, or a few that look alike. Peaks of a spectrum are in proportion to what they explain only while each pass leaves
+    /// something: a pass that is buried by its neighbours adds harmonics, and hides a part of the amplitude.
+    fn best_lines(&self, tilts: bool) -> Vec<Line> {
+        let highest = self.data.config.max_frequency_ratio;
+        let left = self.left();
+        let lines = left.lines(tilts, highest);
+        let Some(first) = lines.first().copied().filter(|first| self.promises(first)) else { return Vec::new() };
+        let buried_nm = 1e6 * self.cut.feed_mm * self.cut.feed_mm / (2.0 * self.cut.nose_mm);
+        let lever =
+            if tilts { self.data.fitted.rows.iter().map(|row| row.y_mm.abs()).fold(0.0, f64::max) } else { 1.0 };
+        if first.amplitude * lever < LINEAR * buried_nm {
+            return vec![first];
+        }
+        let left_with = |line: &Line| {
+            let mut applied = self.cut.applied.clone();
+            applied.lines.push(*line);
+            let cut = Cut::new(&self.data.config, self.data.extent_mm, applied)?;
+            let residual_nm = phase::fit(&cut, &self.data.sample, &self.data.sample).residual_nm;
+            Some((dot(&residual_nm, &residual_nm), *line))
+        };
+        let sorted = |lines: Vec<Line>| -> Vec<Line> {
+            let mut all: Vec<(f64, Line)> = lines.iter().filter_map(left_with).collect();
+            all.sort_by(|one, other| one.0.total_cmp(&other.0));
+            all.into_iter().map(|(_, line)| line).collect()
+        };
+        let least = |lines: Vec<Line>| sorted(lines).first().copied().unwrap_or(first);
+        // Buried passes show a line by its harmonics: the line itself may be at a half or a third of what the spectrum shows.
+        let parts = lines.iter().flat_map(|line| {
+            (1..=HARMONICS)
+                .flat_map(move |part| (0..part).map(move |turn| (line.ratio.fract() + turn as f64) / part as f64))
+        });
+        let strongest = |fraction: f64| {
+            let all = left.aliases(fraction, tilts, highest, 1e-3).into_iter();
+            let (ratio, size) = all.max_by(|one, other| one.1.norm_sqr().total_cmp(&other.1.norm_sqr()))?;
+            Some(Line { ratio, amplitude: first.amplitude, phase: size.arg(), tilts })
+        };
+        let around = |line: Line, sizes: [f64; 3], turns: &[f64]| -> Vec<Line> {
+            let turned = |turn: &f64| {
+                sizes.map(|size| Line { amplitude: size * line.amplitude, phase: line.phase + turn, ..line })
+            };
+            turns.iter().flat_map(turned).collect()
+        };
+        let quarter = 0.25 * TAU;
+        let tried = parts
+            .filter_map(strongest)
+            .flat_map(|line| around(line, ENLARGED, &[0.0, quarter, 2.0 * quarter, -quarter]));
+        let best = least(tried.collect());
+        let best = least(around(
+            best,
+            [0.75, 1.0, 1.4],
+            &[-0.5 * quarter, -0.25 * quarter, 0.0, 0.25 * quarter, 0.5 * quarter],
+        ));
+        let others = left.others(best, highest).into_iter().map(|line| Line { amplitude: best.amplitude, ..line });
+        let mut alike = sorted(others.chain([best]).collect());
+        alike.truncate(ALIKE);
+        alike
+    }
+
+    /// Points that were fitted.
+    pub fn heights(&self) -> &Heights {
+        &self.data.fitted
+    }
+}
+
+/// Lengths of equal parts.
+fn parts(count: usize) -> Vec<usize> {
+    (0..PARTS).map(|part| count * (part + 1) / PARTS - count * part / PARTS).collect()
+}
+
+impl Fit for CutFit {
+    fn remainder(&self) -> &Remainder {
+        &self.remainder
+    }
+
+    fn signature(&self, effect: usize) -> Vec<Vec<f64>> {
+        let Some(missing) = MISSING.get(effect).copied() else { return Vec::new() };
+        let values = match (self.values(missing), missing.line()) {
+            (Some(values), _) => values.to_vec(),
+            (None, Some(_)) => match self.starts(missing).first() {
+                Some(start) => start.to_vec(),
+                None => return vec![vec![0.0; self.data.fitted.len()]; 3],
+            },
+            (None, None) => vec![0.0; missing.effect().parameters.len()],
+        };
+        let mut columns = missing.partials(&values, &self.cut, &self.data.fitted, &self.phased.surface);
+        let scale = -self.data.fitted.std_nm.unwrap_or(1e3).recip();
+        let direction = &self.phased.direction;
+        for column in &mut columns {
+            without_mean(column);
+            let share = dot(direction, column);
+            column.iter_mut().zip(direction).for_each(|(entry, along)| *entry -= share * along);
+            column.iter_mut().for_each(|entry| *entry *= scale);
+        }
+        columns
+    }
+
+    /// What one unit does to the surface; a line is always looked for, so that its bias says nothing.
+    fn bias(&self, effect: usize) -> Vec<Bias> {
+        let Some(missing) = MISSING.get(effect).copied().filter(|missing| missing.line().is_none()) else {
+            return Vec::new();
+        };
+        let parameters = missing.effect().parameters;
+        let columns =
+            missing.partials(&vec![0.0; parameters.len()], &self.cut, &self.data.fitted, &self.phased.surface);
+        let of = |(parameter, column): (runout_core::model::Parameter, Vec<f64>)| Bias {
+            on: "surface".into(),
+            value: (dot(&column, &column) / column.len().max(1) as f64).sqrt(),
+            unit: format!("nm/{}", parameter.unit),
+        };
+        parameters.into_iter().zip(columns).map(of).collect()
+    }
+
+    fn values(&self) -> Vec<Outcome> {
+        Vec::new()
+    }
+
+    fn unexplained(&self) -> Vec<Unexplained> {
+        let left = &self.remainder;
+        let excess = left.rms.powi(2) - left.noise_floor.powi(2);
+        let extent = |of: [f64; 2]| format!("{:.3} to {:.3} mm", of[0], of[1]);
+        vec![Unexplained {
+            sensor: None,
+            setup: None,
+            orders: [0, 0],
+            rms_um: excess.max(0.0).sqrt(),
+            place: format!(
+                "all over the map: x {}, y {}",
+                extent(self.data.extent_mm[0]),
+                extent(self.data.extent_mm[1])
+            ),
+        }]
+    }
+}

@@ -1,0 +1,243 @@
+//! The model of a surface: heights of passes, and the lowest of them at each point.
+//!
+//! Pass n crosses a row at x = n·f + f·θ/2π + r(cos θ − 1) + p, with sin θ = y/r and p the phase of the scallops. At a distance d from
+//! it, measured along the radius of the cutter, its edge is R − √(R² − d²) above its tip.
+
+use std::f64::consts::TAU;
+
+use crate::{
+    config::FlyCuttingConfig,
+    heights::{Heights, Row},
+};
+
+/// Lowest order of table straightness; the orders follow one another.
+pub(crate) const FIRST_ORDER: usize = 2;
+/// Orders of table straightness.
+pub(crate) const ORDERS: usize = 4;
+
+/// A line in the height of the tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Line {
+    /// Periods a turn.
+    pub ratio: f64,
+    /// In nm; of a tilt about x in µrad.
+    pub amplitude: f64,
+    /// At the pass n = 0 and y = 0.
+    pub phase: f64,
+    /// A tilt about x: its height is the tilt times y.
+    pub tilts: bool,
+}
+
+impl Line {
+    /// What the amplitude is multiplied by in a row.
+    pub fn lever(&self, row: &Row) -> f64 {
+        if self.tilts { row.y_mm } else { 1.0 }
+    }
+
+    /// Phase at a pass, in radians.
+    pub fn at(&self, pass: f64, row: &Row) -> f64 {
+        TAU * self.ratio * (pass + row.angle / TAU) + self.phase
+    }
+}
+
+/// What is applied to the declared cut.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Applied {
+    /// Relative error of the feed.
+    pub feed_scale: f64,
+    /// Actual less declared nose radius, in mm.
+    pub radius_mm: f64,
+    /// Slopes of the map along x and y, in µrad.
+    pub tilt_urad: [f64; 2],
+    /// Legendre polynomials of the table, from order 2, in nm.
+    pub table_nm: [f64; ORDERS],
+    /// Shape along y that all passes have: Legendre polynomials from order 2, in nm.
+    pub shape_nm: [f64; ORDERS],
+    pub lines: Vec<Line>,
+}
+
+impl Applied {
+    /// Nothing.
+    pub fn none() -> Self {
+        Self {
+            feed_scale: 0.0,
+            radius_mm: 0.0,
+            tilt_urad: [0.0; 2],
+            table_nm: [0.0; ORDERS],
+            shape_nm: [0.0; ORDERS],
+            lines: Vec::new(),
+        }
+    }
+}
+
+/// A cut with what is applied to it, over a map of some extent.
+#[derive(Debug, Clone)]
+pub(crate) struct Cut {
+    /// Declared feed, in mm.
+    pub declared_mm: f64,
+    /// Actual feed, in mm.
+    pub feed_mm: f64,
+    pub nose_mm: f64,
+    pub applied: Applied,
+    /// Middle and half of the length of the map along x, and along y, in mm.
+    pub middle_mm: [[f64; 2]; 2],
+}
+
+/// A surface as the model has it, without level.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Surface {
+    /// Heights, in nm.
+    pub height_nm: Vec<f64>,
+    /// The pass that remains at each point.
+    pub pass: Vec<i32>,
+    /// Distance of each point from that pass, along the radius of the cutter, in mm.
+    pub beside_mm: Vec<f64>,
+}
+
+/// Values of the Legendre polynomials 2 to 5.
+pub(crate) fn legendre(u: f64) -> [f64; ORDERS] {
+    let square = u * u;
+    [
+        1.5 * square - 0.5,
+        (2.5 * square - 1.5) * u,
+        (4.375 * square - 3.75) * square + 0.375,
+        ((7.875 * square - 8.75) * square + 1.875) * u,
+    ]
+}
+
+impl Cut {
+    pub fn new(config: &FlyCuttingConfig, extent_mm: [[f64; 2]; 2], applied: Applied) -> Option<Self> {
+        let declared_mm = 1e-3 * config.feed_um_per_rev;
+        let (feed_mm, nose_mm) = (declared_mm * (1.0 + applied.feed_scale), config.nose_radius_mm + applied.radius_mm);
+        let middle_mm = extent_mm.map(|[from, to]| [0.5 * (from + to), 0.5 * (to - from)]);
+        (applied.feed_scale > -0.5 && applied.feed_scale < 1.0 && nose_mm > feed_mm).then_some(Self {
+            declared_mm,
+            feed_mm,
+            nose_mm,
+            applied,
+            middle_mm,
+        })
+    }
+
+    /// x at which the pass 0 crosses a row, in mm.
+    pub fn first_mm(&self, row: &Row) -> f64 {
+        row.sag_mm + self.feed_mm * row.angle / TAU
+    }
+
+    /// Place of the table at a pass, from −1 to 1 over the map.
+    pub fn table_at(&self, pass: f64, row: &Row) -> f64 {
+        let [middle_mm, half_mm] = self.middle_mm[0];
+        (self.feed_mm * (pass + row.angle / TAU) - middle_mm) / half_mm
+    }
+
+    /// Legendre polynomials of a row over the map.
+    pub fn across(&self, row: &Row) -> [f64; ORDERS] {
+        let [middle_mm, half_mm] = self.middle_mm[1];
+        legendre((row.y_mm - middle_mm) / half_mm)
+    }
+
+    /// Height of the tip at consecutive passes, in nm.
+    fn tips(&self, row: &Row, first: i64, count: usize) -> Vec<f64> {
+        let mut tips = vec![0.0; count];
+        for line in &self.applied.lines {
+            let size = line.amplitude * line.lever(row);
+            let (step_sine, step_cosine) = (TAU * line.ratio).sin_cos();
+            let (mut sine, mut cosine) = (0.0, 0.0);
+            for (index, tip) in tips.iter_mut().enumerate() {
+                // A rotation by a constant angle, begun anew before its rounding grows.
+                if index % 64 == 0 {
+                    (sine, cosine) = line.at(first as f64 + index as f64, row).sin_cos();
+                }
+                *tip += size * cosine;
+                (sine, cosine) = (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
+            }
+        }
+        if self.applied.table_nm.iter().any(|size| *size != 0.0) {
+            for (index, tip) in tips.iter_mut().enumerate() {
+                let values = legendre(self.table_at(first as f64 + index as f64, row));
+                *tip += values.iter().zip(self.applied.table_nm).map(|(value, size)| value * size).sum::<f64>();
+            }
+        }
+        tips
+    }
+
+    /// Passes to each side of the nearest one that may be lower than it.
+    fn reach(&self, row: &Row, tips: &[f64]) -> i64 {
+        let waves: f64 = self.applied.lines.iter().map(|line| 2.0 * (line.amplitude * line.lever(row)).abs()).sum();
+        if waves == 0.0 && self.applied.table_nm.iter().all(|size| *size == 0.0) {
+            return 0;
+        }
+        // What is not a line is smooth: its step from pass to pass is bounded.
+        let smooth = tips.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        let steps = if self.applied.table_nm.iter().any(|size| *size != 0.0) { smooth } else { 0.0 };
+        let per_pass_mm = self.feed_mm * row.cosine;
+        let most = (2.0 * self.nose_mm / per_pass_mm).ceil() as i64;
+        let mut reach = 1;
+        // The edge of the pass `reach + 1`, at half a feed less than so many, less that of the nearest pass.
+        while reach < most {
+            let edge_nm = |passes: f64| 1e6 * (passes * per_pass_mm).powi(2) / (2.0 * self.nose_mm);
+            if edge_nm(reach as f64 + 0.5) - edge_nm(0.5) > waves + steps * (reach + 1) as f64 {
+                break;
+            }
+            reach += 1;
+        }
+        reach
+    }
+
+    /// The surface at the points of a map, with the scallops at a phase.
+    pub fn surface(&self, heights: &Heights, phase_mm: f64) -> Surface {
+        let mut surface = Surface {
+            height_nm: Vec::with_capacity(heights.len()),
+            pass: Vec::with_capacity(heights.len()),
+            beside_mm: Vec::with_capacity(heights.len()),
+        };
+        for row in &heights.rows {
+            self.row(heights, row, phase_mm, &mut surface);
+        }
+        surface
+    }
+
+    fn row(&self, heights: &Heights, row: &Row, phase_mm: f64, surface: &mut Surface) {
+        let x_mm = &heights.x_mm[row.points.clone()];
+        let start_mm = self.first_mm(row) + phase_mm;
+        let turns = |x: f64| (x - start_mm) / self.feed_mm;
+        let [low, high] = [x_mm.first(), x_mm.last()].map(|x| turns(x.copied().unwrap_or(start_mm)));
+        // Passes around the row, so that the reach is known before the ends are.
+        let most = (2.0 * self.nose_mm / (self.feed_mm * row.cosine)).ceil() as i64;
+        let probe = self.tips(row, low.round() as i64, (high - low) as usize + 2);
+        let reach = self.reach(row, &probe).min(most);
+        let first = low.round() as i64 - reach;
+        let count = (high.round() as i64 + reach - first + 1) as usize;
+        let tips = if reach == 0 { vec![0.0; count] } else { self.tips(row, first, count) };
+        let square = self.nose_mm * self.nose_mm;
+        let per_pass_mm = self.feed_mm * row.cosine;
+        let [tilt_x, tilt_y] = self.applied.tilt_urad;
+        let shape_nm: f64 = self.across(row).iter().zip(self.applied.shape_nm).map(|(value, size)| value * size).sum();
+        for x in x_mm {
+            let at = turns(*x);
+            let nearest = at.round() as i64;
+            let mut best = (f64::INFINITY, 0_i64, 0.0);
+            for pass in nearest - reach..=nearest + reach {
+                let beside_mm = (at - pass as f64) * per_pass_mm;
+                let depth = square - beside_mm * beside_mm;
+                if depth < 0.0 {
+                    continue;
+                }
+                let edge_nm = 1e6 * beside_mm * beside_mm / (self.nose_mm + depth.sqrt());
+                let height = edge_nm + tips[(pass - first) as usize];
+                if height < best.0 {
+                    best = (height, pass, beside_mm);
+                }
+            }
+            // µrad times mm is nm.
+            surface.height_nm.push(best.0 + shape_nm + tilt_x * x + tilt_y * row.y_mm);
+            surface.pass.push(best.1 as i32);
+            surface.beside_mm.push(best.2);
+        }
+    }
+
+    /// Change of the height with the distance from the pass, in nm/mm.
+    pub fn slope(&self, beside_mm: f64) -> f64 {
+        1e6 * beside_mm / (self.nose_mm * self.nose_mm - beside_mm * beside_mm).sqrt()
+    }
+}

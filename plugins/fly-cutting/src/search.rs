@@ -1,0 +1,202 @@
+//! Where a line or another feed may be: correlations of what is left with every frequency.
+//!
+//! A line of q periods a turn adds Re a·e^{2πi q τ} at the turns τ = n + θ/2π. n is whole, so that e^{2πi q n} has the fraction of q
+//! only; the rows, whose angles θ differ, show the whole part. The sum over passes is a Fourier transform a row, the sum over rows is
+//! taken at the few whole parts that they resolve, and at all of them where the fraction is known.
+
+use std::f64::consts::TAU;
+
+use runout_core::Complex64;
+use rustfft::FftPlanner;
+
+use crate::{
+    heights::{Heights, Row},
+    passes::{Cut, Line, Surface},
+};
+
+/// Frequencies for each that the passes resolve.
+const OVERSAMPLED: usize = 4;
+/// Longest transform.
+const LONGEST: usize = 1 << 18;
+/// Angle over the rows between whole parts that are summed apart, in radians.
+const RESOLVED: f64 = 1.5;
+/// A line has at least so many periods, counted from the next whole ratio, over the map: with fewer it is a bend.
+const FEWEST_PERIODS: f64 = 0.8;
+/// Peaks of the spectrum that are tried, and the least of them beside the strongest.
+const PEAKS: usize = 4;
+const LEAST_PEAK: f64 = 0.1;
+/// Periods over the map by which peaks are apart.
+const BESIDE: f64 = 3.0;
+/// Feeds within ± this share are looked at.
+const FEEDS: f64 = 0.03;
+/// Part of a period at the end of the map between feeds that are looked at.
+const FEED_STEP: f64 = 0.4;
+
+/// What is left of a map, pass by pass.
+pub(crate) struct Left<'a> {
+    pub heights: &'a Heights,
+    pub surface: &'a Surface,
+    pub residual_nm: &'a [f64],
+}
+
+impl Left<'_> {
+    /// The lines that explain most, of ratios up to `highest`, one for each of some fractions; the largest first.
+    pub fn lines(&self, tilts: bool, highest: usize) -> Vec<Line> {
+        let Some(length) = self.transform_length() else { return Vec::new() };
+        let of = |fraction: f64| {
+            let near = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|part| fraction + part / length as f64);
+            let best =
+                near.into_iter().flat_map(|fraction| self.aliases(fraction, tilts, highest, 0.0)).max_by(by_size)?;
+            Some(Line { ratio: best.0, amplitude: best.1.norm(), phase: best.1.arg(), tilts })
+        };
+        self.fractions(tilts, highest, length).into_iter().filter_map(of).collect()
+    }
+
+    /// Lines at all other ratios that look alike at y = 0.
+    pub fn others(&self, line: Line, highest: usize) -> Vec<Line> {
+        let all = self.aliases(line.ratio, line.tilts, highest, 1e-3).into_iter();
+        let other = all.filter(|(ratio, _)| (ratio - line.ratio).abs() > 1e-3);
+        other
+            .map(|(ratio, size)| Line { ratio, amplitude: size.norm(), phase: size.arg(), tilts: line.tilts })
+            .collect()
+    }
+
+    /// Amplitudes at all ratios with this fraction, below and above whole numbers; `lines` that were taken out count again.
+    pub fn aliases(&self, fraction: f64, tilts: bool, highest: usize, lowest: f64) -> Vec<(f64, Complex64)> {
+        let fraction = fraction.rem_euclid(1.0);
+        let mut weight = 0.0;
+        let sums: Vec<(f64, Complex64)> = self
+            .heights
+            .rows
+            .iter()
+            .map(|row| {
+                let lever = lever(row, tilts);
+                weight += lever * lever * row.points.len() as f64;
+                let turned = |point: usize| {
+                    let turns = fraction * f64::from(self.surface.pass[point]);
+                    Complex64::from_polar(self.residual_nm[point] * lever, -TAU * turns)
+                };
+                (row.angle, row.points.clone().map(turned).sum())
+            })
+            .collect();
+        let at = |ratio: f64, conjugate: bool| -> (f64, Complex64) {
+            let turned = sums.iter().map(|(angle, sum)| {
+                let sum = if conjugate { sum.conj() } else { *sum };
+                sum * Complex64::from_polar(1.0, -ratio * angle)
+            });
+            (ratio, 2.0 * turned.sum::<Complex64>() / weight.max(f64::MIN_POSITIVE))
+        };
+        let above = (0..highest).map(|whole| at(whole as f64 + fraction, false));
+        let below = (1..=highest).map(|whole| at(whole as f64 - fraction, true));
+        above.chain(below).filter(|(ratio, _)| *ratio > lowest).collect()
+    }
+
+    fn passes(&self) -> Option<[i32; 2]> {
+        let low = self.surface.pass.iter().min()?;
+        let high = self.surface.pass.iter().max()?;
+        Some([*low, *high])
+    }
+
+    fn transform_length(&self) -> Option<usize> {
+        let [low, high] = self.passes()?;
+        Some((OVERSAMPLED * (high - low + 1) as usize).next_power_of_two().min(LONGEST))
+    }
+
+    /// The fractions of the ratio that explain most: peaks of the spectrum, each apart from those before it.
+    fn fractions(&self, tilts: bool, highest: usize, length: usize) -> Vec<f64> {
+        let Some([low, high]) = self.passes() else { return Vec::new() };
+        let passes = f64::from(high - low);
+        let angles = || self.heights.rows.iter().map(|row| row.angle);
+        let spread = angles().fold(f64::NEG_INFINITY, f64::max) - angles().fold(f64::INFINITY, f64::min);
+        let apart = if spread > 0.0 { (RESOLVED / spread).floor().max(1.0) } else { f64::INFINITY };
+        let first = (0.5 * apart).min(0.5 * highest as f64);
+        let wholes: Vec<f64> = (0..)
+            .map(|index| first + apart * f64::from(index))
+            .take_while(|whole| *whole <= first.max(highest as f64))
+            .collect();
+        let wholes: &[f64] = if apart.is_finite() { &wholes } else { &[0.0] };
+        let transform = FftPlanner::new().plan_fft_forward(length);
+        let mut sums = vec![Complex64::ZERO; wholes.len() * length];
+        let mut row_sums = vec![Complex64::ZERO; length];
+        for row in &self.heights.rows {
+            row_sums.fill(Complex64::ZERO);
+            let lever = lever(row, tilts);
+            for point in row.points.clone() {
+                let place = (self.surface.pass[point] - low) as usize % length;
+                row_sums[place] += lever * self.residual_nm[point];
+            }
+            transform.process(&mut row_sums);
+            let step = Complex64::from_polar(1.0, -row.angle / length as f64);
+            for (whole, sums) in wholes.iter().zip(sums.chunks_exact_mut(length)) {
+                let mut turn = Complex64::from_polar(1.0, -whole * row.angle);
+                for (sum, entry) in sums.iter_mut().zip(&row_sums) {
+                    *sum += entry * turn;
+                    turn *= step;
+                }
+            }
+        }
+        let fraction = |index: usize| (index % length) as f64 / length as f64;
+        let is_line = |index: &usize| {
+            let part = fraction(*index);
+            part.min(1.0 - part) * passes >= FEWEST_PERIODS
+        };
+        let mut power: Vec<f64> =
+            (0..sums.len()).map(|index| if is_line(&index) { sums[index].norm_sqr() } else { 0.0 }).collect();
+        let mut found: Vec<f64> = Vec::new();
+        let mut strongest = 0.0;
+        while found.len() < PEAKS {
+            let best = (0..power.len()).max_by(|one, other| power[*one].total_cmp(&power[*other]));
+            let Some(best) = best.filter(|best| power[*best] > LEAST_PEAK * strongest) else { break };
+            strongest = power[best].max(strongest);
+            found.push(fraction(best));
+            // Lines and their aliases on the other side of a whole ratio are one peak with its side lobes.
+            for (index, power) in power.iter_mut().enumerate() {
+                let apart = |other: f64| (fraction(index) - other - (fraction(index) - other).round()).abs() * passes;
+                if apart(fraction(best)) < BESIDE || apart(1.0 - fraction(best)) < BESIDE {
+                    *power = 0.0;
+                }
+            }
+        }
+        found
+    }
+
+    /// The relative error of the feed at which scallops explain most, the residual with those of the model put back; `None` where the
+    /// declared feed explains as much.
+    pub fn feed_scale(&self, cut: &Cut) -> Option<f64> {
+        let mut heights = self.residual_nm.to_vec();
+        let square = cut.nose_mm * cut.nose_mm;
+        for (height, beside_mm) in heights.iter_mut().zip(&self.surface.beside_mm) {
+            *height += 1e6 * beside_mm * beside_mm / (cut.nose_mm + (square - beside_mm * beside_mm).sqrt());
+        }
+        let mean = heights.iter().sum::<f64>() / heights.len().max(1) as f64;
+        let [low, high] = self.passes()?;
+        let farthest = f64::from(low.abs().max(high.abs())).max(1.0);
+        let length = f64::from(high - low).max(1.0);
+        let step = FEED_STEP / length;
+        let count = (FEEDS / step).ceil().min(400.0) as i32;
+        let explained = |scale: f64| {
+            let feed_mm = cut.declared_mm * (1.0 + scale);
+            let mut sum = Complex64::ZERO;
+            for row in &self.heights.rows {
+                let start_mm = row.sag_mm + feed_mm * row.angle / TAU;
+                for point in row.points.clone() {
+                    let turns = (self.heights.x_mm[point] - start_mm) / feed_mm;
+                    sum += Complex64::from_polar(heights[point] - mean, -TAU * turns);
+                }
+            }
+            sum.norm_sqr()
+        };
+        let scales = (-count..=count).map(|index| cut.applied.feed_scale + step * f64::from(index));
+        let best = scales.map(|scale| (scale, explained(scale))).max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let moved = (best.0 - cut.applied.feed_scale).abs() * farthest;
+        (moved > 0.5 * FEED_STEP && best.1 > 1.1 * explained(cut.applied.feed_scale)).then_some(best.0)
+    }
+}
+
+fn lever(row: &Row, tilts: bool) -> f64 {
+    if tilts { row.y_mm } else { 1.0 }
+}
+
+fn by_size(one: &(f64, Complex64), other: &(f64, Complex64)) -> std::cmp::Ordering {
+    one.1.norm_sqr().total_cmp(&other.1.norm_sqr())
+}

@@ -1,0 +1,145 @@
+//! The closed loop: what is there is found with its size, nothing else is, and strangers are unexplained.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+mod common;
+
+use common::{CUT, diagnose, parameter, run, scenario, separator, told, value};
+use runout_core::model::diagnosis::Verdict;
+
+const SIDE: usize = 160;
+
+#[test]
+fn clean_surfaces_name_nothing() {
+    for seed in 0..3 {
+        let grid = scenario(SIDE, &format!("noise_nm = 0.2\nseed = {seed}")).heights().unwrap();
+        let found = diagnose(grid, &separator(CUT));
+        assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor, "{}", told(&found.diagnosis));
+        assert!(found.diagnosis.added.is_empty());
+    }
+}
+
+#[test]
+fn the_line_of_the_paper_is_found() {
+    let line = "noise_nm = 0.1\n[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 4.0\nphase_deg = 40.0\n";
+    let found = diagnose(scenario(SIDE, line).heights().unwrap(), &separator(CUT));
+    println!("{}", told(&found.diagnosis));
+    let [added] = &found.diagnosis.added[..] else { panic!("{}", told(&found.diagnosis)) };
+    assert_eq!((added.effect.as_str(), added.confounded_with.len()), ("spindle-line", 0));
+    for (name, truth) in [("frequency_ratio", 5.6235 / 6.5), ("amplitude", 4.0), ("phase", 40.0)] {
+        let [number, std] = parameter(added, name);
+        assert!((number - truth).abs() < 4.0 * std, "{name}: {number} ± {std}");
+    }
+    assert_eq!(found.diagnosis.verdict, Verdict::Explained);
+    let [before, after] = ["measured", "corrected"].map(|of| value(&found.after, "Sq", Some(of)));
+    assert!(before > 2.0 && after < 0.6, "{before} {after}");
+}
+
+#[test]
+fn every_effect_is_found_with_its_size() {
+    let cases: [(&str, &str, &[(&str, f64)]); 6] = [
+        // cos 3θ over y from 0 to 4 mm is 1 − 4.5·(y/r)², and P2 takes a sixth of the square of the length of it.
+        ("synchronous-motion", "", &[("order_2", -4.5 * 16.0 / (6.0 * 250.0 * 250.0) * 4e4), ("order_3", 0.0)]),
+        ("workpiece-tilt", "x_urad = 3.0\ny_urad = -1.5", &[("x", 3.0), ("y", -1.5)]),
+        ("table-straightness", "order = 3\namplitude_nm = 2.0", &[("order_3", 2.0), ("order_2", 0.0)]),
+        ("feed-scale", "scale_um_per_m = 3000", &[("scale", 3000.0)]),
+        ("nose-radius", "change_mm = 0.8", &[("change", 0.8)]),
+        (
+            "spindle-line",
+            "frequency_ratio = 2.3\ndirection = 'tilt-x'\namplitude_urad = 0.8",
+            &[("frequency_ratio", 2.3), ("amplitude", 0.8)],
+        ),
+    ];
+    for (effect, keys, truth) in cases {
+        let text = if keys.is_empty() {
+            // Its slope is that of a work piece that is tilted.
+            let slope = "[[effect]]\nplugin = 'workpiece-tilt'\ny_urad = 11.52\n";
+            format!("noise_nm = 0.1\n[[harmonics]]\norder = 3\namplitude_nm = 4e4\n{slope}")
+        } else {
+            format!("noise_nm = 0.1\nseed = 4\n[[effect]]\nplugin = '{effect}'\n{keys}\n")
+        };
+        let found = diagnose(scenario(SIDE, &text).heights().unwrap(), &separator(CUT));
+        println!("{}", told(&found.diagnosis));
+        let [added] = &found.diagnosis.added[..] else { panic!("{}", told(&found.diagnosis)) };
+        assert_eq!(added.effect, effect);
+        for (name, truth) in truth {
+            let [number, std] = parameter(added, name);
+            assert!((number - truth).abs() < 4.0 * std, "{effect} {name}: {number} ± {std}");
+        }
+    }
+}
+
+/// Effects far beyond the usual, and two at once.
+#[test]
+fn large_and_joint_effects_are_found() {
+    let text = "noise_nm = 0.5\n[[effect]]\nplugin = 'workpiece-tilt'\nx_urad = 800.0\n
+        [[effect]]\nplugin = 'spindle-line'\nfrequency_ratio = 0.31\namplitude_nm = 30.0\n";
+    let found = diagnose(scenario(100, text).heights().unwrap(), &separator(CUT));
+    println!("{}", told(&found.diagnosis));
+    let names: Vec<&str> = found.diagnosis.added.iter().map(|added| added.effect.as_str()).collect();
+    assert_eq!(names, ["workpiece-tilt", "spindle-line"]);
+    assert_eq!(found.diagnosis.verdict, Verdict::Explained);
+}
+
+#[test]
+fn strangers_are_unexplained_with_their_place() {
+    let cases = [
+        ("plugin = 'pit'\nat_mm = [1.2, 2.5]\nradius_mm = 0.06\ndepth_nm = 8.0", [1.2, 2.5]),
+        ("plugin = 'scratch'\nfrom_mm = [2.8, 1.0]\nto_mm = [3.2, 1.6]\nwidth_mm = 0.06\ndepth_nm = 5.0", [3.0, 1.3]),
+    ];
+    for (stranger, [x, y]) in cases {
+        for line in ["", "[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 3.0\n"] {
+            let text = format!("noise_nm = 0.3\n[[effect]]\n{stranger}\n{line}");
+            let found = diagnose(scenario(SIDE, &text).heights().unwrap(), &separator(CUT));
+            println!("{}", told(&found.diagnosis));
+            assert_eq!(found.diagnosis.verdict, Verdict::Unexplained);
+            assert_eq!(found.diagnosis.added.len(), usize::from(!line.is_empty()));
+            let place = &found.diagnosis.unexplained[0].place;
+            let numbers: Vec<f64> = place.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
+            assert!(numbers[0] <= x && x <= numbers[1] && numbers[2] <= y && y <= numbers[3], "{place}");
+        }
+    }
+}
+
+/// Where rows do not reach far along y, ratios a whole number apart are a set.
+#[test]
+fn aliases_are_named_where_the_rows_do_not_separate_them() {
+    let text = |rows: usize, noise: f64| {
+        format!(
+            "noise_nm = {noise}\n[cut]\n{CUT}[grid]\nrows = {rows}\ncolumns = 400\nstep_x_mm = 0.01\nstep_y_mm = 0.0087\n
+             [[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 4.0\n"
+        )
+    };
+    let found = diagnose(common::of(&text(400, 0.1)).heights().unwrap(), &separator(CUT));
+    assert_eq!(found.diagnosis.added[0].confounded_with.len(), 0, "{}", told(&found.diagnosis));
+    let found = diagnose(common::of(&text(20, 1.0)).heights().unwrap(), &separator(CUT));
+    println!("{}", told(&found.diagnosis));
+    let added = &found.diagnosis.added[0];
+    assert!(!added.confounded_with.is_empty() && added.parameters.iter().all(|one| one.std.is_none()));
+    let members = added.confounded_with.iter().filter_map(|name| name.rsplit(' ').next()?.parse::<f64>().ok());
+    let mut ratios = members.chain([parameter(added, "frequency_ratio")[0]]);
+    assert!(ratios.any(|ratio| (ratio - 5.6235 / 6.5).abs() < 1e-3), "{}", told(&found.diagnosis));
+}
+
+/// Without a stated uncertainty nothing can be called explained.
+#[test]
+fn unknown_noise_is_said() {
+    let text = "noise_nm = 0.2\nstated_std_nm = 0\n[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 4.0\n";
+    let found = diagnose(scenario(SIDE, text).heights().unwrap(), &separator(CUT));
+    assert_eq!(found.diagnosis.verdict, Verdict::Improved, "{}", told(&found.diagnosis));
+    let clean = diagnose(scenario(SIDE, "noise_nm = 0.2\nstated_std_nm = 0").heights().unwrap(), &separator(CUT));
+    assert_eq!(clean.diagnosis.verdict, Verdict::NothingFound, "{}", told(&clean.diagnosis));
+}
+
+#[test]
+fn a_run_gives_the_surface_and_its_values() {
+    let outcome = run(scenario(SIDE, "noise_nm = 0.1").heights().unwrap(), &separator(CUT));
+    assert!((value(&outcome, "scallop", None) - 1.4352).abs() < 1e-3);
+    assert!((value(&outcome, "scallop_rq", None) - 0.4279).abs() < 1e-3);
+    assert!((value(&outcome, "Sq", Some("residual")) - 0.1).abs() < 0.003);
+    assert!((value(&outcome, "Sq", Some("measured")) - 0.4279_f64.hypot(0.1)).abs() < 0.01);
+    let rows: Vec<(&str, usize)> =
+        outcome.tables.iter().map(|rows| (rows.table.as_str(), rows.rows.num_rows())).collect();
+    assert_eq!(rows, [("surface", SIDE * SIDE), ("residual", SIDE * SIDE)]);
+    assert!(value(&outcome, "scallop_phase", None).abs() < 0.1);
+}
