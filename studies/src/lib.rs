@@ -6,6 +6,7 @@ pub mod blind;
 pub mod campaign;
 pub mod coverage;
 pub mod eccentricity;
+pub mod flat;
 pub mod minimum_zone_cylinder;
 pub mod monte_carlo;
 pub mod plot;

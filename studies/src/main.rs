@@ -8,7 +8,7 @@ use runout_core::{Error, Result, atomic_file};
 use runout_studies::{
     averaging, axial,
     blind::{self, domains, draw::Layout, points::Domain},
-    coverage, eccentricity,
+    coverage, eccentricity, flat,
     minimum_zone_cylinder::{self, Wall},
     monte_carlo, points_pictures, results, rotor, scaling, straightness, surface as unrolled,
     values::{self, Spectrum},
@@ -28,6 +28,7 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies diagnose-scaling       time of a diagnosis over the number of stations
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies component-errors PIPELINE PICTURE   component errors of a C axis over the command
+       runout-studies flat PIPELINE PICTURE      a fly-cut surface, and the same without what the closed loop found
        runout-studies pretravel PIPELINE PICTURE   pre-travel of a touch-trigger probe by direction
        runout-studies straightness-traces FILE   the simulated traces of example 4, as CSV
        runout-studies straightness FILE PICTURE  what axial-reversal makes of them, beside the truth
@@ -92,6 +93,7 @@ fn main() -> ExitCode {
         ["component-errors", pipeline, picture] => {
             drawn(picture, points_pictures::component_errors(Path::new(pipeline), 'C'))
         }
+        ["flat", pipeline, picture] => drawn(picture, flat::picture(Path::new(pipeline))),
         ["pretravel", pipeline, picture] => drawn(picture, points_pictures::pretravel(Path::new(pipeline))),
         ["straightness-traces", file] => straightness_traces(file),
         ["straightness", file, picture] => straightness(file, picture),

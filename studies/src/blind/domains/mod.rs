@@ -1,12 +1,13 @@
 //! Domains of measured points with a blind benchmark: one file each, and a line in [`ALL`].
 
+mod fly_cutting;
 mod rotary_axis;
 mod touch_probe;
 
 use super::points::Domain;
 
 /// All of them.
-pub const ALL: [Domain; 2] = [rotary_axis::DOMAIN, touch_probe::DOMAIN];
+pub const ALL: [Domain; 3] = [rotary_axis::DOMAIN, touch_probe::DOMAIN, fly_cutting::DOMAIN];
 
 /// The domain of a name.
 #[must_use]
