@@ -31,8 +31,8 @@ pub fn points(columns: &[(&str, Vec<f64>)]) -> Points {
     Points {
         input: "test.csv".into(),
         columns: columns.iter().map(|(name, values)| Column { name: (*name).into(), values: values.clone() }).collect(),
-        labels: Vec::new(),
         traces: vec![Trace { id: "points".into(), kind: "points".into(), points: 0..count }],
+        ..Points::default()
     }
 }
 
