@@ -17,3 +17,4 @@ pub mod scaling;
 pub mod straightness;
 pub mod surface;
 pub mod values;
+pub mod walls;

@@ -12,6 +12,7 @@ use runout_studies::{
     minimum_zone_cylinder::{self, Wall},
     monte_carlo, points_pictures, results, rotor, scaling, straightness, surface as unrolled,
     values::{self, Spectrum},
+    walls,
 };
 
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
@@ -20,6 +21,7 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
        runout-studies value-coverage [CAMPAIGNS [SEED [LAYOUT]]]   the same of every value of the standards, two rigs and two
                                              spectra, from a seed on; LAYOUT is four or six
+       runout-studies wall-coverage [WALLS [SEED]]   the same of measured walls: positions, lines, texture along the axis
        runout-studies blind [CAMPAIGNS [SEED [FILE [LAYOUT]]]]   what the closed loop says of campaigns that it knows
                                              nothing of; LAYOUT is four, six or reversed
        runout-studies blind --domain NAME [CAMPAIGNS [SEED [FILE]]]   the same of measured points: rotary-axis, touch-probe, …
@@ -72,6 +74,10 @@ fn main() -> ExitCode {
         ["value-coverage", ref rest @ ..] if rest.len() <= 3 && sizes(rest, [300, 0]).is_some() => {
             let [campaigns, seed] = sizes(rest, [300, 0]).unwrap_or_default();
             layout(rest.get(2)).and_then(|only| value_coverage(campaigns, seed, only))
+        }
+        ["wall-coverage", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [200, 0]).is_some() => {
+            let [walls, seed] = sizes(rest, [200, 0]).unwrap_or_default();
+            wall_coverage(walls, seed)
         }
         ["blind", ref rest @ ..] if rest.len() <= 4 && sizes(rest, [240, 1]).is_some() => {
             let [campaigns, seed] = sizes(rest, [240, 1]).unwrap_or_default();
@@ -193,6 +199,15 @@ fn value_coverage(campaigns: u64, seed: u64, only: Option<Layout>) -> Result<()>
             println!("{campaigns} campaigns from seed {seed}, simulated: {}; {}\n", rig.name(), spectrum.name());
             println!("{}", values::table(&values::rows(rig, spectrum, seed..seed + campaigns, folder.path())?));
         }
+    }
+    Ok(())
+}
+
+fn wall_coverage(walls: u64, seed: u64) -> Result<()> {
+    let folder = tempfile::tempdir().map_err(|error| Error::new("make", "a folder for points", error))?;
+    for noise_um in [0.02, 0.1] {
+        println!("{walls} walls from seed {seed}, simulated: noise of {noise_um} µm\n");
+        println!("{}", values::table(&walls::rows(noise_um, seed..seed + walls, folder.path())?));
     }
     Ok(())
 }

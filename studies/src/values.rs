@@ -177,7 +177,7 @@ fn is_synchronous(symbol: &str) -> bool {
     !["asynchronous", "total"].iter().any(|kind| symbol.starts_with(kind))
 }
 
-fn count(found: &Summary, truth: &Summary, rows: &mut Rows) {
+pub(crate) fn count(found: &Summary, truth: &Summary, rows: &mut Rows) {
     // Every section and station in turn: the n-th of a name is that of the other.
     let named = |summary: &Summary| {
         let mut places: BTreeMap<String, Vec<Value>> = BTreeMap::new();
