@@ -213,6 +213,10 @@ impl AxialReversal {
         };
         for (effects, covariance) in fit.uncertain() {
             let moves: Vec<_> = effects.iter().flat_map(|effect| on.moves(data, fit.applied(), *effect)).collect();
+            for (which, errors) in after.errors.iter_mut().enumerate() {
+                let moves: Vec<&[f64]> = moves.iter().map(|both| both[which].as_slice()).collect();
+                errors.add(&moves, &covariance);
+            }
             for (which, std_um) in [&mut after.part_std_um, &mut after.slide_std_um].into_iter().enumerate() {
                 for (at, std) in std_um.iter_mut().enumerate() {
                     let of = |row: usize| moves[row][which].get(at).copied().unwrap_or(0.0);
@@ -230,6 +234,9 @@ impl AxialReversal {
         let Some(open) = open else { return Vec::new() };
         let moves = on.moves(data, fit.applied(), open.effect);
         let Some(both) = moves.first() else { return Vec::new() };
+        for (errors, moved) in after.errors.iter_mut().zip(both) {
+            errors.common_um.push(moved.iter().map(|moved| moved * open.extra.sqrt()).collect());
+        }
         for (std_um, moved) in [&mut after.part_std_um, &mut after.slide_std_um].into_iter().zip(both) {
             for (std, moved) in std_um.iter_mut().zip(moved) {
                 *std = (*std * *std + moved * moved * open.extra).sqrt();
@@ -381,8 +388,27 @@ fn mean(results: &[(f64, Straightness)], spread: fn(&[(f64, f64)]) -> f64) -> Op
         let (values, std): (Vec<f64>, Vec<f64>) = both.unzip();
         [values, std]
     };
+    let kept: Vec<usize> = z_mm.iter().filter_map(|z| at(&results[0].1, z)).collect();
+    mean.errors = mean.errors.each_ref().map(|errors| errors.at(&kept));
     [mean.part_um, mean.part_std_um] = mixed(|one| [&one.part_um, &one.part_std_um]);
     [mean.slide_um, mean.slide_std_um] = mixed(|one| [&one.slide_um, &one.slide_std_um]);
+    // What the results differ by from their mean changes the whole profile.
+    let both = [
+        (&mean.part_um, (|one| &one.part_um) as fn(&Straightness) -> &Vec<f64>),
+        (&mean.slide_um, |one: &Straightness| &one.slide_um),
+    ];
+    for (errors, (centre, of)) in mean.errors.iter_mut().zip(both) {
+        let changes = results.iter().map(|(weight, one)| {
+            let value = |z: &f64| at(one, z).and_then(|index| of(one).get(index)).copied();
+            let change = z_mm.iter().zip(centre).map(|(z, centre)| value(z).map_or(0.0, |value| value - centre));
+            (*weight, change.collect::<Vec<f64>>())
+        });
+        let changes: Vec<(f64, Vec<f64>)> = changes.collect();
+        let distances: Vec<(f64, f64)> = changes.iter().map(|(weight, change)| (*weight, rms(change))).collect();
+        let all: f64 = distances.iter().map(|(_, distance)| distance * distance).sum();
+        let share = if all > 0.0 { (spread(&distances) / all).sqrt() } else { 0.0 };
+        errors.common_um.extend(changes.iter().map(|(_, change)| change.iter().map(|value| share * value).collect()));
+    }
     Some(mean)
 }
 
@@ -512,12 +538,12 @@ fn open_shift(data: &Data, fit: &TracesFit) -> Option<OpenShift> {
 /// STRt and rms of part and slide, before and after.
 fn moved(before: &Straightness, after: &Straightness) -> Vec<Moved> {
     let of = |result: &Straightness| {
-        [(&result.part_um, &result.part_std_um), (&result.slide_um, &result.slide_std_um)]
-            .map(|(values, std)| (strt_lsli_um(&result.z_mm, values), rms(values), at_the_ends(values, std), rms(std)))
+        [&result.part_um, &result.slide_um].map(|values| [strt_lsli_um(&result.z_mm, values), rms(values)])
     };
+    let std = [0, 1].map(|which| after.std_of_values(which));
     let (before, after) = (of(before), of(after));
-    let both = ["part", "slide"].into_iter().zip(before.into_iter().zip(after));
-    both.flat_map(|(section, (before, after))| {
+    let both = ["part", "slide"].into_iter().zip(before.into_iter().zip(after).zip(std));
+    both.flat_map(|(section, ((before, after), std))| {
         let one = |value: &str, [before, after]: [f64; 2], std: f64| Moved {
             value: value.into(),
             section: Some(section.into()),
@@ -529,17 +555,10 @@ fn moved(before: &Straightness, after: &Straightness) -> Vec<Moved> {
             filter: Some("none".into()),
             lost_orders: Vec::new(),
         };
-        [one("STRt", [before.0, after.0], after.2), one("straightness rms", [before.1, after.1], after.3)]
+        let values = ["STRt", "straightness rms"].into_iter().enumerate();
+        values.map(|(which, value)| one(value, [before[which], after[which]], std[which])).collect::<Vec<_>>()
     })
     .collect()
-}
-
-/// Standard uncertainty of the difference of the highest and the lowest value, for independent errors.
-fn at_the_ends(values: &[f64], std: &[f64]) -> f64 {
-    let ends = values.iter().zip(std);
-    let lowest = ends.clone().min_by(|a, b| a.0.total_cmp(b.0));
-    let highest = ends.max_by(|a, b| a.0.total_cmp(b.0));
-    lowest.zip(highest).map_or(f64::NAN, |((_, one), (_, other))| one.hypot(*other))
 }
 
 #[cfg(test)]

@@ -30,6 +30,8 @@ pub struct Split {
     pub slide_um: Vec<f64>,
     /// Variance of one trace at each position, in µm²; NaN where not known.
     pub variance: Vec<f64>,
+    /// Correlation of a trace's errors over 0, 1, … positions.
+    pub correlation: Vec<f64>,
     /// Standard uncertainties of part and slide from it.
     pub std_um: [Vec<f64>; 2],
     /// Root mean square difference of the setups' half difference from the slide that is declared possible; NaN where
@@ -157,6 +159,7 @@ impl Grid {
             std_um: [std(&of_part), std(&of_slide)],
             part_um,
             slide_um,
+            correlation: self.correlation(&aligned, &means),
             variance,
             beyond_smooth_um: if self.smooth.is_some() { rms } else { f64::NAN },
         }

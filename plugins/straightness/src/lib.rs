@@ -15,6 +15,7 @@ mod separate;
 mod spline;
 mod straightness;
 mod trace;
+mod value_std;
 
 use runout_core::pipeline::{
     effects::EffectEntry,

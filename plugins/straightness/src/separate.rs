@@ -23,6 +23,7 @@ use crate::{
     positions::{coarsest_mm, common_range, positions},
     straightness::{self, LIMIT, Straightness},
     trace::AxialTrace,
+    value_std::ProfileErrors,
 };
 
 /// `[separate] plugin = "axial-reversal"`.
@@ -246,7 +247,13 @@ impl AxialReversal {
         }
         let repeated = split.variance.iter().sum::<f64>() / split.variance.len() as f64;
         let [part_std_um, slide_std_um] = split.std_um.clone();
+        let errors = split.std_um.clone().map(|noise_um| ProfileErrors {
+            noise_um,
+            correlation: split.correlation.clone(),
+            common_um: Vec::new(),
+        });
         let result = Straightness {
+            errors,
             z_mm: grid.z_mm.clone(),
             part_um: split.part_um.clone(),
             slide_um: split.slide_um.clone(),

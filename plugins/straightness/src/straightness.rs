@@ -7,7 +7,7 @@ use runout_core::{
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 
-use crate::moves::rms;
+use crate::{moves::rms, value_std::ProfileErrors};
 
 /// What the numbers are, for files that explain themselves.
 pub const CONVENTION: &str = "Straightness along z about the least-squares line (LSLI, ISO 12780-1). part_um is \
@@ -36,6 +36,8 @@ pub struct Straightness {
     pub repeatability_um: f64,
     /// Degrees of freedom behind each position's standard uncertainty.
     pub degrees_of_freedom: usize,
+    /// What the errors of part and slide are made of.
+    pub(crate) errors: [ProfileErrors; 2],
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -103,6 +105,23 @@ impl Straightness {
         values.push(value("last-position", end(self.z_mm.last()), f64::NAN, "mm", "last position along the axis"));
         values.push(value("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
         values
+    }
+
+    /// Standard uncertainties of STRt and of the root mean square of part (0) or slide (1): of the difference of the highest and the lowest
+    /// deviation, and of a mean over all positions. NaN where not known.
+    pub(crate) fn std_of_values(&self, which: usize) -> [f64; 2] {
+        let values = if which == 0 { &self.part_um } else { &self.slide_um };
+        let ends = |sign: f64| {
+            let each = values.iter().enumerate();
+            each.max_by(|a, b| (sign * a.1).total_cmp(&(sign * b.1))).map(|(at, _)| at)
+        };
+        let mut difference = vec![0.0; values.len()];
+        for (sign, at) in [1.0, -1.0].into_iter().filter_map(|sign| Some((sign, ends(sign)?))) {
+            difference[at] += sign;
+        }
+        let size = values.len() as f64 * rms(values);
+        let mean: Vec<f64> = values.iter().map(|value| value / size).collect();
+        [self.errors[which].of(&difference), self.errors[which].of(&mean)]
     }
 
     /// Whether all its deviations are numbers.
