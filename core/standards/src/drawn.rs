@@ -9,7 +9,7 @@
 //! Where b is large against s, the interval depends on how well t̂ resembles t, which no recording shows: such a value has no
 //! interval, but the reason why.
 
-use super::uncertainty::Uncertainty;
+use super::uncertainty::{NORMAL_95, Uncertainty};
 use runout_numerics::{Complex64, lanes::product};
 
 /// Pairs of draws of a section's values: Student's factor is then 9 % above the normal distribution's.
@@ -161,16 +161,46 @@ impl Drawn {
         if !(value.is_finite() && about.is_finite() && pairs > 1 && draws.iter().all(|draw| draw.is_finite())) {
             return Err("not every profile or surface within the errors has this value".into());
         }
-        if self.share.is_nan() || self.share > sensitivity.largest_share() {
-            let percent = 100.0 * self.share;
-            return Err(format!(
-                "errors are {percent:.2} % of the variance of what it is taken from; no interval holds 95 % then"
-            ));
-        }
         let count = draws.len() as f64;
         let shift = draws.iter().map(|draw| draw - about).sum::<f64>() / count;
         let squares: f64 = draws.iter().map(|draw| (draw - about - shift).powi(2)).sum();
         let std = (squares / (count - 1.0)).sqrt();
+        let lowest = draws.iter().copied().fold(f64::INFINITY, f64::min);
+        Moments { about: *about, shift, std, share: self.share, draws: draws.len(), lowest }
+            .uncertainty(value, sensitivity)
+    }
+}
+
+/// What errors do to a value of a form without its noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moments {
+    /// The value of that form.
+    pub about: f64,
+    /// By how much errors raise it in the mean.
+    pub shift: f64,
+    /// Standard deviation of the value with errors.
+    pub std: f64,
+    /// Mean square of the errors over the variance of what the value is taken from.
+    pub share: f64,
+    /// Draws, in pairs, that the standard deviation was taken from; 0 where it is a closed form.
+    pub draws: usize,
+    /// The lowest that the value can be, or was in a draw: an interval of values from 0 on ends there.
+    pub lowest: f64,
+}
+
+impl Moments {
+    /// What is known of the error of the value, which was found as `value`; or why nothing is stated.
+    ///
+    /// # Errors
+    /// The reason why no interval is stated.
+    pub fn uncertainty(&self, value: f64, sensitivity: Sensitivity) -> Result<Uncertainty, String> {
+        let Self { about, shift, std, share, draws, lowest } = *self;
+        if share.is_nan() || share > sensitivity.largest_share() {
+            let percent = 100.0 * share;
+            return Err(format!(
+                "errors are {percent:.2} % of the variance of what it is taken from; no interval holds 95 % then"
+            ));
+        }
         let rounding = 1e-12 * about.abs();
         if shift.abs() > sensitivity.largest_shift() * std + rounding {
             let share = shift.abs() / std;
@@ -179,10 +209,10 @@ impl Drawn {
                 "errors {direction} it by {share:.1} standard uncertainties; no interval holds 95 % then"
             ));
         }
-        let floor = if draws.iter().all(|draw| *draw >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
-        let half = student_95((pairs - 1) as f64) * std;
-        let interval_95 = [-half, half].map(|end| (value - shift + end).max(floor));
-        Ok(Uncertainty { std, interval_95, draws: draws.len() })
+        let floor = if lowest >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        let quantile = if draws > 0 { student_95((draws / 2 - 1) as f64) } else { NORMAL_95 };
+        let interval_95 = [-quantile, quantile].map(|end| (value - shift + end * std).max(floor));
+        Ok(Uncertainty { std, interval_95, draws })
     }
 }
 

@@ -3,7 +3,9 @@
 pub mod areal;
 pub mod cylindricity;
 pub mod drawn;
+mod errors;
 pub mod gaps;
+pub mod mean_deviation;
 mod near;
 pub mod parameter;
 pub mod position;

@@ -26,6 +26,11 @@ pub(super) struct Correlation {
 }
 
 impl Correlation {
+    /// Whether the row at a lag was asked for.
+    pub(super) fn is_known(&self, lag: usize) -> bool {
+        !self.waiting[lag]
+    }
+
     /// All lags of columns at a lag of rows: the sums of products.
     pub(super) fn row(&mut self, lag: usize) -> &mut [f64] {
         let target = &mut self.values[lag * self.width..][..self.width];

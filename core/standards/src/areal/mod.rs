@@ -10,6 +10,7 @@ mod height;
 mod hybrid;
 mod material_ratio;
 mod spatial;
+mod spatial_draws;
 
 pub use features::Features;
 pub use form::{without_cylinder, without_polynomial, without_taper, without_turned_body};
@@ -18,6 +19,7 @@ pub use hybrid::Hybrid;
 pub(super) use hybrid::derivative;
 pub use material_ratio::{Functional, MaterialRatio};
 pub use spatial::Spatial;
+pub use spatial_draws::SpatialDraws;
 
 pub use super::parameter::Parameter;
 pub use runout_numerics::height_map::HeightMap;
@@ -139,13 +141,27 @@ pub fn without_curve_and_features(map: &HeightMap, settings: &Settings) -> Areal
     of_centred(&map.with(height::centred(map.heights_um())), settings)
 }
 
-fn of_centred(centred: &HeightMap, settings: &Settings) -> Areal {
+/// A map with mean 0.
+#[must_use]
+pub fn centred(map: &HeightMap) -> HeightMap<'static> {
+    map.with(height::centred(map.heights_um()))
+}
+
+/// Heights, lengths and slopes of a map with mean 0.
+#[must_use]
+pub fn of_centred(centred: &HeightMap, settings: &Settings) -> Areal {
+    heights_and_slopes(centred, Spatial::of(centred, settings.decay))
+}
+
+/// Heights and slopes of a map with mean 0, beside spatial parameters that are known.
+#[must_use]
+pub fn heights_and_slopes(centred: &HeightMap, spatial: Spatial) -> Areal {
     let missing = centred.missing();
     Areal {
         points: centred.heights_um().len() - missing,
         missing,
         height: Height::of(centred),
-        spatial: Spatial::of(centred, settings.decay),
+        spatial,
         hybrid: Hybrid::of(centred),
         functional: Functional::NONE,
         features: Features::NONE,

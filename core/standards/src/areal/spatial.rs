@@ -6,7 +6,7 @@ use super::{
 };
 
 /// Angles of the angular spectrum over half a turn: steps of 0.5°.
-const ANGLES: usize = 360;
+pub(super) const ANGLES: usize = 360;
 
 /// Lengths and direction of the texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +24,9 @@ pub struct Spatial {
 }
 
 impl Spatial {
+    /// Nothing known.
+    pub const NONE: Self = Self { sal_mm: f64::NAN, str: f64::NAN, std_deg: f64::NAN, ssw_mm: f64::NAN };
+
     /// Of a map with mean 0. The autocorrelation is over the pairs of measured points at each lag (unbiased); around a
     /// closed map it is circular. For the spectrum, missing points lie on the mean.
     pub(super) fn of(centred: &HeightMap, decay: f64) -> Self {
@@ -69,20 +72,20 @@ impl Spatial {
 }
 
 /// Places in the angular spectrum of directions, of which the next is mostly near the last.
-struct Sectors {
+pub(super) struct Sectors {
     /// Tangents of the angles at which places begin, of a quarter turn, and infinity.
     tangents: Vec<f64>,
     last: usize,
 }
 
 impl Sectors {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let tangents = (0..ANGLES / 2).map(|place| (place as f64 * 180.0 / ANGLES as f64).to_radians().tan());
         Self { tangents: tangents.chain([f64::INFINITY]).collect(), last: 0 }
     }
 
     /// The place of the direction (fx, fy), fx from 0 on: of its angle modulo 180°.
-    fn of(&mut self, fx: f64, fy: f64) -> usize {
+    pub(super) fn of(&mut self, fx: f64, fy: f64) -> usize {
         let (place, up) = (&mut self.last, fy.abs());
         while up >= self.tangents[*place + 1] * fx && *place + 2 < self.tangents.len() {
             *place += 1;
@@ -100,19 +103,39 @@ impl Sectors {
     }
 }
 
+/// Rows of an autocorrelation.
+pub(super) trait Rows {
+    /// Column lags in a row.
+    fn width(&self) -> usize;
+
+    /// All lags of columns at a lag of rows: the sums of products.
+    fn row(&mut self, lag: usize) -> Option<&[f64]>;
+}
+
+impl Rows for Correlation {
+    fn width(&self) -> usize {
+        self.width
+    }
+
+    fn row(&mut self, lag: usize) -> Option<&[f64]> {
+        let row: &[f64] = Self::row(self, lag);
+        Some(row)
+    }
+}
+
 /// The region around lag 0 in which the autocorrelation stays above a level.
-struct Decay<'a> {
+pub(super) struct Decay<'a, R> {
     map: &'a HeightMap<'a>,
-    sums: &'a mut Correlation,
+    sums: &'a mut R,
     /// Whether sums are over all pairs of points, and still to be divided by their number.
     undivided: bool,
     width: usize,
     level: f64,
 }
 
-impl<'a> Decay<'a> {
-    fn new(map: &'a HeightMap<'a>, sums: &'a mut Correlation, undivided: bool, decay: f64) -> Self {
-        let width = sums.width;
+impl<'a, R: Rows> Decay<'a, R> {
+    pub(super) fn new(map: &'a HeightMap<'a>, sums: &'a mut R, undivided: bool, decay: f64) -> Self {
+        let width = sums.width();
         let mut found = Self { map, sums, undivided, width, level: 0.0 };
         found.level = decay * found.at(0, 0).unwrap_or(f64::NAN);
         found
@@ -123,17 +146,18 @@ impl<'a> Decay<'a> {
         let (across, along) = if along < 0 { (-across, -along) } else { (across, along) };
         let inside = self.map.closed() || across.unsigned_abs() < self.map.columns();
         let lag = along.unsigned_abs();
-        (inside && lag < self.map.rows()).then(|| {
-            let sum = self.sums.row(lag)[across.rem_euclid(self.width.cast_signed()) as usize];
-            let beside = if self.map.closed() { 0 } else { across.unsigned_abs() };
-            let pairs = (self.map.columns() - beside) * (self.map.rows() - lag);
-            if self.undivided { sum / pairs as f64 } else { sum }
-        })
+        if !inside || lag >= self.map.rows() {
+            return None;
+        }
+        let sum = self.sums.row(lag)?[across.rem_euclid(self.width.cast_signed()) as usize];
+        let beside = if self.map.closed() { 0 } else { across.unsigned_abs() };
+        let pairs = (self.map.columns() - beside) * (self.map.rows() - lag);
+        Some(if self.undivided { sum / pairs as f64 } else { sum })
     }
 
     /// Shortest and longest lag at which the level is reached, in mm. The shortest is NaN where it is never reached; the
     /// longest where the region reaches the end of the map, or goes all the way round.
-    fn lengths(&mut self) -> [f64; 2] {
+    pub(super) fn lengths(&mut self) -> [f64; 2] {
         // A flat map has no autocorrelation.
         if self.level <= 0.0 {
             return [f64::NAN; 2];

@@ -251,6 +251,12 @@ impl Uncertain {
         })
     }
 
+    /// Whether the surface has the measured rings, and none between them.
+    #[must_use]
+    pub fn is_as_measured(&self) -> bool {
+        self.step_mm.is_none()
+    }
+
     /// A surface's deviations from those of its measured rings.
     #[must_use]
     pub fn laid(&self, rings_um: &[f64]) -> Vec<f64> {

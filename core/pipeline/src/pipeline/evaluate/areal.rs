@@ -14,7 +14,7 @@ use runout_numerics::{
 };
 use runout_standards::{
     Value,
-    areal::{self, MaterialRatio},
+    areal::{self, Areal, MaterialRatio, Spatial, SpatialDraws},
     drawn::{Drawn, Sensitivity, in_pairs},
     twist::{self, Twist},
     uncertainty::seed,
@@ -23,7 +23,7 @@ use runout_turning::surface::{Section, Surface, Uncertain};
 
 /// Points that all draws look at together, about: a large surface has fewer draws, a small one more.
 const POINTS_DRAWN: usize = 8_000_000;
-const PAIRS: std::ops::RangeInclusive<usize> = 12..=48;
+const PAIRS: std::ops::RangeInclusive<usize> = 10..=48;
 
 /// Why hills and dales have no uncertainty.
 const COUNTED: &str =
@@ -107,6 +107,17 @@ enum Draws {
     /// Errors are known and none are drawn.
     LeftOut,
     Made(Drawn),
+}
+
+/// A surface that errors are drawn about, with mean 0, and what is drawn of its lengths and directions.
+struct About {
+    map: HeightMap<'static>,
+    spatial: Option<SpatialDraws<'static>>,
+}
+
+/// Values in the order of [`areal::PARAMETERS`].
+fn numbers(found: &Areal) -> Vec<f64> {
+    found.parameters().iter().map(|one| one.value).collect()
 }
 
 /// What is done to a surface before it is evaluated.
@@ -207,37 +218,82 @@ impl<'a> Prepared<'a> {
         }
         let pairs = POINTS_DRAWN / (2 * self.surface.deviation_um.len()).max(1);
         let rings_um = uncertain.without_noise(lowest);
-        let settings = areal::Settings::default();
-        let of = |rings_um: &[f64]| -> Vec<f64> {
-            let map = self.map(uncertain.laid(rings_um));
-            // What the measured surface has, a drawn one has; if not, there is no uncertainty.
-            map.map_or_else(
-                |_| vec![f64::NAN; areal::PARAMETERS.len()],
-                |map| {
-                    areal::without_curve_and_features(&map, &settings)
-                        .parameters()
-                        .iter()
-                        .map(|one| one.value)
-                        .collect()
-                },
-            )
-        };
+        let mut about: Option<About> = None;
         let both = |[above, below]: [&[f64]; 2]| {
             if std::ptr::eq(above, below) {
-                let of_both = of(above);
-                return [of_both.clone(), of_both];
+                let (found, numbers) = self.about(uncertain, above);
+                about = found;
+                return [numbers.clone(), numbers];
             }
-            std::thread::scope(|scope| {
-                let other = scope.spawn(|| of(below));
-                let above = of(above);
-                // A thread that stopped gave nothing.
-                [above, other.join().unwrap_or_default()]
-            })
+            let drawn = match &mut about {
+                Some(about) => self.beside(about, [above, below]),
+                None => self.apart(uncertain, [above, below]),
+            };
+            // What the measured surface has, a drawn one has; if not, there is no uncertainty.
+            drawn.unwrap_or_else(|_| [(); 2].map(|()| vec![f64::NAN; areal::PARAMETERS.len()]))
         };
         let mut drawn = in_pairs(&rings_um, pairs.clamp(*PAIRS.start(), *PAIRS.end()), next, both).behind_filter(SQ);
         // The direction comes round again after 180°.
         drawn.unwrap_period(STD, 180.0);
         Draws::Made(drawn)
+    }
+
+    /// Values of a surface that errors are drawn about, and what all draws about it share where everything that is done to
+    /// its heights is linear in them: no rings between those measured.
+    fn about(&self, uncertain: &Uncertain, rings_um: &[f64]) -> (Option<About>, Vec<f64>) {
+        let settings = areal::Settings::default();
+        let Ok(map) = self.map(uncertain.laid(rings_um)) else {
+            return (None, vec![f64::NAN; areal::PARAMETERS.len()]);
+        };
+        if !uncertain.is_as_measured() {
+            return (None, numbers(&areal::without_curve_and_features(&map, &settings)));
+        }
+        let map = areal::centred(&map);
+        // Filters along the axis make errors of rings depend on each other.
+        let filtered = self.evaluate.lambda_s_mm.is_some() || self.evaluate.lambda_c_mm.is_some();
+        let spatial = if filtered { None } else { SpatialDraws::new(map.clone(), settings.decay) };
+        let found = match &spatial {
+            Some((_, spatial)) => areal::heights_and_slopes(&map, *spatial),
+            None => areal::of_centred(&map, &settings),
+        };
+        (Some(About { map, spatial: spatial.map(|(draws, _)| draws) }), numbers(&found))
+    }
+
+    /// Values of the surface with errors added and taken away.
+    fn beside(&self, About { map, spatial }: &mut About, [above, below]: [&[f64]; 2]) -> Result<[Vec<f64>; 2]> {
+        let errors: Vec<f64> = above.iter().zip(below).map(|(above, below)| 0.5 * (above - below)).collect();
+        let errors = areal::centred(&self.map(errors)?);
+        let with = |sign: f64| {
+            let heights = map.heights_um().iter().zip(errors.heights_um()).map(|(height, error)| height + sign * error);
+            map.with(heights.collect())
+        };
+        let settings = areal::Settings::default();
+        Ok(std::thread::scope(|scope| {
+            let Some(spatial) = spatial else {
+                let below = scope.spawn(|| numbers(&areal::of_centred(&with(-1.0), &settings)));
+                let above = numbers(&areal::of_centred(&with(1.0), &settings));
+                // A thread that stopped gave nothing.
+                return [above, below.join().unwrap_or_default()];
+            };
+            let spatial = scope.spawn(|| spatial.both(errors.heights_um()));
+            let found = [1.0, -1.0].map(|sign| areal::heights_and_slopes(&with(sign), Spatial::NONE));
+            let [added, taken] = spatial.join().unwrap_or([Spatial::NONE; 2]);
+            let [above, below] = found;
+            [(above, added), (below, taken)].map(|(found, spatial)| numbers(&Areal { spatial, ..found }))
+        }))
+    }
+
+    /// Values of two surfaces.
+    fn apart(&self, uncertain: &Uncertain, both: [&[f64]; 2]) -> Result<[Vec<f64>; 2]> {
+        let [above, below] = both.map(|rings_um| self.map(uncertain.laid(rings_um)));
+        let [above, below] = [above?, below?];
+        let of = |map: &HeightMap| numbers(&areal::without_curve_and_features(map, &areal::Settings::default()));
+        Ok(std::thread::scope(|scope| {
+            let below = scope.spawn(|| of(&below));
+            let above = of(&above);
+            // A thread that stopped gave nothing.
+            [above, below.join().unwrap_or_default()]
+        }))
     }
 
     fn areal(&self, map: &HeightMap, draws: &Draws) -> (Vec<Label>, Vec<Found>) {

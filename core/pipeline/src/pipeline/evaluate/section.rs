@@ -88,9 +88,8 @@ pub(super) struct Form {
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
     pub(super) at: SectionAt,
-    /// What its errors are drawn from, for all of its values of roundness, and for those of texture.
+    /// What its errors are drawn from, for all of its values.
     noise: Noise,
-    noise_of_texture: Noise,
 }
 
 impl Form {
@@ -117,7 +116,6 @@ impl Form {
             angles: result.angles,
             radius_mm,
             noise: Noise::new(held.highest + 1, seed(&[&result.station, &at.id])),
-            noise_of_texture: Noise::of_fresh(held.highest + 1, seed(&[&result.station, &at.id])),
             held,
             at,
         })
@@ -127,8 +125,7 @@ impl Form {
     fn exactly(&self, harmonics: &[Complex64]) -> Self {
         let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
         let (freedom, held, at) = (self.freedom.clone(), self.held.clone(), self.at.clone());
-        let (noise, noise_of_texture) = (self.noise.clone(), self.noise_of_texture.clone());
-        Self { harmonics, equivalents, variance, freedom, held, at, noise, noise_of_texture, ..*self }
+        Self { harmonics, equivalents, variance, freedom, held, at, ..*self }
     }
 
     fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
@@ -259,7 +256,7 @@ impl Form {
     }
 
     /// Variances as wide as they are badly known, behind a filter.
-    fn widened(&self, filter: &Filter) -> Vec<f64> {
+    pub(super) fn widened(&self, filter: &Filter) -> Vec<f64> {
         let wider = self.freedom.iter().map(|freedom| (student_95(*freedom as f64) / NORMAL_95).powi(2));
         let wider = wider.chain(std::iter::repeat(1.0));
         let variance: Vec<f64> = self.variance.iter().zip(wider).map(|(variance, wider)| variance * wider).collect();
@@ -267,13 +264,8 @@ impl Form {
     }
 
     /// Errors as wide as their variance is badly known.
-    fn errors(&self, filter: &Filter) -> Option<Errors> {
+    pub(super) fn errors(&self, filter: &Filter) -> Option<Errors> {
         Errors::sharing(&self.widened(filter), 2, &self.noise)
-    }
-
-    /// Errors that are all taken fresh.
-    pub(super) fn fresh_errors(&self, filter: &Filter) -> Option<Errors> {
-        Errors::sharing(&self.widened(filter), 2, &self.noise_of_texture)
     }
 
     fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {

@@ -5,6 +5,7 @@ use runout_numerics::fourier::Fourier;
 use runout_standards::{
     Value,
     drawn::{Drawn, PAIRS, Sensitivity, in_pairs, remove_noise},
+    mean_deviation::of_mean_deviation,
     texture::{self, Kind, Settings},
 };
 
@@ -56,8 +57,11 @@ impl Form {
     pub(super) fn papers_ra(&self) -> Vec<Value> {
         let filter = Filter::low_pass(None);
         let profile_um = self.profile(&filter, &mut Fourier::new(self.fine(&filter)));
-        let drawn = self.drawn(&filter, |profile_um| vec![texture::ra_um(profile_um)]);
-        let ra = found(drawn.as_ref(), 0, texture::ra_um(&profile_um), Ok(Sensitivity::Mean));
+        let value = texture::ra_um(&profile_um);
+        let ra = self.mean_deviation(&filter, value).unwrap_or_else(|| {
+            let drawn = self.drawn(&filter, |profile_um| vec![texture::ra_um(profile_um)]);
+            found(drawn.as_ref(), 0, value, Ok(Sensitivity::Mean))
+        });
         let label = Label::new("Ra", "µm", "Qiao, Xu, Zhao 2024: unfiltered circumferential profile", "mean line");
         labelled_with_reasons(vec![label], vec![ra], &filter, &self.held, self.at.coverage(self.angles))
     }
@@ -93,9 +97,21 @@ impl Form {
         self.angles * (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.angles).max(1)
     }
 
-    /// Values of the form without its noise and of draws about it; `None` where no errors are known.
-    fn drawn(&self, filter: &Filter, look: impl Fn(&[f64]) -> Vec<f64>) -> Option<Drawn> {
-        let mut errors = self.fresh_errors(filter)?;
+    /// The mean absolute deviation with what errors do to it, in closed form; `None` where a part of the profile is missing or
+    /// no errors are known.
+    fn mean_deviation(&self, filter: &Filter, value: f64) -> Option<Found> {
+        if !self.at.gaps.is_empty() {
+            return None;
+        }
+        let (form_um, mut fourier) = self.without_noise(filter);
+        let moments = of_mean_deviation(&form_um, &self.widened(filter), &mut fourier)?;
+        let known = moments.uncertainty(value, Sensitivity::Mean);
+        let no_uncertainty = known.as_ref().err().cloned();
+        Some(Found { value, uncertainty: known.ok(), no_uncertainty })
+    }
+
+    /// The form without its noise, on as many angles as its errors ask for.
+    fn without_noise(&self, filter: &Filter) -> (Vec<f64>, Fourier) {
         let angles = (DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).next_multiple_of(WHOLE).max(WHOLE);
         let mut fourier = Fourier::new(angles);
         let mut forms = [filter.harmonics(&self.harmonics)];
@@ -103,6 +119,13 @@ impl Form {
         let [harmonics] = forms;
         let mut form_um = fourier.synthesise(harmonics).to_vec();
         self.at.gaps.blank(&mut form_um);
+        (form_um, fourier)
+    }
+
+    /// Values of the form without its noise and of draws about it; `None` where no errors are known.
+    fn drawn(&self, filter: &Filter, look: impl Fn(&[f64]) -> Vec<f64>) -> Option<Drawn> {
+        let mut errors = self.errors(filter)?;
+        let (form_um, mut fourier) = self.without_noise(filter);
         Some(in_pairs(
             &form_um,
             PAIRS,

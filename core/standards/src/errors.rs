@@ -1,0 +1,352 @@
+//! Errors of profiles, drawn from the variance of their harmonics.
+//!
+//! Errors of a separated form are normal, favour no phase, and do not couple orders: over the angle they are a stationary
+//! process, so that one drawn profile, turned by any angle, is another draw. Each transform thus gives several draws.
+//!
+//! Normal numbers come from one table. A draw takes a stretch of it, from a place that its seed gives; further draws of the seed
+//! take the stretches behind it, so that they have no number in common before the table ends.
+
+use std::sync::LazyLock;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use runout_numerics::{Complex64, fourier::Fourier};
+
+/// Draws from one transform, turned by equal steps from a random start.
+pub(crate) const TURNS_OF_A_DRAW: usize = 25;
+
+/// Complex normal numbers of the table: more than the draws of one form take.
+const TABLE: usize = 1 << 17;
+
+/// Pairs of independent normal numbers of variance 1.
+static NORMALS: LazyLock<Vec<Complex64>> = LazyLock::new(|| {
+    let mut random = ChaCha8Rng::seed_from_u64(0x006e_6f69_7365);
+    (0..TABLE).map(|_| Complex64::new(StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))).collect()
+});
+
+/// Random bits that depend on a seed and a number only (splitmix64: Steele, Lea, Flood, OOPSLA 2014).
+fn bits(seed: u64, number: u64) -> u64 {
+    let mut bits = seed.wrapping_add(number.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
+}
+
+/// Draws of normal numbers from one seed, a stretch of the table each.
+#[derive(Debug, Clone, Copy)]
+struct Draws {
+    seed: u64,
+    /// Numbers that each draw has to itself.
+    stride: usize,
+    /// Draws taken.
+    taken: usize,
+}
+
+impl Draws {
+    /// The next numbers, without end.
+    fn next(&mut self) -> impl Iterator<Item = &'static Complex64> {
+        let first = bits(self.seed, 0) as usize % TABLE;
+        let from = (first + self.taken * self.stride) % TABLE;
+        self.taken += 1;
+        NORMALS[from..].iter().chain(NORMALS.iter().cycle())
+    }
+
+    /// Where the draw that was taken last starts in a turn of so many angles.
+    fn start(&self, angles: usize) -> usize {
+        let share = (bits(self.seed, self.taken as u64) >> 11) as f64 / (1_u64 << 53) as f64;
+        ((share * angles as f64) as usize).min(angles.saturating_sub(1))
+    }
+}
+
+/// Normal numbers of one seed that several [`Errors`] share: those of one form behind different filters.
+#[derive(Debug, Clone, Copy)]
+pub struct Noise {
+    seed: u64,
+    orders: usize,
+}
+
+impl Noise {
+    /// For so many orders, from a seed.
+    #[must_use]
+    pub fn new(orders: usize, seed: u64) -> Self {
+        Self { seed, orders }
+    }
+}
+
+/// A source of noise, the same for all profiles that have a part of it.
+struct Source {
+    draws: Draws,
+    /// What it adds to each order, by order from 0.
+    amplitudes: Vec<Complex64>,
+}
+
+/// Draws of the errors of a profile on equal angles.
+pub struct Errors {
+    sources: Vec<Source>,
+    /// The errors last drawn, before they are turned.
+    drawn_um: Vec<f64>,
+    largest_um: f64,
+    squares_um2: f64,
+    start: usize,
+    turn: usize,
+}
+
+/// One draw of errors on equal angles.
+#[derive(Debug, Clone, Copy)]
+pub struct DrawnErrors<'a> {
+    drawn_um: &'a [f64],
+    /// Place of the first angle's error.
+    from: usize,
+    largest_um: f64,
+    squares_um2: f64,
+}
+
+impl<'a> DrawnErrors<'a> {
+    /// These, in µm.
+    #[must_use]
+    pub fn new(errors_um: &'a [f64]) -> Self {
+        let (largest_um, squares_um2) = size(errors_um);
+        Self { drawn_um: errors_um, from: 0, largest_um, squares_um2 }
+    }
+
+    /// The error at an angle by its number, in µm.
+    #[must_use]
+    pub fn at(&self, angle: usize) -> f64 {
+        let (place, count) = (angle + self.from, self.drawn_um.len());
+        self.drawn_um[if place < count { place } else { place - count }]
+    }
+
+    /// Errors at the first angles, and at the others.
+    #[must_use]
+    pub fn parts(&self) -> [&'a [f64]; 2] {
+        let (head, tail) = self.drawn_um.split_at(self.from);
+        [tail, head]
+    }
+
+    /// At all angles, in µm.
+    pub fn iter(&self) -> impl Iterator<Item = &'a f64> + use<'a> {
+        let [first, others] = self.parts();
+        first.iter().chain(others)
+    }
+
+    /// The largest of them in µm, without sign.
+    #[must_use]
+    pub fn largest_um(&self) -> f64 {
+        self.largest_um
+    }
+
+    /// Sum of their squares, in µm².
+    #[must_use]
+    pub fn squares_um2(&self) -> f64 {
+        self.squares_um2
+    }
+}
+
+impl Errors {
+    /// From the variance E|δ|² of the harmonics by order from 0; orders without a known variance, and those below
+    /// `lowest`, are taken as exact. `None` where no variance is known.
+    #[must_use]
+    pub fn new(variance: &[f64], lowest: usize, seed: u64) -> Option<Self> {
+        Self::sharing(variance, lowest, &Noise::new(variance.len(), seed))
+    }
+
+    /// The same from numbers that others take too: draw by draw, errors of both differ by their variance only.
+    #[must_use]
+    pub fn sharing(variance: &[f64], lowest: usize, noise: &Noise) -> Option<Self> {
+        let amplitudes = variance.iter().map(|variance| Complex64::from(variance.sqrt())).collect();
+        Self::of_numbers([(*noise, amplitudes)], lowest)
+    }
+
+    /// From independent sources of noise, each with its seed and what its noise of E|g|² = 1 makes of each order: profiles that
+    /// have a source in common have its noise in common. All draws are turned as the first source says.
+    #[must_use]
+    pub fn of_sources(sources: impl IntoIterator<Item = (u64, Vec<Complex64>)>, lowest: usize) -> Option<Self> {
+        let noise = |(seed, amplitudes): (u64, Vec<Complex64>)| (Noise::new(amplitudes.len(), seed), amplitudes);
+        Self::of_numbers(sources.into_iter().map(noise), lowest)
+    }
+
+    fn of_numbers(sources: impl IntoIterator<Item = (Noise, Vec<Complex64>)>, lowest: usize) -> Option<Self> {
+        // A coefficient's real and imaginary part have half of its variance each; a level is real.
+        let share = |order: usize| if order == 0 { 1.0 } else { 0.5_f64.sqrt() };
+        let amplitude = |(order, amplitude): (usize, Complex64)| {
+            if order >= lowest && amplitude.is_finite() { share(order) * amplitude } else { Complex64::ZERO }
+        };
+        let source = |(noise, amplitudes): (Noise, Vec<Complex64>)| Source {
+            draws: Draws { seed: noise.seed, stride: noise.orders, taken: 0 },
+            amplitudes: amplitudes.into_iter().enumerate().map(amplitude).collect(),
+        };
+        let sources: Vec<Source> = sources.into_iter().map(source).collect();
+        let some = sources.iter().flat_map(|source| &source.amplitudes).any(|amplitude| *amplitude != Complex64::ZERO);
+        let (drawn_um, start, turn) = (Vec::new(), 0, 0);
+        some.then(|| Self { sources, drawn_um, largest_um: 0.0, squares_um2: 0.0, start, turn })
+    }
+
+    /// The standard deviation of an error at any one angle.
+    #[must_use]
+    pub fn std_um(&self) -> f64 {
+        let amplitudes = self.sources.iter().flat_map(|source| &source.amplitudes);
+        amplitudes.map(Complex64::norm_sqr).sum::<f64>().sqrt()
+    }
+
+    /// The largest error of the last draw.
+    #[must_use]
+    pub fn largest_um(&self) -> f64 {
+        self.largest_um
+    }
+
+    /// Harmonics of the next errors, independent of all before, by order from 0.
+    fn harmonics(&mut self) -> Vec<Complex64> {
+        let mut sum = Vec::new();
+        for Source { draws, amplitudes } in &mut self.sources {
+            let numbers = amplitudes.iter().zip(draws.next());
+            if sum.is_empty() {
+                sum.extend(numbers.map(|(amplitude, number)| amplitude * number));
+                continue;
+            }
+            sum.resize(amplitudes.len().max(sum.len()), Complex64::ZERO);
+            sum.iter_mut().zip(numbers).for_each(|(sum, (amplitude, number))| *sum += amplitude * number);
+        }
+        sum
+    }
+
+    /// Fills `errors_um` with the next errors on the equal angles that `fourier` has, independent of all before.
+    pub fn fresh(&mut self, fourier: &mut Fourier, errors_um: &mut [f64]) {
+        let harmonics = self.harmonics();
+        errors_um.copy_from_slice(&fourier.synthesise(harmonics)[..errors_um.len()]);
+    }
+
+    /// The next errors; all draws are of the one length that `fourier` has.
+    pub fn turned(&mut self, fourier: &mut Fourier) -> DrawnErrors<'_> {
+        let length = fourier.length();
+        if self.turn == 0 {
+            let harmonics = self.harmonics();
+            self.drawn_um.clear();
+            self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
+            // As the first source says.
+            self.start = self.sources.first().map_or(0, |source| source.draws.start(length));
+            (self.largest_um, self.squares_um2) = size(&self.drawn_um);
+        }
+        let from = (self.start + self.turn * length / TURNS_OF_A_DRAW) % length;
+        self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
+        let Self { drawn_um, largest_um, squares_um2, .. } = self;
+        DrawnErrors { drawn_um, from, largest_um: *largest_um, squares_um2: *squares_um2 }
+    }
+
+    /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
+    pub fn draw(&mut self, fourier: &mut Fourier, form_um: &[f64], drawn: &mut Vec<f64>) {
+        let errors = self.turned(fourier);
+        drawn.clear();
+        drawn.extend(form_um.iter().zip(errors.iter()).map(|(form, error)| form + error));
+    }
+}
+
+/// The largest of some errors, without sign, and the sum of their squares.
+fn size(errors: &[f64]) -> (f64, f64) {
+    const LANES: usize = 8;
+    // Lanes that do not wait for each other.
+    let (mut largest, mut squares) = ([0.0_f64; LANES], [0.0; LANES]);
+    for chunk in errors.chunks(LANES) {
+        for (error, (largest, squares)) in chunk.iter().zip(largest.iter_mut().zip(&mut squares)) {
+            let size = error.abs();
+            *largest = if size > *largest { size } else { *largest };
+            *squares += size * size;
+        }
+    }
+    (largest.into_iter().fold(0.0, f64::max), squares.iter().sum())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    /// Two profiles of one station: the second has 0.6i of the first one's noise, and 0.8 of its own.
+    #[test]
+    fn profiles_share_the_noise_of_their_sources() {
+        let (orders, length, order) = (12, 64, 5);
+        let of = |share: Complex64| vec![share; orders];
+        let own = (1, of(Complex64::ONE));
+        let mut first = Errors::of_sources([own.clone()], 2).unwrap();
+        let mut second =
+            Errors::of_sources([(1, of(Complex64::new(0.0, 0.6))), (2, of(Complex64::from(0.8)))], 2).unwrap();
+        assert!((first.std_um() - second.std_um()).abs() < 1e-12);
+        let (mut fourier, level) = (Fourier::new(length), vec![0.0; length]);
+        let (mut squares, mut product) = ([0.0; 2], Complex64::ZERO);
+        for _ in 0..TURNS_OF_A_DRAW * 2000 {
+            let mut drawn = [Vec::new(), Vec::new()];
+            first.draw(&mut fourier, &level, &mut drawn[0]);
+            second.draw(&mut fourier, &level, &mut drawn[1]);
+            let [a, b] = drawn.map(|profile| {
+                let mut harmonics = vec![Complex64::ZERO; length / 2];
+                Fourier::new(length).analyse(profile, &mut harmonics);
+                harmonics[order]
+            });
+            squares = [squares[0] + a.norm_sqr(), squares[1] + b.norm_sqr()];
+            product += b * a.conj();
+        }
+        let product = product / (squares[0] * squares[1]).sqrt();
+        // 2000 independent draws.
+        assert!((squares[0] / squares[1] - 1.0).abs() < 0.1 && (product - Complex64::new(0.0, 0.6)).norm() < 0.06);
+        // The first source alone draws what it drew before there were several.
+        let mut alone = Errors::new(&vec![1.0; orders], 2, 1).unwrap();
+        let mut again = Errors::of_sources([own], 2).unwrap();
+        let mut drawn = [Vec::new(), Vec::new()];
+        alone.draw(&mut fourier, &level, &mut drawn[0]);
+        again.draw(&mut fourier, &level, &mut drawn[1]);
+        assert_eq!(drawn[0], drawn[1]);
+    }
+
+    /// Shared numbers are those of the seed, for all that share them.
+    #[test]
+    #[allow(clippy::float_cmp, reason = "the same operations")]
+    fn errors_share_their_numbers() {
+        let variance = [0.01; 30];
+        let noise = Noise::new(30, 5);
+        let mut fourier = Fourier::new(64);
+        let mut own = Errors::new(&variance, 2, 5).unwrap();
+        let mut shared = Errors::sharing(&variance, 2, &noise).unwrap();
+        let mut doubled = Errors::sharing(&variance.map(|variance| 4.0 * variance), 2, &noise).unwrap();
+        for draw in 0..40 {
+            let expected: Vec<f64> = own.turned(&mut fourier).iter().copied().collect();
+            let found = shared.turned(&mut fourier);
+            assert!(found.iter().eq(&expected), "{draw}");
+            assert!((0..64).all(|angle| found.at(angle) == expected[angle]), "{draw}");
+            let twice = doubled.turned(&mut fourier);
+            assert!((0..64).all(|angle| (twice.at(angle) - 2.0 * expected[angle]).abs() < 1e-14), "{draw}");
+        }
+        let more = Errors::sharing(&[0.01; 31], 2, &noise).unwrap();
+        assert_eq!(more.sources[0].amplitudes.len(), 31);
+    }
+
+    /// Draws of one seed, and of others, are as independent as numbers of their own would be.
+    #[test]
+    fn draws_have_no_numbers_in_common() {
+        let orders = 1000;
+        let mut draws = Draws { seed: 3, stride: orders, taken: 0 };
+        let all: Vec<Vec<Complex64>> = (0..100).map(|_| draws.next().take(orders).copied().collect()).collect();
+        let mut largest: f64 = 0.0;
+        for (index, one) in all.iter().enumerate() {
+            let power = one.iter().map(Complex64::norm_sqr).sum::<f64>() / orders as f64;
+            // 2 ± 2/√1000.
+            assert!((power - 2.0).abs() < 0.35, "{index}: {power}");
+            for other in &all[..index] {
+                let product: Complex64 = one.iter().zip(other).map(|(a, b)| a * b.conj()).sum();
+                largest = largest.max(product.norm() / (2.0 * orders as f64));
+            }
+        }
+        // Of 4950 pairs, each 1/√1000 in the root mean square.
+        assert!(largest < 0.13, "{largest}");
+        let starts: Vec<usize> = (0..1000)
+            .map(|seed| {
+                let mut draws = Draws { seed, stride: 10, taken: 0 };
+                let _ = draws.next();
+                draws.start(360)
+            })
+            .collect();
+        let mean = starts.iter().sum::<usize>() as f64 / 1000.0;
+        assert!((mean - 179.5).abs() < 12.0 && starts.iter().all(|start| *start < 360), "{mean}");
+    }
+}
