@@ -37,11 +37,11 @@ fn a_reading_far_from_all_others_is_told_unless_its_turn_is_left_out() {
         summary["stations"][0]["warnings"].to_string()
     };
     let warnings = told(&[]);
-    for part in ["shaft.csv", "A reads 106.2210 µm near sample", "in other turns at most", "outlier_sigma"] {
+    for part in ["shaft.csv", "A reads 106.2210 µm at sample", "in other turns at most", "outlier_sigma"] {
         assert!(warnings.contains(part), "{part}: {warnings}");
     }
     let warnings = told(&["--set", "preprocess.0.outlier_sigma=6", "--set", "preprocess.0.min_turns=4"]);
-    assert!(!warnings.contains("near sample"), "{warnings}");
+    assert!(!warnings.contains("µm at sample"), "{warnings}");
 }
 
 #[test]

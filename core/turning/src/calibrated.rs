@@ -68,6 +68,7 @@ mod tests {
             sensor_ids: vec!["S2".into(), "S1".into()],
             converter_limits_um: Some(vec![[-10.0, 10.0]; 2]),
             marks: Vec::new(),
+            marks_within_samples: 0.0,
             encoder: false,
             trimmed: Vec::new(),
             responses: Vec::new(),

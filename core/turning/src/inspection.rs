@@ -206,7 +206,7 @@ impl SampleStream for Inspection<'_> {
                 self.ended = true;
                 self.alive()?;
                 if let Some(tell) = self.tell.take() {
-                    let spike = |(index, channel): (usize, &Channel)| channel.spike(index, self.chunk as u64);
+                    let spike = |(index, channel): (usize, &Channel)| channel.spike(index);
                     tell(self.channels.iter().enumerate().filter_map(spike).collect());
                 }
             }

@@ -12,6 +12,7 @@ pub mod error_motion;
 pub mod inspection;
 pub mod marker;
 pub mod measurement;
+pub mod near_tone;
 pub mod profile;
 pub mod provenance;
 pub mod reading;

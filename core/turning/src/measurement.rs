@@ -81,6 +81,9 @@ pub struct Capture {
     pub converter_limits_um: Option<Vec<[f64; 2]>>,
     /// Sample positions (fractional, ascending) at which a turn begins: the once-per-turn mark, or the encoder's zero.
     pub marks: Vec<f64>,
+    /// Half of the interval in which each of them lies, in samples: 0.5 where only the samples before and behind it are known, 0
+    /// where it is timed.
+    pub marks_within_samples: f64,
     /// Whether each block brings the encoder's angle of each sample.
     pub encoder: bool,
     /// Turns that a preprocessor has set aside at the ends, with its reason.

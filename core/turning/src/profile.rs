@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use crate::{
     creep::Levels,
     measurement::{DefectKind, Response, Trim},
+    near_tone::{NearTone, near_tones},
     spread::Spread,
 };
 use runout_numerics::Complex64;
@@ -35,6 +36,8 @@ pub struct Profile {
     /// The scatter without what `covariance` is taken from, likewise. A covariance does not show what weights from the same
     /// readings gain by fitting their noise; with these weights it is without bias. `None` where it is not known apart.
     pub scatter_beside: Option<Vec<Complex64>>,
+    /// Tones so near to an order that the mean takes them for synchronous.
+    pub near_tones: Vec<NearTone>,
     /// Mean level of each turn used.
     pub levels: TurnLevels,
     /// The same turns in parts, where asked for.
@@ -43,6 +46,9 @@ pub struct Profile {
     pub spread: Option<Spread>,
     /// How many turns there were, and what became of them.
     pub turns: TurnCount,
+    /// Standard uncertainty of the spindle angle that the turns are counted from, in rad: of marks that are known to a part of a
+    /// sample only. It turns all harmonics together.
+    pub angle_std_rad: f64,
     /// Mean speed over the turns used, where the sampling rate is known.
     pub speed_rpm: Option<f64>,
     /// Samples a second, where known.
@@ -223,6 +229,7 @@ impl Split {
             covariance: part.covariance.clone(),
             scatter: part.scatter.clone(),
             scatter_beside: None,
+            near_tones: part.neighbours.as_ref().map(near_tones).unwrap_or_default(),
             split: None,
             spread: None,
             turns: TurnCount { used: part.turns.len(), ..whole.turns.clone() },

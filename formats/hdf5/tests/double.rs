@@ -75,6 +75,7 @@ impl Memory {
                             sensor_ids: vec!["S1".into(), "S2".into()],
                             converter_limits_um: None,
                             marks: (1..=samples / TURN).map(|turn| (turn * TURN) as f64 - 0.25).collect(),
+                            marks_within_samples: 0.0,
                             encoder,
                             trimmed: Vec::new(),
                             responses: Vec::new(),

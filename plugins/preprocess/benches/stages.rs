@@ -38,6 +38,7 @@ static RECORD: LazyLock<MemoryStream> = LazyLock::new(|| {
             sensor_ids: (0..CHANNELS).map(|channel| format!("S{channel}")).collect(),
             converter_limits_um: None,
             marks: (0..=TURNS).map(|turn| turn as f64 * TURN_SAMPLES).collect(),
+            marks_within_samples: 0.0,
             encoder: false,
             trimmed: Vec::new(),
             responses: Vec::new(),

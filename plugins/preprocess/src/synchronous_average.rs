@@ -12,6 +12,7 @@ mod bridge;
 mod encoder;
 mod kernel;
 mod level;
+mod marks;
 mod mean;
 mod outliers;
 mod resample;
@@ -25,6 +26,7 @@ mod window;
 use runout_core::{
     Error, Result,
     measurement::{Block, Capture, Response, SampleStream},
+    near_tone::NearTone,
     numerics::fourier,
     pipeline::{
         error::Fault,
@@ -38,6 +40,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use kernel::{Kernel, PASS_BAND};
+use marks::angle_std_rad;
 use resample::Resampling;
 use turns::Turn;
 
@@ -180,6 +183,21 @@ impl SynchronousAverage {
     }
 }
 
+/// Says which tones the average takes for synchronous.
+fn near_synchronous(tones: &[NearTone], turns: usize, object: &str) -> Option<String> {
+    let size = |tone: &NearTone| tone.leak.iter().map(|leak| leak.norm()).fold(0.0, f64::max);
+    let largest = tones.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let others = if tones.len() > 1 { format!(" (and {} more)", tones.len() - 1) } else { String::new() };
+    Some(format!(
+        "{object}: a tone at {:.4} of a turn is {:.2} periods over the record from order {}{others}: it puts up to {:.4} µm into the \
+         average, which the stated uncertainties include; record more turns",
+        largest.order as f64 + largest.off / turns as f64,
+        largest.off.abs(),
+        largest.order,
+        size(largest),
+    ))
+}
+
 /// Highest order that turns of this many samples hold, below Nyquist as for whole numbers of samples.
 fn orders_held(turn_samples: f64) -> usize {
     (0.5 * (turn_samples - 1.0)) as usize
@@ -254,6 +272,7 @@ impl Averager for SynchronousAverage {
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
         if let Some(speed_rpm) = speed_rpm {
             in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
@@ -268,10 +287,12 @@ impl Averager for SynchronousAverage {
             covariance: outcome.covariance,
             scatter: outcome.scatter,
             scatter_beside: outcome.scatter_beside,
+            near_tones: outcome.near_tones,
             levels: outcome.levels,
             split: outcome.split,
             spread: outcome.spread,
             turns: count,
+            angle_std_rad: angle_std_rad(&capture.marks, capture.marks_within_samples),
             speed_rpm,
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,

@@ -27,6 +27,7 @@ pub(crate) fn stream(channels: &[Vec<f64>], marks: Vec<f64>) -> MemoryStream {
         sensor_ids: (1..=channels.len()).map(|number| format!("S{number}")).collect(),
         converter_limits_um: None,
         marks,
+        marks_within_samples: 0.0,
         encoder: false,
         trimmed: Vec::new(),
         responses: Vec::new(),

@@ -250,6 +250,7 @@ mod tests {
             sensor_ids: vec!["S1".into()],
             converter_limits_um: None,
             marks: Vec::new(),
+            marks_within_samples: 0.0,
             encoder: false,
             trimmed: Vec::new(),
             responses: Vec::new(),

@@ -165,12 +165,13 @@ fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String
     };
     let in_average = spikes.iter().filter(|spike| !left_out(spike));
     let told = in_average.map(|spike| {
-        let Spike { channel, near_sample, reading_um, usual_um, stretches, .. } = spike;
+        let Spike { channel, near_sample, within_samples, reading_um, usual_um, stretches } = spike;
         let sensor = capture.sensor_ids.get(*channel).map_or("", String::as_str);
         let times = if *stretches > 1 { format!(" ({stretches} turns or so have such readings)") } else { String::new() };
         let usually = if reading_um > usual_um { "at most" } else { "at least" };
+        let at = if *within_samples == 0 { "at" } else { "near" };
         format!(
-            "{}: {sensor} reads {reading_um:.4} µm near sample {near_sample}{times}, in other turns {usually} {usual_um:.4} µm; if that is \
+            "{}: {sensor} reads {reading_um:.4} µm {at} sample {near_sample}{times}, in other turns {usually} {usual_um:.4} µm; if that is \
              a disturbance, `outlier_sigma` of the synchronous average leaves such turns out",
             capture.object
         )

@@ -90,8 +90,8 @@ impl Channel {
     }
 
     /// A reading far from all usual ones, where so many samples were looked over at once.
-    pub(super) fn spike(&self, index: usize, chunk: u64) -> Option<Spike> {
-        self.extents.spike(index, chunk)
+    pub(super) fn spike(&self, index: usize) -> Option<Spike> {
+        self.extents.spike(index)
     }
 
     /// Where the run begins whose end must be awaited.
@@ -282,11 +282,12 @@ impl LaneWork for Look<'_> {
                 channel.look(offset + lane, self.frames.clone(), count, (self.rule, self.stuck), self.block, self.past);
                 // What could not be used is replaced by now.
                 let samples = &self.block.samples[self.frames.start * count..self.frames.end * count];
-                let readings = samples.iter().skip(offset + lane).step_by(count);
-                let (low, high) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| {
+                let readings = || samples.iter().skip(offset + lane).step_by(count);
+                let (low, high) = readings().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| {
                     (low.min(*reading), high.max(*reading))
                 });
-                channel.extents.note(low, high, self.block.start + self.frames.start as u64, self.frames.len() as u64);
+                let place = [self.block.start + self.frames.start as u64, self.frames.len() as u64];
+                channel.extents.note([low, high], place, || Box::new(readings()));
             }
             return;
         }
@@ -297,8 +298,9 @@ impl LaneWork for Look<'_> {
             channel.finest_step = channel.finest_step.min(finest[lane]);
             channel.seen += self.frames.len() as u64;
             let end = self.block.start + self.frames.end as u64;
-            let frames = self.frames.len() as u64;
-            channel.extents.note(lowest[lane], highest[lane], end - frames, frames);
+            let place = [self.block.start + self.frames.start as u64, self.frames.len() as u64];
+            let readings = || frames.iter().skip(offset + lane).step_by(count);
+            channel.extents.note([lowest[lane], highest[lane]], place, || Box::new(readings()));
             let repeated = repeats[lane] as u64;
             channel.same = Same { start: end - repeated, repeats: repeated, stuck: false };
             channel.run = Run {

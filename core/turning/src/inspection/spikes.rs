@@ -7,7 +7,7 @@ pub struct Spike {
     pub channel: usize,
     /// The sample, to within [`within_samples`](Self::within_samples).
     pub near_sample: u64,
-    /// How well its place is known.
+    /// How well its place is known: 0 for the farthest reading of the recording, half of a turn for others.
     pub within_samples: u64,
     /// The reading, in µm.
     pub reading_um: f64,
@@ -38,6 +38,8 @@ pub(super) struct Extents {
     length: u64,
     stretches: Vec<Extent>,
     under_way: Extent,
+    /// Highest reading so far, and highest of the negated readings.
+    records: [f64; 2],
 }
 
 /// Lowest and highest reading, and near which samples they are.
@@ -45,11 +47,18 @@ pub(super) struct Extents {
 struct Extent {
     samples: u64,
     /// Highest reading, and highest of the negated readings.
-    far: [(f64, u64); 2],
+    far: [(f64, Near); 2],
+}
+
+/// A sample, to within so many others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Near {
+    sample: u64,
+    within: u64,
 }
 
 impl Extent {
-    const NONE: Self = Self { samples: 0, far: [(f64::NEG_INFINITY, 0); 2] };
+    const NONE: Self = Self { samples: 0, far: [(f64::NEG_INFINITY, Near { sample: 0, within: 0 }); 2] };
 
     fn join(&mut self, other: &Self) {
         self.samples += other.samples;
@@ -65,16 +74,31 @@ impl Extents {
     /// For turns of so many samples.
     pub(super) fn new(turn_samples: Option<f64>) -> Self {
         let length = turn_samples.map_or(0, |turn| turn.ceil() as u64);
-        Self { length, stretches: Vec::new(), under_way: Extent::NONE }
+        Self { length, stretches: Vec::new(), under_way: Extent::NONE, records: [f64::NEG_INFINITY; 2] }
     }
 
-    /// Takes note of the extremes of samples that follow those before.
-    pub(super) fn note(&mut self, lowest: f64, highest: f64, start: u64, samples: u64) {
+    /// Takes note of the extremes of samples from `start` on, which follow those before. `readings` are the same samples, in
+    /// which an extreme is looked for where none was farther before: a spike is one, and others are few.
+    pub(super) fn note<'a>(
+        &mut self,
+        [lowest, highest]: [f64; 2],
+        [start, samples]: [u64; 2],
+        readings: impl Fn() -> Box<dyn Iterator<Item = &'a f64> + 'a>,
+    ) {
         if self.length == 0 {
             return;
         }
-        let middle = start + samples / 2;
-        self.under_way.join(&Extent { samples, far: [(highest, middle), (-lowest, middle)] });
+        let mut place = |side: usize, far: f64, reading: f64| {
+            let middle = Near { sample: start + samples / 2, within: samples.div_ceil(2) };
+            if far <= self.records[side] {
+                return (far, middle);
+            }
+            self.records[side] = far;
+            let found = readings().position(|other| other.total_cmp(&reading).is_eq());
+            (far, found.map_or(middle, |sample| Near { sample: start + sample as u64, within: 0 }))
+        };
+        let far = [place(0, highest, highest), place(1, -lowest, lowest)];
+        self.under_way.join(&Extent { samples, far });
         if self.under_way.samples < self.length {
             return;
         }
@@ -92,8 +116,8 @@ impl Extents {
         }
     }
 
-    /// The farthest reading that is far from all usual ones, where so many samples were noted at once.
-    pub(super) fn spike(&self, channel: usize, chunk: u64) -> Option<Spike> {
+    /// The farthest reading that is far from all usual ones.
+    pub(super) fn spike(&self, channel: usize) -> Option<Spike> {
         // The last one may be shorter, and its extremes are then nearer.
         let last = Some(self.under_way).filter(|extent| extent.samples > 0);
         let stretches: Vec<Extent> = self.stretches.iter().copied().chain(last).collect();
@@ -112,7 +136,7 @@ impl Extents {
             let limit = upper + (FAR * (upper - lower)).max(MATTERS * swing);
             let sign = if side == 0 { 1.0 } else { -1.0 };
             let value = |extent: &Extent| extent.far[side].0;
-            let mut far: Vec<(f64, u64)> = Vec::new();
+            let mut far: Vec<(f64, Near)> = Vec::new();
             let (mut before, mut rest) = (None, &stretches[..]);
             for run in stretches.chunk_by(|a, b| (value(a) > limit) == (value(b) > limit)) {
                 rest = &rest[run.len()..];
@@ -123,12 +147,12 @@ impl Extents {
                 }
                 before = run.last();
             }
-            let (reading, near_sample) = far.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
+            let (reading, near) = far.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
             let usual = values.iter().copied().rfind(|value| *value <= limit)?;
             Some(Spike {
                 channel,
-                near_sample,
-                within_samples: chunk.div_ceil(2),
+                near_sample: near.sample,
+                within_samples: near.within,
                 reading_um: sign * reading,
                 usual_um: sign * usual,
                 stretches: far.len(),
@@ -149,14 +173,15 @@ mod tests {
         for turn in 0..10 * MOST as u64 {
             let noise = 0.01 * (turn as f64 * 0.7).sin();
             let highest = if turn == 33_333 { 50.0 } else { 10.0 + noise };
-            extents.note(-10.0 + noise, highest, 100 * turn, 100);
+            let readings: Vec<f64> = (0..100).map(|sample| if sample == 7 { highest } else { -10.0 + noise }).collect();
+            extents.note([-10.0 + noise, highest], [100 * turn, 100], || Box::new(readings.iter()));
             assert!(extents.stretches.len() <= MOST);
         }
-        let spike = extents.spike(3, 100);
+        let spike = extents.spike(3);
         let expected = Spike {
             channel: 3,
-            near_sample: 3_333_350,
-            within_samples: 50,
+            near_sample: 3_333_307,
+            within_samples: 0,
             reading_um: 50.0,
             usual_um: 10.01,
             stretches: 1,

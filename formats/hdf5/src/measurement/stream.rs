@@ -86,6 +86,7 @@ impl Hdf5Stream {
             sensor_ids: rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
             converter_limits_um,
             marks,
+            marks_within_samples: 0.0,
             encoder: scan.is_some(),
             trimmed: Vec::new(),
             responses: Vec::new(),

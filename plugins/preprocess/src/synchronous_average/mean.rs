@@ -96,12 +96,12 @@ impl Mean {
         mean
     }
 
-    /// Covariance of the mean, `[order][channel][channel]`; `None` below two turns. See [`Slow`].
-    pub(super) fn covariance(&self) -> Option<Vec<Complex64>> {
-        self.neighbours().map(|neighbours| neighbours.covariance()).or_else(|| self.scatter())
+    /// Covariance of the mean, `[order][channel][channel]`, from its neighbours; `None` below two turns. See [`Slow`].
+    pub(super) fn covariance(&self, neighbours: Option<&Neighbours>) -> Option<Vec<Complex64>> {
+        neighbours.map(Neighbours::covariance).or_else(|| self.scatter())
     }
 
-    /// What that covariance is taken from; `None` below three turns.
+    /// What the covariance of the mean is taken from; `None` below three turns.
     pub(super) fn neighbours(&self) -> Option<Neighbours> {
         self.slow.neighbours(&self.sum, self.turns, self.size)
     }

@@ -5,6 +5,7 @@ use std::{collections::VecDeque, f64::consts::TAU};
 use runout_core::{
     Complex64,
     measurement::{Block, Capture, Defect},
+    near_tone::{NearTone, near_tones},
     numerics::{fourier::max_order, lanes::fused},
     profile::{RejectedTurn, Rejection, Split, TurnLevels},
     spread::Spread,
@@ -34,6 +35,7 @@ pub(super) struct Outcome {
     pub covariance: Option<Vec<Complex64>>,
     pub scatter: Option<Vec<Complex64>>,
     pub scatter_beside: Option<Vec<Complex64>>,
+    pub near_tones: Vec<NearTone>,
     pub levels: TurnLevels,
     pub split: Option<Split>,
     pub spread: Option<Spread>,
@@ -158,15 +160,17 @@ impl<'a> Resampling<'a> {
             self.sort(judged);
         }
         self.means.sum_up();
+        let neighbours = self.means.whole.neighbours();
         Outcome {
             turn_angles: self.angles,
             mean: self.means.whole.mean(),
-            covariance: self.means.whole.covariance(),
+            covariance: self.means.whole.covariance(neighbours.as_ref()),
+            near_tones: neighbours.as_ref().map(near_tones).unwrap_or_default(),
             scatter: self.means.whole.scatter(),
             scatter_beside: self.means.scatter_beside(),
             used: self.means.whole.turns(),
             levels: self.means.levels(),
-            split: self.means.split(),
+            split: self.means.split(neighbours.as_ref()),
             spread: self.means.spread(),
             used_samples: self.used_samples,
             rejected: self.rejected,

@@ -160,15 +160,15 @@ impl Means {
         self.whole.scatter_beside()
     }
 
-    /// The parts; `None` where too few turns are left to fill them.
-    pub fn split(&self) -> Option<Split> {
+    /// The parts, beside the neighbours of the whole; `None` where too few turns are left to fill them.
+    pub fn split(&self, neighbours: Option<&Neighbours>) -> Option<Split> {
         let parts = self.parts.as_ref().filter(|parts| parts.held_out.turns() > 0)?;
         let fitted = parts.fit.turns();
         let part = |mean: &Mean, turns| {
             let neighbours = mean.neighbours();
             Part {
                 mean: mean.mean(),
-                covariance: neighbours.as_ref().map(Neighbours::covariance).or_else(|| mean.scatter()),
+                covariance: mean.covariance(neighbours.as_ref()),
                 scatter: mean.scatter(),
                 neighbours,
                 turns,
@@ -177,7 +177,7 @@ impl Means {
         Some(Split {
             fit: part(&parts.fit, 0..fitted),
             held_out: part(&parts.held_out, fitted..fitted + parts.held_out.turns()),
-            neighbours: self.whole.neighbours(),
+            neighbours: neighbours.cloned(),
             turns: parts.turns.clone(),
         })
     }

@@ -235,7 +235,10 @@ impl StationData {
         part: Part,
         seen: Arc<TurnObservations>,
     ) -> Result<Self> {
-        let mut readings = Readings::gather(selection, layout, fit, Scatter::OfAll)?;
+        // A fit of all turns has the weights of a run, but where a drift has to be taken out of them first.
+        let steady = seen.creeping.iter().flatten().all(|creeping| !creeping.certain());
+        let scatter = if part == Part::All && steady { Scatter::Beside } else { Scatter::OfAll };
+        let mut readings = Readings::gather(selection, layout, fit, scatter)?;
         for (sensor, creeping) in seen.creeping.iter().enumerate() {
             if let Some(creeping) = creeping {
                 creeping.take_out_of_scatter(&mut readings, sensor, part);
@@ -267,6 +270,17 @@ impl StationData {
             sensor.creep_shares = creeping.as_ref().map_or_else(Vec::new, |creeping| creeping.shares(turns, self.part));
         }
         altered
+    }
+
+    /// What effects leave of the drifts and lines that single turns show, in standard uncertainties.
+    pub fn beside_averages(&self, alterations: &Alterations) -> Vec<f64> {
+        let creeps =
+            self.creeps.iter().map(|(sensor, creep, std)| (creep - alterations.sensors[*sensor].creep_um) / std);
+        let lines = self.seen.lines.iter().enumerate().map(|(number, line)| {
+            let (sensor, evidence) = line.row();
+            if alterations.lines.contains(&(number, sensor)) { 0.0 } else { evidence.sqrt() }
+        });
+        creeps.chain(lines).collect()
     }
 
     /// Leaves out the orders above `max_order`.

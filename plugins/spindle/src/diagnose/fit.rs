@@ -42,6 +42,8 @@ pub(super) struct Solved {
     /// Effects as they act on the turns fitted.
     alterations: Alterations,
     propagation: Option<Propagation>,
+    /// The same with what is not known of the setups' angles.
+    with_angles: Option<Propagation>,
     pub estimate: Estimate,
     /// Readings taken back to displacements.
     pub corrected: Readings,
@@ -73,6 +75,25 @@ impl SpindleFit {
     pub(super) fn redundant(&self) -> Option<[usize; 2]> {
         let of_stations = self.stations.iter().filter_map(|station| station.residual().orders);
         of_stations.reduce(|[low, high], [lowest, highest]| [low.min(lowest), high.max(highest)])
+    }
+
+    /// χ² per degree of freedom as a run states it of each station, and of what single turns show beside; `None` where nothing is
+    /// redundant or the noise is not known.
+    ///
+    /// The loop weighs each order by its own noise floor, a run all orders by one: the two differ by some percent.
+    pub(super) fn stated_chi2_per_dof(&self) -> Option<f64> {
+        let (mut chi2, mut dof) = (0.0, 0);
+        for (solved, data) in self.stations.iter().zip(&self.shared.data) {
+            let level = solved.residual();
+            if level.dof > 0 {
+                chi2 += level.chi2_per_dof * level.dof as f64;
+                dof += level.dof;
+            }
+            let beside = data.beside_averages(&self.alterations);
+            dof += beside.len();
+            chi2 += beside.iter().map(|left| left * left).sum::<f64>();
+        }
+        (dof > 0).then(|| chi2 / dof as f64).filter(|chi2| chi2.is_finite())
     }
 
     /// How far form and motion of another fit are, root mean square over sections and directions, in µm.
@@ -142,7 +163,7 @@ impl SpindleFit {
     fn own_separations(&self, stations: &[Station]) -> Vec<Separation> {
         let solver = self.shared.solver(&self.layout, &self.alterations);
         let each = self.stations.iter().zip(stations).map(|(solved, station)| {
-            let propagation = solved.propagation.as_ref();
+            let propagation = solved.with_angles.as_ref().or(solved.propagation.as_ref());
             let residual = solved.residual();
             solver.report(station, &solved.operators, &solved.estimate, propagation, residual)
         });
@@ -192,7 +213,14 @@ impl Solved {
             })
             .collect();
         let propagation = Propagation::of(&corrected, &operators);
-        Self { operators, alterations: altered, propagation, estimate, corrected, linear, whitened }
+        // The residual shows an angle that is off, as an effect; results are uncertain by it all the same.
+        let with_angles = (data.part == Part::All && corrected.has_uncertain_angles()).then(|| {
+            let mut uncertain = corrected.clone();
+            uncertain.add_angle_uncertainty();
+            Propagation::of(&uncertain, &operators)
+        });
+        let with_angles = with_angles.flatten();
+        Self { operators, alterations: altered, propagation, with_angles, estimate, corrected, linear, whitened }
     }
 
     fn residual(&self) -> Residual {
@@ -237,15 +265,9 @@ fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, alterations:
         project(&solved.whitened, &solved.linear, count, |_, values| {
             residual.extend(values.iter().flat_map(|value| [value.re, value.im]));
         });
-        for (sensor, creep, std) in &data.creeps {
-            residual.push((creep - alterations.sensors[*sensor].creep_um) / std);
-            dof += 1;
-        }
-        for (number, line) in data.seen.lines.iter().enumerate() {
-            let (sensor, evidence) = line.row();
-            residual.push(if alterations.lines.contains(&(number, sensor)) { 0.0 } else { evidence.sqrt() });
-            dof += 1;
-        }
+        let beside = data.beside_averages(alterations);
+        dof += beside.len();
+        residual.extend(beside);
         stretches.push(residual.len() - stretches.iter().sum::<usize>());
         for (index, operator) in solved.operators.orders.iter().enumerate() {
             let freedom = 2 * count.saturating_sub(operator.rank);
@@ -458,16 +480,17 @@ impl Fit for SpindleFit {
             let along_axis = self.layout.unknowns.contains(&Quantity::Z);
             let first: Vec<Vec<Complex64>> =
                 partials.iter().filter(|_| along_axis).map(|partial| solved.first_moved(partial)).collect();
-            let Some(propagation) = &mut solved.propagation else { continue };
-            for (of_i, row) in first.iter().zip(covariance) {
-                for (of_j, entry) in first.iter().zip(row) {
-                    let products = of_i.iter().flat_map(|a| of_j.iter().map(move |b| a * b.conj() * *entry));
-                    propagation.covariance[0].iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+            for propagation in [&mut solved.propagation, &mut solved.with_angles].into_iter().flatten() {
+                for (of_i, row) in first.iter().zip(covariance) {
+                    for (of_j, entry) in first.iter().zip(row) {
+                        let products = of_i.iter().flat_map(|a| of_j.iter().map(move |b| a * b.conj() * *entry));
+                        propagation.covariance[0].iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+                    }
                 }
-            }
-            for (of_i, row) in moved.iter().zip(covariance) {
-                for (of_j, entry) in moved.iter().zip(row) {
-                    add_products(&mut propagation.covariance, [of_i, of_j], *entry);
+                for (of_i, row) in moved.iter().zip(covariance) {
+                    for (of_j, entry) in moved.iter().zip(row) {
+                        add_products(&mut propagation.covariance, [of_i, of_j], *entry);
+                    }
                 }
             }
         }

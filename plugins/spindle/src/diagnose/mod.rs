@@ -282,7 +282,10 @@ pub fn diagnose(
     model.join_swaps(&mut diagnosis, &closed.settings);
     diagnosis.blind_to.extend(model.unobservable(&closed.settings)?);
     diagnosis.lost_orders = Some(lost_orders(&closed.after));
-    (diagnosis.before.orders, diagnosis.after.orders) = (closed.before.redundant(), closed.after.redundant());
+    for (level, fit) in [(&mut diagnosis.before, &closed.before), (&mut diagnosis.after, &closed.after)] {
+        level.orders = fit.redundant();
+        level.chi2_per_dof = level.chi2_per_dof.and(fit.stated_chi2_per_dof());
+    }
     let copies = model.traced.data.iter().flat_map(|data| wiring::copies(&model.traced.selection.rig, &data.readings));
     diagnosis.warnings.extend(copies);
     let highest = TRACED_ORDERS.min(closed.after.max_order());

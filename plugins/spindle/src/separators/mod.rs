@@ -1,6 +1,7 @@
 //! Separators: each gives one linear operator an order; solving, second-order geometry and uncertainty are shared.
 
 mod algebra;
+mod angles;
 pub mod closed_form;
 pub mod donaldson_reversal;
 pub mod face_notes;

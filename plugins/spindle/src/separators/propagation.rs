@@ -256,6 +256,8 @@ mod tests {
             covariance: Some(setups.clone()),
             scatter: None,
             turns: vec![10; SETUPS],
+            near_tones: vec![Vec::new(); SETUPS],
+            angle_std_rad: vec![0.0; SETUPS],
             places: (0..COUNT).collect(),
         };
         let scatter =

@@ -1,6 +1,6 @@
 //! One station's averaged readings, in the layout's order.
 
-use runout_core::{Complex64, Error, Result, profile::Profile, stage::Station};
+use runout_core::{Complex64, Error, Result, near_tone::NearTone, profile::Profile, stage::Station};
 
 use crate::{layout::Layout, selection::Selection};
 
@@ -24,6 +24,10 @@ pub struct Readings {
     pub scatter: Option<Vec<Vec<Complex64>>>,
     /// Turns averaged in each setup.
     pub turns: Vec<usize>,
+    /// What tones near whole orders put into the averages of each setup: order, and one coefficient a sensor.
+    pub near_tones: Vec<Vec<(usize, Vec<Complex64>)>>,
+    /// Standard uncertainty of the spindle angle in each setup, in rad.
+    pub angle_std_rad: Vec<f64>,
     /// Place of each reading among the channels of all profiles of the station.
     pub places: Vec<usize>,
 }
@@ -96,8 +100,53 @@ impl Readings {
                 Scatter::Beside => |profile| profile.scatter_beside.as_ref().or(profile.scatter.as_ref()),
             }),
             turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
+            near_tones: ordered.iter().map(|(profile, channels)| leaks(profile, channels)).collect(),
+            angle_std_rad: ordered.iter().map(|(profile, _)| profile.angle_std_rad).collect(),
             places,
         })
+    }
+
+    /// Adds to the covariance of the averages what tones near whole orders put into them.
+    pub fn add_near_tones(&mut self) {
+        let sensors = self.count / self.turns.len().max(1);
+        for (matrices, tones) in self.covariance.iter_mut().flatten().zip(&self.near_tones) {
+            for (order, leak) in tones.iter().filter(|(order, _)| *order <= self.max_order) {
+                let matrix = &mut matrices[order * sensors * sensors..(order + 1) * sensors * sensors];
+                for (row, one) in matrix.chunks_exact_mut(sensors).zip(leak) {
+                    row.iter_mut().zip(leak).for_each(|(entry, other)| *entry += one * other.conj());
+                }
+            }
+        }
+    }
+
+    /// Whether angles of setups against each other are known to a part of a sample only.
+    #[must_use]
+    pub fn has_uncertain_angles(&self) -> bool {
+        // The angle of one setup is what all angles are counted from.
+        self.turns.len() > 1 && self.angle_std_rad.iter().any(|std_rad| *std_rad > 0.0)
+    }
+
+    /// Adds to the covariance of the averages that of the angle which each setup's turns are counted from: at an angle that is off by
+    /// δ, order n is off by −i·n·δ·u, in all channels together.
+    ///
+    /// Weights do not have it: it repeats in every turn, and scatter does not show it.
+    pub fn add_angle_uncertainty(&mut self) {
+        if !self.has_uncertain_angles() {
+            return;
+        }
+        let sensors = self.count / self.turns.len();
+        for (setup, (matrices, std_rad)) in self.covariance.iter_mut().flatten().zip(&self.angle_std_rad).enumerate() {
+            if *std_rad <= 0.0 {
+                continue;
+            }
+            let means = self.mean.chunks_exact(self.count).map(|order| &order[setup * sensors..(setup + 1) * sensors]);
+            for (order, (matrix, mean)) in matrices.chunks_exact_mut(sensors * sensors).zip(means).enumerate() {
+                let square = (order as f64 * std_rad).powi(2);
+                for (row, one) in matrix.chunks_exact_mut(sensors).zip(mean) {
+                    row.iter_mut().zip(mean).for_each(|(entry, other)| *entry += square * one * other.conj());
+                }
+            }
+        }
     }
 
     /// Leaves out the orders above `max_order`.
@@ -118,4 +167,10 @@ impl Readings {
     pub fn order(&self, order: usize) -> &[Complex64] {
         &self.mean[order * self.count..(order + 1) * self.count]
     }
+}
+
+/// What tones put into the averages of some channels, by order.
+fn leaks(profile: &Profile, channels: &[usize]) -> Vec<(usize, Vec<Complex64>)> {
+    let of = |tone: &NearTone| (tone.order, channels.iter().map(|channel| tone.leak[*channel]).collect());
+    profile.near_tones.iter().map(of).collect()
 }

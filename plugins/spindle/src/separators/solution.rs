@@ -9,6 +9,7 @@ use runout_core::{
 
 use super::{
     algebra::apply,
+    angles,
     joint::Joint,
     leak,
     operators::{Operators, OrderOperator},
@@ -95,8 +96,15 @@ impl Solver<'_> {
             return Err(self.unsettled(station, &readings, &estimate));
         }
         let mut warnings = wiring::copies(&self.selection.rig, &readings);
-        let propagation = Propagation::of(&readings, &operators);
-        let residual = residual(&operators, &readings, &linear, propagation.as_ref());
+        let mut propagation = Propagation::of(&readings, &operators);
+        let mut residual = residual(&operators, &readings, &linear, propagation.as_ref());
+        if readings.has_uncertain_angles() {
+            // What is left is held against noise and angles, results are uncertain by both.
+            residual.chi2_per_dof *=
+                1.0 - angles::explained_share(&operators, &readings, &linear, propagation.as_ref());
+            readings.add_angle_uncertainty();
+            propagation = Propagation::of(&readings, &operators);
+        }
         if residual.chi2_per_dof > wiring::SUSPICIOUS_CHI2 {
             let weights = weights::whitening(&readings);
             warnings.extend(wiring::warning(self.selection, self.layout, &readings, weights.as_deref()));

@@ -31,6 +31,8 @@ pub fn smooth_by_order(readings: &mut Readings) {
     for (setups, smooth) in both {
         setups.iter_mut().flatten().for_each(|matrices| smooth(matrices, sensors * sensors));
     }
+    // A tone is at one order only.
+    readings.add_near_tones();
 }
 
 /// W with Wᴴ·W = Σ⁻¹ for the scatter Σ of each order from 1: with independent turns it makes errors uncorrelated and of

@@ -29,6 +29,8 @@ const TRACELESS: f64 = 1e-6;
 const SHARE_OF_TWO: f64 = 1e-3;
 /// Corrections that leave up to this many times the least are as likely.
 const ALIKE: f64 = 1.5;
+/// A gain that is wrong by more is no effect of usual kind: -2 is a wrong sign.
+const LARGEST_GAIN: f64 = 0.5;
 /// As many are worth a whole fit.
 const MOST: usize = 8;
 /// Form, motion and eccentricity live in the low orders.
@@ -152,6 +154,58 @@ impl<'a> Trial<'a> {
         Some(Suspect { mistakes, chi2 })
     }
 
+    /// χ² per degree of freedom with the one wrong gain that explains most; `None` where nothing is redundant.
+    fn with_a_gain(&self, readings: &Readings) -> Option<f64> {
+        let layout = self.layout.altered(self.applied);
+        let (count, sensors) = (layout.readings.len(), layout.declared_signs().len());
+        let (mut chi2, mut dof) = (0.0, 0);
+        // Of each sensor, products of its own readings with the residual and with themselves, where the fit cannot reach.
+        let mut products = vec![[0.0; 2]; sensors];
+        for (index, whitened) in self.readings.iter().enumerate() {
+            let (order, matrix) = (index + 1, self.matrix(&layout, self.applied, index));
+            let qr = layout.factor_matrix(matrix.len() / count, &matrix);
+            let operator = qr.operator();
+            let left = |values: &[Complex64]| -> Vec<Complex64> {
+                let fitted = apply(&matrix, &apply(&operator, values));
+                values.iter().zip(fitted).map(|(value, fitted)| value - fitted).collect()
+            };
+            let residual = left(whitened);
+            chi2 += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+            dof += count - qr.rank();
+            for (sensor, sums) in products.iter_mut().enumerate() {
+                let own = layout.readings.iter().zip(readings.order(order));
+                let own: Vec<Complex64> = own
+                    .map(|(reading, value)| if reading.sensor == sensor { *value } else { Complex64::ZERO })
+                    .collect();
+                let own = left(&self.weights.map_or_else(|| own.clone(), |weights| weights[index].times(&own, 1)));
+                sums[0] += own.iter().zip(&residual).map(|(own, left)| (own.conj() * left).re).sum::<f64>();
+                sums[1] += own.iter().map(Complex64::norm_sqr).sum::<f64>();
+            }
+        }
+        let explained = |[across, along]: &[f64; 2]| {
+            if *along > 0.0 && across.abs() < LARGEST_GAIN * along { across * across / along } else { 0.0 }
+        };
+        let most = products.iter().map(explained).fold(0.0, f64::max);
+        (dof > 0).then(|| (chi2 - most) / dof as f64)
+    }
+
+    /// W·A of an order, by its index.
+    fn matrix(&self, layout: &Layout, alterations: &Alterations, index: usize) -> Vec<Complex64> {
+        let order = index + 1;
+        let mut matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
+        let columns = matrix.len() / layout.readings.len();
+        for (reading, row) in layout.readings.iter().zip(matrix.chunks_exact_mut(columns)) {
+            let response = alterations.sensors[reading.sensor].response(order);
+            for entry in row {
+                *entry *= response;
+            }
+        }
+        match self.weights {
+            Some(weights) => weights[index].times(&matrix, columns),
+            None => matrix,
+        }
+    }
+
     /// χ² per degree of freedom with mistakes corrected; `None` where it is above the limit, or nothing is redundant.
     fn left(&self, mistakes: &[(Mistake, usize)], limit: f64) -> Option<f64> {
         let mut alterations = self.applied.clone();
@@ -164,19 +218,8 @@ impl<'a> Trial<'a> {
         let most = limit * (2 * count * self.readings.len()) as f64;
         let (mut chi2, mut dof) = (0.0, 0);
         for (index, readings) in self.readings.iter().enumerate() {
-            let order = index + 1;
-            let mut matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
-            let columns = matrix.len() / count;
-            for (reading, row) in layout.readings.iter().zip(matrix.chunks_exact_mut(columns)) {
-                let response = alterations.sensors[reading.sensor].response(order);
-                for entry in row {
-                    *entry *= response;
-                }
-            }
-            if let Some(weights) = self.weights {
-                matrix = weights[index].times(&matrix, columns);
-            }
-            let qr = layout.factor_matrix(columns, &matrix);
+            let matrix = self.matrix(&layout, &alterations, index);
+            let qr = layout.factor_matrix(matrix.len() / count, &matrix);
             let fitted = apply(&matrix, &apply(&qr.operator(), readings));
             // A real degree of freedom has half of a complex one's square.
             chi2 += 2.0 * readings.iter().zip(fitted).map(|(read, fitted)| (read - fitted).norm_sqr()).sum::<f64>();
@@ -200,7 +243,12 @@ pub fn warning(
     let applied = Alterations::none(layout);
     let found = suspects(layout, &applied, readings, weights);
     let first = found.first()?;
-    let declared = Trial::new(layout, &applied, readings, weights).left(&[], f64::INFINITY)?;
+    let trial = Trial::new(layout, &applied, readings, weights);
+    let declared = trial.left(&[], f64::INFINITY)?;
+    // A wrong gain is no mistake in the file, and explains as much.
+    if trial.with_a_gain(readings).is_some_and(|left| left <= ALIKE * first.chi2) {
+        return None;
+    }
     // One effect of another kind may look like two mistakes.
     if first.mistakes.len() > 1 && first.chi2 > SHARE_OF_TWO * declared {
         return None;

@@ -171,6 +171,7 @@ impl<'a> SimulatedStream<'a> {
             sensor_ids: world.rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
             converter_limits_um: limits,
             marks: spin.marks(),
+            marks_within_samples: 0.0,
             encoder: world.phase == Phase::Encoder,
             trimmed: Vec::new(),
             responses: Vec::new(),

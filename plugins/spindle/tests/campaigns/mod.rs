@@ -56,8 +56,26 @@ pub fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     averaged_behind(None, config, rig)
 }
 
+/// The same of recordings that are changed on their way.
+pub fn averaged_from(
+    config: &SpindleConfig,
+    rig: &Rig,
+    change: impl FnMut(Box<dyn SampleStream + '_>) -> Box<dyn SampleStream + '_>,
+) -> (Station, StationTruth) {
+    averaged_through(None, config, rig, change)
+}
+
 /// The same behind a low-pass.
 pub fn averaged_behind(cutoff_hz: Option<f64>, config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
+    averaged_through(cutoff_hz, config, rig, |input| input)
+}
+
+fn averaged_through(
+    cutoff_hz: Option<f64>,
+    config: &SpindleConfig,
+    rig: &Rig,
+    mut change: impl FnMut(Box<dyn SampleStream + '_>) -> Box<dyn SampleStream + '_>,
+) -> (Station, StationTruth) {
     let simulator = simulate::simulator(config).unwrap();
     let recording = simulator.spindle_recording();
     let average = SynchronousAverageConfig {
@@ -76,7 +94,7 @@ pub fn averaged_behind(cutoff_hz: Option<f64>, config: &SpindleConfig, rig: &Rig
         low_pass
     });
     let profile = |setup| {
-        let inspected: Box<dyn SampleStream> = Box::new(Inspection::new(recording.open(0, setup).unwrap()));
+        let inspected: Box<dyn SampleStream> = Box::new(Inspection::new(change(recording.open(0, setup).unwrap())));
         let stream = match &low_pass {
             Some(low_pass) => low_pass.attach(inspected).unwrap(),
             None => inspected,

@@ -282,3 +282,20 @@ fn nothing_else_is_taken_for_a_mistake() {
         }
     }
 }
+
+/// A wrong gain of one sensor, from small to absurd, is no mistake in the rig file to `run` either.
+#[test]
+fn a_wrong_gain_is_no_mistake_to_a_run() {
+    let mut said = Vec::new();
+    for seed in 0..24 {
+        let sensor = 1 + seed % 4;
+        let gain = [0.02, -0.05, 0.1, -0.15, 0.25, -0.3][seed as usize % 6];
+        let effect = format!(r#"[{{"plugin":"sensor-gain","targets":["S{sensor}"],"relative_gain":{gain}}}]"#);
+        for config in [campaign(seed, &effect), six(seed, &effect)] {
+            let rig = config.rig.clone().check().unwrap();
+            let warnings = warned(&config.rig, &averaged(&config, &rig).0);
+            said.extend(warnings.into_iter().filter(|warning| warning.contains("a mistake is likely")));
+        }
+    }
+    assert_eq!(said, Vec::<String>::new());
+}
