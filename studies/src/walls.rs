@@ -72,10 +72,11 @@ impl Wall {
         let circle = |index: usize| {
             let along = index as f64 / (CIRCLES - 1) as f64 - 0.5;
             let centre_um = bend.map(|bend| 4.0 * bend * along * along + 0.3 * normal());
-            let form = common.iter().zip(2..).map(|(common, order): (&[f64; 2], u32)| {
+            let form_um = common.iter().zip(2..).map(|(common, order): (&[f64; 2], u32)| {
                 common.map(|common| (0.7 * common + 0.7 * normal()) / f64::from(order))
             });
-            Circle { level_um: taper * along + 0.3 * normal(), centre_um, form_um: form.collect() }
+            let form_um = form_um.collect();
+            Circle { level_um: taper * along + 0.3 * normal(), centre_um, form_um }
         };
         Self { circles: (0..CIRCLES).map(circle).collect() }
     }
