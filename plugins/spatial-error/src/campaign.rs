@@ -49,6 +49,8 @@ pub struct Campaign {
     pub readings_um: Vec<[f64; 3]>,
     /// Time of each reading, 0 at the first and 1 at the last.
     pub time: Vec<f64>,
+    /// Whether the file gives times.
+    pub timed: bool,
     /// Number of the pass of each reading, counted where the file does not say it.
     pub repeat: Vec<usize>,
     /// What is known of the noise.
@@ -104,7 +106,7 @@ impl Campaign {
         if let Some(row) = stated.and_then(|values| values.iter().position(|value| *value <= 0.0)) {
             return Err(refuse(format!("row {} of the column `std_um` must be above 0 µm", row + 1)));
         }
-        let mut remarks = looks_wrong(&rows, &readings_um, optional("time_s").is_some());
+        let mut remarks = looks_wrong(&rows, &readings_um);
         let noise = match (stated, std_um) {
             (Some(stated), _) => Noise::Column(stated.to_vec()),
             (None, Some(std_um)) => Noise::Stated(std_um),
@@ -117,9 +119,10 @@ impl Campaign {
                 place_of.len() - places_mm.len()
             ));
         }
+        let timed = optional("time_s").is_some();
         let volume = Volume::around(&places_mm, tool_mm, chain);
         let span = Span::of(&places_mm);
-        Ok(Self { file, places_mm, place_of, readings_um, time, repeat, noise, volume, span, remarks })
+        Ok(Self { file, places_mm, place_of, readings_um, time, timed, repeat, noise, volume, span, remarks })
     }
 
     /// Variance of the noise of a reading, in µm²; `None` where it is not known.
@@ -252,7 +255,7 @@ fn scaled(time: Option<&[f64]>, count: usize) -> Vec<f64> {
     time.iter().map(|at| if last > first { (at - first) / (last - first) } else { 0.0 }).collect()
 }
 
-fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]], has_time: bool) -> Vec<String> {
+fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]]) -> Vec<String> {
     let mut remarks = Vec::new();
     let mut sizes: Vec<f64> = readings_um.iter().flatten().map(|value| value.abs()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -277,9 +280,6 @@ fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]], has_time: bool) ->
     }
     if extent > 50_000.0 {
         remarks.push(format!("the places are {extent:.0} mm apart: are `x_mm`, `y_mm`, `z_mm` in µm?"));
-    }
-    if !has_time {
-        remarks.push("no column `time_s`: rows count as evenly spaced in time".into());
     }
     remarks
 }

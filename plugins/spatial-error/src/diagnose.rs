@@ -147,6 +147,7 @@ impl PointModel for SpatialError {
             outputs: Vec::new(),
         };
         diagnosis.warnings.append(&mut outcome.remarks);
+        diagnosis.warnings.push(crate::remarks::of_field(&campaign, &after));
         Ok(PointDiagnosis { diagnosis, after: outcome })
     }
 }

@@ -1,6 +1,6 @@
 //! Predictions from the nearest places: for more places than one covariance matrix can hold.
 //!
-//! Each prediction takes the 96 nearest places (Vecchia, J. R. Statist. Soc. B 50 (1988) 297; Stein, *The screening effect in
+//! Each prediction takes the 192 nearest places (Vecchia, J. R. Statist. Soc. B 50 (1988) 297; Stein, *The screening effect in
 //! kriging*, Ann. Statist. 30 (2002) 298). The trend and its covariance come from a fit of places drawn at random.
 
 use std::num::NonZero;
@@ -15,8 +15,8 @@ use crate::{
     solve::LeftOut,
 };
 
-/// Places that a prediction takes.
-const NEAREST: usize = 96;
+/// Places that a prediction takes, and that of a place left out.
+pub const NEAREST: [usize; 2] = [192, 96];
 
 /// Places by nearness, in ranges of each field.
 #[derive(Debug, Clone)]
@@ -58,7 +58,7 @@ impl Neighbours {
         let one = |(row, place): (usize, &[f64; 3])| {
             let columns = query.design.ncols();
             let design = DVector::from_fn(columns, |column, _| query.design[(row, column)]);
-            local.predict(&self.nearest(field, place, NEAREST), place, &design, query.nugget_counts)
+            local.predict(&self.nearest(field, place, NEAREST[0]), place, &design, query.nugget_counts)
         };
         query.places.iter().enumerate().map(one).collect()
     }
@@ -70,7 +70,7 @@ impl Neighbours {
             [0, 1, 2].map(|field| {
                 let covariance = &self.covariances[field];
                 let local = Local { data, joint, field, covariance };
-                let mut near = self.nearest(field, place, NEAREST + 1);
+                let mut near = self.nearest(field, place, NEAREST[1] + 1);
                 near.retain(|other| *other != index);
                 let design = DVector::from_fn(data.columns(), |column, _| data.design[field][(index, column)]);
                 let found = local.predict(&near, place, &design, false);

@@ -110,6 +110,7 @@ impl Conclusion<'_> {
             tables,
             values: self.values(&queries, &left_out),
             remarks: remarks::remarks(self, &queries, &left_out),
+            notes: remarks::notes(self, &queries),
             ..Outcome::default()
         })
     }

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::{
     campaign::Campaign,
     joint::{Joint, Predictor, Query},
-    neighbours::Neighbours,
+    neighbours::{NEAREST, Neighbours},
     noise::Noise,
     outcome::{At, COMPONENTS, Conclusion},
     solve::{LeftOut, Solution, estimated_from},
@@ -18,18 +18,12 @@ const COMPARED: [usize; 2] = [1200, 200];
 /// A left-out residual of more than this many standard deviations is worth a word.
 const FAR: f64 = 5.5;
 
-/// All remarks.
+/// What may be wrong.
 pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[LeftOut; 3]]) -> Vec<String> {
-    let Conclusion { separator, campaign, solution, .. } = conclusion;
+    let Conclusion { campaign, solution, .. } = conclusion;
     let mut all = campaign.remarks.clone();
     all.extend(of_span(campaign, solution, queries));
-    all.push(of_field(campaign, solution));
-    all.extend(of_noise(campaign));
-    all.extend(of_numbers(campaign, solution));
-    let extrapolated = queries.iter().filter(|query| query.extrapolated).count();
-    if extrapolated > 0 {
-        all.push(format!("{extrapolated} of {} predictions are extrapolations, which the table flags", queries.len()));
-    }
+    all.extend(of_stated(campaign));
     let limited = queries.iter().filter(|query| query.correction.as_ref().is_some_and(|one| one.limited)).count();
     if limited > 0 {
         all.push(format!(
@@ -37,10 +31,26 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
             queries.len()
         ));
     }
+    all.extend(far_readings(campaign, left_out));
+    all
+}
+
+/// What the result contains, and how it was computed.
+pub(crate) fn notes(conclusion: &Conclusion, queries: &[At]) -> Vec<String> {
+    let Conclusion { separator, campaign, solution, .. } = conclusion;
+    let mut all = vec![of_field(campaign, solution)];
+    all.extend(of_noise(campaign));
+    all.extend(of_numbers(campaign, solution));
+    let extrapolated = queries.iter().filter(|query| query.extrapolated).count();
+    if extrapolated > 0 {
+        all.push(format!("{extrapolated} of {} predictions are extrapolations, which the table flags", queries.len()));
+    }
     if separator.config.kriging.fixed().is_some() {
         all.push("the covariance is given, not estimated: standard uncertainties hold as far as it does".into());
     }
-    all.extend(far_readings(campaign, left_out));
+    if !campaign.timed {
+        all.push("no column `time_s`: rows count as evenly spaced in time".into());
+    }
     all
 }
 
@@ -92,7 +102,7 @@ fn name(term: Term) -> String {
     }
 }
 
-fn of_field(campaign: &Campaign, solution: &Solution) -> String {
+pub(crate) fn of_field(campaign: &Campaign, solution: &Solution) -> String {
     let sizes: Vec<String> =
         (0..3).map(|axis| format!("{} {:.2}", COMPONENTS[axis], solution.covariances[axis].sill_um)).collect();
     let nuggets: Vec<String> =
@@ -113,21 +123,22 @@ fn of_noise(campaign: &Campaign) -> Option<String> {
             "noise of one reading from repeats, after a common smooth drift: {x:.2}, {y:.2}, {z:.2} µm ({dof} degrees of freedom each)"
         )),
         Noise::Unknown => Some("the noise is not known: it is in the nugget, which predictions do not include".into()),
-        Noise::Column(_) | Noise::Stated(_) => {
-            let known = crate::noise::of_repeats(
-                &campaign.place_of,
-                campaign.places_mm.len(),
-                &campaign.readings_um,
-                &campaign.time,
-            );
-            let Noise::Repeats { std_um, .. } = known else { return None };
-            let ratios = [0, 1, 2].map(|axis| std_um[axis] / campaign.noise_um(axis));
-            let worst = ratios.into_iter().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs())).unwrap_or(1.0);
-            (!(0.6..1.7).contains(&worst)).then(|| {
-                format!("repeats scatter {worst:.2} times as much as the stated uncertainty: is `std_um` right?")
-            })
-        }
+        Noise::Column(_) | Noise::Stated(_) => None,
     }
+}
+
+/// Repeats that scatter unlike the stated uncertainty.
+fn of_stated(campaign: &Campaign) -> Option<String> {
+    if !matches!(campaign.noise, Noise::Column(_) | Noise::Stated(_)) {
+        return None;
+    }
+    let (places, readings) = (&campaign.place_of, &campaign.readings_um);
+    let known = crate::noise::of_repeats(places, campaign.places_mm.len(), readings, &campaign.time);
+    let Noise::Repeats { std_um, .. } = known else { return None };
+    let ratios = [0, 1, 2].map(|axis| std_um[axis] / campaign.noise_um(axis));
+    let worst = ratios.into_iter().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs())).unwrap_or(1.0);
+    (!(0.6..1.7).contains(&worst))
+        .then(|| format!("repeats scatter {worst:.2} times as much as the stated uncertainty: is `std_um` right?"))
 }
 
 fn of_numbers(campaign: &Campaign, solution: &Solution) -> Vec<String> {
@@ -140,7 +151,11 @@ fn of_numbers(campaign: &Campaign, solution: &Solution) -> Vec<String> {
         ));
     }
     if let Some(fitted) = &solution.fitted {
-        all.push(format!("{count} places: predictions use the 96 nearest ones, and the trend {} places", fitted.len()));
+        all.push(format!(
+            "{count} places: predictions use the {} nearest ones, and the trend {} places",
+            NEAREST[0],
+            fitted.len()
+        ));
         all.extend(against_full(campaign, solution));
     }
     all

@@ -287,5 +287,5 @@ fn nearest_neighbours_predict_what_all_places_do() {
             assert!((std_near[row] / std_all[row] - 1.0).abs() < 0.25, "{name}: {} {}", std_all[row], std_near[row]);
         }
     }
-    assert!(near.remarks.iter().any(|remark| remark.contains("beside the full solution")), "{:?}", near.remarks);
+    assert!(near.notes.iter().any(|note| note.contains("beside the full solution")), "{:?}", near.notes);
 }
