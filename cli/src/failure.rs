@@ -3,12 +3,15 @@
 use std::{io, process::ExitCode};
 
 use runout_core::{
-    Error,
+    Error, ErrorKind,
     pipeline::{document::ConfigError, error::Diagnostic},
 };
 use serde_json::{Value, json};
 
 use crate::render::{self, diagnostic};
+
+/// The kind of a mistake in the command line, in the JSON document.
+const COMMAND_LINE: &str = "command-line";
 
 /// Why a command did not do its work.
 #[derive(Debug)]
@@ -86,7 +89,11 @@ impl Failure {
             Self::Name { message, help } => plain(message, Some(help)),
             Self::Configuration(ConfigError::Text(diagnostic)) => diagnostic::report(diagnostic),
             Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
-                plain(&error.to_string(), error.advice())
+                let message = error.to_string();
+                // Most messages hold the text of their source already.
+                let causes = error.causes().into_iter().filter(|cause| !message.contains(cause.as_str()));
+                let causes: String = causes.map(|cause| format!("\n  cause: {cause}")).collect();
+                plain(&(message + &causes), error.advice())
             }
             Self::Limit(open) => plain(&format!("not proven to be kept: {}", open.join("; ")), None),
             Self::Warnings(count) => {
@@ -103,12 +110,13 @@ impl Failure {
                 let text = error.render().to_string();
                 let first: Vec<&str> = text.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
                 let tip = text.lines().find_map(|line| line.trim().strip_prefix("tip: "));
-                json!({ "message": first.join(" ").trim_start_matches("error: "), "help": tip })
+                json!({ "kind": COMMAND_LINE, "message": first.join(" ").trim_start_matches("error: "), "help": tip })
             }
-            Self::Name { message, help } => json!({ "message": message, "help": help }),
+            Self::Name { message, help } => json!({ "kind": COMMAND_LINE, "message": message, "help": help }),
             Self::Configuration(ConfigError::Text(diagnostic)) => {
                 let (line, column) = diagnostic.line_and_column();
                 json!({
+                    "kind": ErrorKind::Configuration.name(),
                     "message": diagnostic.message,
                     "help": diagnostic.help,
                     "file": diagnostic.source_name,
@@ -117,11 +125,16 @@ impl Failure {
                 })
             }
             Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
-                json!({ "message": error.to_string(), "help": error.advice() })
+                json!({
+                    "kind": error.kind().name(),
+                    "message": error.to_string(),
+                    "help": error.advice(),
+                    "causes": error.causes(),
+                })
             }
-            Self::Limit(open) => json!({ "message": "not proven to be kept", "limits": open }),
-            Self::Warnings(count) => json!({ "message": "there are warnings", "warnings": count }),
-            Self::Output(error) => json!({ "message": error.to_string() }),
+            Self::Limit(open) => json!({ "kind": "limit", "message": "not proven to be kept", "limits": open }),
+            Self::Warnings(count) => json!({ "kind": "warnings", "message": "there are warnings", "warnings": count }),
+            Self::Output(error) => json!({ "kind": ErrorKind::Io.name(), "message": error.to_string() }),
         }
     }
 }

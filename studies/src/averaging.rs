@@ -74,7 +74,7 @@ pub fn table_1() -> Result<SpindleConfig> {
 /// Scales the form, which is proportional to its `rms_um`, to a mean Ra of its sections.
 fn with_mean_ra(mut config: SpindleConfig, ra_mean_um: f64) -> Result<SpindleConfig> {
     config.form.rms_um = 1.0;
-    let simulator = simulator(&config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let simulator = simulator(&config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
     let truth = simulator.spindle_recording().truth(0)?.unwrap_or_default();
     let sections = truth.form_um.len() as f64;
     config.form.rms_um = ra_mean_um * sections / truth.form_um.iter().map(|form| ra_um(form)).sum::<f64>();
@@ -99,10 +99,10 @@ fn settings() -> SpindleConfig {
 /// # Errors
 /// When a stage fails.
 pub fn study(config: &SpindleConfig) -> Result<Study> {
-    let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
-    let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let rig = config.rig.clone().check().map_err(|fault| Error::caused("check", "the rig", fault))?;
+    let simulator = simulator(config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
     let separator = four_sensor_reversal::separator(Selection::whole(&rig), true, false)
-        .map_err(|fault| Error::new("set up", "the separator", fault))?;
+        .map_err(|fault| Error::caused("set up", "the separator", fault))?;
     let samples = config.recording.samples_per_rev;
     let mut study = Study { own_um: [f64::NAN; 2], rows: Vec::new() };
     for turns in TURNS {

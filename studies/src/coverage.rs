@@ -140,8 +140,8 @@ pub fn rows(campaigns: &[SpindleConfig]) -> Result<Vec<Row>> {
 fn part_rows(campaigns: &[SpindleConfig]) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for config in campaigns {
-        let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
-        let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+        let rig = config.rig.clone().check().map_err(|fault| Error::caused("check", "the rig", fault))?;
+        let simulator = simulator(config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
         let recording = &config.recording;
         let (station, truth) = campaign::station(&simulator, &rig, recording.samples_per_rev, recording.revolutions)?;
         let separation = HarmonicLeastSquares::new(&rig, true, Weighting::TurnCovariance).separate(&station)?;

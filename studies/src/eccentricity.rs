@@ -39,8 +39,8 @@ pub fn rows(seeds: u64) -> Result<Vec<Row>> {
         let mut row = Row { eccentricity_um, exact_um: vec![], linear_um: vec![], chi2: vec![], linear_chi2: vec![] };
         for seed in 0..seeds {
             let config = campaign::reference(seed, eccentricity_um);
-            let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
-            let simulator = simulator(&config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+            let rig = config.rig.clone().check().map_err(|fault| Error::caused("check", "the rig", fault))?;
+            let simulator = simulator(&config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
             let (station, truth) =
                 campaign::station(&simulator, &rig, config.recording.samples_per_rev, config.recording.revolutions)?;
             for (second_order, errors, chi2) in

@@ -193,7 +193,7 @@ fn axial(campaigns: u64, seed: u64) -> Result<()> {
 }
 
 fn value_coverage(campaigns: u64, seed: u64, only: Option<Layout>) -> Result<()> {
-    let folder = tempfile::tempdir().map_err(|error| Error::new("make", "a folder for recordings", error))?;
+    let folder = tempfile::tempdir().map_err(|error| Error::caused("make", "a folder for recordings", error))?;
     for rig in values::RIGS.into_iter().filter(|rig| only.is_none_or(|only| only == *rig)) {
         for spectrum in Spectrum::ALL {
             println!("{campaigns} campaigns from seed {seed}, simulated: {}; {}\n", rig.name(), spectrum.name());

@@ -66,8 +66,8 @@ fn row(campaigns: u64, threads: usize) -> Result<Row> {
 /// One campaign's error of form.
 fn scored(seed: u64) -> Result<f64> {
     let config = reference(seed, 8.0);
-    let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
-    let simulator = simulator(&config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let rig = config.rig.clone().check().map_err(|fault| Error::caused("check", "the rig", fault))?;
+    let simulator = simulator(&config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
     let [samples, turns] = [config.recording.samples_per_rev, config.recording.revolutions];
     let (station, truth) = campaign::station(&simulator, &rig, samples, turns)?;
     let separator = HarmonicLeastSquares::new(&rig, true, Weighting::TurnCovariance);

@@ -111,7 +111,7 @@ fn files(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(current) = folders.pop() {
-        let failure = |error: std::io::Error| Error::new("read", current.display().to_string(), error);
+        let failure = |error: std::io::Error| Error::caused("read", current.display().to_string(), error);
         for entry in fs::read_dir(&current).map_err(failure)? {
             let path = entry.map_err(failure)?.path();
             let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
@@ -132,11 +132,11 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
     let mut columns = BTreeMap::new();
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("parquet") => {
-            let failure = |error: &dyn std::fmt::Display| Error::new("read", &shown, error);
-            let file = File::open(path).map_err(|error| failure(&error))?;
-            let reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|error| failure(&error))?;
-            for batch in reader.build().map_err(|error| failure(&error))? {
-                let batch = batch.map_err(|error| failure(&error))?;
+            let failure = |error: parquet::errors::ParquetError| Error::caused("read", &shown, error);
+            let file = File::open(path).map_err(|error| Error::caused("read", &shown, error))?;
+            let reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(failure)?;
+            for batch in reader.build().map_err(failure)? {
+                let batch = batch.map_err(|error| Error::caused("read", &shown, error))?;
                 for (field, values) in batch.schema().fields().iter().zip(batch.columns()) {
                     if let Some(numbers) = values.as_primitive_opt::<Float64Type>() {
                         let all: &mut Vec<f64> = columns.entry(field.name().clone()).or_default();
@@ -146,12 +146,12 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
             }
         }
         Some("h5") => {
-            let file = hdf5_metno::File::open(path).map_err(|error| Error::new("read", &shown, error))?;
-            datasets(&file, "", &mut columns).map_err(|error| Error::new("read", &shown, error))?;
+            let file = hdf5_metno::File::open(path).map_err(|error| Error::caused("read", &shown, error))?;
+            datasets(&file, "", &mut columns).map_err(|error| Error::caused("read", &shown, error))?;
         }
         _ => {
-            let text = fs::read(path).map_err(|error| Error::new("read", &shown, error))?;
-            let value: Value = serde_json::from_slice(&text).map_err(|error| Error::new("read", &shown, error))?;
+            let text = fs::read(path).map_err(|error| Error::caused("read", &shown, error))?;
+            let value: Value = serde_json::from_slice(&text).map_err(|error| Error::caused("read", &shown, error))?;
             leaves(&value, "", &mut columns);
         }
     }

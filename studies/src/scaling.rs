@@ -47,8 +47,8 @@ fn seconds(stations: usize, effect: Option<&Effect>) -> Result<f64> {
     let mut config: SpindleConfig = campaign::reference(1, 8.0);
     config.recording.stations.count = stations;
     config.effect.extend(effect.cloned());
-    let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
-    let simulator = simulator(&config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let rig = config.rig.clone().check().map_err(|fault| Error::caused("check", "the rig", fault))?;
+    let simulator = simulator(&config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
     let recording = &config.recording;
     let [samples, turns] = [recording.samples_per_rev, recording.revolutions];
     let one = |index| Ok(campaign::station_holding_out(&simulator, &rig, index, [samples, turns], Some(HOLD_OUT))?.0);

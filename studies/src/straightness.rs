@@ -32,7 +32,7 @@ pub fn slide_um(z_mm: f64) -> f64 {
 /// Never but for a spread that no distribution has.
 pub fn traces() -> Result<String> {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
-    let noise = Normal::new(0.0, NOISE_UM).map_err(|error| Error::new("simulate", "the traces", error))?;
+    let noise = Normal::new(0.0, NOISE_UM).map_err(|error| Error::caused("simulate", "the traces", error))?;
     let mut text = String::from("trace,setup,z_mm,reading_um\n");
     for (setup, sign) in [("initial", 1.0), ("reversed", -1.0)] {
         for repeat in 1..=3 {
@@ -57,7 +57,7 @@ pub fn traces() -> Result<String> {
 /// # Errors
 /// When the file cannot be read or separated.
 pub fn separate(file: &Path) -> Result<Straightness> {
-    let configured = |fault| Error::new("set up", "the separator", fault);
+    let configured = |fault| Error::caused("set up", "the separator", fault);
     let separator = AxialReversalConfig::default().separator().map_err(configured)?;
     separator.separated(&runout_points::read(file, &separator.columns())?)
 }

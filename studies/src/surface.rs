@@ -27,7 +27,7 @@ const CELLS: [usize; 2] = [120, 360];
 /// When the pipeline fails or gives no surface.
 pub fn picture(pipeline: &Path) -> Result<Vec<u8>> {
     let no_exports = ["export=[]".to_owned()];
-    let configured = |error: ConfigError| Error::new("read", pipeline.display().to_string(), error);
+    let configured = |error: ConfigError| Error::caused("read", pipeline.display().to_string(), error);
     let sources = Sources::read(pipeline, &no_exports, INCLUDE_KEY).map_err(configured)?;
     let mut pipeline = Pipeline::from_sources(&sources, &registry()).map_err(configured)?;
     let kept = std::sync::Arc::new(Mutex::new(None));

@@ -157,18 +157,18 @@ fn evaluated(config: &SpindleConfig, folder: &Path, worker: usize) -> Result<Sum
     runout_hdf5::register(&mut registry);
     runout_preprocess::register(&mut registry);
     runout_spindle::register(&mut registry);
-    let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let simulator = simulator(config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
     let name = format!("campaign-{worker}");
     let path = folder.join(format!("{name}.h5"));
     let options = WriteOptions::default();
     write_measurement(&simulator.spindle_recording(), simulator.rig(), &path, &options, &mut |_| {})?;
     let rig = toml::to_string(&BTreeMap::from([("rig", &config.rig)]))
-        .map_err(|error| Error::new("write", "the rig", error))?;
+        .map_err(|error| Error::caused("write", "the rig", error))?;
     let text = format!("{}\n{rig}", STAGES.replace("NAME", &name));
     let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY)
-        .map_err(|error| Error::new("read", "the pipeline", error))?;
+        .map_err(|error| Error::caused("read", "the pipeline", error))?;
     let pipeline =
-        Pipeline::from_sources(&sources, &registry).map_err(|error| Error::new("check", "the pipeline", error))?;
+        Pipeline::from_sources(&sources, &registry).map_err(|error| Error::caused("check", "the pipeline", error))?;
     run(&pipeline, NonZeroUsize::new(1), &Silent)
 }
 

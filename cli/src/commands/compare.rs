@@ -121,7 +121,7 @@ impl Output {
             }
             Self::Document(path) => {
                 let text = serde_json::to_vec_pretty(comparison)
-                    .map_err(|error| Error::new("write", path.display().to_string(), error))?;
+                    .map_err(|error| Error::caused("write", path.display().to_string(), error))?;
                 atomic_file::write(path, &text)?;
             }
         }

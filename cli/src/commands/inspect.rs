@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fs::File, io::Read, path::Path};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use runout_core::{Error, Result};
+use runout_core::{Error, ErrorKind, Result};
 use runout_hdf5::FileReport;
 use serde::Serialize;
 
@@ -56,26 +56,29 @@ pub fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failur
 }
 
 fn report(path: &Path) -> Result<Report> {
-    let failure = |problem: &dyn ToString| Error::new("inspect", path.display().to_string(), problem.to_string());
     let mut signature = Vec::new();
-    let file = File::open(path).map_err(|error| failure(&error))?;
-    file.take(8).read_to_end(&mut signature).map_err(|error| failure(&error))?;
+    let start = File::open(path).and_then(|file| file.take(8).read_to_end(&mut signature));
+    start.map_err(|error| Error::caused("inspect", path.display().to_string(), error))?;
     if signature == *b"\x89HDF\r\n\x1a\n" {
         return runout_hdf5::inspect(path).map(Report::Hdf5);
     }
     if signature.starts_with(b"PAR1") {
         return table(path).map(Report::Parquet);
     }
-    Err(failure(&"it is neither HDF5 nor Parquet").help("inspect reads measurement files, results and Parquet tables"))
+    let problem = "it is neither HDF5 nor Parquet";
+    Err(Error::new("inspect", path.display().to_string(), problem)
+        .of(ErrorKind::DamagedData)
+        .help("inspect reads measurement files, results and Parquet tables"))
 }
 
 /// Arrow's own schema, in Base64: the columns say the same.
 const ARROW_SCHEMA: &str = "ARROW:schema";
 
 fn table(path: &Path) -> Result<TableReport> {
-    let failure = |problem: &dyn ToString| Error::new("inspect", path.display().to_string(), problem.to_string());
-    let file = File::open(path).map_err(|error| failure(&error))?;
-    let reader = SerializedFileReader::new(file).map_err(|error| failure(&error))?;
+    let shown = path.display().to_string();
+    let file = File::open(path).map_err(|error| Error::caused("inspect", &shown, error))?;
+    let reader = SerializedFileReader::new(file)
+        .map_err(|error| Error::caused("inspect", &shown, error).of(ErrorKind::DamagedData))?;
     let metadata = reader.metadata();
     let about = metadata.file_metadata();
     let columns = about.schema_descr().columns().iter().map(|column| ColumnReport {

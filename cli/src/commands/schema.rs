@@ -62,7 +62,7 @@ fn write(registry: &Registry, folder: &Path) -> Result<Vec<String>, Failure> {
     for (name, schema) in files(registry) {
         let path = folder.join(format!("{name}.schema.json"));
         let mut text = serde_json::to_string_pretty(&schema)
-            .map_err(|error| Error::new("write", path.display().to_string(), error))?;
+            .map_err(|error| Error::caused("write", path.display().to_string(), error))?;
         text.push('\n');
         written.push(atomic_file::write(&path, text.as_bytes())?.display().to_string());
     }

@@ -122,7 +122,8 @@ fn write(scenario: &Scenario) -> Result<Report, Error> {
         }
     };
     let output = scenario.output.clone();
-    let bytes = std::fs::metadata(&output).map_err(|error| Error::new("read", output.display().to_string(), error))?;
+    let bytes =
+        std::fs::metadata(&output).map_err(|error| Error::caused("read", output.display().to_string(), error))?;
     Ok(Report { title: scenario.title.clone(), output, bytes: bytes.len(), effects: scenario.effects, made })
 }
 

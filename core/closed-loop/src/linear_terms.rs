@@ -13,7 +13,7 @@ use super::{
     evidence::{Group, far_worse},
     fit::dot,
 };
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::farthest;
 
 /// What was measured.
@@ -121,7 +121,8 @@ impl LinearTerms {
         let basis = Basis::of(declared.iter().map(|known| known.column.clone()).collect());
         if basis.dependent() {
             let names: Vec<&str> = declared.iter().map(|known| known.name.as_str()).collect();
-            return Err(refuse(format!("{count} points cannot tell {} apart", names.join(", "))));
+            let problem = format!("{count} points do not determine {}", names.join(", "));
+            return Err(refuse(problem).of(ErrorKind::InsufficientData));
         }
         let effects = terms.iter().map(|term| term.effect.clone()).collect();
         let (unseen, known, ends) = (Vec::new(), Vec::new(), Vec::new());

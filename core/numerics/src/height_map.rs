@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 
 /// Distances of rings that differ by less than this share are equal.
 const EVEN: f64 = 1e-6;
@@ -44,7 +44,8 @@ impl<'a> HeightMap<'a> {
         }
         let map = Self { heights_um, columns, dx_mm, dy_mm, closed };
         match map.heights_um.len() - map.missing() {
-            measured @ 0..2 => failure(format!("{measured} of its points were measured; two or more are needed")),
+            measured @ 0..2 => failure(format!("{measured} of its points were measured; two or more are needed"))
+                .map_err(|error| error.of(ErrorKind::InsufficientData)),
             _ => Ok(map),
         }
     }
@@ -56,7 +57,9 @@ impl<'a> HeightMap<'a> {
     /// Where rings are not at equal distances, or fewer than two.
     pub fn unrolled(radius_mm: f64, z_mm: &[f64], angles: usize, heights_um: &'a [f64]) -> Result<Self> {
         let [first, second, ..] = z_mm[..] else {
-            return Err(Error::new("unroll", "the surface", "it has fewer than two rings"));
+            return Err(
+                Error::new("unroll", "the surface", "it has fewer than two rings").of(ErrorKind::InsufficientData)
+            );
         };
         let step = second - first;
         let even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= EVEN * step;

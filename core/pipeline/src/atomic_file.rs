@@ -9,7 +9,7 @@ use std::{
     },
 };
 
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 
 /// What this process has begun and not finished.
 static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new() });
@@ -38,7 +38,7 @@ impl UnderWay {
 
     /// Gives a file its final name.
     fn finish(&mut self, file: &mut PendingFile) -> Result<PathBuf> {
-        fs::rename(&file.temporary, &file.destination).map_err(|error| file.failure(error))?;
+        fs::rename(&file.temporary, &file.destination).map_err(|error| file.caused(error))?;
         self.files.retain(|pending| *pending != file.temporary);
         file.committed = true;
         Ok(file.destination.clone())
@@ -77,11 +77,11 @@ impl PendingFile {
         let shown = destination.display().to_string();
         // A rename would put a file in the place of a folder, a device or a pipe.
         if fs::metadata(&destination).is_ok_and(|found| !found.is_file()) {
-            return Err(Error::new("write", shown, "what is there is no file").help("name a file"));
+            return Err(Error::new("write", shown, "what is there is no file").of(ErrorKind::Io).help("name a file"));
         }
         let name = destination
             .file_name()
-            .ok_or_else(|| Error::new("write", &shown, "the path ends in no file name"))?
+            .ok_or_else(|| Error::new("write", &shown, "the path ends in no file name").of(ErrorKind::Configuration))?
             .to_string_lossy()
             .into_owned();
         let folder = match destination.parent() {
@@ -90,7 +90,7 @@ impl PendingFile {
         };
         make(folder).map_err(|error| {
             let file = folder.ancestors().find(|above| above.is_file());
-            let failure = Error::new("create the folder", folder.display().to_string(), error);
+            let failure = Error::caused("create the folder", folder.display().to_string(), error);
             match file {
                 Some(file) => failure.help(format!("{} is a file; name another folder", file.display())),
                 None => failure,
@@ -120,7 +120,7 @@ impl PendingFile {
     /// # Errors
     /// When the file system refuses.
     pub fn create(&self) -> Result<fs::File> {
-        fs::File::create(&self.temporary).map_err(|error| self.failure(error))
+        fs::File::create(&self.temporary).map_err(|error| self.caused(error))
     }
 
     /// Refuses to begin what may not fit: a library that the disk fails in the middle of a file may not survive it.
@@ -133,16 +133,21 @@ impl PendingFile {
             Ok(free) if free < bytes => {
                 let [wanted, free] = [bytes, free].map(|bytes| bytes as f64 / 1e6);
                 let problem = format!("it may take {wanted:.1} MB, and {free:.1} MB are free there");
-                Err(self.failure(problem).help("make room, or write elsewhere"))
+                Err(self.failure(problem).of(ErrorKind::Io).help("make room, or write elsewhere"))
             }
             // Where the system does not tell, the attempt will.
             _ => Ok(()),
         }
     }
 
-    /// An error about this file, named by its final name.
+    /// An error about this file, named by its final name: what is to be written cannot be.
     pub fn failure(&self, problem: impl ToString) -> Error {
         Error::new("write", self.destination.display().to_string(), problem)
+    }
+
+    /// The error of an attempt to write this file, named by its final name.
+    pub fn caused(&self, error: impl std::error::Error + Send + Sync + 'static) -> Error {
+        Error::caused("write", self.destination.display().to_string(), error)
     }
 
     /// Gives the file its final name, replacing what was there.
@@ -228,7 +233,7 @@ pub fn resolved(path: &Path) -> PathBuf {
 /// When the folder or the file cannot be written.
 pub fn write(destination: impl Into<PathBuf>, contents: &[u8]) -> Result<PathBuf> {
     let pending = PendingFile::new(destination)?;
-    fs::write(pending.path(), contents).map_err(|error| pending.failure(error))?;
+    fs::write(pending.path(), contents).map_err(|error| pending.caused(error))?;
     pending.commit()
 }
 

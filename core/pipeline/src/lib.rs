@@ -10,7 +10,7 @@ pub mod points;
 pub mod stage;
 
 pub use runout_closed_loop as model;
-pub use runout_error::{Error, Result};
+pub use runout_error::{Error, ErrorKind, Result};
 pub use runout_numerics::{self as numerics, Complex64};
 pub use runout_table as table;
 pub use runout_turning::{
@@ -26,5 +26,5 @@ pub mod evaluate {
 
 /// Errors of data and files.
 pub mod error {
-    pub use runout_error::{Error, Result};
+    pub use runout_error::{Error, ErrorKind, Result};
 }

@@ -162,7 +162,7 @@ impl TableSpec {
     /// When columns are missing, of another type, or of different lengths.
     pub fn rows(&self, columns: Vec<ArrayRef>) -> Result<RecordBatch> {
         RecordBatch::try_new(self.schema(), columns)
-            .map_err(|error| Error::new("make", format!("rows of the table {}", self.name), error))
+            .map_err(|error| Error::caused("make", format!("rows of the table {}", self.name), error))
     }
 }
 

@@ -58,7 +58,7 @@ impl Checksum {
     /// When it cannot be read.
     pub fn finish(&self) -> Result<Input> {
         let shown = self.path.display().to_string();
-        let failure = |error: std::io::Error| Error::new("checksum", &shown, error);
+        let failure = |error: std::io::Error| Error::caused("checksum", &shown, error);
         let mut file = File::open(&self.path).map_err(failure)?;
         let bytes = file.metadata().map_err(failure)?.len();
         if bytes <= BRANCH {

@@ -39,7 +39,7 @@ impl Input {
     /// When it cannot be read.
     pub fn of(path: &Path) -> Result<Self> {
         let shown = path.display().to_string();
-        let failure = |error: std::io::Error| Error::new("checksum", &shown, error);
+        let failure = |error: std::io::Error| Error::caused("checksum", &shown, error);
         let mut file = std::fs::File::open(path).map_err(failure)?;
         let bytes = file.metadata().map_err(failure)?.len();
         let mut hasher = blake3::Hasher::new();

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     marker::Marker,
     measurement::StationKey,
     pipeline::{
@@ -194,7 +194,9 @@ impl Loader for CsvLoader {
 
     fn open(&self, wanted: &Request) -> Result<Source> {
         let rig = wanted.rig.filter(|_| !self.paths.is_empty());
-        let rig = rig.ok_or_else(|| Error::new("open", "the CSV files", "recorded turns need a [rig]"))?;
+        let rig = rig.ok_or_else(|| {
+            Error::new("open", "the CSV files", "recorded turns need a [rig]").of(ErrorKind::Configuration)
+        })?;
         let recording = CsvRecording::open(rig, self.stations.clone(), self.paths.clone(), self.stated.clone())?;
         Ok(Source::Turns(Box::new(recording)))
     }

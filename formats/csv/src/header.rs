@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use runout_core::{Error, Result, marker::Marker, pipeline::error::known_names, rig::Rig};
+use runout_core::{Error, ErrorKind, Result, marker::Marker, pipeline::error::known_names, rig::Rig};
 
 use crate::lines::{Stretch, Stretches, cells};
 
@@ -74,7 +74,8 @@ impl Header {
                 }
             }
         }
-        Err(Error::new("read", shown, "expected a header that names the columns, found none"))
+        Err(Error::new("read", shown, "expected a header that names the columns, found none")
+            .of(ErrorKind::DamagedData))
     }
 
     fn parse(line: &[u8], number: u64, shown: String, rig: &Rig, marker: Option<&Marker>) -> Result<Self> {
@@ -149,11 +150,12 @@ impl Header {
     pub(crate) fn error(&self, line: u64, column: usize, problem: impl ToString) -> Error {
         let name = self.names.get(column).map_or("", String::as_str);
         Error::new("read", format!("{}, line {line}, column {} (`{name}`)", self.shown, column + 1), problem)
+            .of(ErrorKind::DamagedData)
     }
 
     /// An error of a whole line.
     pub(crate) fn line_error(&self, line: u64, problem: impl ToString) -> Error {
-        Error::new("read", format!("{}, line {line}", self.shown), problem)
+        Error::new("read", format!("{}, line {line}", self.shown), problem).of(ErrorKind::DamagedData)
     }
 
     /// An error of a cell that holds no number.

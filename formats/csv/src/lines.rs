@@ -8,7 +8,7 @@ use std::{
 
 use flate2::read::MultiGzDecoder;
 
-use runout_core::{Error, Result};
+use runout_core::{Error, ErrorKind, Result};
 
 /// Text that is read at a time: what it holds, as numbers, stays in a core's own cache.
 const STRETCH: usize = 1 << 18;
@@ -51,7 +51,7 @@ impl Stretches {
             let whole = Cursor::new(first).chain(file);
             Ok(if is_packed { Box::new(MultiGzDecoder::new(whole)) as Box<dyn Read + Send> } else { Box::new(whole) })
         };
-        let text = open().map_err(|error: std::io::Error| Error::new("open", &shown, error))?;
+        let text = open().map_err(|error: std::io::Error| Error::caused("open", &shown, error))?;
         Ok(Self { text, shown, rest: Vec::new(), lines: 0 })
     }
 
@@ -80,18 +80,19 @@ impl Stretches {
             }
             if *end > LONGEST_LINE {
                 let object = format!("{}, line {}", self.shown, self.lines + 1);
-                return Err(Error::new("read", object, format!("expected a line end within {LONGEST_LINE} bytes")));
+                return Err(Error::new("read", object, format!("expected a line end within {LONGEST_LINE} bytes"))
+                    .of(ErrorKind::DamagedData));
             }
         }
         if self.lines == 0 {
             let begin = &buffer[..*end];
             if begin.starts_with(&[0xFF, 0xFE]) || begin.starts_with(&[0xFE, 0xFF]) {
                 let error = Error::new("read", &self.shown, "expected text in UTF-8 or Latin-1, found UTF-16");
-                return Err(error.help("save it as UTF-8"));
+                return Err(error.of(ErrorKind::DamagedData).help("save it as UTF-8"));
             }
             if begin.starts_with(b"PK\x03\x04") {
                 let error = Error::new("read", &self.shown, "expected text, found a ZIP archive or a workbook");
-                return Err(error.help("unpack it, or save the sheet as CSV"));
+                return Err(error.of(ErrorKind::DamagedData).help("unpack it, or save the sheet as CSV"));
             }
             if begin.starts_with(&[0xEF, 0xBB, 0xBF]) {
                 *start = 3;
@@ -108,7 +109,12 @@ impl Stretches {
             match self.text.read(into) {
                 Ok(count) => return Ok(count),
                 Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(Error::new("read", &self.shown, error)),
+                Err(error) => {
+                    // So the decompressor reports a damaged stream.
+                    let damaged = error.kind() == std::io::ErrorKind::InvalidInput;
+                    let error = Error::caused("read", &self.shown, error);
+                    return Err(if damaged { error.of(ErrorKind::DamagedData) } else { error });
+                }
             }
         }
     }

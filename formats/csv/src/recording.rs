@@ -3,7 +3,7 @@
 use std::{num::NonZeroUsize, path::PathBuf};
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     encoder::EncoderScan,
     measurement::{Block, Capture, Recording, SampleStream, StationKey},
     rig::Rig,
@@ -78,7 +78,8 @@ impl Recording for CsvRecording {
     fn open_with(&self, threads: NonZeroUsize, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
         let path = self.paths.get(station).and_then(|setups| setups.get(setup));
         let (Some(key), Some(path)) = (self.stations.get(station), path) else {
-            return Err(Error::new("open", format!("station {station} in setup {setup}"), "there is no such file"));
+            return Err(Error::new("open", format!("station {station} in setup {setup}"), "there is no such file")
+                .of(ErrorKind::MissingFile));
         };
         let marker = self.stated.marker.as_ref();
         let rows = Rows::open(path, &self.rig, marker)?;

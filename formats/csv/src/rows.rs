@@ -6,7 +6,7 @@ use std::{
     sync::mpsc::{Receiver, SyncSender, sync_channel},
 };
 
-use runout_core::{Error, Result, marker::Marker, rig::Rig};
+use runout_core::{Error, ErrorKind, Result, marker::Marker, rig::Rig};
 
 use crate::{
     header::Header,
@@ -124,7 +124,8 @@ impl Rows {
             format.parse(piece);
             accept(&mut text, piece)?;
         }
-        let stopped = || Error::new("read", &format.header.shown, "a thread that read it stopped");
+        let stopped =
+            || Error::new("read", &format.header.shown, "a thread that read it stopped").of(ErrorKind::Interrupted);
         std::thread::scope(|scope| {
             let parse = |_| {
                 let (sender, pieces) = sync_channel::<Piece>(WAITING);

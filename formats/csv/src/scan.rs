@@ -4,7 +4,7 @@
 use std::num::NonZeroUsize;
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     encoder::EncoderScan,
     marker::{Marker, MarkerScan},
     measurement::Block,
@@ -61,7 +61,8 @@ impl Scan {
             Ok(())
         })?;
         if samples == 0 {
-            return Err(Error::new("read", shown, "expected samples below the header, found none"));
+            return Err(Error::new("read", shown, "expected samples below the header, found none")
+                .of(ErrorKind::InsufficientData));
         }
         let (marks, encoder) = turns.marks().map_err(|problem| {
             Error::new("read", &shown, problem)

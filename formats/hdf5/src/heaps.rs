@@ -13,7 +13,7 @@ use std::{
 
 use hdf5_metno::{File, Group};
 use memchr::memmem;
-use runout_core::{Error, Result};
+use runout_core::{Error, ErrorKind, Result};
 
 /// What a collection begins with: its signature, and the one version that there is.
 const SIGNATURE: &[u8] = b"GCOL\x01\0\0\0";
@@ -31,9 +31,9 @@ const DEEPEST: usize = 6;
 
 /// Refuses a file with a heap that has no end.
 pub(crate) fn check(file: &File, path: &Path) -> Result<()> {
-    let failure = |problem: String| Error::new("read", path.display().to_string(), problem);
-    let mut source = fs::File::open(path).map_err(|error| failure(error.to_string()))?;
-    let end = source.metadata().map_err(|error| failure(error.to_string()))?.len();
+    let failure = |error: std::io::Error| Error::caused("read", path.display().to_string(), error);
+    let mut source = fs::File::open(path).map_err(|error| failure(error))?;
+    let end = source.metadata().map_err(|error| failure(error))?.len();
     let mut data = Vec::new();
     if end > SMALL {
         extents(file, DEEPEST, &mut data);
@@ -41,10 +41,11 @@ pub(crate) fn check(file: &File, path: &Path) -> Result<()> {
     }
     let mut from = 0;
     for extent in data.into_iter().chain(std::iter::once(end..end)) {
-        let endless = find(&mut source, from..extent.start.min(end)).map_err(|error| failure(error.to_string()))?;
+        let endless = find(&mut source, from..extent.start.min(end)).map_err(|error| failure(error))?;
         if let Some(place) = endless {
             let problem = format!("it is damaged: the texts at byte {place} have no end");
-            return Err(failure(problem).help("copy the file again from where it was recorded"));
+            let error = Error::new("read", path.display().to_string(), problem).of(ErrorKind::DamagedData);
+            return Err(error.help("copy the file again from where it was recorded"));
         }
         from = from.max(extent.end);
     }

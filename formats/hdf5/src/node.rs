@@ -7,7 +7,7 @@ use hdf5_metno::{
     dataset::Layout,
     types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode},
 };
-use runout_core::{Error, Result};
+use runout_core::{Error, ErrorKind, Result};
 
 use crate::{heaps, text};
 
@@ -30,7 +30,7 @@ impl Place {
 
     #[allow(clippy::needless_pass_by_value, reason = "callers give text and errors alike")]
     pub(crate) fn error(&self, problem: impl fmt::Display) -> Error {
-        Error::new("read", self.to_string(), without_build_paths(&problem.to_string()))
+        Error::new("read", self.to_string(), without_build_paths(&problem.to_string())).of(ErrorKind::DamagedData)
     }
 }
 
@@ -59,12 +59,13 @@ pub(crate) fn open(path: &Path) -> Result<(File, Place)> {
     // The file system's own answer is clearer than the library's.
     let bytes = std::fs::File::open(path)
         .and_then(|file| file.metadata())
-        .map_err(|error| Error::new("open", &shown, error))?;
+        .map_err(|error| Error::caused("open", &shown, error))?;
     if bytes.is_dir() {
-        return Err(Error::new("open", &shown, "expected an HDF5 file, found a folder"));
+        return Err(Error::new("open", &shown, "expected an HDF5 file, found a folder").of(ErrorKind::DamagedData));
     }
     let file = File::open(path).map_err(|error| {
         Error::new("open", &shown, format!("no HDF5 file, or a damaged one: {error}"))
+            .of(ErrorKind::DamagedData)
             .help("a file whose writing was interrupted is often truncated")
     })?;
     heaps::check(&file, path)?;

@@ -3,7 +3,7 @@
 use std::{fs::File, io, path::PathBuf, thread};
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     atomic_file::PendingFile,
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
     table::{RecordBatch, TableSpec},
@@ -77,10 +77,12 @@ impl Export for MeshExport {
             let meshes: Result<Vec<Mesh>> = self.files.iter().map(draw).collect();
             (meshes, checksum.join())
         });
-        let checksum = checksum.map_err(|_| Error::new("draw", "the surface", "the thread of its checksum stopped"))?;
+        let checksum = checksum.map_err(|_| {
+            Error::new("draw", "the surface", "the thread of its checksum stopped").of(ErrorKind::Interrupted)
+        })?;
         for (Target { place, file, .. }, mesh) in self.files.iter_mut().zip(meshes?) {
             let notes = Notes::new(&self.format, &mesh, surface, &checksum, result);
-            (self.format.write)(&mesh, &notes, file).map_err(|error| place.failure(error))?;
+            (self.format.write)(&mesh, &notes, file).map_err(|error| place.caused(error))?;
         }
         // Closed: some systems do not rename what is open.
         Ok(self.files.into_iter().map(|Target { place, .. }| place).collect())

@@ -11,7 +11,7 @@ mod table;
 use std::path::PathBuf;
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     atomic_file::PendingFile,
     pipeline::{
         error::Fault,
@@ -78,7 +78,9 @@ impl Exporter for Parquet {
     fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
         if self.folder.is_file() {
             let shown = self.folder.display().to_string();
-            return Err(Error::new("write to", shown, "there is a file of that name").help("name a folder"));
+            return Err(Error::new("write to", shown, "there is a file of that name")
+                .of(ErrorKind::Io)
+                .help("name a folder"));
         }
         let (always, optional): (Vec<_>, Vec<_>) = result.tables.iter().cloned().partition(|table| !table.optional);
         let begun = always.into_iter().map(|table| Ok((TableFile::create(self.file(&table), &table)?, table)));
@@ -111,7 +113,7 @@ impl Export for TableFiles {
         // An earlier run's motion beside this run's form would be taken for this run's.
         for path in self.optional.iter().map(|table| self.place.file(table)).filter(|path| path.is_file()) {
             std::fs::remove_file(&path)
-                .map_err(|error| Error::new("remove the outdated", path.display().to_string(), error))?;
+                .map_err(|error| Error::caused("remove the outdated", path.display().to_string(), error))?;
         }
         Ok(complete)
     }
@@ -119,7 +121,8 @@ impl Export for TableFiles {
 
 /// Completes tables side by side: each has rows that were not packed yet, and nothing else is left to do meanwhile.
 fn close_all(tables: Vec<(TableFile, TableSpec)>, result: &Completed) -> Result<Vec<PendingFile>> {
-    let stopped = |_| Err(Error::new("write", "the tables", "a thread that wrote them stopped"));
+    let stopped =
+        |_| Err(Error::new("write", "the tables", "a thread that wrote them stopped").of(ErrorKind::Interrupted));
     std::thread::scope(|scope| {
         let close =
             |(file, table): (TableFile, TableSpec)| scope.spawn(move || file.close(&about::entries(&table, result)));

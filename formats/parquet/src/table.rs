@@ -38,8 +38,8 @@ impl TableFile {
         let pending = PendingFile::new(path)?;
         let schema = table.schema();
         let properties = properties(&schema).build();
-        let writer = ArrowWriter::try_new(pending.create()?, schema, Some(properties))
-            .map_err(|error| pending.failure(error))?;
+        let writer =
+            ArrowWriter::try_new(pending.create()?, schema, Some(properties)).map_err(|error| pending.caused(error))?;
         Ok(Self { writer, pending })
     }
 
@@ -48,7 +48,7 @@ impl TableFile {
     /// # Errors
     /// When the file system refuses them.
     pub fn append(&mut self, rows: &RecordBatch) -> Result<()> {
-        self.writer.write(rows).map_err(|error| self.pending.failure(error))
+        self.writer.write(rows).map_err(|error| self.pending.caused(error))
     }
 
     /// Completes the file with metadata; it appears when the result is committed.
@@ -59,7 +59,7 @@ impl TableFile {
         for (key, value) in entries {
             self.writer.append_key_value_metadata(KeyValue::new(key.clone(), value.clone()));
         }
-        self.writer.close().map_err(|error| self.pending.failure(error))?;
+        self.writer.close().map_err(|error| self.pending.caused(error))?;
         Ok(self.pending)
     }
 }

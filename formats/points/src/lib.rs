@@ -16,7 +16,7 @@ use std::{
 };
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     pipeline::{
         error::Fault,
         registry::{Context, Plugin, Registry, StageConfig},
@@ -106,6 +106,12 @@ impl Loader for PointFile {
     }
 }
 
+/// The error of an attempt to read a file; what its reader cannot read is damaged, or of another format.
+fn failed(shown: &str, error: impl std::error::Error + Send + Sync + 'static) -> Error {
+    let error = Error::caused("read", shown, error);
+    if error.kind() == ErrorKind::UnsuitableData { error.of(ErrorKind::DamagedData) } else { error }
+}
+
 /// A file's columns as they are.
 struct RawTable {
     names: Vec<String>,
@@ -126,7 +132,7 @@ impl RawTable {
     fn read(path: &Path) -> Result<Self> {
         let mut start = [0; 4];
         let read = std::fs::File::open(path).and_then(|mut file| std::io::Read::read(&mut file, &mut start));
-        let length = read.map_err(|error| Error::new("read", path.display().to_string(), error))?;
+        let length = read.map_err(|error| Error::caused("read", path.display().to_string(), error))?;
         if start[..length] == *b"PAR1" { parquet::read(path) } else { text::read(path) }
     }
 }

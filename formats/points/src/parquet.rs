@@ -14,21 +14,20 @@ use arrow_schema::DataType;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use runout_core::{Error, Result};
 
-use crate::{RawColumn, RawTable};
+use crate::{RawColumn, RawTable, failed};
 
 pub fn read(path: &Path) -> Result<RawTable> {
     let shown = path.display().to_string();
-    let failure = |problem: &dyn std::fmt::Display| Error::new("read", &shown, problem);
-    let file = File::open(path).map_err(|error| failure(&error))?;
+    let file = File::open(path).map_err(|error| failed(&shown, error))?;
     // The types of Parquet itself, so that dictionaries of another program are plain texts.
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder =
-        ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(|error| failure(&error))?;
+        ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(|error| failed(&shown, error))?;
     let names: Vec<String> = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
     let mut columns: Vec<Option<RawColumn>> = names.iter().map(|_| None).collect();
     let mut rows = 0;
-    for batch in builder.build().map_err(|error| failure(&error))? {
-        let batch = batch.map_err(|error| failure(&error))?;
+    for batch in builder.build().map_err(|error| failed(&shown, error))? {
+        let batch = batch.map_err(|error| failed(&shown, error))?;
         rows += batch.num_rows();
         for ((column, values), name) in columns.iter_mut().zip(batch.columns()).zip(&names) {
             // Columns of other types can be there; only one that is wanted is an error, which a later look gives.
@@ -37,7 +36,7 @@ pub fn read(path: &Path) -> Result<RawTable> {
                 (Some(RawColumn::Numbers(all)), RawColumn::Numbers(part)) => all.extend(part),
                 (Some(RawColumn::Texts(all)), RawColumn::Texts(part)) => all.extend(part),
                 (empty @ None, part) => *empty = Some(part),
-                _ => return Err(failure(&format!("the column `{name}` changes its type"))),
+                _ => return Err(Error::new("read", &shown, format!("the column `{name}` changes its type"))),
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     pipeline::error::known_names,
     points::{Column, Labels, PointColumn, PointKind, Points, Trace},
 };
@@ -212,6 +212,7 @@ impl Raw {
             self.table.lines.get(row).map_or_else(|| format!("row {} from 1", row + 1), |line| format!("line {line}"));
         let name = &self.table.names[place];
         Error::new("read", format!("{}, {at}, column {} ({name})", self.file, place + 1), problem)
+            .of(ErrorKind::DamagedData)
     }
 }
 

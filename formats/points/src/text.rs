@@ -7,26 +7,25 @@ use std::{
 };
 
 use csv::{ByteRecord, ReaderBuilder, Trim};
-use runout_core::{Error, Result};
+use runout_core::{Error, ErrorKind, Result};
 
-use crate::{RawColumn, RawTable};
+use crate::{RawColumn, RawTable, failed};
 
 pub fn read(path: &Path) -> Result<RawTable> {
     let shown = path.display().to_string();
-    let failure = |problem: &dyn std::fmt::Display| Error::new("read", &shown, problem);
-    let mut file = BufReader::new(File::open(path).map_err(|error| failure(&error))?);
-    let delimiter = delimiter(&mut file).map_err(|error| failure(&error))?;
+    let mut file = BufReader::new(File::open(path).map_err(|error| failed(&shown, error))?);
+    let delimiter = delimiter(&mut file).map_err(|error| failed(&shown, error))?;
     let mut reader = ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(file);
-    let header = reader.byte_headers().map_err(|error| failure(&error))?;
+    let header = reader.byte_headers().map_err(|error| failed(&shown, error))?;
     let names: Vec<String> = header.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
     let mut columns = vec![Vec::new(); names.len()];
     let (mut record, mut lines) = (ByteRecord::new(), Vec::new());
-    while reader.read_byte_record(&mut record).map_err(|error| failure(&error))? {
+    while reader.read_byte_record(&mut record).map_err(|error| failed(&shown, error))? {
         let line = record.position().map_or(0, csv::Position::line);
         for (place, (column, name)) in columns.iter_mut().zip(&names).enumerate() {
             let text = std::str::from_utf8(record.get(place).unwrap_or_default()).map_err(|_| {
                 let object = format!("{shown}, line {line}, column {} ({name})", place + 1);
-                Error::new("read", object, "it is not UTF-8")
+                Error::new("read", object, "it is not UTF-8").of(ErrorKind::DamagedData)
             })?;
             column.push(text.to_owned());
         }

@@ -22,9 +22,9 @@ pub fn write(path: &Path, table: &TableSpec, rows: &RecordBatch, about: &[(&str,
     let pending = PendingFile::new(path)?;
     let file = pending.create()?;
     if path.extension().is_some_and(|extension| extension == "parquet") {
-        parquet(file, table, rows, about).map_err(|error| pending.failure(error))?;
+        parquet(file, table, rows, about).map_err(|error| pending.caused(error))?;
     } else {
-        csv(file, rows).map_err(|error| pending.failure(error))?;
+        csv(file, rows).map_err(|error| pending.caused(error))?;
     }
     pending.commit().map(|_| ())
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Error, ErrorKind, Result,
     pipeline::{
         error::{Fault, known_names, within},
         registry::{Context, StageConfig},
@@ -353,6 +353,7 @@ impl LeastSquaresCylinder {
         let mut placed = cylinder.place(&circle.scan);
         let unfit = |problem: String| {
             Error::new("fit harmonics to", format!("{} of {}", circle.id, points.input.display()), problem)
+                .of(ErrorKind::InsufficientData)
                 .help("leave the trace out of `use`")
         };
         let mut level_variance = [0.0; 2];
@@ -465,7 +466,7 @@ fn left_out(cleaned: &Cleaned, scan: &Scan, outlier_mad: f64) -> String {
 
 fn cylinder(points: &Points, circles: &[Circle], nominal_mm: f64) -> Result<Cylinder> {
     let object = points.input.display().to_string();
-    let refuse = |problem: &str| Error::new("fit a cylinder to", &object, problem);
+    let refuse = |problem: &str| Error::new("fit a cylinder to", &object, problem).of(ErrorKind::InsufficientData);
     if circles.is_empty() {
         return Err(refuse("every trace that could be used is held out").help("shorten `hold_out`"));
     }
@@ -488,5 +489,6 @@ fn tilt_observable(circles: &[Circle]) -> bool {
 
 fn unfit(points: &Points, trace: &Trace, problem: &str) -> Error {
     Error::new("fit harmonics to", format!("trace {} of {}", trace.id, points.input.display()), problem)
+        .of(ErrorKind::InsufficientData)
         .help("leave the trace out of `use`")
 }

@@ -6,7 +6,7 @@
 //! piece begins so far beyond its end that what it did not see has died away below rounding.
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     measurement::{Block, Capture, Defect, Response, SampleStream},
     pipeline::{
         error::Fault,
@@ -88,11 +88,13 @@ impl Conditioner for LowPass {
             let problem =
                 format!("cutoff_hz = {} is not below half of the sampling rate, {rate_hz} Hz", self.cutoff_hz);
             let help = "lower cutoff_hz, or leave the low-pass out";
-            return Err(Error::new("low-pass", &capture.object, problem).help(help));
+            return Err(Error::new("low-pass", &capture.object, problem).of(ErrorKind::Configuration).help(help));
         }
         if self.cutoff_hz < LOWEST_SHARE * rate_hz {
             let problem = format!("cutoff_hz = {} is too far below the sampling rate, {rate_hz} Hz", self.cutoff_hz);
-            return Err(Error::new("low-pass", &capture.object, problem).help("raise cutoff_hz"));
+            return Err(Error::new("low-pass", &capture.object, problem)
+                .of(ErrorKind::Configuration)
+                .help("raise cutoff_hz"));
         }
         let half_power_hz = two_pass_half_power_hz(self.order, self.cutoff_hz, rate_hz);
         capture.responses.push(Response {
@@ -228,7 +230,7 @@ impl LowPassStream<'_> {
         if self.stage == Stage::Filling {
             let frames = self.held.samples.len() / self.channels().max(1);
             let problem = format!("it holds {frames} samples, the filter needs more than {}", self.pad);
-            return Err(Error::new("low-pass", &self.capture.object, problem));
+            return Err(Error::new("low-pass", &self.capture.object, problem).of(ErrorKind::InsufficientData));
         }
         self.stage = Stage::Done;
         let channels = self.channels();

@@ -24,7 +24,7 @@ mod turns;
 mod window;
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     measurement::{Block, Capture, Response, SampleStream},
     near_tone::NearTone,
     numerics::fourier,
@@ -133,7 +133,7 @@ impl SynchronousAverage {
         } else {
             "record more turns, mend what is named above, or lower min_turns"
         };
-        Err(Error::new("average", &capture.object, problem).help(help))
+        Err(Error::new("average", &capture.object, problem).of(ErrorKind::InsufficientData).help(help))
     }
 
     /// That the marks make turns.

@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Error, ErrorKind, Result,
     model::{
         Effect, Fit,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
@@ -246,7 +246,7 @@ impl LinearModel for Quadrature {
         let count = samples.phase_rad.len();
         if count < 2 * self.0.blocks {
             let problem = format!("it has {count} samples for {} blocks", self.0.blocks);
-            let error = Error::new("fit", points.input.display().to_string(), problem);
+            let error = Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData);
             return Err(error.help("ask for fewer `blocks`"));
         }
         let (values, radius, gain_and_angle) = samples.linearised(self.0.max_order)?;

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     model::{
         Effect, Setting,
         closed_loop::{self, Settings},
@@ -44,7 +44,9 @@ impl PointModel for RotaryAxis {
     }
 
     fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
-        let failure = |problem: String| Error::new("diagnose", points.input.display().to_string(), problem);
+        let failure = |problem: String| {
+            Error::new("diagnose", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData)
+        };
         let mut campaign = Campaign::of(&self.0, points)?;
         let declared = self.separate(points)?;
         let before = fit(&campaign.layout, &campaign.readings, &[]).map_err(failure)?.residual;

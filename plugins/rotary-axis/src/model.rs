@@ -171,7 +171,7 @@ impl LinearModel for RTest {
         };
         let object = points.input.display();
         let model = LinearTerms::new(observations, declared.collect(), terms.collect())
-            .map_err(|error| Error::new("fit the installation to", object.to_string(), error))?;
+            .map_err(|error| Error::caused("fit the installation to", object.to_string(), error))?;
         let highest = self.0.max_order;
         Ok(model.ending_at(format!("harmonic-{highest}"), format!("`separate.max_order` is {highest}")))
     }

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     pipeline::{
         error::{Fault, known_names},
         registry::{Context, StageConfig},
@@ -123,7 +123,9 @@ impl PointSeparator for CircleFit {
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let campaign = Campaign::of(&self.config, points)?;
         let id = &self.config.balls[self.ball].id;
-        let refuse = |problem: String| Error::new("fit", points.input.display().to_string(), problem);
+        let refuse = |problem: String| {
+            Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData)
+        };
         let Some(ball) = campaign.balls.iter().position(|known| known == id) else {
             return Err(refuse(format!("no point is of {id}")));
         };
@@ -245,7 +247,9 @@ impl PointSeparator for ThreePoint {
     /// distinct commands, component errors what is left, without what turns with the table.
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let campaign = Campaign::of(&self.0, points)?;
-        let refuse = |problem: String| Error::new("fit", points.input.display().to_string(), problem);
+        let refuse = |problem: String| {
+            Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData)
+        };
         let [first, second, third] =
             [0, 1, 2].map(|ball| campaign.balls.iter().position(|known| *known == self.0.balls[ball].id));
         let (Some(first), Some(second), Some(third)) = (first, second, third) else {

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     points::{PointColumn, Points},
     stage::{
         NamedValue, Outcome, PointModel, PointPlan, PointSeparator,
@@ -171,7 +171,9 @@ impl RotaryAxis {
         before: &[Vector3<f64>],
         alternatives: &[Vec<Column>],
     ) -> Result<Outcome> {
-        let failure = |problem: String| Error::new("fit", points.input.display().to_string(), problem);
+        let failure = |problem: String| {
+            Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData)
+        };
         let found = fit(&campaign.layout, &campaign.readings, effects).map_err(failure)?;
         let axis = self.0.axis;
         let others: Vec<Fit> =

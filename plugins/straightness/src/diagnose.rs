@@ -1,7 +1,7 @@
 //! The closed loop on traces along an axis.
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     evaluate::straightness::strt_lsli_um,
     model::{
         Effect, Fit, Model, Setting,
@@ -200,7 +200,10 @@ impl AxialReversal {
         }
         let said = said.into_iter().next().unwrap_or_default();
         let mean = mean(&results, farthest_square);
-        let none = || Error::new("diagnose", points.input.display().to_string(), "no fit explains the traces");
+        let none = || {
+            Error::new("diagnose", points.input.display().to_string(), "no fit explains the traces")
+                .of(ErrorKind::Numerical)
+        };
         Ok((mean.ok_or_else(none)?, said))
     }
 

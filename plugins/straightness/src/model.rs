@@ -9,7 +9,7 @@
 use std::sync::Arc;
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     model::{
         Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, linear_terms::basis::Basis,
     },
@@ -118,7 +118,7 @@ impl TracesModel {
         let all = alterations(&self.0.candidates, applied, self.0.traces.len());
         for (alteration, trace) in all.iter().zip(&self.0.traces) {
             if let Some(problem) = alteration.beyond(self.0.max_shift_mm) {
-                return Err(Error::new("fit", format!("trace {}", trace.id), problem));
+                return Err(Error::new("fit", format!("trace {}", trace.id), problem).of(ErrorKind::Numerical));
             }
         }
         Ok(all)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use runout_core::{Error, Result};
+use runout_core::{Error, ErrorKind, Result};
 
 use crate::trace::AxialTrace;
 
@@ -29,9 +29,13 @@ pub fn common_range(file: &Path, all: &[&AxialTrace]) -> Result<[f64; 2]> {
                 latest.id, earliest.id
             );
             Err(Error::new("separate", file.display().to_string(), problem)
+                .of(ErrorKind::InsufficientData)
                 .help("all traces have to share a range of z, in the part's own coordinate"))
         }
-        _ => Err(Error::new("separate", file.display().to_string(), "it holds no traces")),
+        _ => {
+            Err(Error::new("separate", file.display().to_string(), "it holds no traces")
+                .of(ErrorKind::InsufficientData))
+        }
     }
 }
 
@@ -50,6 +54,7 @@ pub fn positions(step_mm: Option<f64>, file: &Path, all: &[&AxialTrace], range: 
             if steps > MOST_POSITIONS {
                 let problem = format!("a step of {step} mm makes {steps:.0} positions of {:.3} mm", last - first);
                 return Err(Error::new("separate", file.display().to_string(), problem)
+                    .of(ErrorKind::InsufficientData)
                     .help("set a larger `step_mm` in [separate]"));
             }
             (0..=steps as usize).map(|index| (first + step * index as f64).min(last)).collect()
@@ -61,6 +66,7 @@ pub fn positions(step_mm: Option<f64>, file: &Path, all: &[&AxialTrace], range: 
             z_mm.len()
         );
         return Err(Error::new("separate", file.display().to_string(), problem)
+            .of(ErrorKind::InsufficientData)
             .help("measure a longer common range, or set a smaller `step_mm` in [separate]"));
     }
     Ok(z_mm)

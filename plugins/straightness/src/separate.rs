@@ -1,7 +1,7 @@
 //! The separator `axial-reversal`.
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     pipeline::{
         error::{Fault, known_names},
         registry::{Context, StageConfig},
@@ -206,7 +206,9 @@ pub(crate) fn finite(points: &Points, result: &Straightness) -> Result<()> {
         return Ok(());
     }
     let problem = "the straightness comes out as no number";
-    Err(Error::new("separate", points.input.display().to_string(), problem).help("look for absurd readings"))
+    Err(Error::new("separate", points.input.display().to_string(), problem)
+        .of(ErrorKind::Numerical)
+        .help("look for absurd readings"))
 }
 
 impl AxialReversal {
@@ -235,7 +237,9 @@ impl AxialReversal {
         let mut grid = grid(&z_mm, None, &traces.setups, &traces.all, cosine);
         if grid.z_mm.len() < 3 {
             let problem = "a setup has no readings at nearly all positions: its traces have gaps there";
-            return Err(Error::new("separate", points.input.display().to_string(), problem));
+            return Err(
+                Error::new("separate", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData)
+            );
         }
         grid.smooth = self.0.slide_cutoff_mm.map(|cutoff| smooth(&grid.z_mm, cutoff));
         let split = grid.split(&rows(&grid, &traces.all));

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     points::{Points, Trace},
 };
 
@@ -39,6 +39,7 @@ impl AxialTrace {
         let [first_row, last_row] = [trace.points.start + 1, trace.points.end];
         let refuse = |problem: String| {
             Error::new("separate", format!("trace {} of {}", trace.id, points.input.display()), problem)
+                .of(ErrorKind::InsufficientData)
         };
         let used: Vec<usize> = match points.column("flag") {
             Ok(flags) => trace.points.clone().filter(|row| flags.get(*row).is_none_or(|flag| *flag < 0.5)).collect(),

@@ -100,7 +100,7 @@ impl TouchProbe {
         };
         let object = points.input.display().to_string();
         let model = LinearTerms::new(observations, declared.collect(), terms.collect())
-            .map_err(|error| Error::new("fit the probe to", object, error))?;
+            .map_err(|error| Error::caused("fit the probe to", object, error))?;
         let last = highest(self.0.max_order);
         let limit = format!("`separate.max_order` is {}", self.0.max_order);
         Ok(model

@@ -1,7 +1,7 @@
 //! The separator `touch-probe`.
 
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     model::diagnosis::LostOrders,
     pipeline::{
         error::Fault,
@@ -233,7 +233,7 @@ impl TouchProbe {
             "a setup needs at least {} directions all around for orders up to {highest}; `max_order` lowers it",
             2 * highest + 1
         );
-        Err(Error::new("fit", points.input.display().to_string(), problem).help(help))
+        Err(Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData).help(help))
     }
 
     /// The result of a fit with more than is declared.

@@ -73,8 +73,8 @@ pub struct FormErrors {
 
 /// The loop on a simulated campaign: the one place that knows how it is called.
 fn run(config: &SpindleConfig, campaign: &Campaign, effects: Option<Vec<String>>) -> Result<Run> {
-    let rig = config.rig.clone().check().map_err(|fault| Error::new("check", "the rig", fault))?;
-    let simulator = simulator(config).map_err(|fault| Error::new("check", "the scenario", fault))?;
+    let rig = config.rig.clone().check().map_err(|fault| Error::caused("check", "the rig", fault))?;
+    let simulator = simulator(config).map_err(|fault| Error::caused("check", "the scenario", fault))?;
     let recording = &config.recording;
     let size = [recording.samples_per_rev, recording.revolutions];
     let (station, truth) = campaign::station_holding_out(&simulator, &rig, 0, size, Some(HOLD_OUT))?;

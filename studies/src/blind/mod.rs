@@ -78,7 +78,7 @@ fn each<T: Send>(count: u64, seed: u64, judge: impl Fn(u64) -> Result<T> + Sync)
                 }
                 let one = judge(index).map_err(|error| {
                     next.store(count, Ordering::Relaxed);
-                    Error::new("diagnose", format!("campaign {index} of seed {seed}"), error)
+                    Error::caused("diagnose", format!("campaign {index} of seed {seed}"), error)
                 })?;
                 judged.lock().map_err(|_| stopped())?.push((index, one));
             }

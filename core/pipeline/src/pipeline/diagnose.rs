@@ -26,7 +26,7 @@ use runout_closed_loop::{
     Effect, Setting, closed_loop,
     diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
 };
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 use runout_turning::separation::Quantity;
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form. These do not
@@ -38,6 +38,7 @@ pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &d
     let source = pipeline.loader.open(&pipeline.request())?;
     let no_model = |separator: &str| {
         Error::new("diagnose", &pipeline.title, format!("`{separator}` has no model of effects for the closed loop"))
+            .of(ErrorKind::Configuration)
     };
     match (&source, &pipeline.route) {
         (Source::Points(points), Route::Points { separator, .. }) => {
@@ -154,7 +155,7 @@ fn diagnose_points(
     let effects = model.effects_of(points)?;
     let settings = if model.points_name_targets() {
         let settings = pipeline.diagnose.settings_for(&effects);
-        settings.map_err(|fault| Error::new("diagnose", &pipeline.title, fault))?
+        settings.map_err(|fault| Error::caused("diagnose", &pipeline.title, fault))?
     } else {
         pipeline.diagnose.settings.clone()
     };
@@ -218,7 +219,7 @@ fn commit(exports: Finished, path: Option<PathBuf>, mut diagnosis: Diagnosis) ->
 /// `diagnosis.json`, written and waiting for its name.
 fn pending(path: PathBuf, diagnosis: &Diagnosis) -> Result<PendingFile> {
     let file = PendingFile::new(path)?;
-    let text = serde_json::to_vec_pretty(diagnosis).map_err(|error| file.failure(error))?;
-    std::fs::write(file.path(), text).map_err(|error| file.failure(error))?;
+    let text = serde_json::to_vec_pretty(diagnosis).map_err(|error| file.caused(error))?;
+    std::fs::write(file.path(), text).map_err(|error| file.caused(error))?;
     Ok(file)
 }

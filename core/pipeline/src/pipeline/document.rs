@@ -15,7 +15,7 @@ use super::{
     error::{Diagnostic, Fault, Place, Step, known_names},
     pinpoint::pinpoint,
 };
-use runout_error::Error;
+use runout_error::{Error, ErrorKind};
 
 /// A table whose every key and value knows its place.
 pub type Table<'a> = Spanned<DeTable<'a>>;
@@ -271,9 +271,10 @@ fn assign<'a>(table: &mut DeTable<'a>, steps: &[&str], value: Spanned<DeValue<'a
 
 fn read_text(path: &Path) -> Result<String, Error> {
     let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|error| Error::new("read", &shown, error))?;
+    let bytes = std::fs::read(path).map_err(|error| Error::caused("read", &shown, error))?;
     String::from_utf8(bytes).map_err(|error| {
         Error::new("read", &shown, format!("expected UTF-8, found {}", error.utf8_error()))
+            .of(ErrorKind::DamagedData)
             .help("save the file as UTF-8")
     })
 }

@@ -12,7 +12,8 @@ use runout_error::{Error, Result};
 /// When it cannot be removed.
 pub(super) fn remove(pipeline: &Pipeline) -> Result<()> {
     for path in pipeline.outdated_diagnoses().filter(|path| is_diagnosis(path)) {
-        fs::remove_file(&path).map_err(|error| Error::new("remove the outdated", path.display().to_string(), error))?;
+        fs::remove_file(&path)
+            .map_err(|error| Error::caused("remove the outdated", path.display().to_string(), error))?;
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ use std::{
     thread,
 };
 
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 use runout_turning::measurement::{Block, Capture, SampleStream};
 
 /// Batches that were read and wait: what a station's captures take while the one before is separated.
@@ -141,7 +141,8 @@ impl<K: Copy + Send> Captures<K> for Ahead<K> {
 
     fn open(&mut self) -> Result<Box<dyn SampleStream + '_>> {
         self.coming();
-        let none = || Err(Error::new("read", "the recording", "the thread that reads it stopped"));
+        let none =
+            || Err(Error::new("read", "the recording", "the thread that reads it stopped").of(ErrorKind::Interrupted));
         let capture = self.begun.take().map_or_else(none, |(_, capture)| capture)?;
         Ok(Box::new(Reading { capture, ahead: self, blocks: VecDeque::new(), ended: false }))
     }
@@ -195,7 +196,9 @@ pub(super) fn write_behind<T: Send, R>(
     work: impl FnOnce(&(dyn Fn(T) -> Result<()> + Sync)) -> Result<R>,
 ) -> Result<R> {
     let (sender, results) = sync_channel(BEHIND);
-    let stopped = |operation| Error::new(operation, "the results", "the thread that writes them stopped");
+    let stopped = |operation| {
+        Error::new(operation, "the results", "the thread that writes them stopped").of(ErrorKind::Interrupted)
+    };
     thread::scope(|scope| {
         let writer = scope.spawn(move || results.into_iter().try_for_each(&mut take));
         let outcome = work(&|result| sender.send(result).map_err(|_| stopped("hand on")));

@@ -14,7 +14,7 @@ use super::{
     run::Observer,
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 use runout_turning::{
     calibrated::calibrated,
     inspection::{Inspection, Spike},
@@ -107,7 +107,9 @@ impl RecordReader<'_> {
         if let Some(checksum) = along {
             return Ok(vec![checksum.finish()?]);
         }
-        inputs.unwrap_or_else(|_| Err(Error::new("checksum", "the inputs", "the thread that read them stopped")))
+        inputs.unwrap_or_else(|_| {
+            Err(Error::new("checksum", "the inputs", "the thread that read them stopped").of(ErrorKind::Interrupted))
+        })
     }
 
     /// A capture as it is read and conditioned; every sample is looked at before anything else touches it.
@@ -202,6 +204,7 @@ pub fn separate(separator: &dyn StationSeparator, station: &Station, radius_mm: 
     };
     problem.map_or(Ok(separation), |problem| {
         Err(Error::new("separate", format!("station {}", station.name), problem)
+            .of(ErrorKind::Numerical)
             .help("look for absurd readings, and check the rig's radius and positions"))
     })
 }

@@ -249,8 +249,8 @@ impl Finished {
         self.summary.outputs = self.outputs();
         if let Some(path) = self.summary_path {
             let file = PendingFile::new(path)?;
-            let text = serde_json::to_vec_pretty(&self.summary).map_err(|error| file.failure(error))?;
-            std::fs::write(file.path(), text).map_err(|error| file.failure(error))?;
+            let text = serde_json::to_vec_pretty(&self.summary).map_err(|error| file.caused(error))?;
+            std::fs::write(file.path(), text).map_err(|error| file.caused(error))?;
             self.complete.push(file);
         }
         commit_all(self.complete)?;

@@ -26,7 +26,7 @@ use crate::{
     atomic_file::resolved,
     stage::{Averager, Conditioner, Source, Station, StationSeparator},
 };
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 use runout_standards::Value;
 use runout_turning::{
     error_motion::{Centre, ErrorMotion},
@@ -76,7 +76,9 @@ fn run_turns(
     observer: &dyn Observer,
 ) -> Result<Summary> {
     spare_inputs(&pipeline.outputs(), &recording.inputs())?;
-    let rig = pipeline.rig.as_ref().ok_or_else(|| Error::new("run", &pipeline.title, "recorded turns need a [rig]"))?;
+    let rig = pipeline.rig.as_ref().ok_or_else(|| {
+        Error::new("run", &pipeline.title, "recorded turns need a [rig]").of(ErrorKind::Configuration)
+    })?;
     let mut writer = ResultWriter::begin(pipeline, &pipeline.exporters, recording.stations())?;
     let line = RecordReader {
         rig,
@@ -145,7 +147,9 @@ pub(super) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<()
     for output in outputs {
         if read.contains(&resolved(output)) {
             let problem = "it is what the run reads";
-            return Err(Error::new("write", output.display().to_string(), problem).help("export to another path"));
+            return Err(Error::new("write", output.display().to_string(), problem)
+                .of(ErrorKind::Configuration)
+                .help("export to another path"));
         }
     }
     Ok(())

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 
 use super::HeightMap;
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::lanes::product;
 
 /// Highest degree of a polynomial form.
@@ -49,7 +49,7 @@ pub fn without_taper(map: &HeightMap) -> Result<HeightMap<'static>> {
 /// # Errors
 /// Above degree 8, and of a map that is not closed.
 pub fn without_turned_body(map: &HeightMap, degree: usize) -> Result<HeightMap<'static>> {
-    let failure = |problem: String| Err(Error::new("remove", "the form", problem));
+    let failure = |problem: String| Err(Error::new("remove", "the form", problem).of(ErrorKind::Configuration));
     if degree > HIGHEST_DEGREE {
         return failure(format!("its degree is {degree}; {HIGHEST_DEGREE} is the highest"));
     }
@@ -66,7 +66,7 @@ pub fn without_turned_body(map: &HeightMap, degree: usize) -> Result<HeightMap<'
 /// # Errors
 /// Above degree 8, and for degrees above 0 of a map that is closed: a polynomial has a step where it closes.
 pub fn without_polynomial(map: &HeightMap, degree: usize) -> Result<HeightMap<'static>> {
-    let failure = |problem: String| Err(Error::new("remove", "the polynomial", problem));
+    let failure = |problem: String| Err(Error::new("remove", "the polynomial", problem).of(ErrorKind::Configuration));
     if degree > HIGHEST_DEGREE {
         return failure(format!("its degree is {degree}; {HIGHEST_DEGREE} is the highest"));
     }

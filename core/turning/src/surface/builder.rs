@@ -8,7 +8,7 @@ use crate::{
     separation::{Quantity, SectionAt, Separation},
     station::StationResult,
 };
-use runout_error::{Error, Result};
+use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
@@ -147,10 +147,11 @@ impl SurfaceBuilder {
             rest = later;
         }
         let (start, end) = match rings.z_mm.as_slice() {
-            [] => return Err(failure("no section was measured".into())),
+            [] => return Err(failure("no section was measured".into()).of(ErrorKind::InsufficientData)),
             [only] => {
                 let problem = format!("all sections lie at one z ({only} mm); a surface needs two or more");
-                return Err(failure(problem).help("measure at another station, or export no mesh"));
+                let help = "measure at another station, or export no mesh";
+                return Err(failure(problem).of(ErrorKind::InsufficientData).help(help));
             }
             [start, .., end] => (*start, *end),
         };
@@ -159,7 +160,7 @@ impl SurfaceBuilder {
             let points = ((end - start) / step + 2.0) * angles as f64;
             if points > MOST_POINTS {
                 let problem = format!("rings every {step} mm over {} mm are more than can be held", end - start);
-                return Err(failure(problem).help("enlarge step_mm or take fewer angles"));
+                return Err(failure(problem).of(ErrorKind::Configuration).help("enlarge step_mm or take fewer angles"));
             }
         }
         let Rings { z_mm, deviation_um, .. } = rings.laid(self.config.step_mm);

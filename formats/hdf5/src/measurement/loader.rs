@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hdf5_metno::{File, LocationType, dataset::Layout};
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     checksum::Checksum,
     marker::Marker,
     measurement::{Recording, SampleStream, StationKey, StationTruth},
@@ -70,6 +70,7 @@ impl Loader for Hdf5Loader {
     fn open(&self, wanted: &Request) -> Result<Source> {
         let rig = wanted.rig.ok_or_else(|| {
             Error::new("open", self.path.display().to_string(), "recorded turns need a [rig] to tell the sensors")
+                .of(ErrorKind::Configuration)
         })?;
         Ok(Source::Turns(Box::new(Hdf5Recording::open(&self.path, rig, self.marker.clone())?)))
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hdf5_metno::{Dataset, File, Group, H5Type};
 use ndarray::{ArrayView1, ArrayView2, s};
 use runout_core::{
-    Error, Result,
+    Error, ErrorKind, Result,
     atomic_file::PendingFile,
     measurement::{Block, Capture, Recording, SampleStream},
     provenance,
@@ -59,12 +59,13 @@ pub fn write_measurement(
     on_capture: &mut dyn FnMut(&str),
 ) -> Result<PathBuf> {
     if options.deflate.is_some_and(|level| level > 9) {
-        return Err(Error::new("write", path.display().to_string(), "expected a deflate level from 0 to 9"));
+        return Err(Error::new("write", path.display().to_string(), "expected a deflate level from 0 to 9")
+            .of(ErrorKind::Configuration));
     }
     let pending = PendingFile::new(path)?;
     pending.room_for(largest(recording, rig, options)?)?;
     {
-        let failure = |error: hdf5_metno::Error| pending.failure(error);
+        let failure = |error: hdf5_metno::Error| pending.caused(error);
         let file = File::with_options()
             // From this version on HDF5 protects its own structures by checksums.
             .with_fapl(|access| access.libver_v110())

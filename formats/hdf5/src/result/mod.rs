@@ -95,7 +95,7 @@ impl<const N: usize> ResultExport<N> {
             let tables = always.map(|table| TableGroup::create(&file, table)).collect::<hdf5_metno::Result<_>>()?;
             Ok((tables, file))
         };
-        let (tables, file) = begin().map_err(|error| pending.failure(error))?;
+        let (tables, file) = begin().map_err(|error| pending.caused(error))?;
         Ok(Self { tables, file, pending })
     }
 }
@@ -150,11 +150,11 @@ impl<const N: usize> Export for ResultExport<N> {
             };
             known.append(rows)
         };
-        append().map_err(|error| self.pending.failure(error))
+        append().map_err(|error| self.pending.caused(error))
     }
 
     fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
-        complete(&self.file, result).map_err(|error| self.pending.failure(error))?;
+        complete(&self.file, result).map_err(|error| self.pending.caused(error))?;
         let Self { tables, file, pending } = *self;
         drop((tables, file));
         Ok(vec![pending])

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Error, ErrorKind, Result,
     model::{Effect, Setting},
     profile::{self, Profile, Split},
     stage::Station,
@@ -69,6 +69,7 @@ pub fn altered(
     for setting in applied {
         let place = places.get(setting.effect).ok_or_else(|| {
             Error::new("apply", format!("effect {}", setting.effect), "there is no such effect in this rig")
+                .of(ErrorKind::Configuration)
         })?;
         kinds[place.kind].alter(place.index, &setting.values, &mut alterations);
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Error, ErrorKind, Result,
     model::{
         Bias, Fit, Outcome, Remainder, Setting,
         diagnosis::Unexplained,
@@ -57,7 +57,7 @@ impl SpindleFit {
     pub(super) fn new(shared: Arc<Shared>, applied: &[Setting]) -> Result<Self> {
         let alterations = data::altered(&shared.layout, &shared.kinds, &shared.places, applied)?;
         if !alterations.are_possible() {
-            return Err(Error::new("apply", "effects", "their values are beyond all bounds"));
+            return Err(Error::new("apply", "effects", "their values are beyond all bounds").of(ErrorKind::Numerical));
         }
         let layout = shared.layout.altered(&alterations);
         let stations: Vec<Solved> =

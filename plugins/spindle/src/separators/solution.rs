@@ -1,7 +1,7 @@
 //! From operators to a separation: solve, add second-order geometry, propagate covariance, look at the residual.
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Error, ErrorKind, Result,
     profile::{NEIGHBOURS, Profile},
     separation::{Quantity, Residual, SectionAt, Sensitivity, Separation},
     stage::Station,
@@ -133,7 +133,7 @@ impl Solver<'_> {
             let problem = format!("{ratio}: sensors' lines do not meet the part, and the result is no number");
             (problem, "check part_radius_mm and the unit of the readings")
         };
-        Error::new("separate", format!("station {}", station.name), problem).help(help)
+        Error::new("separate", format!("station {}", station.name), problem).of(ErrorKind::Numerical).help(help)
     }
 
     /// What a large eccentricity carries into orders that are told, of what is not: a surface that goes sideways by e turns

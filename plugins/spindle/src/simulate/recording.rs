@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Error, ErrorKind, Result,
     measurement::{Block, Capture, Recording, SampleStream, StationKey, StationTruth},
 };
 
@@ -67,6 +67,7 @@ impl Recording for SpindleRecording<'_> {
 
 fn missing(noun: &str, index: usize) -> Error {
     Error::new("simulate", format!("{noun} {index}"), "the scenario has none of this number")
+        .of(ErrorKind::Configuration)
 }
 
 /// One station in one setup.

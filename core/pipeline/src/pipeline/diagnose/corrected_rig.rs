@@ -42,7 +42,7 @@ pub(super) fn pending(path: PathBuf, pipeline: &Pipeline, changes: &[Change]) ->
         ConfigError::Text(diagnostic) => refuse(diagnostic.to_string()),
     })?;
     let file = PendingFile::new(path)?;
-    std::fs::write(file.path(), head(&pipeline.title, changes) + &text).map_err(|error| file.failure(error))?;
+    std::fs::write(file.path(), head(&pipeline.title, changes) + &text).map_err(|error| file.caused(error))?;
     Ok(file)
 }
 
