@@ -7,9 +7,10 @@ use super::{
     confounded::{choices, nearest},
     diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Estimated, Level, Moved, Refused, Step, Verdict},
     evidence::{Evidence, agreement},
-    fit::{Refit, dot, norm, refit},
+    fit::{INDEPENDENT, Refit, refit},
 };
 use runout_error::Result;
+use runout_numerics::least_squares::{dot, norm, orthonormal};
 
 /// Chance of noise doing as much, corrected for the number of candidates, below which an effect is believed.
 const P_LIMIT: f64 = 1e-3;
@@ -305,7 +306,7 @@ impl<M: Model> Tracing<'_, M> {
         let fixed = self.settings.known.len();
         let active: Vec<Vec<f64>> =
             current.settings[fixed..].iter().flat_map(|setting| current.fit.signature(setting.effect)).collect();
-        let basis = orthonormal(active, &[]);
+        let basis = orthonormal(active, &[], INDEPENDENT);
         let starts: BTreeMap<usize, Vec<f64>> = candidates
             .iter()
             .filter_map(|effect| Some((*effect, self.model.start(*effect, &current.settings)?)))
@@ -618,29 +619,7 @@ fn independent(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
     if columns.iter().map(outside).sum::<f64>() < DIFFERENT * DIFFERENT * whole {
         return Vec::new();
     }
-    orthonormal(columns, basis)
-}
-
-/// Columns made orthonormal to a basis and to each other; dependent ones are left out.
-pub(super) fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let mut made: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
-    for mut column in columns {
-        let whole = norm(&column);
-        for _ in 0..2 {
-            for other in basis.iter().chain(&made) {
-                let share = dot(other, &column);
-                column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= share * other);
-            }
-        }
-        let left = norm(&column);
-        if left > 1e-9 * whole {
-            for entry in &mut column {
-                *entry /= left;
-            }
-            made.push(column);
-        }
-    }
-    made
+    orthonormal(columns, basis, INDEPENDENT)
 }
 
 fn known(value: f64) -> Option<f64> {

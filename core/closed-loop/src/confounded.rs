@@ -3,7 +3,7 @@
 //! The parameter values that fit the data equally well form a curved manifold. Each hypothesis "this member is all of it" is
 //! a point on it, found by a full non-linear refit. The truth is taken to be one of these points, or a mixture of them.
 
-use super::fit::dot;
+use runout_numerics::least_squares::dot;
 
 /// Most combinations of members that are refitted; beyond it, the sets are varied one at a time.
 const MOST_CHOICES: usize = 16;

@@ -1,6 +1,6 @@
 //! Evidence for an effect: how much it explains, and how likely noise alone would do as much.
 
-use super::fit::dot;
+use runout_numerics::{least_squares::dot, statistics::f_tail};
 
 /// How a model with more parameters compares with one with fewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,78 +112,9 @@ const FEWEST_GROUPS: usize = 3;
 /// Stretches that tell how far they differ, at least.
 const FEWEST_STRETCHES: usize = 4;
 
-/// Chance that an F-distributed number with these degrees of freedom is above `f`: the regularised incomplete beta
-/// function I_x(b/2, a/2) at x = b/(b + a f) (DLMF 8.17).
-#[must_use]
-pub fn f_tail(f: f64, a: f64, b: f64) -> f64 {
-    if !(f > 0.0 && b > 0.0) {
-        return 1.0;
-    }
-    incomplete_beta(0.5 * b, 0.5 * a, b / (b + a * f))
-}
-
-/// I_x(a, b) by its continued fraction (DLMF 8.17.22), from the side on which it converges fast.
-fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
-    if x <= 0.0 {
-        return 0.0;
-    }
-    if x >= 1.0 {
-        return 1.0;
-    }
-    if x > (a + 1.0) / (a + b + 2.0) {
-        return 1.0 - incomplete_beta(b, a, 1.0 - x);
-    }
-    let front = (ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b) + a * x.ln() + b * (-x).ln_1p()).exp() / a;
-    let keep = |value: f64| if value.abs() < 1e-300 { 1e-300 } else { value };
-    let (mut c, mut d) = (1.0, 1.0 / keep(1.0 - (a + b) * x / (a + 1.0)));
-    let mut fraction = d;
-    for step in 1..10_000 {
-        let m = f64::from(step);
-        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
-        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
-        let mut change = 1.0;
-        for term in [even, odd] {
-            d = 1.0 / keep(1.0 + term * d);
-            c = keep(1.0 + term / c);
-            change = c * d;
-            fraction *= change;
-        }
-        if (change - 1.0).abs() < 1e-14 {
-            break;
-        }
-    }
-    front * fraction
-}
-
-/// ln Γ by Stirling's series (DLMF 5.11.1) after moving the argument above 10, where it holds to 1e-14.
-fn ln_gamma(mut x: f64) -> f64 {
-    let mut product = 1.0;
-    while x < 10.0 {
-        product *= x;
-        x += 1.0;
-    }
-    let square = 1.0 / (x * x);
-    let series = (1.0 / 12.0 - square * (1.0 / 360.0 - square * (1.0 / 1260.0 - square / 1680.0))) / x;
-    (x - 0.5) * x.ln() - x + 0.5 * std::f64::consts::TAU.ln() + series - product.ln()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Tables of the F distribution, and closed forms: with 2 degrees above, (1 + 2f/b)^(−b/2).
-    #[test]
-    fn tails_of_the_f_distribution() {
-        for (f, a, b, tail) in [(161.448, 1.0, 1.0, 0.05), (4.9646, 1.0, 10.0, 0.05), (2.7109, 5.0, 20.0, 0.05)] {
-            // The tables give five digits.
-            assert!((f_tail(f, a, b) - tail).abs() < 2e-5, "{f}: {}", f_tail(f, a, b));
-        }
-        for (f, b) in [(3.0, 7.0), (30.0, 600.0), (12.0, 6000.0)] {
-            let closed = (1.0_f64 + 2.0 * f / b).powf(-0.5 * b);
-            assert!((f_tail(f, 2.0, b) / closed - 1.0).abs() < 1e-9, "{f}, {b}");
-        }
-        assert!((f_tail(0.0, 2.0, 5.0) - 1.0).abs() < 1e-15);
-    }
 
     /// Two effects of the same size in sum: one is in every stretch, one in a single stretch only.
     #[test]

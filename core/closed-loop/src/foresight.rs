@@ -5,11 +5,12 @@ use serde::Serialize;
 
 use super::{
     Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
-    closed_loop::{VISIBLE, blind, orthonormal},
+    closed_loop::{VISIBLE, blind},
     diagnosis::{BiasPerUnit, Blind},
-    fit::{dot, norm},
+    fit::INDEPENDENT,
 };
 use runout_error::Result;
+use runout_numerics::least_squares::{dot, norm, orthonormal};
 
 /// What a measurement could show of each effect.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
@@ -191,7 +192,7 @@ impl Columns {
                 *entry *= parameter.tolerance;
             }
         }
-        Self { name: effect.name(), basis: orthonormal(signature.clone(), &[]), sized: signature }
+        Self { name: effect.name(), basis: orthonormal(signature.clone(), &[], INDEPENDENT), sized: signature }
     }
 
     /// Whether nothing of it would show once the other is fitted.

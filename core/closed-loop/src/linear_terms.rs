@@ -1,20 +1,20 @@
 //! A model whose declared part and effects are all linear: measured points and terms.
 
-pub mod basis;
 #[cfg(test)]
 mod tests;
 
 use std::{ops::Range, sync::Arc};
 
-use self::basis::Basis;
 use super::{
     Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
     diagnosis::Unexplained,
     evidence::{Group, far_worse},
-    fit::dot,
 };
 use runout_error::{Error, ErrorKind, Result};
-use runout_numerics::farthest;
+use runout_numerics::{
+    farthest,
+    least_squares::{Basis, dot},
+};
 
 /// What was measured.
 #[derive(Debug, Clone, Default)]

@@ -9,6 +9,7 @@ pub mod interpolation;
 pub mod lanes;
 pub mod least_squares;
 pub mod side_by_side;
+pub mod statistics;
 
 pub use num_complex::Complex64;
 

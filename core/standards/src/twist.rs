@@ -14,6 +14,7 @@ use super::areal::HeightMap;
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
+    statistics::upper_median,
 };
 
 /// Most threads that are looked for.
@@ -217,11 +218,7 @@ impl Lines {
                 }
             }
         }
-        let middle = powers.len() / 2;
-        if powers.is_empty() {
-            return None;
-        }
-        let median = *powers.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let median = upper_median(&mut powers)?;
         (best.0 > SIGNIFICANT * SIGNIFICANT * median && best.0 > self.rounding_um.powi(2)).then_some((best.1, best.2))
     }
 

@@ -5,7 +5,10 @@
 //! periods: a creep is certain only where captures agree on it better than captures that wander would, or where next to
 //! nothing else is in the levels.
 
-use runout_closed_loop::evidence::f_tail;
+use runout_numerics::{
+    least_squares::dot,
+    statistics::{f_tail, student_95},
+};
 
 /// Fewest turns of a capture.
 const FEWEST: usize = 8;
@@ -24,8 +27,6 @@ const TRIED: usize = 61;
 const LONGEST: f64 = 10.0;
 /// A time constant is determined where it is this many times its standard uncertainty.
 const DETERMINED: f64 = 3.0;
-/// Two-sided 95 % quantiles of Student's distribution for 1, 2, 3, … degrees of freedom.
-const STUDENT_95: [f64; 8] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31];
 
 /// Levels that are looked at in a capture: of more turns, means over several are.
 const MOST_LEVELS: usize = 128;
@@ -412,7 +413,7 @@ impl Partials {
                 *sum += each.iter().map(|one| (one[which] - mean).powi(2)).sum::<f64>();
             }
         }
-        let wider = STUDENT_95.get(freedom(captures, all) - 1).map_or(1.0, |quantile| 0.5 * quantile);
+        let wider = (0.5 * student_95(freedom(captures, all) as f64)).max(1.0);
         let count = (captures * (captures - 1) * all.len()) as f64;
         Some(squares.map(|sum| wider * (sum / count).sqrt()))
     }
@@ -434,10 +435,6 @@ fn about_mean(mut values: Vec<f64>) -> Vec<f64> {
         *value -= mean;
     }
     values
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

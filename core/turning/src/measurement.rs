@@ -4,6 +4,7 @@ use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use crate::checksum::Checksum;
 use runout_error::Result;
+use runout_numerics::statistics::upper_median;
 
 /// A recording of all stations in all setups.
 pub trait Recording: Send + Sync {
@@ -103,11 +104,7 @@ impl Capture {
     #[must_use]
     pub fn median_turn_samples(&self) -> Option<f64> {
         let mut lengths: Vec<f64> = self.marks.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        if lengths.is_empty() {
-            return None;
-        }
-        let middle = lengths.len() / 2;
-        Some(*lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
+        upper_median(&mut lengths)
     }
 
     /// Number of the turn that begins at the first mark still there, counted from 0 before anything was trimmed.

@@ -3,10 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
-use runout_core::Complex64;
+use runout_core::{
+    Complex64,
+    numerics::least_squares::{Leading, Solution},
+};
 
 use crate::{
-    least_squares::{Factored, Solution},
     robust::{Fence, correlation_factor, rms},
     scan::Scan,
 };
@@ -65,7 +67,7 @@ impl Harmonics {
             }
         });
         let right = DVector::from_column_slice(&scan.deviation_um);
-        let factored = Factored::new(matrix.clone(), right.clone());
+        let factored = Leading::new(matrix.clone(), right.clone());
         let (order, found) = carried(&factored, points, slopes, highest).ok_or_else(|| {
             let [from, to] = widest_gap_deg(&scan.angle_rad);
             format!(
@@ -119,7 +121,7 @@ impl Harmonics {
 
 /// The highest order up to `highest` whose model has no harmonic of more than [`WORST_NOISE_GAIN`], and its solution. More
 /// orders never lower a variance, so that halving finds it.
-fn carried(factored: &Factored, points: usize, slopes: usize, highest: usize) -> Option<(usize, Solution)> {
+fn carried(factored: &Leading, points: usize, slopes: usize, highest: usize) -> Option<(usize, Solution)> {
     let solve = |order: usize| {
         let found = factored.leading(slopes + 2 * order + 1)?;
         let worst = found.unit_variance[slopes..].iter().fold(0.0_f64, |worst, variance| worst.max(*variance));

@@ -4,7 +4,6 @@
 //! as a part measured on a spindle. Traces that are not used test the surface: it has to predict them.
 
 mod circle;
-mod least_squares;
 mod model;
 mod predict;
 mod robust;

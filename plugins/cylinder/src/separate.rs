@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
+    numerics::statistics::median,
     pipeline::{
         error::{Fault, known_names, within},
         registry::{Context, StageConfig},
@@ -25,7 +26,7 @@ use serde::Deserialize;
 use crate::{
     circle::{Cleaned, Harmonics, empty_stretches},
     predict::Prediction,
-    robust::{median, rms},
+    robust::rms,
     scan::{Helix, Scan, Turn},
     shape::Cylinder,
 };

@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::{least_squares, scan::Scan};
+use runout_core::numerics::least_squares;
+
+use crate::scan::Scan;
 
 /// A cylinder near the nominal one, whose axis is z. A measured point of angle α, height z and deviation d is the point at
 /// (R + d)·(cos α, sin α) and z, where R is the nominal radius.

@@ -13,6 +13,7 @@ use runout_core::{
         diagnosis::{BiasPerUnit, Blind, Diagnosis, Moved},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
+    numerics::least_squares::dot,
     points::Points,
     stage::{NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator},
 };
@@ -125,10 +126,6 @@ impl Run {
             best.map_or(self.constants[coordinate], |index| grid[index])
         })
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn remove(basis: &[Vec<f64>], from: &mut [f64]) {

@@ -1,6 +1,7 @@
 //! Noise of one reading from repeats: their scatter after a common smooth drift.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
+use runout_core::numerics::least_squares::least_norm;
 
 use crate::solve::Reading;
 
@@ -21,6 +22,8 @@ pub enum Noise {
 const FEWEST: usize = 3;
 /// Highest power of time in the drift.
 const HIGHEST_POWER: usize = 6;
+/// Functions of the drift that add less than this to the others, relative, are not fitted.
+const DETERMINED: f64 = 1e-9;
 /// Degrees of freedom a function of the drift.
 const FREEDOM_A_FUNCTION: usize = 12;
 
@@ -55,8 +58,8 @@ fn scatter<K: PartialEq>(
     let free = rows - groups.len();
     let powers = HIGHEST_POWER.min(free / FREEDOM_A_FUNCTION);
     let others = usize::from(lost_motion.is_some());
-    let mut columns = DMatrix::zeros(3 * rows, 3 * powers + others);
-    let mut values = DVector::zeros(3 * rows);
+    let mut columns = vec![vec![0.0; 3 * rows]; 3 * powers + others];
+    let mut values = vec![0.0; 3 * rows];
     let mut row = 0;
     for (_, members) in &groups {
         let mean = |of: &dyn Fn(usize) -> Vector3<f64>| {
@@ -72,34 +75,20 @@ fn scatter<K: PartialEq>(
             for coordinate in 0..3 {
                 values[row] = reading(*member)[coordinate] - level[coordinate];
                 for (power, entry) in drift.iter().enumerate() {
-                    columns[(row, 3 * power + coordinate)] = *entry;
+                    columns[3 * power + coordinate][row] = *entry;
                 }
                 if others > 0 {
-                    columns[(row, 3 * powers)] = lost(*member)[coordinate] - lost_level[coordinate];
+                    columns[3 * powers][row] = lost(*member)[coordinate] - lost_level[coordinate];
                 }
                 row += 1;
             }
         }
     }
-    let mut rank = 0;
-    if columns.ncols() > 0 && rows > 0 {
-        for mut column in columns.column_iter_mut() {
-            let size = column.norm();
-            if size > 0.0 {
-                column /= size;
-            }
-        }
-        let svd = columns.svd(true, false);
-        let kept: Vec<usize> =
-            (0..svd.singular_values.len()).filter(|index| svd.singular_values[*index] > 1e-9).collect();
-        rank = kept.len();
-        if let Some(u) = svd.u {
-            let basis = u.select_columns(&kept);
-            values -= &basis * basis.tr_mul(&values);
-        }
-    }
+    let fitted = least_norm(&columns, &values, DETERMINED);
+    let rank = values.len() - fitted.dof;
     let dof = (3 * free).saturating_sub(rank);
-    let std_um = 1e3 * (values.norm_squared() / dof.max(1) as f64).sqrt();
+    let squares: f64 = fitted.residual.iter().map(|value| value * value).sum();
+    let std_um = 1e3 * (squares / dof.max(1) as f64).sqrt();
     (dof >= FEWEST && std_um > 0.0).then_some(Noise::Repeats { std_um, dof })
 }
 

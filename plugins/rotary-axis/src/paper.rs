@@ -4,9 +4,10 @@
 //! `rotary-axis-circle-fit`: a circle through the track of one ball gives the offsets, a plane through its height the tilts.
 //! `rotary-axis-three-point`: at each command the six readings P1 x, y, z, P2 x, y and P3 x give six errors.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use runout_core::{
     Error, ErrorKind, Result,
+    numerics::least_squares::least_norm,
     pipeline::{
         error::{Fault, known_names},
         registry::{Context, StageConfig},
@@ -174,27 +175,21 @@ impl PointSeparator for CircleFit {
 
 /// Rows a·x = b of weight 1: x, its covariance, and the sum of squares left.
 fn least_squares(rows: impl Iterator<Item = (Vector3<f64>, f64)> + Clone) -> Option<(Vector3<f64>, Matrix3<f64>, f64)> {
-    let rows: Vec<(Vector3<f64>, f64)> = rows.collect();
-    let matrix = DMatrix::from_fn(rows.len(), 3, |row, column| rows[row].0[column]);
-    let right = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.1));
-    if rows.len() < 3 {
+    let (mut columns, mut right) = (vec![Vec::new(); 3], Vec::new());
+    for (row, value) in rows {
+        columns.iter_mut().zip(&row).for_each(|(column, entry)| column.push(*entry));
+        right.push(value);
+    }
+    if right.len() < 3 {
         return None;
     }
-    let size = Vector3::from_fn(|column, _| matrix.column(column).norm());
-    if size.iter().any(|size| *size <= 0.0) {
+    let found = least_norm(&columns, &right, SINGULAR);
+    if found.lost.contains(&true) {
         return None;
     }
-    let scaled = DMatrix::from_fn(rows.len(), 3, |row, column| matrix[(row, column)] / size[column]);
-    let svd = scaled.svd(true, true);
-    if svd.singular_values.min() < SINGULAR * svd.singular_values.max() {
-        return None;
-    }
-    let inverse = svd.pseudo_inverse(0.0).ok()?;
-    let found = &inverse * &right;
-    let solution = Vector3::from_fn(|index, _| found[index] / size[index]);
-    let spread = &inverse * inverse.transpose();
-    let covariance = Matrix3::from_fn(|row, column| spread[(row, column)] / (size[row] * size[column]));
-    let left = (&matrix * solution - right).norm_squared();
+    let solution = Vector3::from_column_slice(&found.coefficients);
+    let covariance = Matrix3::from_fn(|row, column| found.covariance[(row, column)]);
+    let left = found.residual.iter().map(|value| value * value).sum();
     Some((solution, covariance, left))
 }
 

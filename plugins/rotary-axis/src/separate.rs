@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
+    numerics::statistics::upper_median,
     points::{PointColumn, Points},
     stage::{
         NamedValue, Outcome, PointModel, PointPlan, PointSeparator,
@@ -464,8 +465,7 @@ fn left_out(campaign: &Campaign, effects: &[Column], whole: &Fit) -> Vec<Option<
         effects.iter().zip(&values).fold(readings[row].value, |sum, (column, value)| sum - column[row] * *value)
     };
     let mut widths = steps(commands_deg);
-    widths.sort_by(f64::total_cmp);
-    let widest = WIDEST_STEPS * widths[widths.len() / 2];
+    let widest = WIDEST_STEPS * upper_median(&mut widths).unwrap_or(0.0);
     let folds = commands.min(MOST_LEFT_OUT);
     for fold in 0..folds {
         let kept: Vec<usize> = (0..commands).filter(|command| command % folds != fold).collect();

@@ -10,9 +10,8 @@ use std::sync::Arc;
 
 use runout_core::{
     Error, ErrorKind, Result,
-    model::{
-        Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, linear_terms::basis::Basis,
-    },
+    model::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained},
+    numerics::least_squares::{Basis, norm},
 };
 
 use crate::{
@@ -572,8 +571,4 @@ impl Fit for TracesFit {
             None
         }
     }
-}
-
-fn norm(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum::<f64>().sqrt()
 }

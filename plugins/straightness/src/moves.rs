@@ -1,6 +1,9 @@
 //! What part and slide come to with effects applied, and how they change with each parameter.
 
-use runout_core::model::{Bias, Setting, linear_terms::basis::Basis};
+use runout_core::{
+    model::{Bias, Setting},
+    numerics::least_squares::Basis,
+};
 
 use crate::{
     effects::{Alteration, Candidate, Kind, alterations},

@@ -3,11 +3,11 @@
 //! reading − ring radius = mean + centring of the setup + Σ L_n e^{in(θ − probe)} + Σ F_n e^{in(θ − ring)}, real parts, n ≥ 2.
 
 use nalgebra::DMatrix;
+use runout_core::numerics::least_squares::{LeastNorm, SINGULAR, least_norm};
 
 use crate::{
     config::TouchProbeConfig,
     effects::Missing,
-    solve::{Solved, solve},
     touches::{Touch, Touches},
     waves::{Part, angles, wave},
 };
@@ -136,7 +136,7 @@ pub(crate) enum Noise {
 #[derive(Debug, Clone)]
 pub(crate) struct Fitted {
     pub design: Design,
-    pub solved: Solved,
+    pub solved: LeastNorm,
     /// Variance by which covariances are multiplied, of a touch of weight 1: the noise's, and more where more than noise is left.
     pub variance: f64,
     /// χ² per degree of freedom, where the noise is known.
@@ -166,7 +166,7 @@ impl Design {
             |column: &Vec<f64>| used.iter().map(|row| column[*row] / weights.std_um[*row]).collect::<Vec<f64>>();
         let columns: Vec<Vec<f64>> = self.columns.iter().map(weigh).collect();
         let values: Vec<f64> = used.iter().map(|row| readings_um[*row] / weights.std_um[*row]).collect();
-        let solved = solve(&columns, &values);
+        let solved = least_norm(&columns, &values, SINGULAR);
         let chi2: f64 = solved.residual.iter().map(|value| value * value).sum();
         let level = if solved.dof > 0 { chi2 / solved.dof as f64 } else { f64::NAN };
         let variance = match weights.noise {

@@ -1,11 +1,12 @@
 //! Ranges before and after compensation, on touches that the fit has not seen.
 
+use runout_core::numerics::least_squares::{SINGULAR, least_norm};
+
 use crate::{
     config::TouchProbeConfig,
     design::{Content, Design, Fitted, Weights, form_order, lobing_order},
     effects::Missing,
     lobe::Lobe,
-    solve::solve,
     touches::Touches,
 };
 
@@ -89,9 +90,10 @@ fn effects(fit: &Fitted, row: usize) -> f64 {
 /// Range of some values about their least-squares circle.
 fn about_circle(touches: &Touches, values: &[f64], pass: &[usize]) -> f64 {
     let column = |of: fn(f64) -> f64| pass.iter().map(|row| of(touches.all[*row].angle)).collect::<Vec<f64>>();
-    let left = solve(
+    let left = least_norm(
         &[column(|_| 1.0), column(f64::cos), column(f64::sin)],
         &pass.iter().map(|row| values[*row]).collect::<Vec<f64>>(),
+        SINGULAR,
     )
     .residual;
     left.iter().copied().fold(f64::NEG_INFINITY, f64::max) - left.iter().copied().fold(f64::INFINITY, f64::min)

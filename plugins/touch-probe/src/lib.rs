@@ -16,7 +16,6 @@ mod outcome;
 mod plan;
 mod separate;
 pub mod simulate;
-mod solve;
 mod touches;
 mod waves;
 

@@ -1,6 +1,6 @@
 //! Orders of lobing, and the pre-travel that they make.
 
-use runout_core::model::evidence::f_tail;
+use runout_core::numerics::statistics::f_tail;
 
 use crate::{
     config::TouchProbeConfig,

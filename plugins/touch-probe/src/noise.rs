@@ -1,8 +1,9 @@
 //! Noise of a touch: stated, or the scatter of repeats after a common smooth drift.
 
+use runout_core::numerics::least_squares::{SINGULAR, least_norm};
+
 use crate::{
     design::{Noise, Weights},
-    solve::solve,
     touches::Touches,
 };
 
@@ -69,7 +70,7 @@ fn repeatability(touches: &Touches) -> Option<(f64, usize)> {
         }
     }
     let free = (repeated - members.len()).checked_sub(columns.len()).filter(|free| *free >= FEWEST);
-    let solved = solve(&columns, &within(&|row| all[row].reading_um));
+    let solved = least_norm(&columns, &within(&|row| all[row].reading_um), SINGULAR);
     let dof = free.map(|_| repeated - members.len() - (repeated - solved.dof))?;
     let squares: f64 = solved.residual.iter().map(|value| value * value).sum();
     (squares > 0.0).then(|| ((squares / dof as f64).sqrt(), dof))

@@ -1,6 +1,7 @@
 //! The robust Gaussian regression filter (ISO 16610-31).
 
 use super::Smoother;
+use crate::statistics::upper_median;
 
 /// c over the median |z − w|: the biweight's limit at three standard deviations of normal noise (ISO 16610-31).
 const LIMIT: f64 = 4.4478;
@@ -56,7 +57,8 @@ impl Biweight {
     /// Weights by what the filter leaves; or that its limit has come to rest, and weights are as they were.
     pub(super) fn next(&mut self, profile: &[f64], low_pass: &[f64], weights: &mut [f64]) -> bool {
         let residual = || profile.iter().zip(low_pass).map(|(value, waviness)| (value - waviness).abs());
-        let limit = LIMIT * median(residual().filter(|value| value.is_finite()).collect());
+        let mut known: Vec<f64> = residual().filter(|value| value.is_finite()).collect();
+        let limit = LIMIT * upper_median(&mut known).unwrap_or(0.0);
         // Half of the points lie on the waviness: there is nothing left to weigh by.
         if limit == 0.0 || !limit.is_finite() || (limit - self.previous).abs() <= SETTLED * limit {
             return true;
@@ -67,9 +69,4 @@ impl Biweight {
         self.previous = limit;
         false
     }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }

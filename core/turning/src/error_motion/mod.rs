@@ -34,7 +34,7 @@ use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
     roundness::{Angles, Points, Reference, ront_lsci_um},
-    uncertainty::{self, DRAWS, Errors, NORMAL_95, Uncertainty, extreme, stand_in},
+    uncertainty::{self, DRAWS, Errors, NORMAL_95, Uncertainty, extreme, stand_in, student_95},
 };
 
 /// What error motion is evaluated from: one station.
@@ -94,8 +94,6 @@ pub const WITH_FUNDAMENTAL: &str = "-with-fundamental";
 
 /// Shares of noise below this, in µm or µrad, are not said: they would be written as 0.
 const SAID: f64 = 5e-4;
-/// Two-sided 95 % quantiles of Student's distribution for 1, 2, 3, … degrees of freedom.
-const STUDENT_95: [f64; 10] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23];
 
 impl ErrorMotion<'_> {
     /// All values, about each of these centres; none without a spread over turns.
@@ -452,7 +450,7 @@ fn between_setups(each: &[f64], std: f64) -> Option<Uncertainty> {
     let count = each.len() as f64;
     let mean = each.iter().sum::<f64>() / count;
     let scatter = (each.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64).sqrt();
-    let student = STUDENT_95.get(freedom - 1).copied().unwrap_or(NORMAL_95);
+    let student = student_95(freedom as f64);
     let half = (student * scatter * (1.0 + 1.0 / count).sqrt()).hypot(NORMAL_95 * std);
     Some(Uncertainty { std: scatter.hypot(std), interval_95: [(mean - half).max(0.0), mean + half], draws: 0 })
 }

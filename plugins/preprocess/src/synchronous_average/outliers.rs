@@ -1,6 +1,6 @@
 //! Turns far from those around them.
 
-use runout_core::{Complex64, profile::Rejection};
+use runout_core::{Complex64, numerics::statistics::upper_median, profile::Rejection};
 
 use super::{split::Means, turns::Turn};
 
@@ -54,7 +54,9 @@ impl Outliers {
         let channels = self.channels;
         let distances = distances_um(&together, channels);
         let usual: Vec<f64> = (0..channels)
-            .map(|channel| median(&mut distances.iter().map(|turn| turn[channel]).collect::<Vec<_>>()))
+            .map(|channel| {
+                upper_median(&mut distances.iter().map(|turn| turn[channel]).collect::<Vec<_>>()).unwrap_or(0.0)
+            })
             .collect();
         for (PendingTurn { turn, readings, harmonics, motion }, distances) in together.into_iter().zip(distances) {
             let farthest = distances.iter().zip(&usual).map(|(distance, usual)| distance - self.sigma * usual);
@@ -87,7 +89,7 @@ fn distances_um(turns: &[PendingTurn], channels: usize) -> Vec<Vec<f64>> {
         let mut middle = |part: fn(&Complex64) -> f64| {
             parts.clear();
             parts.extend(turns.iter().map(|turn| part(&turn.harmonics[at])));
-            median(&mut parts)
+            upper_median(&mut parts).unwrap_or(0.0)
         };
         let middle = Complex64::new(middle(|value| value.re), middle(|value| value.im));
         // A harmonic's mean square over the turn is half of its amplitude's square; that of the level is all of it.
@@ -98,14 +100,6 @@ fn distances_um(turns: &[PendingTurn], channels: usize) -> Vec<Vec<f64>> {
     }
     squares.iter_mut().flatten().for_each(|square| *square = square.sqrt());
     squares
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 impl Verdict {

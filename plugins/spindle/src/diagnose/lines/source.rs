@@ -1,6 +1,6 @@
 //! Where a line comes from: a motion of the axis, which all sensors see as one displacement and tilt, or single channels.
 
-use runout_core::Complex64;
+use runout_core::{Complex64, numerics::least_squares::orthonormal};
 
 use crate::layout::{Layout, UM_PER_MM_URAD};
 
@@ -10,6 +10,10 @@ const TOLERANCE: f64 = 0.05;
 const FITS: f64 = 4.0;
 /// A channel has a line from this many standard deviations of its noise, and from this share of the largest channel's.
 const SEEN: (f64, f64) = (4.0, 0.1);
+
+/// A direction of motion that adds less than this to those before it, relative: sensors at nearly the same place and angle see
+/// no tilt.
+const DIRECTION: f64 = 1e-3;
 
 /// Where a line comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +53,7 @@ pub(super) fn source(found: &[Vec<Complex64>], noise: &[f64], layout: &Layout, s
         let mean_noise = noise.iter().sum::<f64>() / sensors.max(1) as f64;
         for (setup, amplitudes) in found.iter().enumerate() {
             let power = amplitudes.iter().map(Complex64::norm_sqr).sum::<f64>() / sensors.max(1) as f64;
-            let basis = orthonormal(columns(setup));
+            let basis = orthonormal(columns(setup), &[], DIRECTION);
             let mut left = amplitudes.clone();
             for column in &basis {
                 let share: Complex64 = left.iter().zip(column).map(|(value, entry)| value * *entry).sum();
@@ -111,28 +115,4 @@ pub(super) fn source(found: &[Vec<Complex64>], noise: &[f64], layout: &Layout, s
             || power[*channel] >= largest
     };
     Source::Sensors { channels: (0..sensors).filter(has).collect(), motion: false }
-}
-
-/// Columns made orthonormal; dependent ones are left out.
-fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let mut made: Vec<Vec<f64>> = Vec::new();
-    for mut column in columns {
-        let whole = dot(&column, &column).sqrt();
-        for _ in 0..2 {
-            for other in &made {
-                let share = dot(other, &column);
-                column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= share * other);
-            }
-        }
-        let left = dot(&column, &column).sqrt();
-        // 1e-3: sensors at nearly the same place and angle see no tilt.
-        if left > 1e-3 * whole {
-            for entry in &mut column {
-                *entry /= left;
-            }
-            made.push(column);
-        }
-    }
-    made
 }

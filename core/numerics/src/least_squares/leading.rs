@@ -1,4 +1,4 @@
-//! Dense least squares by Householder QR with scaled columns.
+//! Nested models by Householder QR with scaled columns.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,7 +17,7 @@ pub struct Solution {
 /// A = Q·R with scaled columns. The leading columns of A are Q times the leading block of R, so that one factorisation
 /// solves every model that uses leading columns only.
 #[derive(Debug, Clone)]
-pub struct Factored {
+pub struct Leading {
     upper: DMatrix<f64>,
     projected: DVector<f64>,
     scale: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct Factored {
     independent: usize,
 }
 
-impl Factored {
+impl Leading {
     /// Factors a matrix with at least as many rows as columns.
     #[must_use]
     pub fn new(mut matrix: DMatrix<f64>, mut right: DVector<f64>) -> Self {
@@ -45,7 +45,7 @@ impl Factored {
         Self { upper, projected, scale, independent }
     }
 
-    /// Minimises |A·x − b| over the first `columns` columns; `None` where these are dependent.
+    /// Minimises |A·x − b| over the first `columns` columns; `None` where these are dependent, or A has fewer.
     #[must_use]
     pub fn leading(&self, columns: usize) -> Option<Solution> {
         if columns > self.independent {
@@ -69,7 +69,7 @@ pub fn solve(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<Solution> {
     if matrix.nrows() < columns {
         return None;
     }
-    Factored::new(matrix, right).leading(columns)
+    Leading::new(matrix, right).leading(columns)
 }
 
 #[cfg(test)]
@@ -85,7 +85,7 @@ mod tests {
         let expected = [(found.values[0], 1.0), (found.values[1], 2.0)];
         let variances = [(found.unit_variance[0], 0.7), (found.unit_variance[1], 0.2)];
         // The leading column alone: the mean.
-        let mean = Factored::new(matrix, right).leading(1).unwrap();
+        let mean = Leading::new(matrix, right).leading(1).unwrap();
         let alone = [(mean.values[0], 4.0), (mean.unit_variance[0], 0.25)];
         for (found, expected) in expected.into_iter().chain(variances).chain(alone) {
             // 1e-13: rounding of numbers near 1.
@@ -97,7 +97,7 @@ mod tests {
     fn dependent_columns_have_no_solution() {
         let matrix = DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 2.0, 4.0, 3.0, 6.0]);
         assert!(solve(matrix.clone(), DVector::zeros(3)).is_none());
-        assert!(Factored::new(matrix, DVector::zeros(3)).leading(1).is_some());
+        assert!(Leading::new(matrix, DVector::zeros(3)).leading(1).is_some());
         assert!(solve(DMatrix::zeros(3, 2), DVector::zeros(3)).is_none());
         assert!(solve(DMatrix::identity(2, 3), DVector::zeros(2)).is_none());
     }

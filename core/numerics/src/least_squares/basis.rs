@@ -1,0 +1,260 @@
+//! Orthogonal columns: fits, and what they predict of points left out.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// A column whose part outside the span of those before it is smaller than this, relative, depends on them.
+const INDEPENDENT: f64 = 1e-9;
+/// Directions that the remaining points determine with less than this share of their weight are not determined at all.
+const DETERMINED: f64 = 1e-12;
+
+/// Scalar product.
+#[must_use]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Euclidean norm.
+#[must_use]
+pub fn norm(vector: &[f64]) -> f64 {
+    dot(vector, vector).sqrt()
+}
+
+/// Columns made orthonormal to a basis and to each other. A column of which less than `tolerance`, relative, is outside the
+/// span of those before it is left out.
+#[must_use]
+pub fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>], tolerance: f64) -> Vec<Vec<f64>> {
+    let mut made: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+    for mut column in columns {
+        let whole = norm(&column);
+        let mut shares = vec![0.0; basis.len() + made.len()];
+        let left = without_span(&mut column, basis.iter().chain(&made), &mut shares);
+        if left > tolerance * whole {
+            divide(&mut column, left);
+            made.push(column);
+        }
+    }
+    made
+}
+
+/// Takes the span of orthonormal columns out of a column, adds what each was to `shares`, and gives the norm of the rest.
+/// Twice is enough (Giraud, Langou, Rozložník, Comput. Math. Appl. 50 (2005) 1069).
+fn without_span<'a>(column: &mut [f64], span: impl Iterator<Item = &'a Vec<f64>> + Clone, shares: &mut [f64]) -> f64 {
+    for _ in 0..2 {
+        for (share, other) in shares.iter_mut().zip(span.clone()) {
+            let part = dot(other, column);
+            *share += part;
+            column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= part * other);
+        }
+    }
+    norm(column)
+}
+
+fn divide(column: &mut [f64], by: f64) {
+    for entry in column {
+        *entry /= by;
+    }
+}
+
+/// A = Q·R by modified Gram-Schmidt, twice; a column that depends on those before it has none in Q, and the parameter 0.
+///
+/// ```
+/// use runout_numerics::least_squares::Basis;
+///
+/// // A line through (0, 1), (1, 3), (2, 5).
+/// let line = Basis::of(vec![vec![1.0, 1.0, 1.0], vec![0.0, 1.0, 2.0]]);
+/// let found = line.coefficients(&[1.0, 3.0, 5.0]);
+/// assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] - 2.0).abs() < 1e-12);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Basis {
+    /// Q, `[column][point]`.
+    orthonormal: Vec<Vec<f64>>,
+    /// R, `[column]`: the column's shares of those of Q so far, its own the last where it is independent.
+    shares: Vec<Vec<f64>>,
+    /// Of each independent column, its place in A.
+    independent: Vec<usize>,
+}
+
+impl Basis {
+    /// Of columns, one after the other.
+    #[must_use]
+    pub fn of(columns: Vec<Vec<f64>>) -> Self {
+        Self { orthonormal: Vec::new(), shares: Vec::new(), independent: Vec::new() }.extended(columns)
+    }
+
+    /// With more columns.
+    #[must_use]
+    pub fn extended(&self, columns: Vec<Vec<f64>>) -> Self {
+        let mut made = self.clone();
+        for mut column in columns {
+            let whole = norm(&column);
+            let mut shares = vec![0.0; made.orthonormal.len()];
+            let left = without_span(&mut column, made.orthonormal.iter(), &mut shares);
+            if left > INDEPENDENT * whole {
+                divide(&mut column, left);
+                made.independent.push(made.shares.len());
+                made.orthonormal.push(column);
+                shares.push(left);
+            }
+            made.shares.push(shares);
+        }
+        made
+    }
+
+    /// Number of independent columns.
+    #[must_use]
+    pub fn rank(&self) -> usize {
+        self.orthonormal.len()
+    }
+
+    /// Whether a column is in the span of those before it.
+    #[must_use]
+    pub fn dependent(&self) -> bool {
+        self.rank() < self.shares.len()
+    }
+
+    /// Share of each place in the span: the diagonal of Q·Qᵀ.
+    #[must_use]
+    pub fn leverage(&self) -> Vec<f64> {
+        let places = self.orthonormal.first().map_or(0, Vec::len);
+        (0..places).map(|place| self.orthonormal.iter().map(|column| column[place] * column[place]).sum()).collect()
+    }
+
+    /// Takes out of `values` what the columns can make.
+    pub fn remove_from(&self, values: &mut [f64]) {
+        for column in &self.orthonormal {
+            let share = dot(column, values);
+            values.iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
+        }
+    }
+
+    /// x with |A·x − values| least, one a column of A: R·x = Qᵀ·values, and 0 for a dependent column.
+    #[must_use]
+    pub fn coefficients(&self, values: &[f64]) -> Vec<f64> {
+        self.solve_upper(self.orthonormal.iter().map(|column| dot(column, values)).collect())
+    }
+
+    /// Diagonal of [`covariance`](Self::covariance).
+    #[must_use]
+    pub fn unit_variance(&self) -> Vec<f64> {
+        let mut variance = vec![0.0; self.shares.len()];
+        for column in self.inverse() {
+            variance.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * entry);
+        }
+        variance
+    }
+
+    /// (AᵀA)⁻¹ = R⁻¹·R⁻ᵀ: the covariance of the coefficients for uncorrelated errors of variance 1; 0 for a dependent column.
+    #[must_use]
+    pub fn covariance(&self) -> Vec<Vec<f64>> {
+        let (count, inverse) = (self.shares.len(), self.inverse());
+        let entry = |row: usize, column: usize| inverse.iter().map(|each| each[row] * each[column]).sum();
+        (0..count).map(|row| (0..count).map(|column| entry(row, column)).collect()).collect()
+    }
+
+    /// The columns of R⁻¹.
+    fn inverse(&self) -> Vec<Vec<f64>> {
+        let unit = |unit: usize| (0..self.rank()).map(|row| if row == unit { 1.0 } else { 0.0 }).collect();
+        (0..self.rank()).map(|row| self.solve_upper(unit(row))).collect()
+    }
+
+    fn solve_upper(&self, right: Vec<f64>) -> Vec<f64> {
+        let mut solution = vec![0.0; self.shares.len()];
+        for (row, (right, column)) in right.into_iter().zip(&self.independent).enumerate().rev() {
+            let later = self.independent[row + 1..].iter();
+            let known: f64 = later.map(|other| self.shares[*other][row] * solution[*other]).sum();
+            solution[*column] = (right - known) / self.shares[*column][row];
+        }
+        solution
+    }
+
+    /// Each point less what the fit to the points outside its group predicts of it.
+    ///
+    /// With r what the fit to all points leaves, it is r_g + Q_g·(1 − Q_gᵀQ_g)⁻¹·Q_gᵀr_g: the others' normal matrix is
+    /// 1 − Q_gᵀQ_g, well conditioned because Q is orthonormal. A direction that only the group tells is predicted as 0.
+    #[must_use]
+    pub fn left_out(&self, values: &[f64], groups: &[Vec<usize>]) -> Vec<f64> {
+        let count = self.rank();
+        let full: Vec<f64> = self.orthonormal.iter().map(|column| dot(column, values)).collect();
+        let mut left = values.to_vec();
+        self.remove_from(&mut left);
+        let mut found = left.clone();
+        for points in groups {
+            let (inside, told) = self.without(points);
+            let mut change = vec![0.0; count];
+            for (direction, weight) in told.eigenvectors.column_iter().zip(told.eigenvalues.iter()) {
+                let step = if *weight > DETERMINED {
+                    let shown = &inside * direction;
+                    shown.iter().zip(points).map(|(entry, point)| entry * left[*point]).sum::<f64>() / weight
+                } else {
+                    direction.iter().zip(&full).map(|(entry, full)| entry * full).sum()
+                };
+                change.iter_mut().zip(direction.iter()).for_each(|(sum, entry)| *sum += step * entry);
+            }
+            for (row, point) in points.iter().enumerate() {
+                found[*point] += (0..count).map(|column| inside[(row, column)] * change[column]).sum::<f64>();
+            }
+        }
+        found
+    }
+
+    /// Root mean square of [`left_out`](Self::left_out) of independent noise of standard deviation 1 in `points` values.
+    ///
+    /// A group's own noise has the covariance 1, that of its prediction Q_g·(1 − Q_gᵀQ_g)⁻¹·Q_gᵀ.
+    #[must_use]
+    pub fn left_out_gain(&self, groups: &[Vec<usize>], points: usize) -> f64 {
+        let predicted = groups.iter().map(|group| {
+            let (inside, told) = self.without(group);
+            let directions = told.eigenvectors.column_iter().zip(told.eigenvalues.iter());
+            let told = directions.filter(|(_, weight)| **weight > DETERMINED);
+            told.map(|(direction, weight)| (&inside * direction).norm_squared() / weight).sum::<f64>()
+        });
+        (1.0 + predicted.sum::<f64>() / points.max(1) as f64).sqrt()
+    }
+
+    /// What some points decide of a fit, in parameters: tr Q_gᵀQ_g.
+    #[must_use]
+    pub fn weight(&self, points: &[usize]) -> f64 {
+        self.orthonormal.iter().flat_map(|column| points.iter().map(|point| column[*point].powi(2))).sum()
+    }
+
+    /// The rows of Q of some points, and the normal matrix of the others, 1 − Q_gᵀQ_g, by its eigenvalues.
+    fn without(&self, points: &[usize]) -> (DMatrix<f64>, SymmetricEigen<f64, nalgebra::Dyn>) {
+        let count = self.rank();
+        let inside = DMatrix::from_fn(points.len(), count, |row, column| self.orthonormal[column][points[row]]);
+        let others = DMatrix::identity(count, count) - inside.tr_mul(&inside);
+        (inside, SymmetricEigen::new(others))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dependent_column_has_the_parameter_0_and_no_variance() {
+        let (one, slope) = (vec![1.0, 1.0, 1.0, 1.0], vec![0.0, 1.0, 2.0, 3.0]);
+        let both: Vec<f64> = one.iter().zip(&slope).map(|(one, slope)| 2.0 * one - slope).collect();
+        let basis = Basis::of(vec![one, both, slope]);
+        assert!(basis.dependent() && basis.rank() == 2);
+        let found = basis.coefficients(&[1.0, 3.0, 5.0, 7.0]);
+        // 1 + 2s is 5 − 2·(2 − s).
+        for (found, expected) in found.iter().zip([5.0, -2.0, 0.0]) {
+            assert!((found - expected).abs() < 1e-12, "{found} instead of {expected}");
+        }
+        let covariance = basis.covariance();
+        assert_eq!((covariance[2][2], covariance[0][2]), (0.0, 0.0));
+        // Var(slope) = 1/Σ(s − s̄)².
+        assert!((covariance[1][1] - 0.2).abs() < 1e-12 && (basis.unit_variance()[1] - 0.2).abs() < 1e-12);
+        assert!(Basis::of(vec![vec![0.0; 3]]).dependent(), "a column of zeros");
+    }
+
+    #[test]
+    fn the_tolerance_decides_what_is_another_column() {
+        let columns = || vec![vec![1.0, 0.0], vec![1.0, 1e-4]];
+        assert_eq!(orthonormal(columns(), &[], 1e-3).len(), 1);
+        let made = orthonormal(columns(), &[], 1e-9);
+        assert!(made.len() == 2 && dot(&made[0], &made[1]).abs() < 1e-15);
+        assert!(orthonormal(columns(), &made, 1e-9).is_empty());
+    }
+}
