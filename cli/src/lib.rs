@@ -20,6 +20,7 @@ mod render;
 use std::{
     io::{self, Write},
     process::ExitCode,
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 use clap::Parser;
@@ -40,9 +41,18 @@ pub fn main_with(registry: &Registry) -> ExitCode {
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(json),
+        Err(failure) => {
+            // Work that fails because it was abandoned leaves the exit status to the handler.
+            while ENDS.load(Ordering::SeqCst) {
+                std::thread::park();
+            }
+            failure.report(json)
+        }
     }
 }
+
+/// Whether the program was interrupted and ends.
+static ENDS: AtomicBool = AtomicBool::new(false);
 
 /// Has an interrupted program take away what it has begun.
 fn leave_nothing_half() {
@@ -50,7 +60,8 @@ fn leave_nothing_half() {
     const INTERRUPTED: i32 = 130;
     // Where no handler can be set, a later run takes it away.
     let _ = ctrlc::set_handler(|| {
-        abandon_all();
+        ENDS.store(true, Ordering::SeqCst);
+        let _nothing_is_begun = abandon_all();
         let _ = writeln!(io::stderr(), "\ninterrupted: what was not finished is taken away");
         std::process::exit(INTERRUPTED);
     });

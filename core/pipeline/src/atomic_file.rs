@@ -12,13 +12,15 @@ use std::{
 use runout_error::{Error, ErrorKind, Result};
 
 /// What this process has begun and not finished.
-static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new() });
+static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new(), abandoning: 0 });
 
 struct UnderWay {
     /// Temporary files.
     files: Vec<PathBuf>,
     /// Folders that were made.
     folders: Vec<PathBuf>,
+    /// How many [`Abandoned`] there are.
+    abandoning: usize,
 }
 
 impl UnderWay {
@@ -38,6 +40,9 @@ impl UnderWay {
 
     /// Gives a file its final name.
     fn finish(&mut self, file: &mut PendingFile) -> Result<PathBuf> {
+        if !self.files.contains(&file.temporary) {
+            return Err(file.failure(ABANDONED).of(ErrorKind::Interrupted));
+        }
         fs::rename(&file.temporary, &file.destination).map_err(|error| file.caused(error))?;
         self.files.retain(|pending| *pending != file.temporary);
         file.committed = true;
@@ -45,14 +50,29 @@ impl UnderWay {
     }
 }
 
-/// Removes all that was begun and not finished, for a program that ends now: nothing can be begun or finished afterwards.
-pub fn abandon_all() {
+/// Why a file that was taken away cannot be finished.
+const ABANDONED: &str = "the work was abandoned";
+
+/// Removes all that this process has begun and not finished, as a program does that is interrupted. What was abandoned cannot be
+/// finished any more, and nothing can be begun while the returned value lives: both fail with [`ErrorKind::Interrupted`].
+#[must_use = "new files can be begun as soon as it is dropped"]
+pub fn abandon_all() -> Abandoned {
     let mut under_way = UnderWay::now();
+    under_way.abandoning += 1;
     while let Some(file) = under_way.files.pop() {
         under_way.remove(&file);
     }
-    // Whoever is still at work waits for the end.
-    std::mem::forget(under_way);
+    Abandoned(())
+}
+
+/// While it lives, no file can be begun: [`abandon_all`].
+#[derive(Debug)]
+pub struct Abandoned(());
+
+impl Drop for Abandoned {
+    fn drop(&mut self) {
+        UnderWay::now().abandoning -= 1;
+    }
 }
 
 /// A file being written under a temporary name beside its final one.
@@ -70,7 +90,7 @@ impl PendingFile {
     /// Reserves a temporary name beside `destination`, creating its folder.
     ///
     /// # Errors
-    /// When the folder cannot be made or `destination` is a folder.
+    /// When the folder cannot be made, `destination` is a folder, or all work is [abandoned](abandon_all).
     pub fn new(destination: impl Into<PathBuf>) -> Result<Self> {
         static SERIAL: AtomicU64 = AtomicU64::new(0);
         let destination = destination.into();
@@ -99,7 +119,11 @@ impl PendingFile {
         remove_stale(folder, &name);
         let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
         let temporary = folder.join(format!(".{name}.{}-{serial}.partial", std::process::id()));
-        UnderWay::now().files.push(temporary.clone());
+        let mut under_way = UnderWay::now();
+        if under_way.abandoning > 0 {
+            return Err(Error::new("write", &shown, ABANDONED).of(ErrorKind::Interrupted));
+        }
+        under_way.files.push(temporary.clone());
         Ok(Self { temporary, destination, committed: false })
     }
 
@@ -153,7 +177,7 @@ impl PendingFile {
     /// Gives the file its final name, replacing what was there.
     ///
     /// # Errors
-    /// When the file system refuses the rename.
+    /// When the file system refuses the rename, or the file was [abandoned](abandon_all).
     pub fn commit(mut self) -> Result<PathBuf> {
         UnderWay::now().finish(&mut self)
     }

@@ -173,6 +173,22 @@ impl Pipeline {
         Self::build(document.root(), sources, registry).map_err(|fault| document.diagnose(fault).into())
     }
 
+    /// Reads and checks a file; paths in it are relative to its folder.
+    ///
+    /// # Errors
+    /// When it cannot be read, and the first mistake, with its place.
+    pub fn read(path: &Path, registry: &Registry) -> Result<Self, ConfigError> {
+        Self::from_sources(&Sources::read(path, &[], INCLUDE_KEY)?, registry)
+    }
+
+    /// Checks a configuration that is there as TOML; paths in it are relative to `folder`.
+    ///
+    /// # Errors
+    /// The first mistake, with its place.
+    pub fn from_toml(text: &str, folder: impl Into<PathBuf>, registry: &Registry) -> Result<Self, ConfigError> {
+        Self::from_sources(&Sources::from_text("pipeline", text, folder.into(), &[], INCLUDE_KEY)?, registry)
+    }
+
     fn build(root: &Table, sources: &Sources, registry: &Registry) -> Result<Self, Fault> {
         for key in root.get_ref().keys() {
             if !KEYS.contains(&key.get_ref().as_ref()) {

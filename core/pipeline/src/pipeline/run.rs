@@ -49,6 +49,16 @@ pub struct Silent;
 
 impl Observer for Silent {}
 
+impl Pipeline {
+    /// Runs it on all threads: [`run`] without a progress bar.
+    ///
+    /// # Errors
+    /// When the data or a file fails. Exports that had begun leave nothing behind.
+    pub fn run(&self) -> Result<Summary> {
+        run(self, None, &Silent)
+    }
+}
+
 /// Runs a pipeline.
 ///
 /// # Errors
