@@ -70,6 +70,9 @@ impl<const D: usize> Cloud<D> {
     }
 
     /// Column `k` of the features.
+    ///
+    /// # Panics
+    /// When `k` is not below `D`.
     #[must_use]
     pub fn column(&self, k: usize) -> &[f64] {
         &self.features[k]
@@ -82,24 +85,36 @@ impl<const D: usize> Cloud<D> {
     }
 
     /// The features f of one point.
+    ///
+    /// # Panics
+    /// When `point` is not below [`len`](Self::len).
     #[must_use]
     pub fn features(&self, point: usize) -> [f64; D] {
         std::array::from_fn(|k| self.features[k][point])
     }
 
     /// Height of one point over `place`.
+    ///
+    /// # Panics
+    /// When `point` is not below [`len`](Self::len).
     #[must_use]
     pub fn height(&self, point: usize, place: &[f64; D]) -> f64 {
         (0..D).fold(self.levels[point], |height, k| height - self.features[k][point] * place[k])
     }
 
     /// f·s of one point over `place`: what its height lacks to its level.
+    ///
+    /// # Panics
+    /// When `point` is not below [`len`](Self::len).
     #[must_use]
     pub fn level_under(&self, point: usize, place: &[f64; D]) -> f64 {
         (0..D).fold(0.0, |sum, k| sum + self.features[k][point] * place[k])
     }
 
     /// Lowest and highest height over `place` in a range of points; (∞, −∞) where none is there.
+    ///
+    /// # Panics
+    /// When the range ends above [`len`](Self::len).
     #[must_use]
     pub fn extremes(&self, range: Range<usize>, place: &[f64; D]) -> (f64, f64) {
         let levels = &self.levels[range.clone()];

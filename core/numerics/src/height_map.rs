@@ -54,7 +54,7 @@ impl<'a> HeightMap<'a> {
     /// is no whole number of steps) is left out.
     ///
     /// # Errors
-    /// Where rings are not at equal distances, or fewer than two.
+    /// Where rings are not at equal distances, or fewer than two, or heights are missing.
     pub fn unrolled(radius_mm: f64, z_mm: &[f64], angles: usize, heights_um: &'a [f64]) -> Result<Self> {
         let [first, second, ..] = z_mm[..] else {
             return Err(
@@ -69,8 +69,12 @@ impl<'a> HeightMap<'a> {
             let problem = format!("its rings are not at equal distances: {step} mm first, then other ones");
             return Err(Error::new("unroll", "the surface", problem).help("set step_mm in [surface]"));
         }
+        let heights_um = heights_um.get(..rows * angles).ok_or_else(|| {
+            let problem = format!("it has {} heights for {rows} rings of {angles} angles", heights_um.len());
+            Error::new("unroll", "the surface", problem).of(ErrorKind::InsufficientData)
+        })?;
         let dx_mm = std::f64::consts::TAU * radius_mm / angles as f64;
-        Self::new(&heights_um[..rows * angles], angles, dx_mm, step, true)
+        Self::new(heights_um, angles, dx_mm, step, true)
     }
 
     /// The same grid with other heights; as many of them are taken as it has, missing ones are NaN.

@@ -68,6 +68,7 @@ impl Levels {
 
 /// How a creep goes on.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Course {
     /// By the same amount each turn.
     Straight,
@@ -88,6 +89,7 @@ impl Course {
 
 /// What the levels of a sensor's turns tell of its creep.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Creep {
     /// How it goes on.
     pub course: Course,

@@ -17,6 +17,7 @@ pub struct EncoderScan {
 /// An angle that no encoder on a turning spindle gives.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{problem}")]
+#[non_exhaustive]
 pub struct EncoderFault {
     /// The sample, counted from 0.
     pub sample: u64,

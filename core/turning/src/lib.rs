@@ -2,6 +2,23 @@
 //! form and motion, error motion values, and the surface over all stations.
 //!
 //! Lengths of displacement and form are in micrometres, geometry in millimetres, angles in radians inside the code (`_deg` in files).
+//!
+//! ```
+//! use runout_turning::surface::Surface;
+//!
+//! // A cone: 1 µm at one end and 3 µm at the other.
+//! let surface = Surface {
+//!     radius_mm: 30.0,
+//!     angles: 8,
+//!     z_mm: vec![0.0, 10.0],
+//!     deviation_um: [vec![1.0; 8], vec![3.0; 8]].concat(),
+//!     interpolation: "",
+//!     meetings: Vec::new(),
+//! };
+//! assert_eq!(surface.ring(1)[0], 3.0);
+//! assert_eq!(surface.height_map()?.rows(), 2);
+//! # Ok::<(), runout_error::Error>(())
+//! ```
 
 pub mod azimuth;
 pub mod calibrated;

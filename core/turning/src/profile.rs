@@ -117,10 +117,12 @@ impl Turns {
         self.numbers.len()
     }
 
-    /// The coefficient of a turn (by position), order and channel.
+    /// The coefficient of a turn (by position), order and channel; NaN where there is none.
     #[must_use]
     pub fn at(&self, turn: usize, order: usize, channel: usize) -> Complex64 {
-        self.harmonics[(turn * self.orders + order) * self.channels + channel]
+        let is_kept = order < self.orders && channel < self.channels;
+        let found = self.harmonics.get((turn * self.orders + order) * self.channels + channel).filter(|_| is_kept);
+        found.copied().unwrap_or(Complex64::new(f64::NAN, f64::NAN))
     }
 
     /// Mean level of a channel in each turn, in µm.
@@ -186,8 +188,12 @@ impl Neighbours {
         covariance
     }
 
-    /// Takes out what a channel creeps: `course` gives each turn's mean level and its rise over the turn, in µm.
+    /// Takes out what a channel creeps: `course` gives each turn's mean level and its rise over the turn, in µm. Nothing happens
+    /// to a channel that is not there.
     pub fn take_out(&mut self, channel: usize, course: &[[f64; 2]]) {
+        if channel >= self.channels {
+            return;
+        }
         let count = course.len().max(1) as f64;
         let [level, rise] = [0, 1].map(|which| course.iter().map(|turn| turn[which]).sum::<f64>() / count);
         for (index, values) in self.coefficients.iter_mut().enumerate() {
@@ -251,18 +257,18 @@ impl Profile {
         (self.mean.len() / self.channels().max(1)).saturating_sub(1)
     }
 
-    /// The mean of one order, one coefficient a channel.
+    /// The mean of one order, one coefficient a channel; nothing above [`max_order`](Self::max_order).
     #[must_use]
     pub fn order(&self, order: usize) -> &[Complex64] {
         let channels = self.channels();
-        &self.mean[order * channels..(order + 1) * channels]
+        self.mean.get(order * channels..(order + 1) * channels).unwrap_or_default()
     }
 
-    /// The covariance of one order's mean, `[channel][channel]`.
+    /// The covariance of one order's mean, `[channel][channel]`; `None` where it is not known.
     #[must_use]
     pub fn order_covariance(&self, order: usize) -> Option<&[Complex64]> {
         let size = self.channels() * self.channels();
-        self.covariance.as_ref().map(|covariance| &covariance[order * size..(order + 1) * size])
+        self.covariance.as_ref()?.get(order * size..(order + 1) * size)
     }
 }
 

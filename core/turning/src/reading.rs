@@ -17,6 +17,7 @@ const LISTED: usize = 15;
 
 /// What the averaged reading of one sensor in one setup has. All of it is of form and motion together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
 pub struct ReadingValues {
     /// Id of the setup.
     pub setup: String,
@@ -39,6 +40,7 @@ pub struct ReadingValues {
 
 /// amplitude · cos(order · angle − phase) over the spindle's angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
 pub struct ReadingHarmonic {
     /// Waves a turn.
     pub order: usize,
@@ -109,7 +111,7 @@ pub fn variances(profile: &Profile, channel: usize) -> Option<Vec<f64>> {
 
 /// One channel's variances of matrices `[order][channel][channel]`.
 fn diagonal(matrices: &[Complex64], channels: usize, channel: usize) -> Vec<f64> {
-    let own = matrices.iter().skip(channel * (channels + 1)).step_by(channels * channels);
+    let own = matrices.iter().skip(channel * (channels + 1)).step_by((channels * channels).max(1));
     own.map(|entry| entry.re.max(0.0)).collect()
 }
 

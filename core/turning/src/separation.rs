@@ -436,7 +436,7 @@ impl Separation {
     pub fn noise_variance(&self, unknown: usize) -> Vec<f64> {
         let width = self.unknowns.len();
         let open = |index: usize| largest(self.equivalents.iter().map(|distance| distance[index]));
-        let each = self.variance.iter().enumerate().skip(unknown).step_by(width);
+        let each = self.variance.iter().enumerate().skip(unknown).step_by(width.max(1));
         each.map(|(index, variance)| (variance - open(index)).max(0.0)).collect()
     }
 
@@ -444,7 +444,7 @@ impl Separation {
     pub fn equivalent_coefficients(&self, unknown: usize) -> impl Iterator<Item = Vec<Complex64>> + '_ {
         let width = self.unknowns.len();
         self.equivalents.iter().map(move |distance| {
-            let distances = distance.iter().skip(unknown).step_by(width);
+            let distances = distance.iter().skip(unknown).step_by(width.max(1));
             let distances = distances.map(|value| if value.is_finite() { *value } else { Complex64::ZERO });
             self.coefficients(unknown).zip(distances).map(|(value, distance)| value + distance).collect()
         })
@@ -459,8 +459,8 @@ impl Separation {
     /// Coefficients of one unknown by order from 0, with 0 where the layout cannot tell.
     pub fn coefficients(&self, unknown: usize) -> impl Iterator<Item = Complex64> + '_ {
         let width = self.unknowns.len();
-        let picked = self.estimate.iter().skip(unknown).step_by(width);
-        let seen = self.observable.iter().skip(unknown).step_by(width);
+        let picked = self.estimate.iter().skip(unknown).step_by(width.max(1));
+        let seen = self.observable.iter().skip(unknown).step_by(width.max(1));
         picked.zip(seen).map(|(value, seen)| if *seen { *value } else { Complex64::ZERO })
     }
 
@@ -468,7 +468,7 @@ impl Separation {
     #[must_use]
     pub fn is_lost(&self, unknown: usize) -> bool {
         let width = self.unknowns.len();
-        let mut seen = self.observable.iter().skip(unknown).step_by(width).skip(1);
+        let mut seen = self.observable.iter().skip(unknown).step_by(width.max(1)).skip(1);
         self.max_order() > 0 && !seen.any(|seen| *seen)
     }
 
@@ -476,7 +476,7 @@ impl Separation {
     #[must_use]
     pub fn tells_no_form(&self) -> bool {
         let width = self.unknowns.len();
-        let seen = |unknown: usize| self.observable.iter().skip(unknown).step_by(width).skip(2).any(|seen| *seen);
+        let seen = |unknown: usize| self.observable.iter().skip(unknown).step_by(width.max(1)).skip(2).any(|seen| *seen);
         self.max_order() > 1 && self.unknowns.iter().any(|unknown| unknown.is_form()) && !(0..width).any(seen)
     }
 
@@ -499,7 +499,7 @@ impl Separation {
     #[must_use]
     pub fn lost_orders(&self, unknown: usize) -> Vec<usize> {
         let width = self.unknowns.len();
-        let seen = self.observable.iter().skip(unknown).step_by(width).enumerate();
+        let seen = self.observable.iter().skip(unknown).step_by(width.max(1)).enumerate();
         seen.filter(|(order, seen)| *order > 0 && !**seen).map(|(order, _)| order).collect()
     }
 
@@ -514,12 +514,12 @@ impl Separation {
             return f64::NAN;
         }
         let width = self.unknowns.len();
-        let seen = self.observable.iter().skip(unknown).step_by(width);
+        let seen = self.observable.iter().skip(unknown).step_by(width.max(1));
         let sum: f64 = self
             .variance
             .iter()
             .skip(unknown)
-            .step_by(width)
+            .step_by(width.max(1))
             .zip(seen)
             .skip(1)
             .filter(|(_, seen)| **seen)

@@ -52,25 +52,25 @@ impl StationResult {
         let unknown = separation.position(Quantity::Form(section)).filter(|unknown| !separation.is_lost(*unknown))?;
         let squares = || separation.coefficients(unknown).skip(2).map(|value| value.norm_sqr());
         let rms = (0.5 * squares().sum::<f64>()).sqrt();
-        let variance = separation.variance.iter().skip(unknown).step_by(separation.unknowns.len()).skip(2);
+        let variance = separation.variance.iter().skip(unknown).step_by(separation.unknowns.len().max(1)).skip(2);
         let errors = squares().zip(variance).filter(|(square, _)| *square > 0.0);
         let spread: f64 = errors.map(|(square, variance)| square * variance).sum();
         Some((rms, (spread / 8.0).sqrt() / rms))
     }
 
     /// One unknown on [`angles`](Self::angles) equal angles from 0: form over the part's, motion over the spindle's.
-    /// Orders that the layout cannot tell are left out; where nothing is known, values are NaN.
+    /// Orders that the layout cannot tell are left out; where nothing is known, and of no unknown, values are NaN.
     #[must_use]
     pub fn over_angle(&self, unknown: usize) -> Vec<f64> {
-        let quantity = self.separation.unknowns[unknown];
-        if self.separation.is_lost(unknown) {
-            return vec![f64::NAN; self.angles];
-        }
+        let known = self.separation.unknowns.get(unknown).filter(|_| !self.separation.is_lost(unknown));
+        let Some(quantity) = known else { return vec![f64::NAN; self.angles] };
         let turned = |value: Complex64| if quantity.is_form() { value } else { value.conj() };
         let mut values =
             Fourier::new(self.angles).synthesise(self.separation.coefficients(unknown).map(turned)).to_vec();
-        if let Quantity::Form(section) = quantity {
-            self.separation.sections[section].gaps.blank(&mut values);
+        if let Quantity::Form(section) = quantity
+            && let Some(section) = self.separation.sections.get(*section)
+        {
+            section.gaps.blank(&mut values);
         }
         values
     }

@@ -22,6 +22,9 @@ pub struct PivotedQr {
 impl PivotedQr {
     /// Factors `matrix`, `[row][col]`. A column that adds less than `tolerance` (relative, after scaling) to the span
     /// of the others does not count towards the rank.
+    ///
+    /// # Panics
+    /// When `matrix` does not hold `rows`·`cols` entries, or `cols` is 0.
     #[must_use]
     pub fn new(rows: usize, cols: usize, matrix: &[Complex64], tolerance: f64) -> Self {
         let mut factors = matrix.to_vec();
@@ -184,6 +187,9 @@ impl PivotedQr {
 }
 
 /// Lower Cholesky factor L (`[row][col]`) of a Hermitian matrix, L·Lᴴ; `None` where it is not positive definite.
+///
+/// # Panics
+/// When `matrix` holds fewer than `size`² entries.
 #[must_use]
 pub fn cholesky(size: usize, matrix: &[Complex64]) -> Option<Vec<Complex64>> {
     let mut lower = vec![Complex64::ZERO; size * size];
@@ -207,6 +213,9 @@ pub fn cholesky(size: usize, matrix: &[Complex64]) -> Option<Vec<Complex64>> {
 }
 
 /// Inverse of a lower triangular matrix with a positive diagonal.
+///
+/// # Panics
+/// When `lower` holds fewer than `size`² entries.
 #[must_use]
 pub fn invert_lower(size: usize, lower: &[Complex64]) -> Vec<Complex64> {
     let mut inverse = vec![Complex64::ZERO; size * size];

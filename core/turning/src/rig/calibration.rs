@@ -8,6 +8,7 @@ use runout_error::fault::Fault;
 
 /// Unit of the numbers that a channel records.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[non_exhaustive]
 pub enum Unit {
     /// Micrometres.
     #[default]
@@ -42,6 +43,7 @@ impl Unit {
 
 /// How the numbers of a channel follow from displacements u in µm, the sign aside: number · `um_per_unit` = gain · (u + a·u² + b·u³).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Calibration {
     /// µm for one unit of the numbers.
     pub um_per_unit: f64,

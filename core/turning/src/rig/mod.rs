@@ -66,6 +66,7 @@ pub struct RigConfig {
 /// One interruption as it stands in a file: from one part angle on, counter-clockwise, to another.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct InterruptionConfig {
     /// The part's own angle at which it begins, in degrees.
     pub from_deg: f64,

@@ -53,6 +53,7 @@ pub struct Section {
 
 /// A source of noise of a station, shared by its sections.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Noise {
     /// The section whose own noise it is, by its place in the station.
     pub of: usize,

@@ -96,10 +96,10 @@ impl Surface {
         HeightMap::unrolled(self.radius_mm, &self.z_mm, self.angles, &self.deviation_um)
     }
 
-    /// Deviations of one ring.
+    /// Deviations of one ring; nothing where there is none of this number.
     #[must_use]
     pub fn ring(&self, ring: usize) -> &[f64] {
-        &self.deviation_um[ring * self.angles..(ring + 1) * self.angles]
+        self.deviation_um.get(ring * self.angles..(ring + 1) * self.angles).unwrap_or_default()
     }
 
     /// Deviation in µm anywhere between the first and the last ring; `None` beyond them.
