@@ -4,6 +4,7 @@ use runout_numerics::{least_squares::dot, statistics::f_tail};
 
 /// How a model with more parameters compares with one with fewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Evidence {
     /// Change of the Bayesian information criterion; negative speaks for the larger model (Schwarz, Ann. Statist. 6
     /// (1978) 461).

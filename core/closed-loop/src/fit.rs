@@ -14,6 +14,7 @@ const SETTLED: f64 = 1e-3;
 pub(super) const INDEPENDENT: f64 = 1e-9;
 
 /// Effects applied at their best values.
+#[non_exhaustive]
 pub struct Refit<F> {
     /// The effects and values; fixed ones first.
     pub settings: Vec<Setting>,

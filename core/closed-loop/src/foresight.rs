@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use super::{
     Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
-    closed_loop::{VISIBLE, blind},
     diagnosis::{BiasPerUnit, Blind},
     fit::INDEPENDENT,
+    report::{VISIBLE, blind},
 };
 use runout_error::Result;
 use runout_numerics::least_squares::{dot, norm, orthonormal};

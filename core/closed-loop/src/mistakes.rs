@@ -2,9 +2,11 @@
 
 use super::{
     Fit, Model, Remainder, Setting,
-    closed_loop::{Found, Tracing, same_finding, worse},
+    closed_loop::Tracing,
     evidence::Evidence,
     fit::Refit,
+    found::Found,
+    judgement::{same_finding, worse},
 };
 use runout_error::Result;
 

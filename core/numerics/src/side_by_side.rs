@@ -13,6 +13,7 @@ pub type Reals = [f64; TOGETHER];
 
 /// A complex number of each problem.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Complexes {
     /// Real parts.
     pub re: Reals,

@@ -26,8 +26,7 @@ static STUDENT_95: LazyLock<Vec<f64>> = LazyLock::new(|| (1..TABLED).map(|freedo
 /// ```
 #[must_use]
 pub fn student_95(freedom: f64) -> f64 {
-    // Written so that no number gives the normal one too.
-    if !(freedom > 0.0) {
+    if freedom.is_nan() || freedom <= 0.0 {
         return NORMAL_95;
     }
     if freedom < TABLED as f64 {

@@ -5,6 +5,7 @@ use super::{cylindricity::Section, near::Course, roundness};
 
 /// A datum axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Axis {
     /// Height at which it passes through (`x_um`, `y_um`).
     pub z_mm: f64,
@@ -46,6 +47,7 @@ impl Axis {
 
 /// Positions of sections about a datum axis, in µm; NaN where a section has too few points.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Positions {
     /// Distance of each section's LSCI centre from the axis.
     pub eccentricity_um: Vec<f64>,

@@ -46,6 +46,7 @@ pub const PARAMETERS: [(&str, &str, &str); 6] = [
 
 /// The strongest helix of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Twist {
     /// DG: number of threads, 0 where the grooves are rings.
     pub threads: usize,

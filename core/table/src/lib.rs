@@ -3,6 +3,18 @@
 //! A [`TableSpec`] declares a table before the run: its columns with unit and meaning. Its rows come as Arrow record batches, some
 //! at a time, so that memory does not grow with a result. Columns keep unit and meaning as the metadata `unit` and `about` of
 //! their Arrow fields.
+//!
+//! ```
+//! use runout_table::{ColumnSpec, TableSpec, numbers};
+//!
+//! let angle = ColumnSpec::number("angle_deg", "deg", "the part's angle").repeating();
+//! let form = ColumnSpec::number("form_um", "um", "deviation from the nominal radius");
+//! let table = TableSpec::new("form", "form of each section", vec![angle, form]);
+//! let rows = table.rows(vec![numbers([0.0, 90.0]), numbers([1.2, -0.8])]).unwrap();
+//! assert_eq!(rows.num_rows(), 2);
+//! assert_eq!(rows.schema().field(1).metadata()["unit"], "um");
+//! assert!(table.rows(vec![numbers([0.0])]).is_err(), "a column is missing");
+//! ```
 
 pub mod figure;
 
@@ -33,6 +45,7 @@ pub enum Kind {
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ColumnSpec {
     /// Its name, with the unit where it has one: `form_um`.
     pub name: String,
@@ -111,6 +124,7 @@ impl ColumnSpec {
 
 /// A table as it is declared before a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TableSpec {
     /// Its name, of a file or a group: `form`.
     pub name: String,

@@ -16,7 +16,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::recording::CsvRecording;
+use crate::{recording::CsvRecording, stated::Stated};
 
 /// `[load] plugin = "csv"`: one file a setup and station.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -171,14 +171,6 @@ fn expanded(
     };
     let paths = |key: &StationKey| rig.setups.iter().map(|setup| path(&setup.id, &key.name)).collect();
     Ok(stations.iter().map(paths).collect())
-}
-
-/// What the configuration says of all files.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Stated {
-    pub(crate) sample_rate_hz: Option<f64>,
-    pub(crate) speed_rpm: Option<f64>,
-    pub(crate) marker: Option<Marker>,
 }
 
 struct CsvLoader {

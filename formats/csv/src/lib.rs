@@ -25,6 +25,7 @@ mod recording;
 mod row;
 mod rows;
 mod scan;
+mod stated;
 
 pub use config::{CsvConfig, FileConfig, StationConfig};
 use runout_core::pipeline::registry::{Plugin, Registry};

@@ -10,10 +10,10 @@ use runout_core::{
 };
 
 use crate::{
-    config::Stated,
     header::{Header, Phase},
     rows::{Piece, Rows},
     scan::Scan,
+    stated::Stated,
 };
 
 /// Readings of a file that are kept from the first look at it, at most: 32 MiB. A file that has more is read twice.

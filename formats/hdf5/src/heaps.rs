@@ -32,8 +32,8 @@ const DEEPEST: usize = 6;
 /// Refuses a file with a heap that has no end.
 pub(crate) fn check(file: &File, path: &Path) -> Result<()> {
     let failure = |error: std::io::Error| Error::caused("read", path.display().to_string(), error);
-    let mut source = fs::File::open(path).map_err(|error| failure(error))?;
-    let end = source.metadata().map_err(|error| failure(error))?.len();
+    let mut source = fs::File::open(path).map_err(&failure)?;
+    let end = source.metadata().map_err(&failure)?.len();
     let mut data = Vec::new();
     if end > SMALL {
         extents(file, DEEPEST, &mut data);
@@ -41,7 +41,7 @@ pub(crate) fn check(file: &File, path: &Path) -> Result<()> {
     }
     let mut from = 0;
     for extent in data.into_iter().chain(std::iter::once(end..end)) {
-        let endless = find(&mut source, from..extent.start.min(end)).map_err(|error| failure(error))?;
+        let endless = find(&mut source, from..extent.start.min(end)).map_err(&failure)?;
         if let Some(place) = endless {
             let problem = format!("it is damaged: the texts at byte {place} have no end");
             let error = Error::new("read", path.display().to_string(), problem).of(ErrorKind::DamagedData);

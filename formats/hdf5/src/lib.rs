@@ -25,6 +25,7 @@ mod measurement;
 mod node;
 mod result;
 mod text;
+mod type_name;
 
 pub use height_map::{HeightMapConfig, read_height_map, write_height_map};
 pub use inspect::{CaptureReport, FileReport, StationReport, TableReport, inspect};

@@ -9,7 +9,7 @@ use hdf5_metno::{
 };
 use runout_core::{Error, ErrorKind, Result};
 
-use crate::{heaps, text};
+use crate::{heaps, text, type_name::type_name};
 
 /// Where something stands: `shaft.h5:/initial/s01`.
 #[derive(Debug, Clone)]
@@ -184,24 +184,6 @@ pub(crate) fn text(location: &Location, place: &Place, name: &str) -> Result<Opt
 /// An attribute that has to be there.
 pub(crate) fn needed<T>(value: Option<T>, place: &Place, name: &str) -> Result<T> {
     value.ok_or_else(|| place.error(format!("expected an attribute `{name}`, found none of that name")))
-}
-
-/// A type in words.
-pub(crate) fn type_name(descriptor: &TypeDescriptor) -> String {
-    let bits = |size: usize| 8 * size;
-    match descriptor {
-        TypeDescriptor::Integer(size) => format!("i{}", bits(*size as usize)),
-        TypeDescriptor::Unsigned(size) => format!("u{}", bits(*size as usize)),
-        TypeDescriptor::Float(size) => format!("f{}", bits(*size as usize)),
-        TypeDescriptor::Boolean => "booleans".into(),
-        TypeDescriptor::Enum(_) => "an enumeration".into(),
-        TypeDescriptor::Compound(_) => "a compound type".into(),
-        TypeDescriptor::FixedAscii(_)
-        | TypeDescriptor::FixedUnicode(_)
-        | TypeDescriptor::VarLenAscii
-        | TypeDescriptor::VarLenUnicode => "text".into(),
-        _ => "another type".into(),
-    }
 }
 
 /// The type of a dataset's elements.

@@ -5,7 +5,7 @@ use hdf5_metno::{
     types::{FixedAscii, FixedUnicode, IntSize, Reference, TypeDescriptor, VarLenAscii, VarLenUnicode},
 };
 
-use crate::node::type_name;
+use crate::type_name::type_name;
 
 /// Characters of a text of fixed length.
 const LONGEST_FIXED: usize = 1024;

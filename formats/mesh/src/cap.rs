@@ -1,11 +1,5 @@
 //! Flat ends that close a mesh.
 
-use crate::mesh::Mesh;
-
-/// Radius of a cap's own ring over that of the rim: so near that the end looks sharp, and far enough that single precision
-/// keeps the two apart.
-const INNER: f64 = 0.995;
-
 /// A flat end, from the axis to a ring. Drawn, not measured.
 ///
 /// It shares the rim's vertices with the wall, so that the solid is closed by its very indices and is one piece for every
@@ -22,12 +16,6 @@ pub struct Cap {
 }
 
 impl Cap {
-    /// Positions in mm of its own vertices, all of which have its normal: a ring, angle by angle, and the centre.
-    pub fn vertices<'m>(&self, mesh: &'m Mesh) -> impl Iterator<Item = [f64; 3]> + use<'m> {
-        let inside = mesh.rim(self.ring).map(|[x, y, z]| [INNER * x, INNER * y, z]);
-        inside.chain([[0.0, 0.0, self.z_mm]])
-    }
-
     /// How many vertices of its own it has on so many angles.
     #[must_use]
     pub fn vertex_count(angles: usize) -> usize {

@@ -1,31 +1,48 @@
 //! The exporter around a format.
 
-use std::{fs::File, io, path::PathBuf, thread};
+use std::{fs::File, path::PathBuf, thread};
 
 use runout_core::{
     Error, ErrorKind, Result,
     atomic_file::PendingFile,
+    pipeline::{error::Fault, registry::Context},
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
     table::{RecordBatch, TableSpec},
 };
 
-use crate::{config::MeshConfig, mesh::Mesh, notes::Notes};
+use crate::{config::MeshConfig, format::Format, mesh::Mesh, notes::Notes};
 
-/// How a mesh becomes a file.
-#[derive(Debug, Clone, Copy)]
-pub struct Format {
-    /// Of its files, without the dot.
-    pub extension: &'static str,
-    /// Of its positions.
-    pub unit: &'static str,
-    /// Writes one mesh into an empty file.
-    pub write: fn(&Mesh, &Notes, &mut File) -> io::Result<()>,
+/// A micrometre drawn as a metre.
+const MOST_MAGNIFICATION: f64 = 1e6;
+
+impl MeshConfig {
+    /// Checks the values and builds the exporter of a format.
+    ///
+    /// # Errors
+    /// The first value that cannot be.
+    pub fn check(self, context: &Context, format: Format) -> std::result::Result<Box<dyn Exporter>, Fault> {
+        let fits = self.path.extension().is_some_and(|found| found.eq_ignore_ascii_case(format.extension));
+        if !fits {
+            let message =
+                format!("expected a file name ending in .{}, found `{}`", format.extension, self.path.display());
+            return Err(Fault::at("path", message));
+        }
+        if let Some(found) = self.magnification.filter(|value| !(*value > 1.0 && *value <= MOST_MAGNIFICATION)) {
+            let message = format!("the magnification must be above 1 and at most {MOST_MAGNIFICATION}, found {found}");
+            let fault = Fault::at("magnification", message);
+            return Err(fault.help("leave it out for the mesh at true scale alone"));
+        }
+        if let Some(found) = self.colour_range_um.filter(|value| !(value.is_finite() && *value > 0.0)) {
+            return Err(Fault::at("colour_range_um", format!("the range must be above 0 µm, found {found}")));
+        }
+        Ok(Box::new(MeshExporter { format, config: Self { path: context.path(&self.path), ..self } }))
+    }
 }
 
 /// Writes the surface at true scale, and magnified where asked.
-pub(crate) struct MeshExporter {
-    pub(crate) format: Format,
-    pub(crate) config: MeshConfig,
+struct MeshExporter {
+    format: Format,
+    config: MeshConfig,
 }
 
 /// Files that wait for the surface.
@@ -81,7 +98,7 @@ impl Export for MeshExport {
             Error::new("draw", "the surface", "the thread of its checksum stopped").of(ErrorKind::Interrupted)
         })?;
         for (Target { place, file, .. }, mesh) in self.files.iter_mut().zip(meshes?) {
-            let notes = Notes::new(&self.format, &mesh, surface, &checksum, result);
+            let notes = Notes::new(self.format.unit, &mesh, surface, &checksum, result);
             (self.format.write)(&mesh, &notes, file).map_err(|error| place.caused(error))?;
         }
         // Closed: some systems do not rename what is open.

@@ -7,7 +7,9 @@
 mod cap;
 mod colour;
 mod config;
+mod ends;
 mod export;
+mod format;
 mod mesh;
 mod notes;
 mod portions;
@@ -15,7 +17,7 @@ mod portions;
 pub use cap::Cap;
 pub use colour::{ColourScale, STEPS as COLOUR_STEPS, UNMEASURED, linear, palette};
 pub use config::MeshConfig;
-pub use export::Format;
+pub use format::Format;
 pub use mesh::{LANES, Mesh, Vertices};
 pub use notes::{InputNote, Notes};
 pub use portions::{in_order, processors};

@@ -3,7 +3,7 @@
 use runout_core::{numerics::fourier::max_order, stage::Completed, surface::Surface};
 use serde::Serialize;
 
-use crate::{export::Format, mesh::Mesh};
+use crate::mesh::Mesh;
 
 /// What a mesh says of itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,7 +51,7 @@ pub struct InputNote {
 }
 
 impl Notes {
-    pub(crate) fn new(format: &Format, mesh: &Mesh, surface: &Surface, checksum: &str, result: &Completed) -> Self {
+    pub(crate) fn new(unit: &'static str, mesh: &Mesh, surface: &Surface, checksum: &str, result: &Completed) -> Self {
         let Completed { summary, about, .. } = result;
         let fitting = max_order(surface.angles);
         let band_upr = about.form_band_upr.map(|[lowest, highest]| [lowest, highest.min(fitting)]);
@@ -59,7 +59,7 @@ impl Notes {
         let within = |order: &&usize| band_upr.is_some_and(|[lowest, highest]| (lowest..=highest).contains(order));
         Self {
             title: summary.title.clone(),
-            unit: format.unit,
+            unit,
             scale: mesh.scale(),
             radius_mm: surface.radius_mm,
             colour_range_um: mesh.range_um(),

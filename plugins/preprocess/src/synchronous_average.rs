@@ -17,6 +17,7 @@ mod mean;
 mod outliers;
 mod resample;
 mod scatter;
+mod size;
 mod slow;
 mod split;
 mod spread;

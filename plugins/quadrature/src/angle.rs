@@ -9,7 +9,7 @@ use runout_core::{
     table::{ColumnSpec, TableRows, TableSpec, counts, numbers, numbers_or_null},
 };
 
-use crate::{components::Component, model::Samples, signal::Signal};
+use crate::{components::Component, samples::Samples, signal::Signal};
 
 /// The sum P of two unknown components of one order is known, their difference Q is not. Where both are of one unknown size,
 /// the chance of |Q| > k·|P| is 1/(1 + k²): two standard deviations hold 95 % where E|Q|² is this many times |P|².

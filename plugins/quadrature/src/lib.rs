@@ -6,6 +6,7 @@
 mod angle;
 mod components;
 mod model;
+mod samples;
 mod signal;
 
 use runout_core::pipeline::registry::{Plugin, Registry};

@@ -4,14 +4,17 @@
 //! turned by 180° about its axis and the probe looks at the same line of it from the opposite side. The separator `axial-reversal`
 //! takes traces of both setups and separates part and slide.
 
+mod data;
 mod diagnose;
 mod effects;
 mod grid;
 mod interpolate;
+mod mixture;
 mod model;
 mod moves;
 mod positions;
 mod separate;
+mod shifts;
 mod spline;
 mod straightness;
 mod trace;

@@ -15,8 +15,8 @@ use runout_core::{
 };
 
 use crate::{
-    effects::{Alteration, Candidate, Content, Kind, Place, USUAL_TIME_CONSTANT, alterations},
-    moves::Results,
+    data::Data,
+    effects::{Alteration, Candidate, Content, Kind, USUAL_TIME_CONSTANT, alterations},
     spline::{Banded, Knots, Local},
     trace::AxialTrace,
 };
@@ -36,27 +36,6 @@ const INDEPENDENT: f64 = 1e-7;
 #[derive(Clone)]
 pub struct TracesModel(Arc<Data>);
 
-pub struct Data {
-    /// Traces with few enough points.
-    pub traces: Vec<AxialTrace>,
-    /// Setup of each.
-    pub setups: Vec<usize>,
-    pub candidates: Vec<Candidate>,
-    pub effects: Vec<Effect>,
-    /// Effects that are declared with their values.
-    pub known: Vec<usize>,
-    /// Standard deviation of a reading, where it is known from elsewhere.
-    pub std_um: Option<f64>,
-    pub max_shift_mm: f64,
-    /// The shortest wave of the slide, where it is declared.
-    pub slide_cutoff_mm: Option<f64>,
-    /// Middle and length of the range that all traces share.
-    pub middle_mm: f64,
-    pub length_mm: f64,
-    /// What part and slide come to.
-    pub results: Results,
-}
-
 /// Readings that something contradicts, and the splines that they are fitted by.
 struct Readings {
     /// Trace and point, in the order of z.
@@ -69,20 +48,6 @@ struct Readings {
 }
 
 impl Data {
-    /// The place of one of its points.
-    pub fn place(&self, trace: usize, point: usize) -> Place {
-        self.place_of(&self.traces[trace], trace, point)
-    }
-
-    /// The place of a point of a trace that may have more points than this one's of that number.
-    pub fn place_of(&self, trace: &AxialTrace, number: usize, point: usize) -> Place {
-        Place {
-            sign: if self.setups[number] == 0 { 1.0 } else { -1.0 },
-            parabola: -(2.0 * (trace.z_mm[point] - self.middle_mm) / self.length_mm).powi(2),
-            time: trace.time[point],
-        }
-    }
-
     fn repeats(&self, setup: usize) -> usize {
         self.setups.iter().filter(|own| **own == setup).count()
     }

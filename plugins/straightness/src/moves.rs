@@ -6,20 +6,12 @@ use runout_core::{
 };
 
 use crate::{
+    data::{Data, Results},
     effects::{Alteration, Candidate, Kind, alterations},
     grid::Grid,
     interpolate::{cubic, cubic_slope},
-    model::Data,
     trace::AxialTrace,
 };
-
-/// The positions on which part and slide are compared.
-#[derive(Debug, Clone)]
-pub struct Results {
-    pub z_mm: Vec<f64>,
-    /// The deviations that the slide may have, where they are declared.
-    pub smooth: Option<Basis>,
-}
 
 /// Of part and slide.
 pub type Both = [Vec<f64>; 2];

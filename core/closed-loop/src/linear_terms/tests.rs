@@ -217,8 +217,8 @@ fn points_that_cannot_tell_are_refused() {
         let columns = columns.iter().map(|column| declared(column)).collect();
         LinearTerms::new(observations(values), columns, Vec::new()).unwrap_err().to_string()
     };
-    assert!(refused(&[1.0, 2.0], &[&[1.0, 1.0], &[2.0, 2.0]]).contains("cannot tell"));
+    assert!(refused(&[1.0, 2.0], &[&[1.0, 1.0], &[2.0, 2.0]]).contains("do not determine"));
     assert!(refused(&[1.0, 2.0], &[&[1.0]]).contains("length"));
     assert!(refused(&[1.0, f64::NAN], &[&[1.0, 1.0]]).contains("finite"));
-    assert!(refused(&[], &[&[]]).contains("cannot tell"));
+    assert!(refused(&[], &[&[]]).contains("do not determine"));
 }

@@ -12,6 +12,7 @@ pub(super) const MOST_ITERATIONS: usize = 50;
 
 /// What a robust filter makes of a profile.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Robust {
     /// The waviness; NaN where the profile is.
     pub low_pass: Vec<f64>,

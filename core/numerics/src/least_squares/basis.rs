@@ -27,7 +27,7 @@ pub fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>], tolerance: f64) -
     for mut column in columns {
         let whole = norm(&column);
         let mut shares = vec![0.0; basis.len() + made.len()];
-        let left = without_span(&mut column, basis.iter().chain(&made), &mut shares);
+        let left = without_span(&mut column, &basis.iter().chain(&made), &mut shares);
         if left > tolerance * whole {
             divide(&mut column, left);
             made.push(column);
@@ -38,7 +38,11 @@ pub fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>], tolerance: f64) -
 
 /// Takes the span of orthonormal columns out of a column, adds what each was to `shares`, and gives the norm of the rest.
 /// Twice is enough (Giraud, Langou, Rozložník, Comput. Math. Appl. 50 (2005) 1069).
-fn without_span<'a>(column: &mut [f64], span: impl Iterator<Item = &'a Vec<f64>> + Clone, shares: &mut [f64]) -> f64 {
+fn without_span<'a>(
+    column: &mut [f64],
+    span: &(impl Iterator<Item = &'a Vec<f64>> + Clone),
+    shares: &mut [f64],
+) -> f64 {
     for _ in 0..2 {
         for (share, other) in shares.iter_mut().zip(span.clone()) {
             let part = dot(other, column);
@@ -89,7 +93,7 @@ impl Basis {
         for mut column in columns {
             let whole = norm(&column);
             let mut shares = vec![0.0; made.orthonormal.len()];
-            let left = without_span(&mut column, made.orthonormal.iter(), &mut shares);
+            let left = without_span(&mut column, &made.orthonormal.iter(), &mut shares);
             if left > INDEPENDENT * whole {
                 divide(&mut column, left);
                 made.independent.push(made.shares.len());

@@ -8,6 +8,7 @@ const FIVE: usize = 5;
 /// Values of the significant hills and dales. Those that reach an open edge of the map, or a gap, are incomplete and
 /// left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Features {
     /// Significant hills.
     pub hills: usize,

@@ -9,6 +9,7 @@ const LANES: usize = 8;
 
 /// Heights about the mean of the points measured, in µm.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Height {
     /// Arithmetic mean of |z|.
     pub sa: f64,

@@ -13,6 +13,7 @@ const GRADIENT: [f64; 3] = [45.0, -9.0, 1.0];
 
 /// Slopes and area.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Hybrid {
     /// Root mean square gradient, over the points that have three measured neighbours on each side; NaN where none has.
     pub sdq: f64,

@@ -17,6 +17,7 @@ pub struct MaterialRatio {
 
 /// Values of the material ratio curve. Heights in µm, volumes in µm³/µm² (which is ml/m²).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Functional {
     /// Difference of the heights at two material ratios.
     pub sdc: f64,

@@ -10,6 +10,7 @@ pub(super) const ANGLES: usize = 360;
 
 /// Lengths and direction of the texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Spatial {
     /// Autocorrelation length: shortest lag at which the autocorrelation has fallen to s. NaN where it does not.
     pub sal_mm: f64,

@@ -6,6 +6,7 @@ use runout_numerics::{chebyshev::Chebyshev, cloud::Cloud};
 
 /// Values of the generatrices, in µm: lines along the wall at the sections' common angles, as deviations from LSCY.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Generatrices {
     /// Straightness STRt of each about its least-squares line LSLI (ISO 12780-1); NaN with fewer than three points.
     pub strt_lsli_um: Vec<f64>,
@@ -87,6 +88,7 @@ impl Generatrices {
 
 /// The least-squares centres of the sections (ISO 14660-2's extracted median line of a cylinder).
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct MedianLine {
     /// Heights of the sections.
     pub z_mm: Vec<f64>,

@@ -2,6 +2,7 @@
 //!
 //! The cylinders belong to the points (R + r)(cos θ, sin θ) at z themselves, at right angles to the tilted axis.
 
+mod determine;
 mod disturbed;
 mod least_squares;
 mod lines;
@@ -53,6 +54,7 @@ pub struct Touch {
 /// CYLt is defined about all four cylinders, the others about LSCY; about another cylinder they are what the same formula
 /// gives.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Values {
     /// Peak to valley, CYLt.
     pub cylt_um: f64,

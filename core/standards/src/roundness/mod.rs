@@ -16,7 +16,9 @@
 //! ```
 
 mod circumscribed;
+mod determine;
 mod disturbed;
+mod equal_heights;
 mod least_squares;
 mod points;
 mod search;
@@ -48,6 +50,7 @@ pub struct Circle {
 /// RONt is defined about all four circles, the others about LSCI; about another circle they are what the same formula
 /// gives. The local deviation is the distance from the centre less the circle's radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Values {
     /// Peak to valley, RONt.
     pub ront_um: f64,

@@ -1,6 +1,6 @@
 //! Minimum zone and maximum inscribed circle: exchange among few points, then a look at all.
 
-use super::{Circle, Points, Undetermined, circumscribed::equal_heights, least_squares::guess};
+use super::{Circle, Points, Undetermined, equal_heights::equal_heights, least_squares::guess};
 use runout_numerics::{
     chebyshev::{Chebyshev, Contact},
     cloud::Cloud,

@@ -9,6 +9,7 @@
 
 mod elements;
 mod profile;
+mod values;
 
 use schemars::JsonSchema;
 use serde::Deserialize;

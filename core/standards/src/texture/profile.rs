@@ -2,14 +2,10 @@
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
 
-use super::{Settings, Texture, elements};
-use crate::areal::{MaterialRatio, derivative};
+use super::{Settings, Texture};
+use crate::areal::derivative;
 use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
 
-/// Hills and dales below this share of Rp and Rv are none (ISO 21920-2).
-const LOWEST: f64 = 0.1;
-/// Hills and dales narrower than this share of a section are none (ISO 4287:1997, 3.2.7).
-const NARROWEST: f64 = 0.01;
 /// Spacings that differ by less than this share are equal.
 const EVEN: f64 = 1e-6;
 
@@ -46,27 +42,6 @@ impl<'a> Profile<'a> {
             (Some(turn), _) => (0.0, turn),
             (None, [first, .., last]) => (*first, last - first),
             _ => (0.0, 0.0),
-        }
-    }
-
-    /// All values.
-    pub(super) fn texture(&self, settings: &Settings) -> Texture {
-        let heights = self.heights(settings);
-        let lowest = [LOWEST * heights.rp, LOWEST * heights.rv];
-        let elements = elements::mean(self, lowest, NARROWEST * heights.section_mm);
-        let curve = MaterialRatio::of_heights(self.heights_um.iter().copied().filter(|height| height.is_finite()));
-        // The volumes of a surface are not asked for: any material ratios will do.
-        let found = curve.functional(settings.difference_percent, settings.difference_percent);
-        Texture {
-            rsm_mm: elements.spacing_mm,
-            rc: elements.height_um,
-            rk: found.sk,
-            rpk: found.spk,
-            rvk: found.svk,
-            rmrk1_percent: found.smrk1_percent,
-            rmrk2_percent: found.smrk2_percent,
-            rdc: found.sdc,
-            ..heights
         }
     }
 

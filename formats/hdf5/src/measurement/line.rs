@@ -6,7 +6,10 @@ use hdf5_metno::{Dataset, Group};
 use ndarray::s;
 use runout_core::Result;
 
-use crate::node::{self, Place};
+use crate::{
+    node::{self, Place},
+    type_name::type_name,
+};
 
 /// Elements that are read at a time where they pass through once.
 const SCAN: usize = 65_536;
@@ -37,7 +40,7 @@ impl Line {
         let (dataset, place) = node::dataset(group, place, name)?;
         let found = node::element_type(&dataset, &place)?;
         if !node::is_number(&found) {
-            return Err(place.error(format!("expected f64, found {}", node::type_name(&found))));
+            return Err(place.error(format!("expected f64, found {}", type_name(&found))));
         }
         let (length, shape) = match node::written_shape(&dataset, &place)?.as_slice() {
             [length] => (*length, Shape::Plain),

@@ -7,7 +7,10 @@ use hdf5_metno::{
 use runout_core::Result;
 
 use super::{SENSORS, orientation::Orientation};
-use crate::node::{self, Place};
+use crate::{
+    node::{self, Place},
+    type_name::type_name,
+};
 
 /// How a file's samples are to be written.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,7 +100,7 @@ impl StoredSamples {
     pub(crate) fn read(group: &Group, dataset: &Dataset, place: &Place) -> Result<Self> {
         let descriptor = node::element_type(dataset, place)?;
         let kind = SampleType::of(&descriptor).ok_or_else(|| {
-            place.error(format!("expected samples of f64, f32, i16 or i32, found {}", node::type_name(&descriptor)))
+            place.error(format!("expected samples of f64, f32, i16 or i32, found {}", type_name(&descriptor)))
         })?;
         let shape = node::written_shape(dataset, place)?;
         if shape.len() != 2 {

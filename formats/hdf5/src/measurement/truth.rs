@@ -5,7 +5,10 @@ use hdf5_metno::Group;
 use runout_core::{Result, measurement::StationTruth, rig::Rig};
 
 use super::TRUTH;
-use crate::node::{self, Place};
+use crate::{
+    node::{self, Place},
+    type_name::type_name,
+};
 
 /// The group of forms.
 const FORM: &str = "form_um";
@@ -49,7 +52,7 @@ fn curve(group: &Group, place: &Place, name: &str) -> Result<Vec<f64>> {
     let (dataset, place) = node::dataset(group, place, name)?;
     let found = node::element_type(&dataset, &place)?;
     if !node::is_number(&found) {
-        return Err(place.error(format!("expected f64, found {}", node::type_name(&found))));
+        return Err(place.error(format!("expected f64, found {}", type_name(&found))));
     }
     match node::written_shape(&dataset, &place)?.as_slice() {
         [length] if *length <= MOST_ANGLES => dataset.read_raw::<f64>().map_err(|error| place.error(error)),

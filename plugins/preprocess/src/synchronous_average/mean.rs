@@ -11,27 +11,10 @@ use runout_core::{
     profile::Neighbours,
 };
 
-use super::{scatter::Scatter, slow::Slow};
+use super::{scatter::Scatter, size::Size, slow::Slow};
 
 /// Turns from which on the neighbours hold a tenth of the scatter or less: it is known well enough without them.
 const MANY_TURNS: usize = 40;
-
-/// What a turn is made of.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Size {
-    pub channels: usize,
-    /// Equal angles.
-    pub angles: usize,
-    /// Harmonics that are kept, from order 0.
-    pub orders: usize,
-}
-
-impl Size {
-    /// Readings of one turn.
-    pub(super) fn readings(&self) -> usize {
-        self.channels * self.angles
-    }
-}
 
 /// Sums over turns, taken from the first one, so that turns that are all alike have exactly no covariance.
 ///

@@ -18,7 +18,7 @@ use runout_core::{
 };
 use rustfft::FftPlanner;
 
-use super::mean::Size;
+use super::size::Size;
 
 /// cos and sin for each of them.
 pub(super) const PHASES: usize = 2 * NEIGHBOURS;

@@ -6,11 +6,7 @@ use runout_core::{
     spread::Spread,
 };
 
-use super::{
-    mean::{Mean, Size},
-    spread::Extremes,
-    turns::Turn,
-};
+use super::{mean::Mean, size::Size, spread::Extremes, turns::Turn};
 
 /// Turns that are summed together at most: the sums are then read and written once for all of them.
 const TOGETHER: usize = 4;

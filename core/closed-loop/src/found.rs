@@ -1,0 +1,18 @@
+//! An effect that was found.
+
+use super::{Remainder, evidence::Evidence};
+
+/// An effect that was believed, with everything that it cannot be told from.
+#[derive(Clone)]
+pub(super) struct Found {
+    /// The best one first.
+    pub members: Vec<usize>,
+    /// Values of each member as if it were all of it.
+    pub alone: Vec<Vec<f64>>,
+    /// Values and standard uncertainties as if the best one were all of it.
+    pub values: Vec<f64>,
+    pub std: Vec<f64>,
+    pub evidence: Evidence,
+    pub before: Remainder,
+    pub after: Remainder,
+}
