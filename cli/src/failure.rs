@@ -91,9 +91,9 @@ impl Failure {
             Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
                 let message = error.to_string();
                 // Most messages hold the text of their source already.
-                let causes = error.causes().into_iter().filter(|cause| !message.contains(cause.as_str()));
-                let causes: String = causes.map(|cause| format!("\n  cause: {cause}")).collect();
-                plain(&(message + &causes), error.advice())
+                let mut lines = vec![message.clone()];
+                lines.extend(error.causes().into_iter().filter(|cause| !message.contains(cause.as_str())));
+                plain(&lines.join("\n  cause: "), error.advice())
             }
             Self::Limit(open) => plain(&format!("not proven to be kept: {}", open.join("; ")), None),
             Self::Warnings(count) => {

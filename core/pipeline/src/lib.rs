@@ -2,6 +2,21 @@
 //!
 //! The core knows no file format and no plugin by name, and prints nothing. Lengths of displacement and form are in
 //! micrometres, geometry in millimetres, angles in radians inside the code (`_deg` in files).
+//!
+//! A pipeline is TOML that is checked against what a program has registered. A mistake has its place:
+//!
+//! ```
+//! use runout_core::pipeline::{Pipeline, Registry, document::ConfigError};
+//!
+//! // This program has no plugin. `runout_cli::builtin::registry()` has those of `runout`.
+//! let registry = Registry::default();
+//! let checked = Pipeline::from_toml("load = { plugin = 'hdf5', path = 'shaft.h5' }", ".", &registry);
+//! let Err(ConfigError::Text(mistake)) = checked else { panic!("there is no such plugin") };
+//! assert_eq!(mistake.message, "unknown plugin `hdf5`");
+//! assert_eq!(mistake.line_and_column(), (1, 19));
+//! ```
+//!
+//! `Pipeline::run` gives what was found as a [`Summary`](pipeline::summary::Summary), and writes the files that `[[export]]` names.
 
 pub mod atomic_file;
 pub mod height_grid;

@@ -1,26 +1,27 @@
 //! A pipeline, from TOML to stages that can only be valid.
+//!
+//! Long because every stage is built here, with what one has to know of another.
 
 use std::path::{Path, PathBuf};
 
-use schemars::{JsonSchema, Schema};
-use serde_json::{Value, json};
 use toml::{Spanned, de::DeValue};
 
+pub use super::schema::{PlainTable, choice, pipeline_schema, plain_tables};
 use super::{
     compare::{self, Candidate},
     diagnose::config::{Diagnose, DiagnoseConfig},
     document::{self, ConfigError, Document, Sources, Table},
     error::{Fault, known_names},
     evaluate::{Evaluate, EvaluateConfig, Limit},
-    registry::{Catalogue, Context, Plugin, Registry},
+    exports::{DIAGNOSIS, Exporting, Exports, beside_the_first, summary_path, written},
+    registry::{Context, Registry},
     tables::{self, StationTables},
 };
 use crate::{
-    atomic_file::resolved,
     points::PointColumn,
     stage::{
         Averager, Check, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Request, Separator,
-        SourceKind, StationModel, StationSeparator, Takes,
+        SourceKind, StationModel, StationSeparator,
     },
 };
 use runout_closed_loop::Effect;
@@ -35,6 +36,7 @@ use runout_turning::{
 pub const INCLUDE_KEY: &str = "rig";
 
 /// A checked pipeline.
+#[non_exhaustive]
 pub struct Pipeline {
     /// For results and meshes.
     pub title: String,
@@ -259,9 +261,11 @@ impl Pipeline {
             .map(|table| registry.checks.build(table, &context))
             .collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref())?;
-        let tables = route.tables(assessment.as_ref(), rig.as_ref());
-        let exporting = Exporting { registry, context: &context, route: &route, tables: &tables, diagnose: &diagnose };
-        let Exports { exporters, diagnosed } = exporting.exports(root, sources)?;
+        let of_result = route.tables(assessment.as_ref(), rig.as_ref());
+        let (gives_form, has_model) = (route.gives_form(), route.has_model());
+        let exporting =
+            Exporting { registry, context: &context, gives_form, has_model, tables: &of_result, diagnose: &diagnose };
+        let Exports { exporters, diagnosed } = exporting.exports(&tables(root, "export")?, sources)?;
         Ok(Self {
             title,
             rig,
@@ -276,7 +280,7 @@ impl Pipeline {
             exporters,
             diagnosed,
             checks,
-            tables,
+            tables: of_result,
             assessment,
             configuration: document::resolved_text(root, sources)?,
         })
@@ -329,30 +333,6 @@ impl Pipeline {
     }
 }
 
-const SUMMARY: &str = "summary.json";
-const SUMMARY_USE: &str = "where the run's summary goes";
-const DIAGNOSIS: &str = "diagnosis.json";
-const DIAGNOSIS_USE: &str = "where the diagnosis goes";
-const DIAGNOSED: &str = "diagnosed";
-const DIAGNOSED_USE: &str = "written by `diagnose`";
-
-fn beside(output: &Path, name: &str) -> PathBuf {
-    output.with_file_name(name)
-}
-
-fn beside_the_first(exporters: &[Box<dyn Exporter>], tables: &[TableSpec], name: &str) -> Option<PathBuf> {
-    exporters.iter().find_map(|exporter| exporter.outputs(tables).first().map(|path| beside(path, name)))
-}
-
-/// Where the summary of these exports goes: beside the first of their files.
-pub(super) fn summary_path(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Option<PathBuf> {
-    beside_the_first(exporters, tables, SUMMARY)
-}
-
-fn written(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Vec<PathBuf> {
-    exporters.iter().flat_map(|exporter| exporter.outputs(tables)).chain(summary_path(exporters, tables)).collect()
-}
-
 /// The route of measured points.
 fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<Route, Fault> {
     match separator {
@@ -392,110 +372,6 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
         evaluate.add_limit(limit);
     }
     Ok(evaluate)
-}
-
-/// The exporters of `run` and those of `diagnose`.
-#[derive(Default)]
-struct Exports {
-    exporters: Vec<Box<dyn Exporter>>,
-    diagnosed: Vec<Box<dyn Exporter>>,
-}
-
-/// What exporters are built from.
-struct Exporting<'a> {
-    registry: &'a Registry,
-    context: &'a Context<'a>,
-    route: &'a Route,
-    tables: &'a [TableSpec],
-    diagnose: &'a Diagnose,
-}
-
-impl Exporting<'_> {
-    /// The exporters, none of which writes over what is read or what another file is for.
-    fn exports(&self, root: &Table, sources: &Sources) -> Result<Exports, Fault> {
-        let Self { registry, context, route, diagnose, .. } = self;
-        let mut exports = Exports::default();
-        let files = sources.files().map(|file| (resolved(file), "read as configuration")).collect();
-        let mut taken = Taken { files, tables: self.tables };
-        taken.files.extend(diagnose.path.as_ref().map(|path| (resolved(path), DIAGNOSIS_USE)));
-        let tables = tables(root, "export")?;
-        for table in &tables {
-            let exporter = registry.exporters.build(table, context)?;
-            if exporter.takes() == Takes::Surface && !route.gives_form() {
-                let fault = Fault::at("plugin", "this exporter takes form along an axis; [separate] gives tables");
-                return Err(document::resolve(fault.help("take one that writes tables"), table));
-            }
-            taken
-                .add(&*exporter, "written by an exporter", &[(SUMMARY, SUMMARY_USE)])
-                .map_err(|fault| document::resolve(fault, table))?;
-            exports.exporters.push(exporter);
-        }
-        if !route.has_model() {
-            return Ok(exports);
-        }
-        let beside: &[_] = match &diagnose.path {
-            None => &[(SUMMARY, DIAGNOSED_USE), (DIAGNOSIS, DIAGNOSIS_USE)],
-            Some(_) => &[(SUMMARY, DIAGNOSED_USE)],
-        };
-        for (table, exporter) in tables.iter().zip(&exports.exporters) {
-            let moved = self.diagnosed(table, &**exporter);
-            let diagnosed = registry.exporters.build(&moved, context)?;
-            taken.add(&*diagnosed, DIAGNOSED_USE, beside).map_err(|fault| document::resolve(fault, table))?;
-            exports.diagnosed.push(diagnosed);
-        }
-        Ok(exports)
-    }
-
-    /// The table of an exporter with another path: a folder `out` becomes `out/diagnosed`, a file `out/shaft.glb`
-    /// `out/diagnosed/shaft.glb`. `out` of `[diagnose]` stands for the folder where there is one.
-    fn diagnosed<'t>(&self, table: &Table<'t>, exporter: &dyn Exporter) -> Table<'t> {
-        let mut keys = table.get_ref().clone();
-        if let Some(value) = keys.get_mut("path")
-            && let Some(path) = value.get_ref().as_str().map(PathBuf::from)
-        {
-            let is_file = exporter.outputs(self.tables).contains(&self.context.path(&path));
-            let folder = match (&self.diagnose.out, is_file) {
-                (Some(out), _) => out.clone(),
-                (None, true) => path.with_file_name(DIAGNOSED),
-                (None, false) => path.join(DIAGNOSED),
-            };
-            let moved =
-                if is_file { path.file_name().map_or(folder.clone(), |name| folder.join(name)) } else { folder };
-            *value.get_mut() = DeValue::String(moved.to_string_lossy().into_owned().into());
-        }
-        Spanned::new(table.span(), keys)
-    }
-}
-
-/// Files that are read or written, each with its use.
-struct Taken<'a> {
-    files: Vec<(PathBuf, &'static str)>,
-    tables: &'a [TableSpec],
-}
-
-impl Taken<'_> {
-    /// Adds an exporter's files, and those beside the first of them where no exporter of this kind has brought them.
-    fn add(
-        &mut self,
-        exporter: &dyn Exporter,
-        own_use: &'static str,
-        beside_it: &[(&str, &'static str)],
-    ) -> Result<(), Fault> {
-        for output in exporter.outputs(self.tables) {
-            let place = resolved(&output);
-            if let Some((_, use_of_it)) = self.files.iter().find(|(other, _)| *other == place) {
-                return Err(Fault::at("path", format!("{} is already {use_of_it}", output.display())));
-            }
-            self.files.push((place, own_use));
-            for (name, use_of_it) in beside_it {
-                // A summary of a diagnosis is one of its files.
-                if self.files.iter().all(|(path, known)| known != use_of_it || !path.ends_with(name)) {
-                    self.files.push((resolved(&beside(&output, name)), use_of_it));
-                }
-            }
-        }
-        Ok(())
-    }
 }
 
 fn turns(
@@ -591,91 +467,4 @@ pub(super) fn tables<'a>(root: &Table<'a>, key: &str) -> Result<Vec<Table<'a>>, 
             .collect(),
         other => Err(expected(value.span(), other.type_str())),
     }
-}
-
-/// A table of a pipeline that names no plugin.
-#[derive(Debug, Clone)]
-pub struct PlainTable {
-    /// Its key in TOML.
-    pub key: &'static str,
-    /// One line for lists.
-    pub about: &'static str,
-    /// Whether there may be several.
-    pub repeats: bool,
-    /// JSON Schema of its keys.
-    pub schema: Schema,
-}
-
-/// The tables of a pipeline that name no plugin.
-#[must_use]
-pub fn plain_tables() -> [PlainTable; 5] {
-    let one = |key, about, schema| PlainTable { key, about, repeats: false, schema };
-    [
-        one("rig", "sensors, setups and part; or the path of a file with these keys", inline::<RigConfig>()),
-        one("surface", "how sections become a surface", inline::<SurfaceConfig>()),
-        one("evaluate", "which of the standards' values are computed, and how", inline::<EvaluateConfig>()),
-        PlainTable { repeats: true, ..one("limit", "a limit of one value", inline::<Limit>()) },
-        one("diagnose", "what the closed loop may consider", inline::<DiagnoseConfig>()),
-    ]
-}
-
-/// JSON Schema of a pipeline file with these plugins.
-#[must_use]
-pub fn pipeline_schema(registry: &Registry) -> Value {
-    let [rig, surface, evaluate, limit, diagnose] = plain_tables().map(|table| table.schema);
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "runout pipeline",
-        "type": "object",
-        "additionalProperties": false,
-        "required": ["load", "separate"],
-        "properties": {
-            "title": { "type": "string", "description": "For results and meshes." },
-            "rig": {
-                "description": "Sensors and setups, or the path of a file that holds them.",
-                "anyOf": [{ "type": "string" }, rig],
-            },
-            "load": choice(&registry.loaders),
-            "preprocess": { "type": "array", "items": choice(&registry.preprocessors) },
-            "separate": choice(&registry.separators),
-            "compare": { "type": "array", "items": choice(&registry.separators) },
-            "surface": surface,
-            "evaluate": evaluate,
-            "limit": { "type": "array", "items": limit },
-            "diagnose": diagnose,
-            "export": { "type": "array", "items": choice(&registry.exporters) },
-            "check": { "type": "array", "items": choice(&registry.checks) },
-        },
-    })
-}
-
-/// Schema of a stage's table: one of the plugins, told apart by `plugin`.
-#[must_use]
-pub fn choice<S>(catalogue: &Catalogue<S>) -> Value {
-    let one = |plugin: &Plugin<S>| {
-        let mut schema = plugin.schema().to_value();
-        if let Some(object) = schema.as_object_mut() {
-            object.remove("$schema");
-            object.insert("title".into(), plugin.name.into());
-            object.insert("description".into(), plugin.about.into());
-            let properties = object.entry("properties").or_insert_with(|| json!({}));
-            if let Some(properties) = properties.as_object_mut() {
-                properties.insert("plugin".into(), json!({ "const": plugin.name }));
-            }
-            let required = object.entry("required").or_insert_with(|| json!([]));
-            if let Some(required) = required.as_array_mut() {
-                required.insert(0, "plugin".into());
-            }
-        }
-        schema
-    };
-    json!({ "oneOf": catalogue.iter().map(one).collect::<Vec<_>>() })
-}
-
-pub(super) fn inline<T: JsonSchema>() -> Schema {
-    let settings = schemars::generate::SchemaSettings::default().with(|settings| {
-        settings.inline_subschemas = true;
-        settings.meta_schema = None;
-    });
-    settings.into_generator().into_root_schema_for::<T>()
 }

@@ -90,6 +90,7 @@ fn hand_on<K>(
 }
 
 /// What the reading thread hands on.
+#[allow(clippy::large_enum_variant, reason = "one capture stands among many blocks")]
 enum Piece<K> {
     Begin(K, Result<Capture>),
     /// Some blocks of the capture.

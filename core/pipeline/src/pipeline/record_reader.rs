@@ -27,6 +27,7 @@ use runout_turning::{
 };
 
 /// From recorded turns to the profiles of one station after the other.
+#[non_exhaustive]
 pub struct RecordReader<'a> {
     pub rig: &'a Rig,
     pub recording: &'a dyn Recording,

@@ -17,6 +17,7 @@ use runout_turning::rig::Rig;
 
 /// Every plugin by stage, and every effect.
 #[derive(Default)]
+#[non_exhaustive]
 pub struct Registry {
     /// From files to recordings.
     pub loaders: Catalogue<Box<dyn Loader>>,
@@ -101,7 +102,7 @@ impl<S> Plugin<S> {
             name: C::NAME,
             about: C::ABOUT,
             former: false,
-            schema: super::config::inline::<C>,
+            schema: inline::<C>,
             build: |table, context| document::read_besides::<C>(table, &["plugin"])?.check(context),
         }
     }
@@ -170,4 +171,13 @@ impl<S> Catalogue<S> {
         let plugin = self.plugins.iter().find(|plugin| plugin.name == name)?;
         Some((plugin.build)(&Spanned::new(0..0, DeTable::new()), context))
     }
+}
+
+/// The schema of a type, without references.
+pub(super) fn inline<T: JsonSchema>() -> Schema {
+    let settings = schemars::generate::SchemaSettings::default().with(|settings| {
+        settings.inline_subschemas = true;
+        settings.meta_schema = None;
+    });
+    settings.into_generator().into_root_schema_for::<T>()
 }

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use super::{
-    config::{Pipeline, summary_path},
+    config::Pipeline,
     evaluate::{Evaluate, Group, PartSummary, add_areal, add_generatrices, decide, part_summary},
+    exports::summary_path,
     steadiness::inflated,
     summary::{LostOrders, StationSummary, Summary, SurfaceSummary, summarise},
     tables::{StationTables, correction_rows, named_value_rows},

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    evaluate::{LimitSummary, PartSummary, PlacedValue, placed},
+    evaluate::{LimitSummary, PartSummary, PlacedValue},
     result::true_error,
 };
 use crate::stage::NamedValue;
@@ -60,7 +60,19 @@ impl Summary {
     /// Every value of form and motion: of sections, then of their station, station by station; the whole part's last.
     #[must_use]
     pub fn placed_values(&self) -> Vec<PlacedValue<'_>> {
-        placed(&self.stations, self.part.as_ref())
+        let mut all = Vec::new();
+        for station in &self.stations {
+            let name = Some(station.station.as_str());
+            for section in &station.sections {
+                let (id, z_mm) = (Some(section.section.as_str()), Some(section.z_mm));
+                all.extend(section.values.iter().map(|value| PlacedValue { station: name, section: id, z_mm, value }));
+            }
+            let place = |value| PlacedValue { station: name, section: None, z_mm: Some(station.z_mm), value };
+            all.extend(station.motion_values.iter().map(place));
+        }
+        let of_part = self.part.iter().flat_map(|part| &part.values);
+        all.extend(of_part.map(|value| PlacedValue { station: None, section: None, z_mm: None, value }));
+        all
     }
 
     /// The run's warnings, then each station's behind its name.

@@ -127,6 +127,7 @@ pub struct Outcome {
 
 /// A value of a result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
 pub struct NamedValue {
     /// The standard's symbol, or a short name.
     pub symbol: String,

@@ -22,6 +22,7 @@ pub struct Candidate {
 }
 
 /// A separator that fits the rig.
+#[non_exhaustive]
 pub struct Method {
     /// Its plugin's name, with a number where there are several.
     pub name: String,
@@ -33,6 +34,7 @@ pub struct Method {
 
 /// A separator that cannot take the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
 pub struct Refusal {
     /// Its plugin's name.
     pub method: String,

@@ -14,6 +14,7 @@ use runout_turning::provenance::Provenance;
 /// Form counts from order 2, motion from 1. Arrays by order begin at order 1; null where an order is lost or not known,
 /// and never 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
 pub struct Comparison {
     /// The pipeline's title.
     pub title: String,
@@ -41,6 +42,7 @@ pub struct Comparison {
 
 /// What a method can tell with the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
 pub struct MethodSummary {
     /// The plugin's name, with a number where several are compared.
     pub method: String,
@@ -150,6 +152,7 @@ pub struct Difference {
 
 /// The order with the largest E_n.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
 pub struct Worst {
     /// Undulations per revolution.
     pub order: usize,

@@ -15,6 +15,7 @@ use runout_error::fault::{Fault, known_names};
 /// `[diagnose]`: what the closed loop may consider. `run` leaves it alone.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct DiagnoseConfig {
     /// "all", or a list of effect ids.
     #[serde(default)]
@@ -35,6 +36,7 @@ pub struct DiagnoseConfig {
 /// A choice of effects.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(untagged)]
+#[non_exhaustive]
 pub enum Effects {
     /// "all".
     Word(AllEffects),
@@ -45,6 +47,7 @@ pub enum Effects {
 /// The word "all".
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum AllEffects {
     /// Every effect that the toolkit knows.
     All,
@@ -59,6 +62,7 @@ impl Default for Effects {
 /// An effect whose size is known.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct KnownEffect {
     /// Its id.
     pub effect: String,
@@ -70,6 +74,7 @@ pub struct KnownEffect {
 
 /// What the closed loop is to do, for the model of a pipeline.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Diagnose {
     /// How the loop runs.
     pub settings: Settings,

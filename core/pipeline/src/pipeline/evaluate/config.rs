@@ -1,4 +1,6 @@
 //! `[evaluate]`: which of the standards' values a run gives.
+//!
+//! Long because each key of `[evaluate]` is declared, checked and turned into what is computed in one place.
 
 use schemars::JsonSchema;
 use serde::{
@@ -22,6 +24,7 @@ use runout_turning::{
 /// `[evaluate]`: which of the standards' values a run gives, and how.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct EvaluateConfig {
     /// Groups of values, or "all"; without it `roundness`, `texture`, `cylindricity` and `error-motion`. Of "all", what a run
     /// cannot give (areal values and twist of a single section) is left out.
@@ -94,6 +97,7 @@ impl FacePlaceConfig {
 /// `[evaluate.texture]`: which profiles have texture values, and what the standard leaves to the one who evaluates.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct TextureConfig {
     /// Profiles: R (roughness, λs to λc), P (primary, from λs on), W (waviness, λc to λf). Without it R. R and W need λc.
     pub profiles: Option<Vec<Kind>>,
@@ -110,6 +114,7 @@ pub struct TextureConfig {
 /// `[evaluate.areal]`: form removal, filter and material ratios of areal values.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ArealConfig {
     /// F-operator: what is taken off before the filters; without it `cylinder`.
     pub form: Option<FormRemoval>,
@@ -126,6 +131,7 @@ pub struct ArealConfig {
 /// What the F-operator takes off a wall, by least squares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum FormRemoval {
     /// Nothing but the mean.
     None,
@@ -142,6 +148,7 @@ pub enum FormRemoval {
 /// The filter of areal values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum ArealFilter {
     /// ISO 16610-61.
     #[default]
@@ -264,6 +271,7 @@ impl Default for Texture {
 /// A centre of a polar plot (ISO 230-7) as it stands in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "UPPERCASE")]
+#[non_exhaustive]
 pub enum CentreConfig {
     /// The centre of the polar chart.
     Pc,
@@ -292,6 +300,7 @@ impl From<CentreConfig> for Centre {
 /// Values that belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Group {
     /// RONt about each reference; RONp, RONv, RONq and the steepest slope dr/dθ about LSCI; of each section.
     Roundness,
@@ -324,6 +333,7 @@ impl Group {
 
 /// Groups of values as they stand in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Groups {
     /// "all".
     All,

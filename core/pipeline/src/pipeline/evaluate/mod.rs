@@ -5,6 +5,7 @@ mod config;
 mod filter;
 mod generatrix;
 mod limit;
+mod limit_check;
 mod part;
 mod section;
 mod texture;
@@ -20,12 +21,12 @@ pub use part::PartSummary;
 pub(super) use part::part_summary;
 pub(super) use section::{missing_circles, section_values, steepest_um_per_deg};
 
-use super::summary::StationSummary;
 use filter::Filter;
 use runout_standards::{Value, uncertainty::Uncertainty};
 
 /// A value and where it belongs.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct PlacedValue<'a> {
     /// The station; none for a value of the whole part.
     pub station: Option<&'a str>,
@@ -35,23 +36,6 @@ pub struct PlacedValue<'a> {
     pub z_mm: Option<f64>,
     /// The value.
     pub value: &'a Value,
-}
-
-/// Values of sections, then of their station, station by station; the whole part's last.
-pub(super) fn placed<'a>(stations: &'a [StationSummary], part: Option<&'a PartSummary>) -> Vec<PlacedValue<'a>> {
-    let mut all = Vec::new();
-    for station in stations {
-        let name = Some(station.station.as_str());
-        for section in &station.sections {
-            let (id, z_mm) = (Some(section.section.as_str()), Some(section.z_mm));
-            all.extend(section.values.iter().map(|value| PlacedValue { station: name, section: id, z_mm, value }));
-        }
-        let z_mm = Some(station.z_mm);
-        all.extend(station.motion_values.iter().map(|value| PlacedValue { station: name, section: None, z_mm, value }));
-    }
-    let of_part = part.iter().flat_map(|part| &part.values);
-    all.extend(of_part.map(|value| PlacedValue { station: None, section: None, z_mm: None, value }));
-    all
 }
 
 /// What a number is, before it is known.

@@ -1,3 +1,4 @@
+//! Long because values, parts and limits are tested on the same few stations.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use std::f64::consts::{PI, SQRT_2};
@@ -7,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::pipeline::summary::{SectionSummary, StationSummary};
+use crate::pipeline::summary::{SectionSummary, StationSummary, Summary};
 use runout_error::fault::{Fault, Place, Step};
 use runout_numerics::Complex64;
 use runout_standards::gaps::Gaps;
@@ -632,7 +633,8 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
     let mut evaluate = Evaluate::default();
     let limit: Limit = toml::from_str(limits).unwrap();
     evaluate.add_limit(limit.check(&evaluate, None).unwrap());
-    let (decided, remarks) = decide(evaluate.limits(), &placed(&[station], None));
+    let summary = Summary { stations: vec![station], ..Summary::default() };
+    let (decided, remarks) = decide(evaluate.limits(), &summary.placed_values());
     let of = |value: &LimitValue| (value.decision, value.within);
     decided.iter().map(|one| (one.decision, one.values.iter().map(of).collect(), remarks.len())).collect()
 }
