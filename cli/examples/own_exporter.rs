@@ -97,12 +97,13 @@ impl Export for Page {
 pub fn page(traces: &Path, page: &Path) -> std::result::Result<(), Box<dyn Error>> {
     let mut registry = runout_cli::builtin::registry();
     registry.exporters.add(Plugin::of::<Markdown>());
+    let (traces, page) = (traces.display(), page.display());
     let configuration = format!(
         r#"
         title = "Straightness of a cylinder and a slide"
-        load = {{ plugin = "points", path = {traces:?} }}
+        load = {{ plugin = "points", path = '{traces}' }}
         separate = {{ plugin = "axial-reversal" }}
-        export = [{{ plugin = "markdown", path = {page:?} }}]
+        export = [{{ plugin = "markdown", path = '{page}' }}]
         "#
     );
     Pipeline::from_toml(&configuration, ".", &registry)?.run()?;

@@ -84,15 +84,14 @@ impl PointSeparator for Plane {
         let tilt = |axis: &str, (slope, std): (f64, f64)| -> NamedValue {
             value("slope", slope, std, "um/mm", "slope of the least-squares plane").of(axis)
         };
-        let mut outcome = Outcome::default();
-        outcome.tables = vec![TableRows { table: "plane".into(), rows: residual().rows(columns.into())? }];
+        let tables = vec![TableRows { table: "plane".into(), rows: residual().rows(columns.into())? }];
         // The range of noise is no uncertainty of a range: it has none here.
-        outcome.values = vec![
+        let values = vec![
             value("FLTt", range, f64::NAN, "um", "peak-to-valley flatness deviation LSPL (ISO 12781-1)"),
             tilt("x", slope(1)),
             tilt("y", slope(2)),
         ];
-        Ok(outcome)
+        Ok(Outcome { tables, values, ..Outcome::default() })
     }
 }
 
@@ -103,11 +102,12 @@ impl PointSeparator for Plane {
 pub fn flatness(points: &Path, out: &Path) -> Result<Summary, Box<dyn Error>> {
     let mut registry: Registry = runout_cli::builtin::registry();
     registry.separators.add(Plugin::of::<Plane>());
+    let (points, out) = (points.display(), out.display());
     let configuration = format!(
         r#"
-        load = {{ plugin = "points", path = {points:?} }}
+        load = {{ plugin = "points", path = '{points}' }}
         separate = {{ plugin = "plane", std_um = 0.1 }}
-        export = [{{ plugin = "parquet", path = {out:?} }}]
+        export = [{{ plugin = "parquet", path = '{out}' }}]
         "#
     );
     Ok(Pipeline::from_toml(&configuration, ".", &registry)?.run()?)

@@ -11,13 +11,14 @@ use runout_core::pipeline::{Pipeline, run::Summary};
 /// # Errors
 /// When the recording cannot be read, or the folder cannot be written to.
 pub fn separate(recording: &Path, out: &Path) -> Result<Summary, Box<dyn Error>> {
+    let (recording, out) = (recording.display(), out.display());
     let configuration = format!(
         r#"
         title = "Three probes around a shaft"
-        load = {{ plugin = "csv", pattern = {recording:?}, stations = [{{ name = "shaft" }}], sample_rate_hz = 1280 }}
+        load = {{ plugin = "csv", pattern = '{recording}', stations = [{{ name = "shaft" }}], sample_rate_hz = 1280 }}
         preprocess = [{{ plugin = "synchronous-average", samples_per_rev = 128 }}]
         separate = {{ plugin = "three-point" }}
-        export = [{{ plugin = "parquet", path = {out:?} }}]
+        export = [{{ plugin = "parquet", path = '{out}' }}]
 
         [rig]
         part_radius_mm = 20

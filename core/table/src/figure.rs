@@ -164,7 +164,7 @@ impl Figure {
                 );
             }
             Drawing::Amplitudes { order, parts } => {
-                columns.extend([order.as_str(), parts[0].as_str(), parts[1].as_str()])
+                columns.extend([order.as_str(), parts[0].as_str(), parts[1].as_str()]);
             }
             Drawing::Map { x, y, value } => columns.extend([x.as_str(), y.as_str(), value.as_str()]),
         }
