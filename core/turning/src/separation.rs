@@ -476,7 +476,8 @@ impl Separation {
     #[must_use]
     pub fn tells_no_form(&self) -> bool {
         let width = self.unknowns.len();
-        let seen = |unknown: usize| self.observable.iter().skip(unknown).step_by(width.max(1)).skip(2).any(|seen| *seen);
+        let seen =
+            |unknown: usize| self.observable.iter().skip(unknown).step_by(width.max(1)).skip(2).any(|seen| *seen);
         self.max_order() > 1 && self.unknowns.iter().any(|unknown| unknown.is_form()) && !(0..width).any(seen)
     }
 

@@ -111,7 +111,7 @@ pub fn read_height_map(path: &Path) -> Result<HeightGrid> {
     node::written_shape(&dataset, &place)?;
     let kind = node::element_type(&dataset, &place)?;
     if !node::is_number(&kind) {
-        return Err(place.error(format!("expected numbers, found {}", node::type_name(&kind))));
+        return Err(place.error(format!("expected numbers, found {}", crate::type_name::type_name(&kind))));
     }
     let height_nm = dataset.read_raw::<f64>().map_err(|error| place.error(error))?;
     let grid = HeightGrid { columns, step_x_mm, step_y_mm, origin_x_mm, origin_y_mm, std_nm, height_nm };

@@ -4,7 +4,7 @@
 //! wrong by any amount, so it only lists what is tried.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use runout_core::model::evidence::f_tail;
+use runout_core::numerics::statistics::f_tail;
 
 use crate::{
     campaign::Campaign,

@@ -65,12 +65,12 @@ pub(crate) fn farthest_square(distances: &[(f64, f64)]) -> f64 {
 /// STRt and rms of part and slide, before and after.
 pub(crate) fn moved(before: &Straightness, after: &Straightness) -> Vec<Moved> {
     let of = |result: &Straightness| {
-        [(&result.part_um, &result.part_std_um), (&result.slide_um, &result.slide_std_um)]
-            .map(|(values, std)| (strt_lsli_um(&result.z_mm, values), rms(values), at_the_ends(values, std), rms(std)))
+        [&result.part_um, &result.slide_um].map(|values| [strt_lsli_um(&result.z_mm, values), rms(values)])
     };
+    let std = [0, 1].map(|which| after.std_of_values(which));
     let (before, after) = (of(before), of(after));
-    let both = ["part", "slide"].into_iter().zip(before.into_iter().zip(after));
-    both.flat_map(|(section, (before, after))| {
+    let both = ["part", "slide"].into_iter().zip(before.into_iter().zip(after).zip(std));
+    both.flat_map(|(section, ((before, after), std))| {
         let one = |value: &str, [before, after]: [f64; 2], std: f64| Moved {
             value: value.into(),
             section: Some(section.into()),
@@ -82,15 +82,8 @@ pub(crate) fn moved(before: &Straightness, after: &Straightness) -> Vec<Moved> {
             filter: Some("none".into()),
             lost_orders: Vec::new(),
         };
-        [one("STRt", [before.0, after.0], after.2), one("straightness rms", [before.1, after.1], after.3)]
+        let values = ["STRt", "straightness rms"].into_iter().enumerate();
+        values.map(|(which, value)| one(value, [before[which], after[which]], std[which])).collect::<Vec<_>>()
     })
     .collect()
-}
-
-/// Standard uncertainty of the difference of the highest and the lowest value, for independent errors.
-pub(crate) fn at_the_ends(values: &[f64], std: &[f64]) -> f64 {
-    let ends = values.iter().zip(std);
-    let lowest = ends.clone().min_by(|a, b| a.0.total_cmp(b.0));
-    let highest = ends.max_by(|a, b| a.0.total_cmp(b.0));
-    lowest.zip(highest).map_or(f64::NAN, |((_, one), (_, other))| one.hypot(*other))
 }

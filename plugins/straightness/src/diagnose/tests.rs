@@ -19,10 +19,8 @@ fn points() -> Points {
         }
         traces.push(Trace { id: format!("{number}"), kind: setup.into(), points: start..z_mm.len() });
     }
-    let columns = vec![
-        Column { name: "z_mm".into(), values: z_mm },
-        Column { name: "reading_um".into(), values: reading_um },
-    ];
+    let columns =
+        vec![Column { name: "z_mm".into(), values: z_mm }, Column { name: "reading_um".into(), values: reading_um }];
     Points { input: "made.csv".into(), columns, traces, ..Points::default() }
 }
 
@@ -81,8 +79,7 @@ fn signatures_and_moves_are_those_of_refits() {
                     };
                     // A refit also turns the span of what is fitted, by as much as is left: that part lies in the span.
                     let change = fit.outside(&slope(&up.remainder().residual, &down.remainder().residual));
-                    let distance =
-                        |a: &[f64], b: &[f64]| rms(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>());
+                    let distance = |a: &[f64], b: &[f64]| rms(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>());
                     let named = format!("{cutoff:?} {:?} {parameter}", model.effects()[effect]);
                     // 1e-6: rounding of readings near 10 µm over 2e-5, and the step's square.
                     assert!(distance(&signature[parameter], &change) < 1e-6 * (1.0 + rms(&change)), "{named}");
