@@ -290,7 +290,7 @@ impl Simulated {
             column("repeat", self.repeat.clone()),
         ];
         let whole = Trace { id: "points".into(), kind: "points".into(), points: 0..self.time_s.len() };
-        Points { input: "simulated.csv".into(), columns, traces: vec![whole], ..Points::default() }
+        Points { input: "simulated.csv".into(), columns, labels: Vec::new(), traces: vec![whole], ..Points::default() }
     }
 }
 
