@@ -96,16 +96,37 @@ impl CutModel {
 impl CutModel {
     /// Of lines that look alike on a sample of the points, the one with which least is left of all.
     fn best_start(&self, effect: usize, applied: &[Setting], starts: &[[f64; 3]]) -> Option<Vec<f64>> {
-        if let [only] = starts {
-            return Some(only.to_vec());
-        }
-        let refined = starts.iter().filter_map(|start| {
+        let [start, _, ..] = starts else { return starts.first().map(|only| only.to_vec()) };
+        let refitted = |values: &[f64]| {
             let mut settings = applied.to_vec();
-            settings.push(Setting { effect, values: start.to_vec() });
+            settings.push(Setting { effect, values: values.to_vec() });
             let refit = refit(self, settings, applied.len()).ok()?;
             Some((refit.chi2, refit.settings.last()?.values.clone()))
+        };
+        let (chi2, values) = refitted(start)?;
+        let [ratio, amplitude, phase_deg] = values[..] else { return Some(values) };
+        // At the middle of the rows, where an alias has the same height, only the slope of its phase along y differs.
+        let angles = self.data.fitted.rows.iter().map(|row| row.angle.to_degrees());
+        let middle_deg = angles.sum::<f64>() / self.data.fitted.rows.len().max(1) as f64;
+        let highest = self.data.config.max_frequency_ratio as i32;
+        let whole = ratio.floor() as i32;
+        let shifted = (0..highest).map(|other| {
+            let by = f64::from(other - whole);
+            [ratio + by, amplitude, phase_deg - by * middle_deg]
         });
-        refined.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, values)| values)
+        let mirrored = (1..=highest).map(|other| {
+            let sum = f64::from(other + whole);
+            [sum - ratio, amplitude, -phase_deg - sum * middle_deg]
+        });
+        let left_with = |values: [f64; 3]| {
+            let mut settings = applied.to_vec();
+            settings.push(Setting { effect, values: values.to_vec() });
+            Some((self.fit(&settings).ok()?.remainder().chi2(), values))
+        };
+        let others = shifted.chain(mirrored).filter(|other| (other[0] - ratio).abs() > 1e-3 && other[0] > 0.0);
+        let best = others.filter_map(left_with).min_by(|one, other| one.0.total_cmp(&other.0));
+        let other = best.and_then(|(_, other)| refitted(&other)).filter(|(other, _)| *other < chi2);
+        Some(other.map_or(values, |(_, other)| other))
     }
 }
 

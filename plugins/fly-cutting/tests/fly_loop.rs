@@ -38,8 +38,8 @@ fn the_line_of_the_paper_is_found() {
 #[test]
 fn every_effect_is_found_with_its_size() {
     let cases: [(&str, &str, &[(&str, f64)]); 6] = [
-        // cos 3θ over y from 0 to 4 mm is 1 − 4.5·(y/r)², and P2 takes a sixth of the square of the length of it.
-        ("synchronous-motion", "", &[("order_2", -4.5 * 16.0 / (6.0 * 250.0 * 250.0) * 4e4), ("order_3", 0.0)]),
+        // A·cos 3θ is A − 4.5·A·(y/r)²: over y from 0 to 3.975 mm −7.584 nm of P2 and a slope of −11.448 nm/mm.
+        ("synchronous-motion", "", &[("order_2", -7.584), ("order_3", 0.0)]),
         ("workpiece-tilt", "x_urad = 3.0\ny_urad = -1.5", &[("x", 3.0), ("y", -1.5)]),
         ("table-straightness", "order = 3\namplitude_nm = 2.0", &[("order_3", 2.0), ("order_2", 0.0)]),
         ("feed-scale", "scale_um_per_m = 3000", &[("scale", 3000.0)]),
@@ -53,7 +53,7 @@ fn every_effect_is_found_with_its_size() {
     for (effect, keys, truth) in cases {
         let text = if keys.is_empty() {
             // Its slope is that of a work piece that is tilted.
-            let slope = "[[effect]]\nplugin = 'workpiece-tilt'\ny_urad = 11.52\n";
+            let slope = "[[effect]]\nplugin = 'workpiece-tilt'\ny_urad = 11.448\n";
             format!("noise_nm = 0.1\n[[harmonics]]\norder = 3\namplitude_nm = 4e4\n{slope}")
         } else {
             format!("noise_nm = 0.1\nseed = 4\n[[effect]]\nplugin = '{effect}'\n{keys}\n")
