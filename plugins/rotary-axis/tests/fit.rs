@@ -102,7 +102,7 @@ fn a_drift_does_not_inflate_the_noise_of_repeats() {
     ] {
         let text = campaign(&format!("noise_um = 1.5\npasses = 3\nball_by_ball = true\neffect = [{drift}]"));
         let found = separated(THREE_BALLS, &scenario(&text).simulate().points());
-        let remark = found.remarks.iter().find(|remark| remark.contains("scatter of repeats")).unwrap();
+        let remark = found.notes.iter().find(|note| note.contains("scatter of repeats")).unwrap();
         let std: f64 = remark.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!((std - 1.5).abs() < 0.2, "{remark}");
     }
@@ -114,7 +114,7 @@ fn repeats_in_opposite_directions_give_the_noise_without_lost_motion() {
         "noise_um = 1.5\npasses = 2\nback_and_forth = true\neffect = [{ plugin = 'backlash', lost_motion_urad = 200 }]",
     );
     let found = separated(THREE_BALLS, &scenario(&text).simulate().points());
-    let remark = found.remarks.iter().find(|remark| remark.contains("scatter of repeats")).unwrap();
+    let remark = found.notes.iter().find(|note| note.contains("scatter of repeats")).unwrap();
     let std: f64 = remark.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!((std - 1.5).abs() < 0.3, "{remark}");
 }

@@ -101,6 +101,13 @@ impl Equations {
                 }
             }
         }
+        for role in [Role::Stiffness, Role::Mass] {
+            let elements =
+                by_role[role as usize].iter().flat_map(Mat::col_iter).flat_map(|column| column.iter().copied());
+            if elements.into_iter().all(|element| element == 0.0) {
+                return Err(refuse(role, "expected numbers other than 0, found none".into()));
+            }
+        }
         for (role, sign) in
             [(Role::Stiffness, 1.0), (Role::Mass, 1.0), (Role::Gyroscopic, -1.0), (Role::Circulatory, -1.0)]
         {

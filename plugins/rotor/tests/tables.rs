@@ -65,10 +65,11 @@ fn tables_hold_what_they_declare() {
     let [order, from, to] = ["order", "from_rpm", "to_rpm"].map(|column| numbers(ranges, column));
     let first = order.iter().position(|order| *order == 1.0).unwrap();
     assert!(from[first] < critical[0] && critical[0] < to[first]);
-    near(from[first], critical[0] / 1.15, 5e-3);
-    near(to[first], critical[0] / 0.85, 5e-3);
+    // The gyroscopic moments move the frequency by about 1 % within a range.
+    near(from[first], critical[0] / 1.15, 2e-2);
+    near(to[first], critical[0] / 0.85, 2e-2);
     let second = order.iter().position(|order| *order == 2.0).unwrap();
-    near(from[second], from[first] / 2.0, 5e-3);
+    near(from[second], from[first] / 2.0, 2e-2);
 }
 
 #[test]

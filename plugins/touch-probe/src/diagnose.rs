@@ -17,6 +17,7 @@ use crate::{
     design::{Content, Design, Noise, Parameter},
     effects::{Missing, highest},
     outcome::residual_rows,
+    second_order::SecondOrder,
     separate::{Prepared, TouchProbe},
     waves::{Part, angles},
 };
@@ -29,6 +30,9 @@ const MOST_ADDED: usize = 9;
 const INDEPENDENT: f64 = 1e-7;
 /// Standard deviations of χ² per degree of freedom that are more than chance.
 const CHANCE: f64 = 4.0;
+/// Amplitude of an order against what the second order makes of it, below which it is not believed: the latter is known to its
+/// size only.
+const SECOND_ORDER: f64 = 3.0;
 /// Sectors of the ring in which what is left is summed.
 const SECTORS: usize = 36;
 
@@ -58,6 +62,18 @@ impl PointModel for TouchProbe {
                  or form"
             ));
         }
+        let small = self.of_second_order(&prepared, &missing, &closed);
+        if !small.is_empty() {
+            let names: Vec<String> = small.iter().map(|effect| missing[*effect].effect().id).collect();
+            let mut left_out = settings.left_out.clone();
+            left_out.extend(small);
+            let settings = Settings { left_out, ..settings.clone() };
+            closed = closed_loop::diagnose(&terms, &settings)?;
+            closed.diagnosis.warnings.push(format!(
+                "{}: not above what the second order of lobing and form makes of them, which the model leaves out",
+                names.join(", ")
+            ));
+        }
         self.concluded(&prepared, &missing, &terms, closed, settings)
     }
 }
@@ -68,6 +84,21 @@ fn orders(missing: &[Missing]) -> impl Iterator<Item = usize> + '_ {
 }
 
 impl TouchProbe {
+    /// Orders that were added, and that are no larger than what the second order makes of them.
+    fn of_second_order(&self, prepared: &Prepared, missing: &[Missing], closed: &Closed<LinearFit>) -> Vec<usize> {
+        let fit = self.fit(prepared, &[], &Content::declared(), &prepared.readings_um());
+        let second_order = SecondOrder::of(&self.0, &fit);
+        let small = closed.settings.iter().filter(|setting| {
+            let order = match missing[setting.effect] {
+                Missing::LobingOrder(order) | Missing::RingFormOrder(order) => order,
+                _ => return false,
+            };
+            let squares: f64 = setting.values.iter().map(|value| value * value).sum();
+            squares.sqrt() < SECOND_ORDER * second_order.amplitude_um(order)
+        });
+        small.map(|setting| setting.effect).collect()
+    }
+
     /// The terms of the loop for some touches.
     pub(crate) fn linear_terms(&self, points: &Points) -> Result<LinearTerms> {
         self.terms(points, &self.prepare(points)?, &self.missing())

@@ -14,6 +14,7 @@ mod lobe;
 mod noise;
 mod outcome;
 mod plan;
+mod second_order;
 mod separate;
 pub mod simulate;
 mod touches;

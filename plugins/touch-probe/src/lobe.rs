@@ -5,6 +5,7 @@ use runout_core::numerics::statistics::f_tail;
 use crate::{
     config::TouchProbeConfig,
     design::{Fitted, Parameter, lobing_order},
+    second_order::SecondOrder,
     waves::{Part, wave},
 };
 
@@ -37,6 +38,7 @@ impl Lobe {
             })
             .collect();
         let count = orders.len() as f64;
+        let second_order = SecondOrder::of(config, fit);
         let lobe = |order: usize| {
             let places = fit.design.pair(lobing_order, order).unwrap_or_default();
             let shared = matches!(fit.design.parameters[places[0]], Parameter::Lobing { shared: true, .. });
@@ -45,7 +47,8 @@ impl Lobe {
             let parts_um = places.map(|place| fit.solved.coefficients[place]);
             let mut covariance = places.map(|row| places.map(|column| fit.covariance(row, column)));
             for index in 0..2 {
-                covariance[index][index] += bound.map_or(0.0, of_bound);
+                covariance[index][index] +=
+                    bound.map_or(0.0, of_bound) + 0.5 * second_order.amplitude_um(order).powi(2);
             }
             // T² of both parts against noise; covariances of repeats or of the residual have degrees of freedom.
             let [[a, b], [_, d]] = covariance;
@@ -85,8 +88,14 @@ fn of_bound(bound_um: f64) -> f64 {
 }
 
 /// Pre-travel at a direction in the probe's frame, without mean and order 1, with its standard uncertainty; by lobes that are
-/// observable.
-pub(crate) fn pretravel_um(fit: &Fitted, lobes: &[Lobe], direction: f64, bound_um: Option<f64>) -> [f64; 2] {
+/// observable. `besides_um2` is the variance of what the model leaves out.
+pub(crate) fn pretravel_um(
+    fit: &Fitted,
+    lobes: &[Lobe],
+    direction: f64,
+    bound_um: Option<f64>,
+    besides_um2: f64,
+) -> [f64; 2] {
     let used: Vec<&Lobe> = lobes.iter().filter(|lobe| lobe.observable).collect();
     if used.is_empty() {
         return [f64::NAN; 2];
@@ -102,7 +111,7 @@ pub(crate) fn pretravel_um(fit: &Fitted, lobes: &[Lobe], direction: f64, bound_u
     }
     let number: f64 = places.iter().zip(&factors).map(|(place, factor)| fit.solved.coefficients[*place] * factor).sum();
     let covariance = fit.covariance_of(&places);
-    let mut variance = 0.0;
+    let mut variance = besides_um2;
     for (row, one) in factors.iter().enumerate() {
         for (column, other) in factors.iter().enumerate() {
             variance += one * other * covariance[(row, column)];

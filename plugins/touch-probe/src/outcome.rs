@@ -15,6 +15,7 @@ use crate::{
     design::{Fitted, Noise, Parameter, Weights, form_order},
     held_out::Ranges,
     lobe::{Lobe, pretravel_um},
+    second_order::SecondOrder,
     touches::Touches,
     waves::{Part, wave},
 };
@@ -160,8 +161,9 @@ impl Found<'_> {
 
     fn pretravel(&self, lobes: &[Lobe]) -> Result<TableRows> {
         let angles: Vec<f64> = (0..DIRECTIONS).map(|index| TAU * index as f64 / DIRECTIONS as f64).collect();
-        let each: Vec<[f64; 2]> =
-            angles.iter().map(|angle| pretravel_um(self.fit, lobes, *angle, self.config.ring_form_um)).collect();
+        let (bound_um, besides_um2) = (self.config.ring_form_um, self.second_order().variance_um2());
+        let at = |angle: &f64| pretravel_um(self.fit, lobes, *angle, bound_um, besides_um2);
+        let each: Vec<[f64; 2]> = angles.iter().map(at).collect();
         let columns = vec![
             numbers(angles.iter().map(|angle| angle.to_degrees())),
             numbers(each.iter().map(|[number, _]| *number)),
@@ -217,12 +219,18 @@ impl Found<'_> {
         let [a, b] = places.map(|place| self.fit.solved.coefficients[place]);
         let amplitude = a.hypot(b);
         let [[aa, ab], [_, bb]] = places.map(|row| places.map(|column| self.fit.covariance(row, column)));
-        [amplitude, (a * a * aa + 2.0 * a * b * ab + b * b * bb).max(0.0).sqrt() / amplitude]
+        let noise_um2 = (a * a * aa + 2.0 * a * b * ab + b * b * bb).max(0.0) / (amplitude * amplitude);
+        [amplitude, (noise_um2 + 0.5 * self.second_order().amplitude_um(order).powi(2)).sqrt()]
+    }
+
+    fn second_order(&self) -> SecondOrder {
+        SecondOrder::of(self.config, self.fit)
     }
 
     fn mean(&self) -> Option<[f64; 2]> {
         let place = self.fit.design.place(&Parameter::Mean).filter(|place| self.fit.is_told(&[*place]))?;
-        Some([self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()])
+        let std_um = self.fit.covariance(place, place).sqrt().hypot(self.second_order().amplitude_um(0));
+        Some([self.fit.solved.coefficients[place], std_um])
     }
 
     fn values(&self, lobes: &[Lobe]) -> Vec<NamedValue> {
@@ -294,6 +302,7 @@ impl Found<'_> {
         (2..=self.config.max_order).any(|order| self.config.separates(&all, order)).then_some(())?;
         let highest = lobes.iter().map(|lobe| lobe.order).max().unwrap_or(0).max(self.config.max_order);
         let lost = Complex64::new(f64::NAN, f64::NAN);
+        let second_order = self.second_order();
         let (mut estimate, mut variance) = (vec![lost; highest + 1], vec![f64::NAN; highest + 1]);
         let mut observable = vec![false; highest + 1];
         // Level and centring are not form.
@@ -311,7 +320,8 @@ impl Found<'_> {
             // a cos nα + b sin nα = Re (a − ib) e^{inα}.
             let [a, b] = places.map(|place| self.fit.solved.coefficients[place]);
             estimate[order] = Complex64::new(a, -b);
-            variance[order] = places.iter().map(|place| self.fit.covariance(*place, *place)).sum();
+            let of_noise: f64 = places.iter().map(|place| self.fit.covariance(*place, *place)).sum();
+            variance[order] = of_noise + second_order.amplitude_um(order).powi(2);
             observable[order] = true;
         }
         let left = &self.fit.residual_um;

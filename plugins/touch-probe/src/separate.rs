@@ -211,7 +211,13 @@ impl TouchProbe {
         Ok(Prepared { touches, weights })
     }
 
-    fn fit(&self, prepared: &Prepared, missing: &[Missing], content: &Content, readings_um: &[f64]) -> Fitted {
+    pub(crate) fn fit(
+        &self,
+        prepared: &Prepared,
+        missing: &[Missing],
+        content: &Content,
+        readings_um: &[f64],
+    ) -> Fitted {
         let all: Vec<usize> = (0..readings_um.len()).collect();
         Design::new(&self.0, &prepared.touches, missing, content).fit(readings_um, &prepared.weights, &all)
     }

@@ -18,7 +18,7 @@ pub(super) fn angle_std_rad(marks: &[f64], within: f64) -> f64 {
     common.sqrt() * TAU / turn_samples
 }
 
-/// Variance of ascending numbers about their least-squares line; 0 of fewer than three.
+/// Mean square of ascending numbers about their least-squares line; 0 of fewer than three.
 fn scatter(marks: &[f64]) -> f64 {
     if marks.len() < 3 {
         return 0.0;
@@ -34,7 +34,7 @@ fn scatter(marks: &[f64]) -> f64 {
     }
     let rise = across / along;
     let left = |(turn, mark): (usize, &f64)| (mark - mean - rise * (turn as f64 - middle)).powi(2);
-    marks.iter().enumerate().map(left).sum::<f64>() / (count - 2.0)
+    marks.iter().enumerate().map(left).sum::<f64>() / count
 }
 
 #[cfg(test)]

@@ -1,15 +1,19 @@
-//! What exact geometry carries out of orders that are lost.
+//! What exact geometry carries out of orders that are lost, and out of the form of a face.
 //!
 //! A surface that goes sideways by t is seen turned by t/R: the reading gains −(t/R)·h'(α) (`docs/physics.md` section 1).
 //! With an eccentricity C in part coordinates, t = −Im C e^{iα}, form H of order n appears at order n + 1 as n·C·H/(2R) and
 //! at order n − 1 as −n·C*·H/(2R); motion of order n across the sensor carries form of order p to n + p and |n − p| in the same way. Form and
 //! motion of a lost order are not known, so that this is not known either: it is part of the readings' uncertainty. The
 //! readings themselves say how large they may be, since each reading is the sum of both.
+//!
+//! A face that goes sideways by t under an axial sensor at the radius ρ is seen turned by t/ρ in the same way. The separators solve
+//! axial readings to first order, so that what the eccentricity carries between orders of a face is part of the readings'
+//! uncertainty too, whether orders are lost or not.
 
 use runout_core::Complex64;
 
 use super::readings::Readings;
-use crate::layout::Layout;
+use crate::layout::{Layout, View};
 
 /// Motion of higher orders is too small to matter.
 const MOTION_ORDERS: usize = 256;
@@ -20,7 +24,8 @@ pub fn widen(layout: &Layout, part_radius_mm: f64, readings: &mut Readings) {
         return;
     }
     let carried = Carried::new(layout, part_radius_mm, readings);
-    if carried.lost.iter().all(|lost| !lost) {
+    let faces = layout.readings.iter().any(|reading| reading.view == View::Axial);
+    if !faces && carried.lost.iter().all(|lost| !lost) {
         return;
     }
     let setups = readings.turns.len().max(1);
@@ -50,9 +55,11 @@ struct Carried<'a> {
     lost: Vec<bool>,
     /// Mean square of the readings, `[order][section]`: of form and motion together.
     squares: Vec<Vec<f64>>,
+    /// The same of axial readings: of a face's form and motion along the axis together.
+    face_squares: Vec<Vec<f64>>,
     /// Mean square over all sections.
     mean: Vec<f64>,
-    /// |C|² of each reading's section in its setup.
+    /// |C|² of each reading's section in its setup; of an axial reading that of all sections.
     eccentricity: Vec<f64>,
 }
 
@@ -62,12 +69,13 @@ impl<'a> Carried<'a> {
         let systems = layout.systems(readings.max_order);
         let is_lost =
             |order: usize| order > 1 && layout.circles().any(|(form, _)| !systems[order - 1].observable[form]);
-        let radial = |index: usize| !layout.readings[index].view.is_axial();
-        let mean_of = |order: usize, of: &dyn Fn(usize) -> bool| {
-            let seen = readings.order(order).iter().enumerate().filter(|(index, _)| radial(*index) && of(*index));
+        let looks = |index: usize, view: View| layout.readings[index].view == view;
+        let mean_along = |order: usize, view: View, of: &dyn Fn(usize) -> bool| {
+            let seen = readings.order(order).iter().enumerate().filter(|(index, _)| looks(*index, view) && of(*index));
             let (sum, count) = seen.fold((0.0, 0.0), |(sum, count), (_, value)| (sum + value.norm_sqr(), count + 1.0));
             if count > 0.0 { sum / count } else { 0.0 }
         };
+        let mean_of = |order: usize, of: &dyn Fn(usize) -> bool| mean_along(order, View::Radial, of);
         let section = |index: usize| layout.readings[index].section;
         let setup = |index: usize| layout.readings[index].setup;
         let orders = 0..=readings.max_order;
@@ -79,10 +87,18 @@ impl<'a> Carried<'a> {
                 .clone()
                 .map(|order| (0..sections).map(|wanted| mean_of(order, &|index| section(index) == wanted)).collect())
                 .collect(),
+            face_squares: orders
+                .clone()
+                .map(|order| {
+                    let of = |wanted| mean_along(order, View::Axial, &|index| section(index) == wanted);
+                    (0..sections).map(of).collect()
+                })
+                .collect(),
             mean: orders.map(|order| mean_of(order, &|_| true)).collect(),
             eccentricity: (0..layout.readings.len())
                 .map(|reading| {
-                    mean_of(1, &|index| section(index) == section(reading) && setup(index) == setup(reading))
+                    let any = looks(reading, View::Axial);
+                    mean_of(1, &|index| (any || section(index) == section(reading)) && setup(index) == setup(reading))
                 })
                 .collect(),
         }
@@ -93,18 +109,24 @@ impl<'a> Carried<'a> {
         let mut block = vec![Complex64::ZERO; sensors * sensors];
         for row in 0..sensors {
             let (one, place) = (&self.layout.readings[setup * sensors + row], setup * sensors + row);
-            if one.view.is_axial() {
+            if one.view == View::OnAxis {
                 continue;
             }
+            let by_form = match one.view {
+                View::Axial => self.by_face(order, one.section, -1e3 * one.lever_mm),
+                _ => self.by_form(order, one.section),
+            };
             for column in 0..sensors {
                 let other = &self.layout.readings[setup * sensors + column];
                 if one.section != other.section {
                     continue;
                 }
                 let phases = self.layout.part_phase(one, order) * self.layout.part_phase(other, order).conj();
-                block[row * sensors + column] += phases * (self.by_form(order, one.section) * self.eccentricity[place]);
+                block[row * sensors + column] += phases * (by_form * self.eccentricity[place]);
             }
-            block[row * (sensors + 1)] += by_motion;
+            if one.view == View::Radial {
+                block[row * (sensors + 1)] += by_motion;
+            }
         }
         block
     }
@@ -116,6 +138,16 @@ impl<'a> Carried<'a> {
             if self.is_lost(lost) { share * share * self.squares[lost][section] } else { 0.0 }
         };
         from(order - 1) + from(order + 1)
+    }
+
+    /// Variance that the form of a face carries to an order at a radius, per square of the eccentricity.
+    fn by_face(&self, order: usize, section: usize, radius_um: f64) -> f64 {
+        let from = |other: usize| {
+            let share = 0.5 * other as f64 / radius_um;
+            self.face_squares.get(other).map_or(0.0, |squares| share * share * squares[section])
+        };
+        let below = if order > 1 { from(order - 1) } else { 0.0 };
+        below + from(order + 1)
     }
 
     /// Variance that lost motion carries to an order, with the form of all others.
