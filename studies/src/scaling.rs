@@ -36,7 +36,7 @@ pub struct Row {
 /// # Errors
 /// When a campaign cannot be made or diagnosed.
 pub fn rows() -> Result<Vec<Row>> {
-    let effect = Effect::ReversalAngle(ReversalAngle { targets: vec!["k2".into()], angle_deg: 0.34 });
+    let effect = Effect::ReversalAngle(ReversalAngle { targets: vec!["k2".into()], angle_deg: 0.34, declared: false });
     let row = |stations: usize| {
         Ok(Row { stations, sound_s: seconds(stations, None)?, one_effect_s: seconds(stations, Some(&effect))? })
     };

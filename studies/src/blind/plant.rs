@@ -43,19 +43,19 @@ impl Chance {
                 let (target, relative_gain) = (self.sensor(config), self.signed(2e-4, 0.1, large));
                 let size = format!("{:+.2} %", 100.0 * relative_gain);
                 let planted = planted("sensor-gain", Some(&target), vec![("gain", relative_gain)], size);
-                (Effect::SensorGain(SensorGain { targets: vec![target], relative_gain }), planted)
+                (Effect::SensorGain(SensorGain { targets: vec![target], relative_gain, declared: false }), planted)
             }
             "sensor-angle" => {
                 let (target, angle_deg) = (self.sensor(config), self.signed(0.003, 2.0, large));
                 let parameters = vec![("angle", angle_deg)];
                 let planted = planted("sensor-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
-                (Effect::SensorAngle(SensorAngle { targets: vec![target], angle_deg }), planted)
+                (Effect::SensorAngle(SensorAngle { targets: vec![target], angle_deg, declared: false }), planted)
             }
             "sensor-axial-position" => {
                 let (target, shift_mm) = (self.sensor(config), self.signed(0.02, 5.0, large));
                 let size = format!("{shift_mm:+.2} mm");
                 let planted = planted("sensor-axial-position", Some(&target), vec![("shift", shift_mm)], size);
-                let effect = SensorAxialPosition { targets: vec![target], shift_mm };
+                let effect = SensorAxialPosition { targets: vec![target], shift_mm, declared: false };
                 (Effect::SensorAxialPosition(effect), planted)
             }
             "sensor-nonlinearity" => {
@@ -65,7 +65,7 @@ impl Chance {
                 let size = format!("{quadratic_per_um:+.1e}/µm, {cubic_per_um2:+.1e}/µm²");
                 let planted = planted("sensor-nonlinearity", Some(&target), parameters, size);
                 let targets = vec![target];
-                let effect = SensorNonlinearity { targets, quadratic_per_um, cubic_per_um2 };
+                let effect = SensorNonlinearity { targets, quadratic_per_um, cubic_per_um2, declared: false };
                 (Effect::SensorNonlinearity(effect), planted)
             }
             "thermal-drift" => self.drift(large, config),
@@ -74,7 +74,7 @@ impl Chance {
                 let (target, cutoff_hz) = (self.sensor(config), self.size(300.0, 2100.0));
                 // The digital filter is not quite the analogue one that the loop finds: no parameter to compare.
                 let planted = planted("filter-attenuation", Some(&target), vec![], format!("{cutoff_hz:.0} Hz"));
-                let effect = FilterAttenuation { targets: vec![target], cutoff_hz, order: 1 };
+                let effect = FilterAttenuation { targets: vec![target], cutoff_hz, order: 1, declared: false };
                 (Effect::FilterAttenuation(effect), planted)
             }
         }
@@ -103,7 +103,7 @@ impl Chance {
         }
         let planted = planted("thermal-drift", Some(&target), parameters, size);
         let targets = vec![target];
-        let effect = ThermalDrift { targets, rate_um_per_rev, time_constant_turns, setups };
+        let effect = ThermalDrift { targets, rate_um_per_rev, time_constant_turns, setups, declared: false };
         (Effect::ThermalDrift(effect), planted)
     }
 
@@ -120,7 +120,8 @@ impl Chance {
         let size = format!("{amplitude_um:.3} µm at {frequency_hz:.2} Hz");
         let planted = planted("sensor-line", Some(&target), parameters, size);
         let targets = vec![target];
-        let effect = SensorLine { targets, frequency_hz: Some(frequency_hz), order: None, amplitude_um };
+        let effect =
+            SensorLine { targets, frequency_hz: Some(frequency_hz), order: None, amplitude_um, declared: false };
         (Effect::SensorLine(effect), planted)
     }
 
@@ -131,18 +132,21 @@ impl Chance {
             let angle_deg = self.signed(0.003, 1.0, large);
             let parameters = vec![("angle", angle_deg)];
             let planted = planted("reversal-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
-            return (Effect::ReversalAngle(ReversalAngle { targets: vec![target], angle_deg }), planted);
+            return (
+                Effect::ReversalAngle(ReversalAngle { targets: vec![target], angle_deg, declared: false }),
+                planted,
+            );
         }
         if id == "sensors-angle" {
             let angle_deg = self.signed(0.003, 1.0, large);
             let parameters = vec![("angle", angle_deg)];
             let planted = planted("sensors-angle", Some(&target), parameters, format!("{angle_deg:+.3}°"));
-            return (Effect::SensorsAngle(SensorsAngle { targets: vec![target], angle_deg }), planted);
+            return (Effect::SensorsAngle(SensorsAngle { targets: vec![target], angle_deg, declared: false }), planted);
         }
         let ratio = 1.0 + self.signed(0.003, 0.3, large);
         let size = format!("{ratio:.3}");
         let planted = planted("setup-motion-change", Some(&target), vec![("ratio", ratio)], size);
-        let effect = SetupMotionChange { targets: vec![target], ratio };
+        let effect = SetupMotionChange { targets: vec![target], ratio, declared: false };
         (Effect::SetupMotionChange(effect), planted)
     }
 
@@ -156,6 +160,7 @@ impl Chance {
             amplitude_deg: amplitude.to_degrees(),
             phase_deg: self.between(0.0, 360.0),
             targets: vec![],
+            declared: false,
         };
         (Effect::SpeedRipple(effect), planted)
     }
@@ -177,24 +182,27 @@ impl Chance {
             let target = (!targets.is_empty()).then(|| targets.join(" "));
             planted(id, target.as_ref(), vec![], String::new())
         };
+        let declared = false;
         match id {
             "sensor-sign" => {
                 let targets = vec![self.sensor(config)];
                 let planted = named("sensor-sign", &targets);
-                (Effect::SensorSign(SensorSign { targets }), planted)
+                (Effect::SensorSign(SensorSign { targets, declared }), planted)
             }
             "sensors-swapped" => {
                 let targets = self.two(config.rig.sensors.len()).map(|index| config.rig.sensors[index].id.clone());
                 let planted = named("sensors-swapped", &targets);
-                (Effect::SensorsSwapped(SensorsSwapped { targets }), planted)
+                (Effect::SensorsSwapped(SensorsSwapped { targets, declared }), planted)
             }
             "setups-swapped" => {
                 let targets = self.two(config.rig.setups.len()).map(|index| config.rig.setups[index].id.clone());
                 let planted = named("setups-swapped", &targets);
-                (Effect::SetupsSwapped(SetupsSwapped { targets }), planted)
+                (Effect::SetupsSwapped(SetupsSwapped { targets, declared }), planted)
             }
-            "rotation-reversed" => (Effect::RotationReversed(RotationReversed {}), named("rotation-reversed", &[])),
-            _ => (Effect::PartAngleSign(PartAngleSign {}), named("part-angle-sign", &[])),
+            "rotation-reversed" => {
+                (Effect::RotationReversed(RotationReversed { declared }), named("rotation-reversed", &[]))
+            }
+            _ => (Effect::PartAngleSign(PartAngleSign { declared }), named("part-angle-sign", &[])),
         }
     }
 
@@ -209,7 +217,7 @@ impl Chance {
         match id {
             "even-order-motion" => {
                 let rms = self.size(0.003, 1.0);
-                let effect = EvenOrderMotion { x_rms_um: rms, y_rms_um: rms, max_order: 20 };
+                let effect = EvenOrderMotion { x_rms_um: rms, y_rms_um: rms, max_order: 20, declared: false };
                 let planted = planted("even-order-motion", None, vec![], format!("{rms:.3} µm rms"));
                 (Effect::EvenOrderMotion(effect), planted)
             }
@@ -218,7 +226,7 @@ impl Chance {
                 let parameters = vec![("amplitude", amplitude_um), ("order", order as f64)];
                 let planted = planted("axial-motion", None, parameters, format!("{amplitude_um:.1} µm at {order}/rev"));
                 let harmonics = vec![MotionHarmonic { order, amplitude_um, phase_deg: self.between(0.0, 360.0) }];
-                (Effect::AxialMotion(AxialMotion { harmonics }), planted)
+                (Effect::AxialMotion(AxialMotion { harmonics, declared: false }), planted)
             }
             _ => {
                 let (order, amplitude_um) = (self.below(4) as f64 + self.between(0.2, 0.8), self.size(0.02, 0.6));
@@ -226,7 +234,7 @@ impl Chance {
                 let size = format!("{amplitude_um:.3} µm at {order:.3}/rev");
                 let planted = planted("asynchronous-line", None, parameters, size);
                 let direction_deg = self.between(0.0, 180.0);
-                let effect = AsynchronousLine { order, amplitude_um, direction_deg };
+                let effect = AsynchronousLine { order, amplitude_um, direction_deg, declared: false };
                 (Effect::AsynchronousLine(effect), planted)
             }
         }
@@ -258,7 +266,7 @@ impl Chance {
                 let (step_um, from_deg) = (self.signed(0.02, 2.0, false), self.between(0.0, 360.0));
                 let to_deg = (from_deg + self.between(20.0, 180.0)) % 360.0;
                 let size = format!("{step_um:+.3} µm from {from_deg:.0}° to {to_deg:.0}° in {sensor}, {setup}");
-                let effect = Step { targets, setups: vec![setup], step_um, from_deg, to_deg };
+                let effect = Step { targets, setups: vec![setup], step_um, from_deg, to_deg, declared: false };
                 (Effect::Step(effect), named("step", size))
             }
             _ => {
@@ -270,6 +278,7 @@ impl Chance {
                     shift_um: self.signed(0.05, 5.0, false),
                     angle_deg: self.signed(0.003, 1.0, false),
                     relative_gain: self.signed(2e-4, 0.03, false),
+                    declared: false,
                 };
                 let size = format!(
                     "{:+.2} µm, {:+.3}°, {:+.2} % after {:.0} turns of {}, {sensor}",

@@ -41,7 +41,7 @@ pub struct SpindleConfig {
     /// Noise of each sensor.
     #[serde(default)]
     pub noise: NoiseConfig,
-    /// What else happens; the separation does not know of it.
+    /// What else happens, declared to the separation or hidden from it.
     #[serde(default)]
     pub effect: Vec<Effect>,
 }

@@ -13,9 +13,16 @@ use crate::simulate::world::World;
 pub struct SensorSign {
     /// Ids of sensors.
     pub targets: Vec<String>,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorSign {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         on_sensors(world, &self.targets, |sensor| sensor.chain.gain *= -1.0)
     }
@@ -27,9 +34,16 @@ impl Acts for SensorSign {
 pub struct SensorsSwapped {
     /// Ids of two sensors.
     pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorsSwapped {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         let [first, second] = pair(&self.targets, &sensor_ids(world), "sensor")?;
         world.sensors.swap(first, second);
@@ -43,9 +57,16 @@ impl Acts for SensorsSwapped {
 pub struct SensorsIdentical {
     /// Ids of two sensors.
     pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorsIdentical {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         let [first, second] = pair(&self.targets, &sensor_ids(world), "sensor")?;
         world.sensors[second] = world.sensors[first].clone();
@@ -59,9 +80,16 @@ impl Acts for SensorsIdentical {
 pub struct SetupsSwapped {
     /// Ids of two setups.
     pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SetupsSwapped {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         let [first, second] = pair(&self.targets, &setup_ids(world), "setup")?;
         world.setups.swap(first, second);
@@ -75,9 +103,16 @@ impl Acts for SetupsSwapped {
 pub struct SetupRepeated {
     /// Ids of two setups.
     pub targets: [String; 2],
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SetupRepeated {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         let [first, second] = pair(&self.targets, &setup_ids(world), "setup")?;
         world.setups[second] = world.setups[first].clone();
@@ -88,9 +123,17 @@ impl Acts for SetupRepeated {
 /// The part turns the other way.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RotationReversed {}
+pub struct RotationReversed {
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
 
 impl Acts for RotationReversed {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         world.rig.rotation = match world.rig.rotation {
             Rotation::Ccw => Rotation::Cw,
@@ -103,9 +146,17 @@ impl Acts for RotationReversed {
 /// The part's angles count the other way.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PartAngleSign {}
+pub struct PartAngleSign {
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
 
 impl Acts for PartAngleSign {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         for setup in &mut world.setups {
             setup.part_rad = -setup.part_rad;

@@ -24,7 +24,7 @@ pub use strangers::{Backlash, Dent, SlippedProbe, Step};
 
 use super::world::World;
 
-/// `[[effect]]`: one entry, named by `plugin`.
+/// `[[effect]]`: one entry, named by `plugin`. `declared` says whether the separation will be told of it.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "plugin", rename_all = "kebab-case")]
 pub enum Effect {
@@ -86,11 +86,20 @@ pub enum Effect {
 
 /// What every effect can do.
 trait Acts {
+    /// Whether the separation will be told of it.
+    fn declared(&self) -> bool;
+
     /// Changes the world; `index` is the effect's place in the list.
     fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault>;
 }
 
 impl Effect {
+    /// Whether the separation will be told of it.
+    #[must_use]
+    pub fn declared(&self) -> bool {
+        self.acts().declared()
+    }
+
     /// Changes the world; `index` is the effect's place in the list.
     pub(super) fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault> {
         self.acts().apply(world, index)

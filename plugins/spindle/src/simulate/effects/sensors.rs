@@ -19,9 +19,16 @@ pub struct SensorGain {
     pub targets: Vec<String>,
     /// Relative: 0.01 reads 1 % too much.
     pub relative_gain: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorGain {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("relative_gain", self.relative_gain)?;
         on_sensors(world, &self.targets, |sensor| sensor.chain.gain *= 1.0 + self.relative_gain)
@@ -36,9 +43,16 @@ pub struct SensorAngle {
     pub targets: Vec<String>,
     /// In degrees about +z.
     pub angle_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorAngle {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("angle_deg", self.angle_deg)?;
         on_sensors(world, &self.targets, |sensor| sensor.angle_rad += self.angle_deg.to_radians())
@@ -53,9 +67,16 @@ pub struct SensorAxialPosition {
     pub targets: Vec<String>,
     /// In mm.
     pub shift_mm: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorAxialPosition {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("shift_mm", self.shift_mm)?;
         on_sensors(world, &self.targets, |sensor| sensor.z_mm += self.shift_mm)
@@ -74,9 +95,16 @@ pub struct SensorNonlinearity {
     /// In 1/µm².
     #[serde(default)]
     pub cubic_per_um2: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorNonlinearity {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("quadratic_per_um", self.quadratic_per_um)?;
         check::finite("cubic_per_um2", self.cubic_per_um2)?;
@@ -101,9 +129,16 @@ pub struct ThermalDrift {
     /// Ids of the setups in which it drifts; all without it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub setups: Vec<String>,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for ThermalDrift {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("rate_um_per_rev", self.rate_um_per_rev)?;
         if let Some(turns) = self.time_constant_turns {
@@ -142,9 +177,16 @@ pub struct SensorLine {
     pub order: Option<f64>,
     /// In µm.
     pub amplitude_um: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorLine {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault> {
         check::finite("amplitude_um", self.amplitude_um)?;
         let runs = match (self.frequency_hz, self.order) {
@@ -177,6 +219,9 @@ pub struct FilterAttenuation {
     /// 1 to 8.
     #[serde(default = "first_order")]
     pub order: usize,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 fn first_order() -> usize {
@@ -184,6 +229,10 @@ fn first_order() -> usize {
 }
 
 impl Acts for FilterAttenuation {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         let filter = LowPass::butterworth(self.order, self.cutoff_hz, world.sample_rate_hz)?;
         on_sensors(world, &self.targets, |sensor| sensor.chain.filters.push(filter.clone()))

@@ -21,9 +21,16 @@ pub struct ReversalAngle {
     pub targets: Vec<String>,
     /// In degrees.
     pub angle_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for ReversalAngle {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("angle_deg", self.angle_deg)?;
         on_setups(world, &self.targets, |setup| setup.part_rad += self.angle_deg.to_radians())
@@ -38,9 +45,16 @@ pub struct SensorsAngle {
     pub targets: Vec<String>,
     /// In degrees.
     pub angle_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SensorsAngle {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("angle_deg", self.angle_deg)?;
         on_setups(world, &self.targets, |setup| setup.sensors_rad += self.angle_deg.to_radians())
@@ -55,9 +69,16 @@ pub struct SetupMotionChange {
     pub targets: Vec<String>,
     /// 1 leaves the motion as it is.
     pub ratio: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SetupMotionChange {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("ratio", self.ratio)?;
         on_setups(world, &self.targets, |setup| setup.motion_ratio *= self.ratio)
@@ -84,9 +105,16 @@ pub struct PartEccentricity {
     /// Towards this angle of the part, in degrees.
     #[serde(default)]
     pub tilt_direction_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for PartEccentricity {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("offset_um", self.offset_um)?;
         check::finite("direction_deg", self.direction_deg)?;

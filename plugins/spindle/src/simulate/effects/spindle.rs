@@ -18,9 +18,17 @@ use crate::simulate::{
 /// No parameters: the radius is known.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SecondOrderGeometry {}
+pub struct SecondOrderGeometry {
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
+}
 
 impl Acts for SecondOrderGeometry {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         match world.geometry {
             Geometry::Exact => Ok(()),
@@ -40,9 +48,16 @@ pub struct EvenOrderMotion {
     pub y_rms_um: f64,
     /// Highest order.
     pub max_order: usize,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for EvenOrderMotion {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault> {
         check::order("max_order", self.max_order, 2, world.orders())?;
         let sizes = [("x_rms_um", self.x_rms_um), ("y_rms_um", self.y_rms_um)];
@@ -70,9 +85,16 @@ pub struct AsynchronousLine {
     /// About +z from x, in degrees.
     #[serde(default)]
     pub direction_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for AsynchronousLine {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         world.asynchronous.add_line(&LineConfig {
             order: self.order,
@@ -96,9 +118,16 @@ pub struct SpeedRipple {
     /// Ids of the setups in which the spindle runs so; all without it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<String>,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SpeedRipple {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::positive("order", self.order)?;
         check::finite("amplitude_deg", self.amplitude_deg)?;
@@ -123,9 +152,16 @@ impl Acts for SpeedRipple {
 pub struct AxialMotion {
     /// a(Φ) = Σ amplitude · cos(order · Φ − phase).
     pub harmonics: Vec<MotionHarmonic>,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for AxialMotion {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         let orders = world.orders();
         for (index, harmonic) in self.harmonics.iter().enumerate() {

@@ -27,9 +27,16 @@ pub struct Dent {
     pub part_angle_deg: f64,
     /// Standard deviation of its shape, in degrees.
     pub width_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for Dent {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         if self.targets.is_empty() && self.setups.is_empty() {
             return Err(Fault::at("plugin", "a dent that every sensor sees in every setup is form")
@@ -60,9 +67,16 @@ pub struct Backlash {
     pub setups: Vec<String>,
     /// Between reading the same on the way in and on the way out, in µm.
     pub play_um: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for Backlash {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::not_negative("play_um", self.play_um)?;
         add(world, &self.targets, &self.setups, Kind::Backlash { play_um: self.play_um })
@@ -84,9 +98,16 @@ pub struct Step {
     pub from_deg: f64,
     /// And where it ends; through 0° where this is below `from_deg`.
     pub to_deg: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for Step {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("step_um", self.step_um)?;
         check::finite("from_deg", self.from_deg)?;
@@ -115,9 +136,16 @@ pub struct SlippedProbe {
     /// Relative: 0.01 reads 1 % too much from then on.
     #[serde(default)]
     pub relative_gain: f64,
+    /// Whether the separation will be told.
+    #[serde(default)]
+    pub declared: bool,
 }
 
 impl Acts for SlippedProbe {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::not_negative("after_turns", self.after_turns)?;
         check::finite("shift_um", self.shift_um)?;

@@ -24,10 +24,12 @@ fn everything() -> SpindleConfig {
             rate_um_per_rev: 0.6,
             time_constant_turns: Some(25.0),
             setups: Vec::new(),
+            declared: true,
         }),
-        Effect::FilterAttenuation(FilterAttenuation { targets, cutoff_hz: 300.0, order: 3 }),
+        Effect::FilterAttenuation(FilterAttenuation { targets, cutoff_hz: 300.0, order: 3, declared: false }),
         Effect::AxialMotion(AxialMotion {
             harmonics: vec![MotionHarmonic { order: 1, amplitude_um: 2.0, phase_deg: 0.0 }],
+            declared: false,
         }),
     ];
     config

@@ -66,7 +66,14 @@ fn backlash() {
 #[test]
 fn a_step_over_part_of_the_turn() {
     // Between samples, so that rounding of the angle does not decide.
-    let effect = Step { targets: ids(&["S4"]), setups: ids(&["turned"]), step_um: 0.4, from_deg: 301.0, to_deg: 21.0 };
+    let effect = Step {
+        targets: ids(&["S4"]),
+        setups: ids(&["turned"]),
+        step_um: 0.4,
+        from_deg: 301.0,
+        to_deg: 21.0,
+        declared: false,
+    };
     check(
         Effect::Step(effect),
         |channel, setup| channel == 3 && setup == TURNED,
@@ -86,6 +93,7 @@ fn a_probe_that_slips() {
         shift_um: 0.3,
         angle_deg: 0.7,
         relative_gain: 0.02,
+        declared: false,
     };
     let slipped = |setup: usize, phi: f64| {
         let theta = 0.7_f64.to_radians();
