@@ -48,7 +48,11 @@ fn residual() -> TableSpec {
     TableSpec::new(
         "plane",
         "distance of each point from the least-squares plane along z",
-        vec![column("x_mm", "mm", "place"), column("y_mm", "mm", "place"), column("distance_um", "um", "above the plane")],
+        vec![
+            column("x_mm", "mm", "place"),
+            column("y_mm", "mm", "place"),
+            column("distance_um", "um", "above the plane"),
+        ],
     )
 }
 

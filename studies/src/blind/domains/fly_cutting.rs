@@ -75,7 +75,14 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
     };
     let separator = config.separator().map_err(|fault| Error::new("check", "the cut", fault))?;
     let points = scenario.heights()?.points("drawn".into());
-    Ok(Campaign { layout: layout.name, points, separator: Box::new(separator), planted, truth: Vec::new() })
+    Ok(Campaign {
+        layout: layout.name,
+        points,
+        separator: Box::new(separator),
+        planted,
+        natural: Vec::new(),
+        truth: Vec::new(),
+    })
 }
 
 fn sound(layout: &Layout, chance: &mut Chance) -> FlyCuttingScenario {

@@ -82,6 +82,7 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
         points: scenario.simulate().points(),
         separator: Box::new(separator),
         planted,
+        natural: Vec::new(),
         truth: scenario.location.iter().map(|(symbol, value)| True::new(row_of(symbol), symbol, *value)).collect(),
     })
 }

@@ -78,8 +78,33 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
         points: scenario.touched().points(),
         separator: Box::new(separator),
         planted,
+        natural: natural(&scenario),
         truth: truth(&scenario),
     })
+}
+
+/// Lobing that is smaller does not show in any of the campaigns.
+const SMALL_UM: f64 = 0.02;
+
+/// Orders of lobing above those declared that the seats of the probe make by themselves.
+fn natural(scenario: &TouchProbeScenario) -> Vec<String> {
+    let orders = MAX_ORDER + 1..=2 * MAX_ORDER;
+    orders
+        .filter(|order| amplitude_um(scenario, *order) > SMALL_UM)
+        .map(|order| format!("lobing-order-{order}"))
+        .collect()
+}
+
+/// Amplitude of lobing, by sums over the circle.
+fn amplitude_um(scenario: &TouchProbeScenario, order: usize) -> f64 {
+    let part = |wave: fn(f64) -> f64| part_um(scenario, order, wave);
+    part(f64::cos).hypot(part(f64::sin))
+}
+
+fn part_um(scenario: &TouchProbeScenario, order: usize, wave: fn(f64) -> f64) -> f64 {
+    let at = |index: usize| TAU * index as f64 / DENSE as f64;
+    let products = (0..DENSE).map(|index| scenario.pretravel_um(at(index)) * wave(at(order * index)));
+    2.0 / DENSE as f64 * products.sum::<f64>()
 }
 
 fn sound(layout: &Layout, chance: &mut Chance) -> TouchProbeScenario {
@@ -105,16 +130,10 @@ fn sound(layout: &Layout, chance: &mut Chance) -> TouchProbeScenario {
 
 /// Mean pre-travel and the amplitudes of its main lobes, by sums over the circle.
 fn truth(scenario: &TouchProbeScenario) -> Vec<True> {
-    let each: Vec<f64> = (0..DENSE).map(|index| scenario.pretravel_um(TAU * index as f64 / DENSE as f64)).collect();
-    let part = |order: usize, wave: fn(f64) -> f64| {
-        let at = |index: usize| wave(TAU * (order * index) as f64 / DENSE as f64);
-        2.0 / DENSE as f64 * each.iter().enumerate().map(|(index, value)| value * at(index)).sum::<f64>()
-    };
-    let amplitude = |order: usize| part(order, f64::cos).hypot(part(order, f64::sin));
     vec![
-        True::new("pretravel_mean", "pretravel_mean", 0.5 * part(0, f64::cos)),
-        True::new("lobe_3_amplitude", "lobe_3_amplitude", amplitude(3)),
-        True::new("lobe_6_amplitude", "lobe_6_amplitude", amplitude(6)),
+        True::new("pretravel_mean", "pretravel_mean", 0.5 * part_um(scenario, 0, f64::cos)),
+        True::new("lobe_3_amplitude", "lobe_3_amplitude", amplitude_um(scenario, 3)),
+        True::new("lobe_6_amplitude", "lobe_6_amplitude", amplitude_um(scenario, 6)),
     ]
 }
 

@@ -80,7 +80,9 @@ pub fn judge(index: u64, kind: Kind, campaign: &Campaign) -> Result<Judged> {
         }
     });
     let effects = effects.collect();
-    let there = |added: &&Added| !campaign.planted.iter().any(|planted| holds(added, planted));
+    let there = |added: &&Added| {
+        !campaign.natural.contains(&added.effect) && !campaign.planted.iter().any(|planted| holds(added, planted))
+    };
     let false_alarms = diagnosis.added.iter().filter(there).map(name).collect();
     let declared = campaign.separator.separate(&campaign.points)?.values;
     let values = campaign.truth.iter().map(|truth| Valued {

@@ -27,6 +27,8 @@ pub struct Campaign {
     pub separator: Box<dyn PointSeparator>,
     /// What is wrong; of a stranger only its id counts.
     pub planted: Vec<Planted>,
+    /// Ids of effects that the simulated world has by itself, so that naming them is right.
+    pub natural: Vec<String>,
     /// True values of results, where the simulation has them.
     pub truth: Vec<True>,
 }

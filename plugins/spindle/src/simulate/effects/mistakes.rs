@@ -13,7 +13,7 @@ use crate::simulate::world::World;
 pub struct SensorSign {
     /// Ids of sensors.
     pub targets: Vec<String>,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -34,7 +34,7 @@ impl Acts for SensorSign {
 pub struct SensorsSwapped {
     /// Ids of two sensors.
     pub targets: [String; 2],
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -57,7 +57,7 @@ impl Acts for SensorsSwapped {
 pub struct SensorsIdentical {
     /// Ids of two sensors.
     pub targets: [String; 2],
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -80,7 +80,7 @@ impl Acts for SensorsIdentical {
 pub struct SetupsSwapped {
     /// Ids of two setups.
     pub targets: [String; 2],
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -103,7 +103,7 @@ impl Acts for SetupsSwapped {
 pub struct SetupRepeated {
     /// Ids of two setups.
     pub targets: [String; 2],
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -124,7 +124,7 @@ impl Acts for SetupRepeated {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotationReversed {
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -147,7 +147,7 @@ impl Acts for RotationReversed {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartAngleSign {
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }

@@ -24,7 +24,7 @@ pub use strangers::{Backlash, Dent, SlippedProbe, Step};
 
 use super::world::World;
 
-/// `[[effect]]`: one entry, named by `plugin`. `declared` says whether the separation will be told of it.
+/// `[[effect]]`: one entry, named by `plugin`. `declared = false` says that the separation is not told of it; true is refused.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "plugin", rename_all = "kebab-case")]
 pub enum Effect {
@@ -86,7 +86,7 @@ pub enum Effect {
 
 /// What every effect can do.
 trait Acts {
-    /// Whether the separation will be told of it.
+    /// Whether the scenario says that the separation will be told of it.
     fn declared(&self) -> bool;
 
     /// Changes the world; `index` is the effect's place in the list.
@@ -94,14 +94,12 @@ trait Acts {
 }
 
 impl Effect {
-    /// Whether the separation will be told of it.
-    #[must_use]
-    pub fn declared(&self) -> bool {
-        self.acts().declared()
-    }
-
     /// Changes the world; `index` is the effect's place in the list.
     pub(super) fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault> {
+        if self.acts().declared() {
+            let fault = Fault::at("declared", "expected false: a scenario does not tell the separation of its effects");
+            return Err(fault.help("leave it out; what the separation is to know is declared in the pipeline, in its rig or as `[diagnose] known`"));
+        }
         self.acts().apply(world, index)
     }
 

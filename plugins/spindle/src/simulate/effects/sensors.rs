@@ -19,7 +19,7 @@ pub struct SensorGain {
     pub targets: Vec<String>,
     /// Relative: 0.01 reads 1 % too much.
     pub relative_gain: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -43,7 +43,7 @@ pub struct SensorAngle {
     pub targets: Vec<String>,
     /// In degrees about +z.
     pub angle_deg: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -67,7 +67,7 @@ pub struct SensorAxialPosition {
     pub targets: Vec<String>,
     /// In mm.
     pub shift_mm: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -95,7 +95,7 @@ pub struct SensorNonlinearity {
     /// In 1/µm².
     #[serde(default)]
     pub cubic_per_um2: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -129,7 +129,7 @@ pub struct ThermalDrift {
     /// Ids of the setups in which it drifts; all without it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub setups: Vec<String>,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -177,7 +177,7 @@ pub struct SensorLine {
     pub order: Option<f64>,
     /// In µm.
     pub amplitude_um: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -219,7 +219,7 @@ pub struct FilterAttenuation {
     /// 1 to 8.
     #[serde(default = "first_order")]
     pub order: usize,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }

@@ -21,7 +21,7 @@ pub struct ReversalAngle {
     pub targets: Vec<String>,
     /// In degrees.
     pub angle_deg: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -45,7 +45,7 @@ pub struct SensorsAngle {
     pub targets: Vec<String>,
     /// In degrees.
     pub angle_deg: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -69,7 +69,7 @@ pub struct SetupMotionChange {
     pub targets: Vec<String>,
     /// 1 leaves the motion as it is.
     pub ratio: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -105,7 +105,7 @@ pub struct PartEccentricity {
     /// Towards this angle of the part, in degrees.
     #[serde(default)]
     pub tilt_direction_deg: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }

@@ -19,7 +19,7 @@ use crate::simulate::{
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SecondOrderGeometry {
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -48,7 +48,7 @@ pub struct EvenOrderMotion {
     pub y_rms_um: f64,
     /// Highest order.
     pub max_order: usize,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -85,7 +85,7 @@ pub struct AsynchronousLine {
     /// About +z from x, in degrees.
     #[serde(default)]
     pub direction_deg: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -118,7 +118,7 @@ pub struct SpeedRipple {
     /// Ids of the setups in which the spindle runs so; all without it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<String>,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -152,7 +152,7 @@ impl Acts for SpeedRipple {
 pub struct AxialMotion {
     /// a(Φ) = Σ amplitude · cos(order · Φ − phase).
     pub harmonics: Vec<MotionHarmonic>,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }

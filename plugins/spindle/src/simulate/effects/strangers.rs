@@ -27,7 +27,7 @@ pub struct Dent {
     pub part_angle_deg: f64,
     /// Standard deviation of its shape, in degrees.
     pub width_deg: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -67,7 +67,7 @@ pub struct Backlash {
     pub setups: Vec<String>,
     /// Between reading the same on the way in and on the way out, in µm.
     pub play_um: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -98,7 +98,7 @@ pub struct Step {
     pub from_deg: f64,
     /// And where it ends; through 0° where this is below `from_deg`.
     pub to_deg: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }
@@ -136,7 +136,7 @@ pub struct SlippedProbe {
     /// Relative: 0.01 reads 1 % too much from then on.
     #[serde(default)]
     pub relative_gain: f64,
-    /// Whether the separation will be told.
+    /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
 }

@@ -24,7 +24,7 @@ fn everything() -> SpindleConfig {
             rate_um_per_rev: 0.6,
             time_constant_turns: Some(25.0),
             setups: Vec::new(),
-            declared: true,
+            declared: false,
         }),
         Effect::FilterAttenuation(FilterAttenuation { targets, cutoff_hz: 300.0, order: 3, declared: false }),
         Effect::AxialMotion(AxialMotion {

@@ -115,7 +115,7 @@ fn sensor_axial_position() {
 #[test]
 fn sensor_nonlinearity() {
     let effect =
-        SensorNonlinearity { targets: ids(&["S1"]), quadratic_per_um: 1.7e-3, cubic_per_um2: -2e-4, declared: true };
+        SensorNonlinearity { targets: ids(&["S1"]), quadratic_per_um: 1.7e-3, cubic_per_um2: -2e-4, declared: false };
     check(
         Effect::SensorNonlinearity(effect),
         |channel, _| channel == 0,
@@ -357,4 +357,15 @@ fn filter_attenuation() {
     // The transient is over after some turns; the whole of the first ten is left to it.
     let settled = &after[0][10 * TURN..];
     assert!(largest_difference(settled, expected) < 1e-11);
+}
+
+/// A scenario cannot tell a separation of its effects: the pipeline does.
+#[test]
+fn an_effect_that_claims_to_be_declared_is_refused() {
+    let with = |declared| {
+        let gain = SensorGain { targets: vec!["S1".into()], relative_gain: 0.01, declared };
+        simulator(&SpindleConfig { effect: vec![Effect::SensorGain(gain)], ..scene() })
+    };
+    let refused = with(true).err().map(|fault| fault.to_string()).unwrap_or_default();
+    assert!(with(false).is_ok() && refused.contains("expected false"), "{refused}");
 }
