@@ -125,7 +125,7 @@ pub fn station_with_spread(
         let recorded = stream.capture().marks.len().saturating_sub(1);
         let trim = trim(recorded.saturating_sub(turns))?;
         let projection = projections.get(setup).and_then(Option::as_ref);
-        let wanted = AverageRequest { hold_out: share, projection, ..AverageRequest::default() };
+        let wanted = AverageRequest { hold_out: share, projection };
         averager.average_requested(trim.attach(Box::new(Inspection::new(stream)))?, wanted)
     };
     let profiles: Result<Vec<Profile>> = (0..rig.setups.len()).map(profile).collect();

@@ -217,13 +217,14 @@ fn entry(rows: &mut Vec<Row>, name: String) -> &mut Row {
 
 fn true_curve(truth: &StationTruth, quantity: Quantity) -> Option<&[f64]> {
     let axis = match quantity {
-        Quantity::Form(section) => return truth.form_um.get(section).map(Vec::as_slice),
+        Quantity::Form(section) | Quantity::FaceForm(section) => {
+            return truth.form_um.get(section).map(Vec::as_slice);
+        }
         Quantity::X => 0,
         Quantity::Y => 1,
         Quantity::TiltX => 2,
         Quantity::TiltY => 3,
         Quantity::Z => return truth.z_um.as_deref(),
-        Quantity::FaceForm(section) => return truth.form_um.get(section).map(Vec::as_slice),
         Quantity::Along(_) | Quantity::TiltAlong(_) | Quantity::FaceMotion(_) => return None,
     };
     Some(&truth.motion.as_ref()?[axis])

@@ -55,6 +55,7 @@ struct Wall {
     circles: Vec<Circle>,
 }
 
+#[allow(clippy::struct_field_names, reason = "units")]
 struct Circle {
     level_um: f64,
     centre_um: [f64; 2],

@@ -74,7 +74,7 @@ pub fn names(names: &[String]) -> String {
         let again = effect == last;
         match (again, whole) {
             (true, true) => shown.push_str(WHOLE),
-            (false, true) => shown.push_str(&format!("{name} {WHOLE}")),
+            (false, true) => shown.extend([name, " ", WHOLE]),
             (true, false) if !target.is_empty() => shown.push_str(target),
             _ => shown.push_str(name),
         }

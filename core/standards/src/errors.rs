@@ -180,7 +180,7 @@ impl Errors {
         let sources: Vec<Source> = sources.into_iter().map(source).collect();
         let some = sources.iter().flat_map(|source| &source.amplitudes).any(|amplitude| *amplitude != Complex64::ZERO);
         let (drawn_um, start, turn) = (Vec::new(), 0, 0);
-        some.then(|| Self { sources, drawn_um, largest_um: 0.0, squares_um2: 0.0, start, turn })
+        some.then_some(Self { sources, drawn_um, largest_um: 0.0, squares_um2: 0.0, start, turn })
     }
 
     /// The standard deviation of an error at any one angle.

@@ -80,7 +80,8 @@ mod tests {
         }
         let form_um = fourier.synthesise(form).to_vec();
         for std_um in [0.003, 0.03, 0.3] {
-            let of_order = |order: usize| 2.0 * std_um * std_um * if order % 7 == 0 { 3.0 } else { 0.7 } / 98.0;
+            let of_order =
+                |order: usize| 2.0 * std_um * std_um * if order.is_multiple_of(7) { 3.0 } else { 0.7 } / 98.0;
             let variance: Vec<f64> = (0..100).map(of_order).collect();
             let found = of_mean_deviation(&form_um, &variance, &mut fourier).unwrap();
             let mut errors = Errors::new(&variance, 2, 9).unwrap();

@@ -36,7 +36,7 @@ pub(crate) fn png(scene: &Scene) -> Result<Vec<u8>, String> {
 /// The scene of a figure; none where it has no points.
 pub(crate) fn figure(figure: &Panels) -> Option<Scene> {
     let drawn = |panel: &&Panel| panel.curves.iter().any(|curve| !curve.points.is_empty());
-    let panels: Vec<&Panel> = figure.panels.iter().filter(drawn).collect();
+    let panels: Vec<&Panel> = figure.drawn.iter().filter(drawn).collect();
     let (scale, unit) = scaled(figure, &panels);
     let cells = panels.iter().map(|panel| cell(figure, panel, scale, &unit));
     let (plots, layouts): (Vec<_>, Vec<_>) = cells.unzip();

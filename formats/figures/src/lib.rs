@@ -163,7 +163,8 @@ struct Drawing {
 
 impl Export for Drawing {
     fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
-        self.figures.iter_mut().filter(|figure| figure.table == table.name).try_for_each(|figure| figure.add(rows))
+        self.figures.iter_mut().filter(|figure| figure.table == table.name).for_each(|figure| figure.add(rows));
+        Ok(())
     }
 
     fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {

@@ -19,7 +19,7 @@ pub(crate) struct Panels {
     pub(crate) kind: Kind,
     /// What is along the horizontal axis, and along the vertical one.
     pub(crate) axes: [Axis; 2],
-    pub(crate) panels: Vec<Panel>,
+    pub(crate) drawn: Vec<Panel>,
     /// Panels that there were.
     numbers: HashMap<String, usize>,
     /// Each so many of them are kept.
@@ -130,7 +130,7 @@ impl Panels {
             table: table.name.clone(),
             kind,
             axes,
-            panels: Vec::new(),
+            drawn: Vec::new(),
             numbers: HashMap::new(),
             stride: 1,
             most,
@@ -153,7 +153,7 @@ impl Panels {
     }
 
     /// Takes rows of the table.
-    pub(crate) fn add(&mut self, rows: &RecordBatch) -> Result<()> {
+    pub(crate) fn add(&mut self, rows: &RecordBatch) {
         let names = |columns: &[String]| columns.iter().map(|column| Names::of(rows, column)).collect::<Vec<_>>();
         let (panel_names, curve_names) = (names(&self.panel_columns), names(&self.curve_columns));
         let only = self.only.as_ref().map(|(column, name)| (Names::of(rows, column), name.clone()));
@@ -176,36 +176,35 @@ impl Panels {
                     [number(&columns[0]), number(&columns[1]), number(&columns[2]), number(&columns[3])];
                 let y = if columns[2].is_some() { y.hypot(second) } else { y };
                 if x.is_finite() && y.is_finite() {
-                    self.panels[panel].curves[first + offset].points.push(Point { x, y, third });
+                    self.drawn[panel].curves[first + offset].points.push(Point { x, y, third });
                 }
             }
         }
-        Ok(())
     }
 
     /// The panel of these names and its first curve; none where the panel is not kept.
     fn place(&mut self, panel: &str, curve: &str) -> Option<(usize, usize)> {
         let next = self.numbers.len();
         let number = *self.numbers.entry(panel.to_owned()).or_insert(next);
-        if number % self.stride != 0 {
+        if !number.is_multiple_of(self.stride) {
             return None;
         }
-        let known = self.panels.iter().position(|known| known.number == number);
+        let known = self.drawn.iter().position(|known| known.number == number);
         let index = if let Some(index) = known {
             index
         } else {
-            if self.panels.len() == self.most {
+            if self.drawn.len() == self.most {
                 self.stride *= 2;
                 let stride = self.stride;
-                self.panels.retain(|panel| panel.number % stride == 0);
-                if number % stride != 0 {
+                self.drawn.retain(|panel| panel.number % stride == 0);
+                if !number.is_multiple_of(stride) {
                     return None;
                 }
             }
-            self.panels.push(Panel { number, name: panel.to_owned(), curves: Vec::new() });
-            self.panels.len() - 1
+            self.drawn.push(Panel { number, name: panel.to_owned(), curves: Vec::new() });
+            self.drawn.len() - 1
         };
-        let curves = &mut self.panels[index].curves;
+        let curves = &mut self.drawn[index].curves;
         let full = |value: &Source| match (curve, value.name.as_str()) {
             ("", name) => name.to_owned(),
             (curve, "") => curve.to_owned(),
@@ -320,14 +319,14 @@ mod tests {
         let figure = Figure::polar("form", "Form", "angle_deg", [Measure::new("form_um")]).panels(["station"]);
         let mut panels = Panels::new(&table(), &figure, 4).unwrap();
         for station in 0..31 {
-            panels.add(&rows(&format!("s{station}"), [f64::from(station), 1.0, f64::NAN])).unwrap();
+            panels.add(&rows(&format!("s{station}"), [f64::from(station), 1.0, f64::NAN]));
         }
-        let names: Vec<&str> = panels.panels.iter().map(|panel| panel.name.as_str()).collect();
+        let names: Vec<&str> = panels.drawn.iter().map(|panel| panel.name.as_str()).collect();
         assert_eq!((panels.count(), names), (31, vec!["s0", "s8", "s16", "s24"]));
         // Rows that come again belong to the panel that is there; NaN is left out.
-        panels.add(&rows("s8", [0.5, 0.5, 0.5])).unwrap();
-        assert_eq!(panels.panels[1].curves.len(), 1);
-        let heights: Vec<f64> = panels.panels[1].curves[0].points.iter().map(|point| point.y).collect();
+        panels.add(&rows("s8", [0.5, 0.5, 0.5]));
+        assert_eq!(panels.drawn[1].curves.len(), 1);
+        let heights: Vec<f64> = panels.drawn[1].curves[0].points.iter().map(|point| point.y).collect();
         assert_eq!(heights, [8.0, 1.0, 0.5, 0.5, 0.5]);
     }
 

@@ -61,6 +61,7 @@ fn a_map_is_read_as_it_was_written() {
 
 #[test]
 fn what_is_wrong_is_named() {
+    #[allow(clippy::type_complexity, reason = "a table of cases")]
     let cases: [(&dyn Fn(&File), &[&str]); 11] = [
         (&|_| {}, &["read: 3 rows, 1 holes"]),
         (&|file| file.delete_attr("format").unwrap(), &["map.h5:/", "`format` is missing", "another program"]),

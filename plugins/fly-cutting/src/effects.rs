@@ -78,8 +78,7 @@ impl Missing {
         };
         let (targets, parameters) = match self {
             Self::WorkpieceTilt => (vec![], vec![parameter("x", "urad", 100.0), parameter("y", "urad", 100.0)]),
-            Self::TableStraightness => (vec![], orders()),
-            Self::SynchronousMotion => (vec![], orders()),
+            Self::TableStraightness | Self::SynchronousMotion => (vec![], orders()),
             Self::FeedScale => (vec![], vec![parameter("scale", "um/m", 1000.0)]),
             Self::NoseRadius => (vec![], vec![parameter("change", "mm", 0.5)]),
             Self::SpindleLine(0) => (vec![], line(parameter("amplitude", "nm", 5.0))),

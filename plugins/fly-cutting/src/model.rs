@@ -108,6 +108,7 @@ impl CutModel {
         // At the middle of the rows, where an alias has the same height, only the slope of its phase along y differs.
         let angles = self.data.fitted.rows.iter().map(|row| row.angle.to_degrees());
         let middle_deg = angles.sum::<f64>() / self.data.fitted.rows.len().max(1) as f64;
+        #[allow(clippy::cast_possible_wrap, reason = "ratios up to some tens")]
         let highest = self.data.config.max_frequency_ratio as i32;
         let whole = ratio.floor() as i32;
         let shifted = (0..highest).map(|other| {

@@ -37,6 +37,7 @@ fn the_line_of_the_paper_is_found() {
 
 #[test]
 fn every_effect_is_found_with_its_size() {
+    #[allow(clippy::type_complexity, reason = "a table of cases")]
     let cases: [(&str, &str, &[(&str, f64)]); 6] = [
         // A·cos 3θ is A − 4.5·A·(y/r)²: over y from 0 to 3.975 mm −7.584 nm of P2 and a slope of −11.448 nm/mm.
         ("synchronous-motion", "", &[("order_2", -7.584), ("order_3", 0.0)]),

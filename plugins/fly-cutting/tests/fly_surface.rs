@@ -96,7 +96,7 @@ fn a_deep_pass_takes_away_its_neighbours() {
 #[ignore = "a measurement of time"]
 fn time_over_points() {
     for side in [500, 1000, 2000] {
-        let step_mm = 10.0 / side as f64;
+        let step_mm = 10.0 / f64::from(side);
         let text = format!(
             "[cut]\n{}[grid]\nrows = {side}\ncolumns = {side}\nstep_x_mm = {step_mm}\nstep_y_mm = {step_mm}\n
              [[line]]\nfrequency_hz = 5.6235\namplitude_nm = 4.0\n",

@@ -193,6 +193,6 @@ mod tests {
         let of = |inner: f64| Section { inner, ..STEEL }.shear_coefficient();
         // Solid: 6(1 + ν)/(7 + 6ν) = 0.886; a thin tube: 2(1 + ν)/(4 + 3ν) = 0.531 (Cowper's table 1, ν = 0.3).
         assert!((of(0.0) - 0.8864).abs() < 1e-4, "{}", of(0.0));
-        assert!((of(0.0499999) - 0.5306).abs() < 1e-4, "{}", of(0.0499999));
+        assert!((of(0.049_999_9) - 0.5306).abs() < 1e-4, "{}", of(0.049_999_9));
     }
 }

@@ -98,7 +98,7 @@ pub fn from_points(points: &Points) -> Result<Equations> {
     let mut size = 0;
     for trace in &points.traces {
         for index in trace.points.clone() {
-            let least = if trace.id == PLACES { 0 } else { 1 };
+            let least = i32::from(trace.id != PLACES);
             for number in [rows[index], columns[index]] {
                 if number.fract() != 0.0 || !(f64::from(least)..=MOST_DEGREES_OF_FREEDOM as f64).contains(&number) {
                     let expected = format!("expected whole numbers from {least} to {MOST_DEGREES_OF_FREEDOM}");

@@ -177,7 +177,7 @@ fn cross_coupling_makes_whirl_grow() {
 /// √(re + i·im) with both parts positive.
 fn root(re: f64, im: f64) -> (f64, f64) {
     let size = re.hypot(im);
-    (((size + re) / 2.0).sqrt(), ((size - re) / 2.0).sqrt())
+    (f64::midpoint(size, re).sqrt(), ((size - re) / 2.0).sqrt())
 }
 
 /// Frequencies of a coarser mesh are higher (Rayleigh). The error falls with the fourth power of the element's length where elements

@@ -220,7 +220,7 @@ impl AxialReversal {
             let moves: Vec<_> = effects.iter().flat_map(|effect| on.moves(data, fit.applied(), *effect)).collect();
             for (which, errors) in after.errors.iter_mut().enumerate() {
                 let moves: Vec<&[f64]> = moves.iter().map(|both| both[which].as_slice()).collect();
-                errors.add(&moves, &covariance);
+                errors.add(&moves, covariance);
             }
             for (which, std_um) in [&mut after.part_std_um, &mut after.slide_std_um].into_iter().enumerate() {
                 for (at, std) in std_um.iter_mut().enumerate() {

@@ -89,9 +89,8 @@ impl TouchProbe {
         let fit = self.fit(prepared, &[], &Content::declared(), &prepared.readings_um());
         let second_order = SecondOrder::of(&self.0, &fit);
         let small = closed.settings.iter().filter(|setting| {
-            let order = match missing[setting.effect] {
-                Missing::LobingOrder(order) | Missing::RingFormOrder(order) => order,
-                _ => return false,
+            let (Missing::LobingOrder(order) | Missing::RingFormOrder(order)) = missing[setting.effect] else {
+                return false;
             };
             let squares: f64 = setting.values.iter().map(|value| value * value).sum();
             squares.sqrt() < SECOND_ORDER * second_order.amplitude_um(order)

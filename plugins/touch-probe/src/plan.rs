@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use runout_core::{
-    Complex64, Result,
+    Complex64,
     model::{
         diagnosis::LostOrders,
         foresight::{Foresight, foresee},
@@ -31,7 +31,7 @@ const ABOUT: f64 = 1.1;
 
 impl TouchProbe {
     /// Plans the setups, each touched around once.
-    pub(crate) fn planned(&self) -> Result<PointPlan> {
+    pub(crate) fn planned(&self) -> PointPlan {
         let foresight = self.foreseen();
         let mut plan = PointPlan {
             noise_gain: self.0.named(),
@@ -64,7 +64,7 @@ impl TouchProbe {
         });
         let assuming = format!("{} touches evenly around in each setup, once, 1 µm of noise in each", self.0.touches());
         plan.foresight = Foresight { assuming, ..foresight };
-        Ok(plan)
+        plan
     }
 
     /// Which effects would show in touches of a round ring by a probe without lobing.

@@ -162,7 +162,7 @@ impl PointSeparator for TouchProbe {
     }
 
     fn plan(&self, _points: Option<&Points>) -> Result<Option<PointPlan>> {
-        self.planned().map(Some)
+        Ok(Some(self.planned()))
     }
 
     fn model(&self) -> Option<&dyn PointModel> {

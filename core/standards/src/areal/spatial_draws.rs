@@ -175,7 +175,9 @@ impl<'a> SpatialDraws<'a> {
         let sums = (0..lags).flat_map(|lag| correlation.row(lag).to_vec()).collect();
         let rows = Planes::of(centred.heights_um(), columns);
         let mut angular = vec![[0.0; 3]; ANGLES];
-        lines.iter().for_each(|line| angular[usize::from(line.sector)][0] += line.weight() * line.amplitude);
+        for line in &lines {
+            angular[usize::from(line.sector)][0] += line.weight() * line.amplitude;
+        }
         let strongest = lines.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
         let own = Spatial {
             sal_mm,
@@ -282,7 +284,9 @@ impl Spectrum {
             *shift += line.weight() * (mean - line.amplitude);
             *spread += line.weight() * line.weight() * variance;
         }
-        sectors.iter_mut().for_each(|sector| sector[2] = sector[2].sqrt());
+        for sector in &mut sectors {
+            sector[2] = sector[2].sqrt();
+        }
         let std = |line: &Seen| (0.5 * squares[line.across]).sqrt();
         let least = lines.iter().map(|line| line.amplitude - FAR * std(line)).fold(0.0, f64::max);
         let strongest = lines.iter().filter(|line| line.amplitude + FAR * std(line) > least);

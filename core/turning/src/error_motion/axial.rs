@@ -54,16 +54,18 @@ impl ErrorMotion<'_> {
             None => found.map(|found| (found, 0.0, None)),
         };
         let id = self.id(direction);
-        let value =
-            |symbol: String, what: String, (found, share, known): (f64, f64, Option<Uncertainty>), bound: f64| {
-                let noise = if known.is_some() && share >= SAID {
-                    format!(", without {share:.3} {} that noise adds to it", unit(direction))
-                } else {
-                    String::new()
-                };
-                let value = (found - share).max(0.0);
-                self.axial_value(symbol, &format!("{what}{noise}"), direction, plot, z_mm, value, bounded(known, bound))
+        let value = |symbol: String,
+                     what: String,
+                     (found, share, known): (f64, f64, Option<Uncertainty>),
+                     bound: f64| {
+            let noise = if known.is_some() && share >= SAID {
+                format!(", without {share:.3} {} that noise adds to it", unit(direction))
+            } else {
+                String::new()
             };
+            let value = (found - share).max(0.0);
+            Self::axial_value(symbol, &format!("{what}{noise}"), direction, plot, z_mm, value, bounded(known, bound))
+        };
         [
             value(format!("{kind}-{id}"), what.to_owned(), range, plot.bound),
             // The root mean square of what lies within a range of B is B/2 at most.
@@ -102,8 +104,8 @@ impl ErrorMotion<'_> {
         let rms_known = bounded(between_setups(&each_rms, std.hypot(across_rms)), 0.5 * plot.bound);
         let total_rms = root_mean_square(&each_rms);
         Some([
-            self.axial_value(format!("total-{id}"), &total, direction, plot, z_mm, all.1 - all.0, range_known),
-            self.axial_value(format!("total-{id}-rms"), &rms_what, direction, plot, z_mm, total_rms, rms_known),
+            Self::axial_value(format!("total-{id}"), &total, direction, plot, z_mm, all.1 - all.0, range_known),
+            Self::axial_value(format!("total-{id}-rms"), &rms_what, direction, plot, z_mm, total_rms, rms_known),
         ])
     }
 
@@ -116,14 +118,13 @@ impl ErrorMotion<'_> {
         let what = "fundamental error motion value, peak to valley of 1/rev";
         let symbol = format!("fundamental-{}", self.id(direction));
         let known = bounded(known, plot.bound);
-        let mut value = self.axial_value(symbol, what, direction, plot, z_mm, value, known);
+        let mut value = Self::axial_value(symbol, what, direction, plot, z_mm, value, known);
         (value.band_upr, value.lost_orders) = ([1, 1], Vec::new());
         Some(value)
     }
 
     #[allow(clippy::too_many_arguments, reason = "what differs between the values of one plot")]
     fn axial_value(
-        &self,
         symbol: String,
         what: &str,
         direction: Direction,

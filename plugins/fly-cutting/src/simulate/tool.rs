@@ -88,7 +88,7 @@ impl Machine {
                     machine.table.push((*order, *amplitude_nm));
                 }
                 SimulatedEffect::FeedScale { scale_um_per_m, .. } => {
-                    machine.feed_mm_per_s *= 1.0 + 1e-6 * scale_um_per_m
+                    machine.feed_mm_per_s *= 1.0 + 1e-6 * scale_um_per_m;
                 }
                 SimulatedEffect::NoseRadius { change_mm, .. } => machine.nose_radius_mm += change_mm,
                 SimulatedEffect::WorkpieceTilt { .. }

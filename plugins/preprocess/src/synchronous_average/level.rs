@@ -90,7 +90,10 @@ mod tests {
             found.extend(levelled.next(false));
         }
         found.extend(std::iter::from_fn(|| levelled.next(true)));
-        assert!(found.iter().all(|turn| turn[0] == 7.0 && (turn[3] - turn[2] - 1.0).abs() < 1e-9), "{found:?}");
+        assert!(
+            found.iter().all(|turn| (turn[0] - 7.0).abs() < 1e-9 && (turn[3] - turn[2] - 1.0).abs() < 1e-9),
+            "{found:?}"
+        );
         found.iter().map(|turn| 0.5 * (turn[2] + turn[3])).collect()
     }
 

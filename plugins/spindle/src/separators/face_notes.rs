@@ -11,6 +11,7 @@ use crate::layout::Layout;
 const LOOKED_AT: usize = 12;
 
 /// Notes on z, the faces and the declared forms of a rig.
+#[must_use]
 pub fn notes(rig: &Rig, assessment: &Assessment) -> Vec<String> {
     let mut notes = along_the_axis(rig, assessment);
     notes.extend(declared(rig));

@@ -118,6 +118,7 @@ fn ratio(values: &[NamedValue], truth: &True) -> f64 {
 }
 
 /// Effect and target as in `confounded_with`.
+#[must_use]
 pub fn name(added: &Added) -> String {
     std::iter::once(&added.effect).chain(&added.targets).cloned().collect::<Vec<_>>().join(" ")
 }

@@ -86,7 +86,7 @@ impl FacePlaceConfig {
             let message = format!("a place of a face is above 0 mm from the axis, found {}", self.radius_mm);
             return Err(Fault::at("radius_mm", message).help("on the axis, face error motion is axial error motion"));
         }
-        if !(self.angle_deg.abs() < 360.0) {
+        if !self.angle_deg.is_finite() || self.angle_deg.abs() >= 360.0 {
             let message = format!("the angle must lie between -360 and 360 degrees, found {}", self.angle_deg);
             return Err(Fault::at("angle_deg", message));
         }
