@@ -1,6 +1,6 @@
 //! Joint refit of all effects that are applied: Gauss-Newton with halved steps, relinearised with the effects applied.
 
-use super::{Fit, Model, Setting};
+use super::{Fit, Model, OpenWithinBound, Setting};
 use runout_error::Result;
 use runout_numerics::least_squares::Basis;
 
@@ -22,7 +22,8 @@ pub struct Refit<F> {
     pub fit: F,
     /// χ² of the data alone.
     pub chi2: f64,
-    /// Covariance of the free parameters, `[parameter][parameter]`, for noise of size 1 in the residual.
+    /// Covariance of the free parameters, `[parameter][parameter]`, for noise of size 1 in the residual, with what is
+    /// [open within bounds](Fit::open_within_bounds).
     pub covariance: Vec<Vec<f64>>,
 }
 
@@ -60,11 +61,30 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
             break;
         }
     }
-    let covariance = system(&fit, &settings[fixed..]).covariance();
+    let system = system(&fit, &settings[fixed..]);
+    let mut covariance = system.covariance();
+    for open in fit.open_within_bounds() {
+        widen(&mut covariance, &system, &open);
+    }
     Ok(Refit { settings, fit, chi2, covariance })
 }
 
 /// The linearised system J δ ≈ −r.
 fn system(fit: &impl Fit, free: &[Setting]) -> Basis {
     Basis::of(free.iter().flat_map(|setting| fit.signature(setting.effect)).collect())
+}
+
+/// Adds to the variance of each parameter the square of what the harmonic to which it is most sensitive moves it by, at the phase
+/// that moves it most.
+fn widen(covariance: &mut [Vec<f64>], system: &Basis, open: &OpenWithinBound) {
+    let mut largest = vec![0.0_f64; covariance.len()];
+    for [cosine, sine] in &open.harmonics {
+        let moved = system.coefficients(cosine).into_iter().zip(system.coefficients(sine));
+        for (largest, (cosine, sine)) in largest.iter_mut().zip(moved) {
+            *largest = largest.max(cosine * cosine + sine * sine);
+        }
+    }
+    for (parameter, square) in largest.into_iter().enumerate() {
+        covariance[parameter][parameter] += square;
+    }
 }

@@ -159,6 +159,11 @@ pub trait Fit {
     /// their covariance `[parameter][parameter]`.
     fn widen(&mut self, _effects: &[usize], _covariance: &[Vec<f64>]) {}
 
+    /// What the declaration leaves open within bounds (a form that is taken as 0): it is in the residual without being noise.
+    fn open_within_bounds(&self) -> Vec<OpenWithinBound> {
+        Vec::new()
+    }
+
     /// Groups of the data (circles, blocks, captures) of which far more is left than of the others, whether or not the noise is
     /// known ([`evidence::far_worse`]).
     fn far_worse(&self) -> Vec<Unexplained> {
@@ -255,6 +260,13 @@ impl Remainder {
     pub fn noise_is_known(&self) -> bool {
         self.noise_floor.is_finite()
     }
+}
+
+/// A quantity that is declared within a bound and not fitted, as it may stand in [`Remainder::residual`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenWithinBound {
+    /// Its harmonics, of which one takes up the whole bound: cosine and sine, each of one standard uncertainty.
+    pub harmonics: Vec<[Vec<f64>; 2]>,
 }
 
 /// What one unit of a parameter does to a result.

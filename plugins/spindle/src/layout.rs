@@ -193,6 +193,11 @@ impl Layout {
         self.form_bounds_um.get(section).copied().flatten()
     }
 
+    /// Sections whose form is declared within a bound and taken as 0, with the bound, in µm peak to valley.
+    pub fn declared_forms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.sections.iter().filter_map(|section| Some((*section, self.form_bound_um(*section)?)))
+    }
+
     /// The same layout, with a limit on the noise that an order may carry.
     #[must_use]
     pub fn limited_to(self, max_noise_gain: f64) -> Self {

@@ -440,7 +440,8 @@ fn a_hidden_gain_of_an_axial_sensor() {
     assert!(itself || added.confounded_with.contains(&"sensor-gain Z".to_owned()), "{added:?}");
     if itself && added.confounded_with.is_empty() {
         let gain = &added.parameters[0];
-        assert!((gain.value - 0.04).abs() < 5.0 * gain.std.unwrap(), "{gain:?}");
+        // In ± is the form of the pole that the rig declares: it changes z, by which the gain is told.
+        assert!((gain.value - 0.04).abs() < 2.5 * gain.std.unwrap(), "{gain:?}");
     }
     let [before, after_error] = [&before, &after].map(|separation| z_error_um(separation, &truth));
     let std = after.angle_std(after.position(Quantity::Z).unwrap());

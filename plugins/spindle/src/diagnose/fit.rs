@@ -5,7 +5,7 @@ use std::sync::Arc;
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
     model::{
-        Bias, Fit, Outcome, Remainder, Setting,
+        Bias, Fit, OpenWithinBound, Outcome, Remainder, Setting,
         diagnosis::Unexplained,
         evidence::{Group, far_worse},
     },
@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     effects::{ActsOn, Alterations, Predicted},
-    layout::{FirstOrder, Layout},
+    layout::{FirstOrder, Layout, View},
     separators::{Estimate, Operators, Propagation, Readings, Solver, apply, leftover, residual},
 };
 
@@ -157,6 +157,33 @@ impl SpindleFit {
             if all.len() == 1 { own } else { Separation::mixture(&self.weights, &all).unwrap_or(own) }
         };
         own.map(mixture).collect()
+    }
+
+    /// What a form that is declared within a bound, and taken as 0, may leave of a station. At order 1 it is clamping, but on the
+    /// axis, where each order has the same share of z. Each part of a harmonic is as likely anywhere within half of the bound.
+    fn declared_form(&self, section: usize, bound_um: f64, station: usize) -> OpenWithinBound {
+        let layout = &self.layout;
+        let (std_um, readings) = (bound_um / 12_f64.sqrt(), &layout.readings);
+        let on_axis = readings.iter().any(|reading| reading.section == section && reading.view == View::OnAxis);
+        let solved = &self.stations[station];
+        let before: usize = self.remainder.stretches[..station].iter().sum();
+        let form = Quantity::Form(section);
+        let harmonic = |order: usize| {
+            let seen: Vec<Complex64> =
+                readings.iter().map(|reading| layout.coefficient(reading, form, order)).collect();
+            let left = apply(&solved.whitened[order - 1], &seen);
+            [Complex64::ONE, Complex64::I].map(|phase| {
+                let mut column = vec![0.0; self.remainder.residual.len()];
+                let place = before + 2 * (order - 1) * solved.corrected.count;
+                for (entry, value) in column[place..].chunks_exact_mut(2).zip(&left) {
+                    let value = std_um * phase * value;
+                    entry.copy_from_slice(&[value.re, value.im]);
+                }
+                column
+            })
+        };
+        let lowest = if on_axis { 1 } else { 2 };
+        OpenWithinBound { harmonics: (lowest..=solved.corrected.max_order).map(harmonic).collect() }
     }
 
     /// Without what is mixed with it.
@@ -460,6 +487,13 @@ impl Fit for SpindleFit {
     fn mix(&mut self, weights: &[f64], others: Vec<Self>) {
         self.weights = weights.to_vec();
         self.others = others;
+    }
+
+    fn open_within_bounds(&self) -> Vec<OpenWithinBound> {
+        let of_section = |(section, bound_um)| {
+            (0..self.stations.len()).map(move |station| self.declared_form(section, bound_um, station))
+        };
+        self.layout.declared_forms().flat_map(of_section).collect()
     }
 
     /// None: values of form and motion are those that a run computes from [`separations`](Self::separations).
