@@ -30,6 +30,7 @@ pub mod inspection;
 pub mod marker;
 pub mod measurement;
 pub mod near_tone;
+pub mod neighbours;
 pub mod profile;
 pub mod provenance;
 pub mod reading;

@@ -6,7 +6,7 @@
 
 use runout_numerics::Complex64;
 
-use crate::profile::Neighbours;
+use crate::neighbours::Neighbours;
 
 /// Distances ν that are looked for, without sign. Nearer tones look like a slow change of the order itself; from farther ones on, the
 /// mean holds no more than its neighbours do.

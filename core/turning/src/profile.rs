@@ -1,12 +1,11 @@
 //! The synchronous average of one capture, one harmonic at a time, with its covariance over the turns.
 
 pub use crate::smoothing::{SMOOTHING, orders_beside};
-use std::f64::consts::TAU;
-
 use crate::{
     creep::Levels,
     measurement::{DefectKind, Response, Trim},
     near_tone::{NearTone, near_tones},
+    neighbours::Neighbours,
     spread::Spread,
 };
 use runout_numerics::Complex64;
@@ -144,86 +143,6 @@ pub struct Part {
     pub neighbours: Option<Neighbours>,
     /// First turn and number of turns, among those used.
     pub turns: std::ops::Range<usize>,
-}
-
-/// Coefficients of a record of turns beside a whole order n, at n ± k/P: the power that the mean takes at n from what is not
-/// synchronous. Their mean square is the covariance of the mean.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Neighbours {
-    /// P, in turns.
-    pub period: usize,
-    /// Channels.
-    pub channels: usize,
-    /// Equal angles of a turn.
-    pub angles: usize,
-    /// Of e^{−2πikm/P} over the turns at n and −n, k = 1, 2, …: `[k][side][order][channel]`, in µm.
-    pub coefficients: Vec<Vec<Complex64>>,
-}
-
-impl Neighbours {
-    /// Covariance of the mean across channels, `[order][channel][channel]`.
-    #[must_use]
-    pub fn covariance(&self) -> Vec<Complex64> {
-        let channels = self.channels;
-        let orders = self.coefficients.first().map_or(0, |side| side.len() / channels.max(1));
-        let mut covariance = vec![Complex64::ZERO; orders * channels * channels];
-        let scale = 1.0 / self.coefficients.len() as f64;
-        for side in &self.coefficients {
-            let each = side.chunks_exact(channels).zip(covariance.chunks_exact_mut(channels * channels));
-            for (values, covariance) in each {
-                for (place, (row, target)) in values.iter().zip(covariance.chunks_exact_mut(channels)).enumerate() {
-                    let row = row * scale;
-                    target.iter_mut().zip(&values[..=place]).for_each(|(to, column)| *to += row * column.conj());
-                }
-            }
-        }
-        for covariance in covariance.chunks_exact_mut(channels * channels) {
-            for row in 0..channels {
-                covariance[row * channels + row].im = 0.0;
-                for column in 0..row {
-                    covariance[column * channels + row] = covariance[row * channels + column].conj();
-                }
-            }
-        }
-        covariance
-    }
-
-    /// Takes out what a channel creeps: `course` gives each turn's mean level and its rise over the turn, in µm. Nothing happens
-    /// to a channel that is not there.
-    pub fn take_out(&mut self, channel: usize, course: &[[f64; 2]]) {
-        if channel >= self.channels {
-            return;
-        }
-        let count = course.len().max(1) as f64;
-        let [level, rise] = [0, 1].map(|which| course.iter().map(|turn| turn[which]).sum::<f64>() / count);
-        for (index, values) in self.coefficients.iter_mut().enumerate() {
-            let (beside, side) = (index / 2 + 1, index % 2);
-            let (mut levels, mut rises) = (Complex64::ZERO, Complex64::ZERO);
-            for (turn, [of_level, of_rise]) in course.iter().enumerate() {
-                let phase = Complex64::cis(-TAU * ((beside * turn % self.period) as f64 / self.period as f64)) / count;
-                levels += phase * (of_level - level);
-                rises += phase * (of_rise - rise);
-            }
-            let share = beside as f64 / self.period as f64;
-            for order in 0..values.len() / self.channels {
-                let at = if side == 0 { order as f64 } else { -(order as f64) } - share;
-                let [flat, ramp] = ramp(at, self.angles);
-                let found = (levels * flat + rises * ramp) * if order == 0 { 1.0 } else { 2.0 };
-                values[order * self.channels + channel] -= if side == 0 { found } else { found.conj() };
-            }
-        }
-    }
-}
-
-/// Means of e^{iνφ} and of (φ/2π − ½)·e^{iνφ} over L equal angles from 0, ν not whole.
-fn ramp(nu: f64, angles: usize) -> [Complex64; 2] {
-    let count = angles as f64;
-    let step = Complex64::cis(TAU * nu / count);
-    let whole = Complex64::cis(TAU * nu);
-    // Sums of a geometric series and of its terms times their number.
-    let flat = (whole - 1.0) / (step - 1.0);
-    let ramp = (whole * count - step * flat) / (step - 1.0);
-    [flat / count, ramp / (count * count) - flat / (2.0 * count)]
 }
 
 impl Split {
@@ -401,20 +320,5 @@ mod tests {
         assert_eq!(rounded(&covariance), [1, 1, 61, 1, 1, 1, 1, 1]);
         assert_eq!(rounded(&over_five), [1, 1, 21, 16, 13, 1, 1, 1]);
         assert_eq!([1, 3, 4, 7, 8, 100].map(orders_beside), [0, 0, 1, 1, 2, 2]);
-    }
-
-    #[test]
-    fn a_ramp_is_the_sum_that_it_is() {
-        for (nu, angles) in [(3.0 - 1.0 / 60.0, 512), (-2.0 - 2.0 / 48.0, 90), (-1.0 / 60.0, 64)] {
-            let terms = (0..angles).map(|angle| {
-                let phase = Complex64::cis(TAU * nu * angle as f64 / angles as f64) / angles as f64;
-                [phase, phase * (angle as f64 / angles as f64 - 0.5)]
-            });
-            let sums = terms.fold([Complex64::ZERO; 2], |sum, term| [sum[0] + term[0], sum[1] + term[1]]);
-            for (found, sum) in ramp(nu, angles).iter().zip(sums) {
-                // Rounding of differences of numbers near 1 over 2π/60/512.
-                assert!((found - sum).norm() < 1e-9, "{nu} {angles}: {found} {sum}");
-            }
-        }
     }
 }

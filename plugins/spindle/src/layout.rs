@@ -14,10 +14,12 @@ use runout_core::{
     separation::{Assessment, OrderAssessment, Quantity},
 };
 
-use crate::{
-    effects::Alterations,
-    systems::{System, Systems},
-};
+mod systems;
+
+pub use systems::System;
+use systems::Systems;
+
+use crate::alterations::Alterations;
 
 /// A column adds to the rank when more than this of it (relative) lies outside the others' span. Rounding of
 /// e^{inθ} at order 10 000 is 1e-12; a sensor misplaced by a nanometre on 30 mm gives 3e-8.

@@ -1,5 +1,6 @@
 //! Spindles: separators of the part's form from the axis's error motion, and a simulator of both.
 
+pub mod alterations;
 pub mod diagnose;
 pub mod effects;
 pub mod layout;
@@ -7,7 +8,8 @@ pub mod plan;
 pub mod selection;
 pub mod separators;
 pub mod simulate;
-pub mod systems;
+mod solve;
+mod wiring;
 
 use runout_core::pipeline::{Registry, registry::Plugin};
 use separators::{

@@ -4,11 +4,11 @@
 
 use runout_core::{
     Complex64,
+    neighbours::Neighbours,
     numerics::{
         fourier::Fourier,
         lanes::{Arithmetic, FusedWork, fused},
     },
-    profile::Neighbours,
 };
 
 use super::{scatter::Scatter, size::Size, slow::Slow};

@@ -13,8 +13,9 @@ use std::{cell::RefCell, f64::consts::TAU};
 
 use runout_core::{
     Complex64,
+    neighbours::Neighbours,
     numerics::lanes::{Arithmetic, load},
-    profile::{NEIGHBOURS, Neighbours},
+    profile::NEIGHBOURS,
 };
 use rustfft::FftPlanner;
 

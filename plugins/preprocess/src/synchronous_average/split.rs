@@ -2,7 +2,8 @@
 
 use runout_core::{
     Complex64,
-    profile::{Neighbours, Part, Split, TURN_ORDERS, TurnLevels, Turns},
+    neighbours::Neighbours,
+    profile::{Part, Split, TURN_ORDERS, TurnLevels, Turns},
     spread::Spread,
 };
 

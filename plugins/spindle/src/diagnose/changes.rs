@@ -12,7 +12,7 @@ use runout_core::{
 };
 
 use super::drift::{self, Creeping};
-use crate::{selection::Selection, separators::Readings};
+use crate::{selection::Selection, solve::Readings};
 
 /// Turns that both sides of a change have at least, and the fewest in all.
 const SIDE: usize = 4;
@@ -225,7 +225,7 @@ impl Weights {
     fn step(&self, series: &Series, order: usize, turn: usize) -> Vec<Complex64> {
         let scale = (turn as f64 * (series.turns - turn) as f64 / series.turns as f64).sqrt();
         let step: Vec<Complex64> = (0..self.width).map(|channel| series.step(order, turn, channel) * scale).collect();
-        crate::separators::apply(self.inverse(order), &step)
+        crate::solve::apply(self.inverse(order), &step)
     }
 
     /// The combination of channels that a change of one channel alone shows best in: eᶜᴴ Σ⁻¹, over its norm.

@@ -19,7 +19,7 @@ use crate::{
     effects::{Alterations, SpindleEffect, TurnEvidence},
     layout::Layout,
     selection::Selection,
-    separators::{Blocks, Operators, Propagation, Readings, Scatter, apply, leak, smooth_by_order, whitening},
+    solve::{Blocks, Operators, Propagation, Readings, Scatter, apply, leak, smooth_by_order, whitening},
 };
 
 /// Orders to each side over which the noise in the residual's space is averaged, beyond what covariances are.

@@ -5,20 +5,17 @@ use std::{ops::Range, sync::Arc};
 use runout_core::{
     Complex64,
     creep::{Creep, Levels, creeps},
-    model::diagnosis::{Added, Diagnosis, Estimated},
-    profile::{Neighbours, Profile},
+    neighbours::Neighbours,
+    profile::Profile,
     stage::Station,
 };
 
-use super::data::Shared;
-use crate::{effects::TurnEvidence, selection::Selection, separators::Readings};
+use crate::{selection::Selection, solve::Readings};
 
 /// Share of a variance that stays whatever is taken out of it.
 const LEAST_LEFT: f64 = 0.05;
 /// Neighbouring levels that count as one observation.
 const ALIKE: f64 = 4.0;
-/// Drifts are one displacement where it leaves less than this share of them.
-const ONE_DISPLACEMENT: f64 = 0.1;
 
 /// One sensor's creep in the captures of a station.
 #[derive(Debug, Clone)]
@@ -44,6 +41,11 @@ struct Capture {
 }
 
 impl Creeping {
+    /// Places among the creep's captures of the station's setups.
+    pub fn captures(&self) -> Range<usize> {
+        self.first..self.first + self.setups.len()
+    }
+
     pub fn certain(&self) -> bool {
         self.creep.certain
     }
@@ -228,80 +230,6 @@ fn held_out(creeping: &Creeping, selection: &Selection, station: &Station, senso
         }
     }
     chi2
-}
-
-/// Says a drift that was found by what it is over the capture, its rate, and its time constant where that is determined.
-pub fn say(diagnosis: &mut Diagnosis, shared: &Shared) {
-    let rig = &shared.selection.rig;
-    let mut drifts = vec![0.0; rig.sensors.len()];
-    let creeps = |added: &&mut Added| shared.turn_evidence(&added.effect) == Some(TurnEvidence::Levels);
-    for added in diagnosis.added.iter_mut().filter(creeps) {
-        let sensor = added.targets.first().and_then(|id| rig.sensors.iter().position(|sensor| sensor.id == *id));
-        let creeping = sensor.and_then(|sensor| {
-            let of_station = |station: &super::data::StationData| station.seen.creeping.get(sensor)?.clone();
-            let all = shared.data.iter().filter_map(of_station);
-            // Where captures differ, the station that has the largest.
-            let has_largest = |one: &Creeping| {
-                one.creep.shared || (one.first..one.first + one.setups.len()).contains(&one.creep.largest())
-            };
-            all.into_iter().find(has_largest)
-        });
-        let (Some(sensor), Some(creeping)) = (sensor, creeping) else { continue };
-        let creep = &creeping.creep;
-        let said = |name: String, value: f64, std: f64, unit: &str| {
-            let std = std.is_finite().then_some(std);
-            Estimated { name, value, std, unit: unit.into() }
-        };
-        added.parameters = if creep.shared {
-            drifts[sensor] = creep.over_capture(0);
-            vec![
-                said("over-capture".into(), creep.over_capture(0), creep.over_capture_std, "um"),
-                said("rate".into(), creep.rates[0], creep.rate_std, "um/rev"),
-            ]
-        } else {
-            let setups = rig.setups.iter().enumerate().take(creeping.setups.len());
-            let over = |(index, setup): (usize, &runout_core::rig::Setup)| {
-                let over_um = creep.over_capture(creeping.first + index);
-                said(format!("over-capture-{}", setup.id), over_um, creep.over_capture_std, "um")
-            };
-            setups.map(over).collect()
-        };
-        if let Some([tau, std]) = creep.time_constant {
-            added.parameters.push(said("time-constant".into(), tau, std, "rev"));
-        }
-    }
-    diagnosis.warnings.extend(one_displacement(&drifts, shared));
-}
-
-/// Drifts of several sensors that are one displacement of the part beside all sensors.
-fn one_displacement(drifts: &[f64], shared: &Shared) -> Option<String> {
-    let sensors = &shared.selection.rig.sensors;
-    let (mut cc, mut cs, mut ss, mut c, mut s) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    let across = || sensors.iter().zip(drifts).filter(|(sensor, _)| sensor.axial_radius_mm.is_none());
-    if across().filter(|(_, drift)| **drift != 0.0).count() < 3 {
-        return None;
-    }
-    for (sensor, drift) in across() {
-        let (sine, cosine) = sensor.angle_rad.sin_cos();
-        (cc, cs, ss) = (cc + cosine * cosine, cs + cosine * sine, ss + sine * sine);
-        (c, s) = (c + drift * cosine, s + drift * sine);
-    }
-    let determinant = cc * ss - cs * cs;
-    if determinant < 1e-6 {
-        return None;
-    }
-    let (x, y) = ((c * ss - s * cs) / determinant, (s * cc - c * cs) / determinant);
-    let left = |(sensor, drift): (&runout_core::rig::Sensor, &f64)| {
-        (drift - x * sensor.angle_rad.cos() - y * sensor.angle_rad.sin()).powi(2)
-    };
-    let left: f64 = across().map(left).sum();
-    let all: f64 = across().map(|(_, drift)| drift * drift).sum();
-    (left < ONE_DISPLACEMENT * ONE_DISPLACEMENT * all).then(|| {
-        format!(
-            "the drifts of the sensors fit one displacement of the part beside all of them, x {x:+.3} µm and y {y:+.3} µm over each \
-             capture: the part, the spindle or the holder of all sensors moves"
-        )
-    })
 }
 
 /// Creep of a turn at an order, for what happens within turns.

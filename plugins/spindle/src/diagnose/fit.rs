@@ -9,19 +9,20 @@ use runout_core::{
         diagnosis::Unexplained,
         evidence::{Group, far_worse},
     },
-    separation::{Quantity, Residual, Separation},
+    separation::{Quantity, Separation},
     stage::Station,
 };
 
 use super::{
     data::{self, Shared, StationData, project, project_some},
     drift::Part,
+    solved::Solved,
     strangers,
 };
 use crate::{
     effects::{ActsOn, Alterations, Predicted},
-    layout::{FirstOrder, Layout, View},
-    separators::{Estimate, Operators, Propagation, Readings, Solver, apply, leftover, residual},
+    layout::{Layout, View},
+    solve::{Readings, apply},
 };
 
 /// A fit, and what its partials need.
@@ -34,23 +35,6 @@ pub struct SpindleFit {
     /// Other fits between which and this one the data do not decide, and the weights of this one and of them.
     others: Vec<SpindleFit>,
     weights: Vec<f64>,
-}
-
-/// One station's solution.
-pub(super) struct Solved {
-    pub operators: Operators,
-    /// Effects as they act on the turns fitted.
-    alterations: Alterations,
-    propagation: Option<Propagation>,
-    /// The same with what is not known of the setups' angles.
-    with_angles: Option<Propagation>,
-    pub estimate: Estimate,
-    /// Readings taken back to displacements.
-    pub corrected: Readings,
-    /// The same without what exact geometry adds.
-    pub linear: Vec<Complex64>,
-    /// W (I − A P) of each order from 1, over the noise of a real degree of freedom.
-    pub whitened: Vec<Vec<Complex64>>,
 }
 
 impl SpindleFit {
@@ -195,90 +179,6 @@ impl SpindleFit {
             solver.report(station, &solved.operators, &solved.estimate, propagation, residual)
         });
         each.collect()
-    }
-}
-
-impl Shared {
-    pub(super) fn solver<'a>(&'a self, layout: &'a Layout, alterations: &Alterations) -> Solver<'a> {
-        Solver { selection: &self.selection, layout, second_order: self.second_order || alterations.exact_geometry }
-    }
-}
-
-impl Solved {
-    fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
-        let mut corrected = data.readings(alterations).clone();
-        for (number, (line, leak)) in data.seen.lines.iter().zip(&data.leaks).enumerate() {
-            if alterations.lines.contains(&(number, line.row().0)) {
-                line.take_out(leak, layout, &mut corrected.mean);
-            }
-        }
-        let altered = data.altered(alterations, data.part);
-        altered.correct(layout, &mut corrected);
-        let max_order = corrected.max_order;
-        // Displacements are weighed by the noise of the readings that they were.
-        let weights: Vec<_> = (1..=max_order).map(|order| data.weights_of(order, layout, alterations)).collect();
-        let mut operators = Operators::least_squares(layout, max_order, Some(weights.clone()));
-        if data.weights.is_none() {
-            operators.weights = None;
-        }
-        let solver = shared.solver(layout, alterations);
-        let (estimate, linear) = solver.iterate(&corrected, &operators, |estimate, excess| {
-            axial(layout, alterations, &corrected, estimate, excess);
-        });
-        let count = corrected.count;
-        let whitened = (1..=max_order)
-            .map(|order| {
-                let system = &operators.systems[order - 1];
-                let left = leftover(&system.matrix, &operators.orders[order - 1].operator, count);
-                let mut left = weights[order - 1].times(&left, count);
-                // A real degree of freedom has half of a complex one's square.
-                let scale = std::f64::consts::SQRT_2 / data.floor_std(order, alterations);
-                for entry in &mut left {
-                    *entry *= scale;
-                }
-                left
-            })
-            .collect();
-        let propagation = Propagation::of(&corrected, &operators);
-        // The residual shows an angle that is off, as an effect; results are uncertain by it all the same.
-        let with_angles = (data.part == Part::All && corrected.has_uncertain_angles()).then(|| {
-            let mut uncertain = corrected.clone();
-            uncertain.add_angle_uncertainty();
-            Propagation::of(&uncertain, &operators)
-        });
-        let with_angles = with_angles.flatten();
-        Self { operators, alterations: altered, propagation, with_angles, estimate, corrected, linear, whitened }
-    }
-
-    fn residual(&self) -> Residual {
-        residual(&self.operators, &self.corrected, &self.linear, self.propagation.as_ref())
-    }
-}
-
-/// Adds what places along z other than the declared ones do to the readings.
-fn axial(
-    layout: &Layout,
-    alterations: &Alterations,
-    readings: &Readings,
-    estimate: &Estimate,
-    excess: &mut [Complex64],
-) {
-    let moved = alterations.sensors.iter().any(|sensor| sensor.circle_mm != 0.0);
-    if alterations.axial_um.is_empty() && !moved {
-        return;
-    }
-    let predicted = Predicted::new(layout, alterations, estimate, readings);
-    if !alterations.axial_um.is_empty() {
-        let along = predicted.curves(
-            &predicted.along_z,
-            |_| true,
-            |angle, slope| -1e-3 * slope * alterations.axial_um.iter().map(|harmonic| harmonic.at(angle)).sum::<f64>(),
-        );
-        excess.iter_mut().zip(along).for_each(|(excess, along)| *excess += along);
-    }
-    for (index, slope) in predicted.along_z.iter().enumerate() {
-        let reading = &layout.readings[index % readings.count];
-        excess[index] += slope * alterations.sensors[reading.sensor].circle_mm;
     }
 }
 
@@ -598,39 +498,5 @@ fn add_products(covariance: &mut [Vec<Complex64>], [a, b]: [&[Vec<(usize, Comple
                 }
             }
         }
-    }
-}
-
-impl Solved {
-    /// How an unknown moves with a parameter, by order from 2: its operator on the readings' partials.
-    fn moved_by<'a>(
-        &'a self,
-        partial: &'a [Complex64],
-        unknown: usize,
-    ) -> impl Iterator<Item = (usize, Complex64)> + 'a {
-        let count = self.corrected.count;
-        self.told_orders(unknown).map(move |order| {
-            let row = &self.operators.orders[order - 1].operator[unknown * count..(unknown + 1) * count];
-            let readings = &partial[order * count..(order + 1) * count];
-            (order, row.iter().zip(readings).map(|(a, b)| a * b).sum())
-        })
-    }
-
-    /// How the unknowns of order 1 move with a parameter.
-    fn first_moved(&self, partial: &[Complex64]) -> Vec<Complex64> {
-        let count = self.corrected.count;
-        apply(&self.operators.orders[0].operator, &partial[count..2 * count])
-    }
-
-    /// How z at 1/rev moves with a parameter, where it can be told.
-    fn first_moved_by(&self, partial: &[Complex64], layout: &Layout) -> Option<Complex64> {
-        let z = layout.unknowns.iter().position(|unknown| *unknown == Quantity::Z)?;
-        let place = layout.first_order_unknowns().iter().position(|unknown| *unknown == FirstOrder::Axial)?;
-        self.operators.observable(1)[z].then(|| self.first_moved(partial)[place])
-    }
-
-    /// Orders from 2 at which an unknown can be told.
-    fn told_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
-        (2..=self.corrected.max_order).filter(move |order| self.operators.observable(*order)[unknown])
     }
 }

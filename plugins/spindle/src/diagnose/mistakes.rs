@@ -15,7 +15,7 @@ use super::{
 use crate::{
     effects::{Alterations, Mistake},
     selection::Selection,
-    separators::wiring,
+    wiring,
 };
 
 /// What moves form and motion by less is another way to say the same, in µm.

@@ -8,6 +8,8 @@ mod fit;
 mod lines;
 mod mistakes;
 mod rig_keys;
+mod said;
+mod solved;
 mod strangers;
 
 use std::sync::Arc;
@@ -28,7 +30,7 @@ use crate::{
     effects::{ActsOn, SpindleEffect, TurnEvidence, ordered_pairs, pair_of, pairs},
     layout::Layout,
     selection::Selection,
-    separators::wiring,
+    wiring,
 };
 use changes::Change;
 use data::{Shared, StationData, TurnObservations};
@@ -265,8 +267,8 @@ pub fn diagnose(
     let max_added = settings.max_added + shown.count();
     let closed = closed_loop::diagnose(&model, &Settings { left_out, max_added, ..settings.clone() })?;
     let mut diagnosis = closed.diagnosis;
-    drift::say(&mut diagnosis, &model.traced);
-    lines::say(&mut diagnosis, &model.traced, stations);
+    said::say_drifts(&mut diagnosis, &model.traced);
+    said::say_lines(&mut diagnosis, &model.traced, stations);
     // The values of one member of a confounded set are conditional on a choice that the data do not make.
     for added in diagnosis.added.iter_mut().filter(|added| !added.confounded_with.is_empty()) {
         added.parameters.iter_mut().for_each(|parameter| parameter.std = None);

@@ -7,7 +7,7 @@ use runout_core::{
     rig::Rig,
 };
 
-use super::{data::project, fit::Solved};
+use super::{data::project, solved::Solved};
 use crate::layout::Layout;
 
 /// A reading is where it comes from when letting that reading be anything takes away this share of the residual.

@@ -8,9 +8,9 @@
 //! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own whose `register` adds it
 //! by [`entry`] (`examples/13-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
 
-mod alterations;
 mod asynchronous_line;
 mod axial_motion;
+mod correct;
 mod even_order_motion;
 mod filter_attenuation;
 mod mistakes;
@@ -35,7 +35,8 @@ use runout_core::{
     pipeline::effects::EffectEntry,
 };
 
-pub use alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, Transfer, creep};
+pub use crate::alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, Transfer};
+pub use correct::creep;
 pub use mistakes::{Mistake, ordered_pairs, pair_of, pairs};
 pub use predicted::Predicted;
 

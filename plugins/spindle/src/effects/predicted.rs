@@ -2,10 +2,11 @@
 
 use runout_core::{Complex64, separation::Quantity};
 
-use super::alterations::{Alterations, Curve};
+use super::correct::Curve;
 use crate::{
+    alterations::Alterations,
     layout::{FirstOrder, Layout, UM_PER_MM_URAD},
-    separators::{Estimate, Readings},
+    solve::{Estimate, Readings},
 };
 
 /// Harmonics of Re Σ c e^{−inΦ}, `[order][reading]` from order 0, of what each reading is made of.

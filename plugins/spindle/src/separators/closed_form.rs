@@ -19,17 +19,15 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    harmonic_least_squares::{Weighting, operators},
-    operators::{Operators, OrderOperator},
-    projection::projection,
-    readings::Readings,
-    solution::Solver,
+    keys::{checked_gain, yes},
+    station::separate,
 };
 use crate::{
     diagnose::DeclaredSpindle,
     layout::{Layout, UM_PER_MM_URAD},
     plan,
     selection::Selection,
+    solve::{Operators, OrderOperator, Readings, Solver, projection},
 };
 
 /// Angles that differ by less are the same; what is off by more is for the general separator.
@@ -88,10 +86,6 @@ pub struct MethodConfig<M> {
     pub method: PhantomData<M>,
 }
 
-pub(super) fn yes() -> bool {
-    true
-}
-
 impl<M: Method> StageConfig for MethodConfig<M> {
     type Stage = Separator;
 
@@ -104,19 +98,6 @@ impl<M: Method> StageConfig for MethodConfig<M> {
         let max_noise_gain = checked_gain(self.max_noise_gain)?.unwrap_or(M::MAX_NOISE_GAIN);
         let separator = ClosedFormSeparator::of::<M>(selection, self.second_order, max_noise_gain)?;
         Ok(Separator::Stations(Box::new(separator)))
-    }
-}
-
-/// A limit of noise gain, as a file gives it.
-///
-/// # Errors
-/// When it is no positive number.
-pub(super) fn checked_gain(gain: Option<f64>) -> std::result::Result<Option<f64>, Fault> {
-    match gain {
-        Some(gain) if gain <= 0.0 || gain.is_nan() => {
-            Err(Fault::at("max_noise_gain", format!("expected a factor above 0, found {gain}")))
-        }
-        gain => Ok(gain),
     }
 }
 
@@ -156,7 +137,7 @@ impl ClosedFormSeparator {
 
     fn operators(&self, readings: &Readings) -> Operators {
         // Order 1 follows the 1/rev rule, which is the general separator's.
-        let general = operators(&self.layout, &Readings { max_order: 1, ..readings.clone() }, Weighting::None);
+        let general = Operators::least_squares(&self.layout, 1, None);
         let mut orders = general.orders;
         for order in 2..=readings.max_order {
             let qr = self.layout.factor(order);
@@ -177,7 +158,7 @@ impl StationSeparator for ClosedFormSeparator {
     }
 
     fn separate(&self, station: &Station) -> Result<Separation> {
-        self.solver().separate(station, |readings| self.operators(readings))
+        separate(&self.solver(), station, |readings| self.operators(readings))
     }
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {

@@ -21,8 +21,9 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::closed_form::{
-    ClosedForm, ClosedFormSeparator, SectionMotion, add_motion, refusal, same_angle, sections_with, takes_sensors, yes,
+    ClosedForm, ClosedFormSeparator, SectionMotion, add_motion, refusal, same_angle, sections_with, takes_sensors,
 };
+use super::keys::yes;
 use crate::{layout::Layout, selection::Selection};
 
 const NAME: &str = "four-sensor-reversal";

@@ -17,15 +17,17 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    closed_form::{checked_gain, yes},
     face_notes,
-    operators::Operators,
-    projection::projection,
-    readings::Readings,
-    solution::Solver,
-    weights,
+    keys::{checked_gain, yes},
+    station::separate,
 };
-use crate::{diagnose::DeclaredSpindle, layout::Layout, plan, selection::Selection};
+use crate::{
+    diagnose::DeclaredSpindle,
+    layout::Layout,
+    plan,
+    selection::Selection,
+    solve::{Operators, Readings, Solver, projection, whitening},
+};
 
 /// How readings are weighed against each other where there are more than unknowns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -113,7 +115,7 @@ impl StationSeparator for HarmonicLeastSquares {
     }
 
     fn separate(&self, station: &Station) -> Result<Separation> {
-        self.solver().separate(station, |readings| operators(&self.layout, readings, self.weighting))
+        separate(&self.solver(), station, |readings| operators(&self.layout, readings, self.weighting))
     }
 
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
@@ -135,10 +137,9 @@ impl StationSeparator for HarmonicLeastSquares {
 }
 
 /// Least-squares operators of all orders.
-#[must_use]
-pub fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> Operators {
+fn operators(layout: &Layout, readings: &Readings, weighting: Weighting) -> Operators {
     let weights = match weighting {
-        Weighting::TurnCovariance => weights::whitening(readings),
+        Weighting::TurnCovariance => whitening(readings),
         Weighting::None => None,
     };
     Operators::least_squares(layout, readings.max_order, weights)

@@ -6,7 +6,6 @@
 //! averages. It is a motion where all channels fit one displacement and tilt (`source.rs`), and else electrical pick-up. A line of the
 //! machine keeps its order; one of the mains keeps its frequency, also where captures differ in speed.
 
-mod said;
 mod source;
 mod spectrum;
 mod turns;
@@ -17,8 +16,7 @@ use runout_core::{Complex64, stage::Station};
 
 use super::drift::Part;
 use crate::{layout::Layout, selection::Selection};
-pub use said::say;
-use source::Source;
+pub(super) use source::Source;
 use turns::{Amplitudes, Capture, Fixed};
 
 /// Fewest turns of a capture.
@@ -31,33 +29,33 @@ const IN_ALL: f64 = 0.5;
 /// A line, and what it does to the averages.
 #[derive(Debug, Clone)]
 pub struct Line {
-    order: f64,
-    order_std: f64,
-    amplitude_um: f64,
-    amplitude_std: f64,
-    direction_rad: f64,
-    direction_std: f64,
+    pub(super) order: f64,
+    pub(super) order_std: f64,
+    pub(super) amplitude_um: f64,
+    pub(super) amplitude_std: f64,
+    pub(super) direction_rad: f64,
+    pub(super) direction_std: f64,
     /// Turns a second, where known, and turns fitted in each capture.
-    turns_hz: Option<f64>,
-    turns: f64,
-    source: Source,
+    pub(super) turns_hz: Option<f64>,
+    pub(super) turns: f64,
+    pub(super) source: Source,
     /// Of each sensor.
-    sensors: Vec<OfSensor>,
+    pub(super) sensors: Vec<OfSensor>,
     /// χ² of the turns fitted that its parameters explain of noise.
-    expected: f64,
+    pub(super) expected: f64,
     /// In the mean over the turns fitted, held out and all, `[order][reading]` from order 0.
-    leak: [Vec<Complex64>; 3],
+    pub(super) leak: [Vec<Complex64>; 3],
 }
 
 /// A line in one sensor, all setups together.
 #[derive(Debug, Clone, Default)]
-struct OfSensor {
-    amplitude_um: f64,
-    amplitude_std: f64,
+pub(super) struct OfSensor {
+    pub(super) amplitude_um: f64,
+    pub(super) amplitude_std: f64,
     /// χ² of the turns fitted that it explains.
-    explained: f64,
+    pub(super) explained: f64,
     /// χ² of the turns that are held out, without it and with it.
-    held_out: [f64; 2],
+    pub(super) held_out: [f64; 2],
 }
 
 impl Line {
@@ -107,7 +105,7 @@ impl Line {
     }
 
     /// Root mean square amplitude in some sensors, in µm, and its standard uncertainty.
-    fn of_sensors(&self, sensors: &[usize]) -> [f64; 2] {
+    pub(super) fn of_sensors(&self, sensors: &[usize]) -> [f64; 2] {
         let count = sensors.len().max(1) as f64;
         let each = || sensors.iter().filter_map(|sensor| self.sensors.get(*sensor));
         let amplitude_um = (each().map(|one| one.amplitude_um.powi(2)).sum::<f64>() / count).sqrt();

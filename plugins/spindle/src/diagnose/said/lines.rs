@@ -5,9 +5,11 @@ use runout_core::{
     stage::Station,
 };
 
-use super::{Line, source::Source};
 use crate::{
-    diagnose::data::Shared,
+    diagnose::{
+        data::Shared,
+        lines::{Line, Source},
+    },
     effects::{ActsOn, TurnEvidence},
 };
 

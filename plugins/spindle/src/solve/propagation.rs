@@ -202,7 +202,7 @@ mod tests {
         },
         *,
     };
-    use crate::systems::System;
+    use crate::layout::System;
 
     const SENSORS: usize = 3;
     const SETUPS: usize = 2;

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
 
-use super::solution::Estimate;
+use super::estimate::Estimate;
 use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
 
 /// Finer grid on which form is tabulated, per angle of the profile.

@@ -5,14 +5,12 @@
 
 use runout_core::{Complex64, model::foresight, rig::Rig};
 
-use super::{
-    algebra::{Blocks, apply},
-    readings::Readings,
-};
 use crate::{
-    effects::{ActsOn, Alterations, Mistake, ordered_pairs, pair_of, pairs},
+    alterations::Alterations,
+    effects::{ActsOn, Mistake, ordered_pairs, pair_of, pairs},
     layout::Layout,
     selection::Selection,
+    solve::{Blocks, Readings, apply},
 };
 
 /// Mistakes are looked for above this weighted sum of squares per degree of freedom.

@@ -1,25 +1,27 @@
-//! From operators to a separation: solve, add second-order geometry, propagate covariance, look at the residual.
+//! One station solved: the operators of all orders, what exact geometry adds, and passes until both agree.
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
-    profile::{NEIGHBOURS, Profile},
-    separation::{Quantity, Residual, SectionAt, Sensitivity, Separation},
+    profile::Profile,
+    separation::{Quantity, Sensitivity, Separation},
     stage::Station,
 };
 
 use super::{
     algebra::apply,
     angles,
+    estimate::Estimate,
     joint::Joint,
     leak,
-    operators::{Operators, OrderOperator},
+    operators::Operators,
     propagation::Propagation,
     readings::{Readings, Scatter},
+    residual::residual,
     second_order::SecondOrder,
-    weights, wiring,
+    weights,
 };
 use crate::{
-    layout::{FirstOrder, Layout, ToReference},
+    layout::{FirstOrder, Layout},
     selection::Selection,
 };
 
@@ -41,37 +43,6 @@ const JOINT_PASSES: usize = 10;
 /// No result is given of a solution that still moves more than this, rms.
 const UNSETTLED_UM: f64 = 5e-4;
 
-/// The unknowns at all orders, motion at the sensors' mean z.
-#[derive(Debug, Clone)]
-pub struct Estimate {
-    pub width: usize,
-    /// First-order unknowns, as [`Layout::first_order_unknowns`] lists them.
-    pub first: Vec<Complex64>,
-    /// `[order][unknown]` from order 0; order 1 holds the motion that turns against the spindle.
-    values: Vec<Complex64>,
-    told: Vec<bool>,
-    /// What form may be at lost orders, likewise; empty where none is lost.
-    likely: Vec<Complex64>,
-    /// How far the last pass has moved the readings, rms.
-    pub moved_um: f64,
-}
-
-impl Estimate {
-    /// An unknown at an order, 0 where it cannot be told.
-    #[must_use]
-    pub fn told(&self, order: usize, unknown: usize) -> Complex64 {
-        let index = order * self.width + unknown;
-        if self.told[index] { self.values[index] } else { Complex64::ZERO }
-    }
-
-    /// A form at an order; where it is lost, what it may be: for what exact geometry carries into other orders, and for no result.
-    #[must_use]
-    pub fn likely_form(&self, order: usize, unknown: usize) -> Complex64 {
-        let index = order * self.width + unknown;
-        if self.told[index] { self.values[index] } else { self.likely.get(index).copied().unwrap_or_default() }
-    }
-}
-
 /// Solves one station.
 pub struct Solver<'a> {
     pub selection: &'a Selection,
@@ -80,11 +51,15 @@ pub struct Solver<'a> {
 }
 
 impl Solver<'_> {
-    /// Separates a station with the operators that `method` makes for its readings.
+    /// Separates a station with the operators that `method` makes for its readings, and gives the readings.
     ///
     /// # Errors
     /// When the station's profiles do not fit the rig.
-    pub fn separate(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Separation> {
+    pub fn separate(
+        &self,
+        station: &Station,
+        method: impl FnOnce(&Readings) -> Operators,
+    ) -> Result<(Separation, Readings)> {
         let mut readings = Readings::gather(self.selection, self.layout, station, Scatter::Beside)?;
         weights::smooth_by_order(&mut readings);
         if self.second_order {
@@ -95,7 +70,6 @@ impl Solver<'_> {
         if self.couples(&readings) && is_above(estimate.moved_um, UNSETTLED_UM) {
             return Err(self.unsettled(station, &readings, &estimate));
         }
-        let mut warnings = wiring::copies(&self.selection.rig, &readings);
         let mut propagation = Propagation::of(&readings, &operators);
         let mut residual = residual(&operators, &readings, &linear, propagation.as_ref());
         if readings.has_uncertain_angles() {
@@ -105,15 +79,10 @@ impl Solver<'_> {
             readings.add_angle_uncertainty();
             propagation = Propagation::of(&readings, &operators);
         }
-        if residual.chi2_per_dof > wiring::SUSPICIOUS_CHI2 {
-            let weights = weights::whitening(&readings);
-            warnings.extend(wiring::warning(self.selection, self.layout, &readings, weights.as_deref()));
-        }
         let mut separation = self.report(station, &operators, &estimate, propagation.as_ref(), residual);
-        separation.warnings = warnings;
         let carried = self.second_order.then(|| self.carried(&readings, &separation)).flatten();
         separation.warnings.extend(carried);
-        Ok(separation)
+        Ok((separation, readings))
     }
 
     /// Where exact geometry does not settle.
@@ -373,108 +342,6 @@ impl Solver<'_> {
         self.layout.unknowns.iter().map(value).collect()
     }
 
-    pub fn report(
-        &self,
-        station: &Station,
-        operators: &Operators,
-        estimate: &Estimate,
-        propagation: Option<&Propagation>,
-        residual: Residual,
-    ) -> Separation {
-        let layout = self.layout;
-        let (width, max_order) = (layout.unknowns.len(), operators.orders.len());
-        let to_reference = layout.to_reference(layout.mean_z_mm + station.z_mm);
-        let mut values = vec![Complex64::ZERO; (max_order + 1) * width];
-        let mut variance = vec![0.0; values.len()];
-        let mut observable = vec![true; values.len()];
-        let motions: Vec<usize> = (0..width).filter(|unknown| !layout.unknowns[*unknown].is_form()).collect();
-        let forms: Vec<usize> = layout.forms().collect();
-        let mut form_covariance = propagation.map(|_| vec![Complex64::ZERO; forms.len() * forms.len()]);
-        let mut motion_covariance = propagation.map(|_| vec![Complex64::ZERO; motions.len() * motions.len()]);
-        for order in 1..=max_order {
-            let row = order * width..(order + 1) * width;
-            let mut solved = estimate.values[row.clone()].to_vec();
-            to_reference.apply(&mut solved);
-            let told = &operators.observable(order);
-            if layout.direction < 0.0 {
-                let forms = layout.unknowns.iter().zip(&mut solved).filter(|(unknown, _)| unknown.is_form());
-                forms.for_each(|(_, form)| *form = form.conj());
-            }
-            let spread = propagation.map(|propagation| {
-                let mut covariance = propagation.covariance[order - 1].clone();
-                if order == 1 {
-                    covariance = about(&covariance, |rows, length| self.named_alike(rows, order, length));
-                }
-                to_reference.apply_about(&mut covariance);
-                covariance
-            });
-            if let (Some(spread), Some(joint)) = (&spread, &mut form_covariance) {
-                let entry = |row: &usize, column: &usize| {
-                    let entry = spread[row * width + column];
-                    if layout.direction < 0.0 { entry.conj() } else { entry }
-                };
-                joint.extend(forms.iter().flat_map(|row| forms.iter().map(move |column| entry(row, column))));
-            }
-            if let (Some(spread), Some(joint)) = (&spread, &mut motion_covariance) {
-                let entry = |row: &usize, column: &usize| spread[row * width + column];
-                joint.extend(motions.iter().flat_map(|row| motions.iter().map(move |column| entry(row, column))));
-            }
-            for unknown in 0..width {
-                let index = row.start + unknown;
-                observable[index] = told[unknown];
-                let lost = Complex64::new(f64::NAN, f64::NAN);
-                values[index] = if told[unknown] { solved[unknown] } else { lost };
-                variance[index] = match &spread {
-                    Some(spread) if told[unknown] => spread[unknown * width + unknown].re.max(0.0),
-                    _ => f64::NAN,
-                };
-            }
-        }
-        let rig = &self.selection.rig;
-        let sections = (rig.sections.iter().enumerate())
-            .map(|(index, id)| SectionAt::whole(id.clone(), rig.section_z_mm(index) + station.z_mm));
-        let tells_tilt = layout.unknowns.iter().any(|unknown| unknown.is_tilt());
-        Separation {
-            sections: sections.collect(),
-            unknowns: layout.unknowns.clone(),
-            estimate: values,
-            variance,
-            observable,
-            motion_covariance,
-            form_covariance,
-            freedom: freedom(station, &self.selection.setups),
-            equivalents: Vec::new(),
-            form_bound: self.form_bound(operators, &to_reference),
-            motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
-            residual,
-            warnings: Vec::new(),
-        }
-    }
-
-    /// By how much forms declared within bounds may move each unknown, peak to valley: each reading of such a section by its bound, at
-    /// the order where that moves the unknown most. Empty where none is declared.
-    fn form_bound(&self, operators: &Operators, to_reference: &ToReference) -> Vec<f64> {
-        let layout = self.layout;
-        let bounds: Vec<f64> =
-            layout.readings.iter().map(|reading| layout.form_bound_um(reading.section).unwrap_or(0.0)).collect();
-        if bounds.iter().all(|bound| *bound <= 0.0) {
-            return Vec::new();
-        }
-        let (width, count) = (layout.unknowns.len(), layout.readings.len());
-        let mut largest = vec![0.0_f64; width];
-        // At order 1 form is clamping, but for what is seen on the axis, which has the same share of z at every order.
-        for order in 2..=operators.orders.len() {
-            let mut rows = self.order_operator(operators, order, count);
-            to_reference.apply(&mut rows);
-            let told = rows.chunks_exact(count).zip(&mut largest).zip(operators.observable(order));
-            for ((row, largest), _) in told.filter(|(_, told)| **told) {
-                let moved: f64 = row.iter().zip(&bounds).map(|(entry, bound)| entry.norm() * bound).sum();
-                *largest = largest.max(moved);
-            }
-        }
-        largest
-    }
-
     /// The largest reading of order 1 across the axis: the largest eccentricity, but for motion.
     fn eccentricity_um(&self, readings: &Readings) -> f64 {
         let radial = readings.order(1).iter().zip(&self.layout.readings).filter(|(_, at)| !at.view.is_axial());
@@ -487,7 +354,7 @@ impl Solver<'_> {
     }
 
     /// Rows, `[unknown][length]`, with the unknowns of orders from 2 also at order 1.
-    fn named_alike(&self, rows: &[Complex64], order: usize, length: usize) -> Vec<Complex64> {
+    pub(super) fn named_alike(&self, rows: &[Complex64], order: usize, length: usize) -> Vec<Complex64> {
         if order > 1 {
             return rows.to_vec();
         }
@@ -500,78 +367,6 @@ impl Solver<'_> {
         let width = self.layout.unknowns.len();
         (0..width).flat_map(|unknown| columns.iter().map(move |column| column[unknown])).collect()
     }
-}
-
-/// Real degrees of freedom behind the covariance of one order by itself: of the neighbours that captures of so many
-/// turns have, and of both parts of each.
-fn freedom(station: &Station, setups: &[usize]) -> usize {
-    let used = station.profiles.iter().filter(|profile| setups.contains(&profile.setup));
-    let of = |profile: &Profile| match profile.turns.used {
-        0 | 1 => 0,
-        2 => 2,
-        turns => 4 * NEIGHBOURS.min((turns - 1) / 2),
-    };
-    used.map(of).sum()
-}
-
-/// What the solution leaves of linear readings, `[order][reading]`, and what noise lets expect of that.
-pub fn residual(
-    operators: &Operators,
-    readings: &Readings,
-    linear: &[Complex64],
-    propagation: Option<&Propagation>,
-) -> Residual {
-    let count = readings.count;
-    let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
-    let mut orders: Option<[usize; 2]> = None;
-    // Weighted as the fit is; set against what the covariance lets expect of it.
-    let (mut weighted, mut weighted_expected) = (0.0, 0.0);
-    for (index, (OrderOperator { operator, rank }, system)) in
-        operators.orders.iter().zip(&operators.systems).enumerate()
-    {
-        if *rank == count {
-            continue;
-        }
-        dof += count - rank;
-        orders = Some([orders.map_or(index + 1, |[lowest, _]| lowest), index + 1]);
-        let recorded = &linear[(index + 1) * count..(index + 2) * count];
-        let fitted = apply(&system.matrix, &apply(operator, recorded));
-        let residual: Vec<Complex64> =
-            recorded.iter().zip(fitted).map(|(recorded, fitted)| recorded - fitted).collect();
-        squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
-        let Some(propagation) = propagation else { continue };
-        expected += propagation.squares[index];
-        if let Some(weights) = &operators.weights {
-            weighted += weights[index].times(&residual, 1).iter().map(Complex64::norm_sqr).sum::<f64>();
-            weighted_expected += propagation.weighted_squares[index];
-        }
-    }
-    if dof == 0 {
-        return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0, orders };
-    }
-    // A coefficient of size c is a wave of mean square c²/2.
-    let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
-    let chi2_per_dof = match &operators.weights {
-        _ if expected <= 0.0 => f64::NAN,
-        Some(_) => weighted / weighted_expected,
-        None => squares / expected,
-    };
-    Residual {
-        rms_um: rms(squares),
-        expected_rms_um: if propagation.is_some() { rms(expected) } else { f64::NAN },
-        chi2_per_dof,
-        dof: 2 * dof,
-        orders,
-    }
-}
-
-/// M·C·Mᴴ for a covariance C, where `times` gives M·rows for rows of a length.
-fn about(covariance: &[Complex64], times: impl Fn(&[Complex64], usize) -> Vec<Complex64>) -> Vec<Complex64> {
-    let size = covariance.len().isqrt();
-    let rows = times(covariance, size);
-    let adjoint: Vec<Complex64> =
-        (0..size).flat_map(|column| rows.iter().skip(column).step_by(size).map(Complex64::conj)).collect();
-    times(&adjoint, rows.len() / size)
 }
 
 /// Whether a value is above a limit, or no number.

@@ -16,7 +16,7 @@ use super::{
     algebra::Blocks,
     side_by_side::{Orders, blocks_times, gather, lane, times_blocks},
 };
-use crate::{layout::Layout, systems::System};
+use crate::{layout::Layout, layout::System};
 
 /// Columns of norm 1 are sure to be independent where the inverse of their triangle is below this. What is nearer to
 /// dependent is looked at by pivoting; the limit is far from both its tolerance and where digits would be missed.

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use runout_core::Complex64;
 
-use crate::layout::Layout;
+use super::Layout;
 
 /// Orders that are kept, from 1: with 10 000 orders and eight sensors in three setups a few megabytes.
 const KEPT: usize = 10_000;

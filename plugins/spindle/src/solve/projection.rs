@@ -9,7 +9,7 @@ use crate::{
 
 /// Least-squares inverse of what the sensors of a setup (an index into the whole rig's) see of motion, at their mean z;
 /// `None` where they tell none.
-pub(super) fn projection(selection: &Selection, layout: &Layout, setup: usize) -> Option<Projection> {
+pub(crate) fn projection(selection: &Selection, layout: &Layout, setup: usize) -> Option<Projection> {
     let setup = selection.setups.iter().position(|chosen| *chosen == setup)?;
     let readings: Vec<&Reading> = layout.readings.iter().filter(|reading| reading.setup == setup).collect();
     // Of odd orders, motion has its own sign in every setup.

@@ -1,0 +1,61 @@
+//! What a solution leaves of the readings, beside what noise lets expect.
+
+use runout_core::{Complex64, separation::Residual};
+
+use super::{
+    algebra::apply,
+    operators::{Operators, OrderOperator},
+    propagation::Propagation,
+    readings::Readings,
+};
+
+/// What the solution leaves of linear readings, `[order][reading]`, and what noise lets expect of that.
+pub fn residual(
+    operators: &Operators,
+    readings: &Readings,
+    linear: &[Complex64],
+    propagation: Option<&Propagation>,
+) -> Residual {
+    let count = readings.count;
+    let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
+    let mut orders: Option<[usize; 2]> = None;
+    // Weighted as the fit is; set against what the covariance lets expect of it.
+    let (mut weighted, mut weighted_expected) = (0.0, 0.0);
+    for (index, (OrderOperator { operator, rank }, system)) in
+        operators.orders.iter().zip(&operators.systems).enumerate()
+    {
+        if *rank == count {
+            continue;
+        }
+        dof += count - rank;
+        orders = Some([orders.map_or(index + 1, |[lowest, _]| lowest), index + 1]);
+        let recorded = &linear[(index + 1) * count..(index + 2) * count];
+        let fitted = apply(&system.matrix, &apply(operator, recorded));
+        let residual: Vec<Complex64> =
+            recorded.iter().zip(fitted).map(|(recorded, fitted)| recorded - fitted).collect();
+        squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let Some(propagation) = propagation else { continue };
+        expected += propagation.squares[index];
+        if let Some(weights) = &operators.weights {
+            weighted += weights[index].times(&residual, 1).iter().map(Complex64::norm_sqr).sum::<f64>();
+            weighted_expected += propagation.weighted_squares[index];
+        }
+    }
+    if dof == 0 {
+        return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0, orders };
+    }
+    // A coefficient of size c is a wave of mean square c²/2.
+    let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
+    let chi2_per_dof = match &operators.weights {
+        _ if expected <= 0.0 => f64::NAN,
+        Some(_) => weighted / weighted_expected,
+        None => squares / expected,
+    };
+    Residual {
+        rms_um: rms(squares),
+        expected_rms_um: if propagation.is_some() { rms(expected) } else { f64::NAN },
+        chi2_per_dof,
+        dof: 2 * dof,
+        orders,
+    }
+}
