@@ -16,6 +16,9 @@ use crate::{
     terms::{Term, Volume},
 };
 
+/// Components of the error.
+pub const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
+
 /// Commands that differ by less than this, in mm, are one place.
 const SAME_MM: f64 = 1e-6;
 /// A median deviation above this, in µm, looks like another unit.

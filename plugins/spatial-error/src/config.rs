@@ -294,3 +294,11 @@ impl Compensate {
         Chain::new(axes, self.limit_um, config.tool_mm).map_err(|problem| Fault::at("axes", problem))
     }
 }
+
+/// Universal kriging of the spatial error, and its compensation.
+#[derive(Debug, Clone)]
+pub struct SpatialError {
+    pub(crate) config: SpatialErrorConfig,
+    pub(crate) chain: Chain,
+    pub(crate) query: Query,
+}

@@ -15,11 +15,12 @@ use runout_core::{
 
 use crate::{
     campaign::Campaign,
+    conclusion::Conclusion,
+    config::SpatialError,
     effects::{Candidate, candidates, jumps, missing},
     likelihood::Prior,
     noise::Noise,
-    outcome::{Conclusion, residual_um},
-    separate::SpatialError,
+    outcome::residual_um,
     solve::{Solution, families, prior, solve},
     terms::Term,
     trace::{Found, Tracing, is_observable},

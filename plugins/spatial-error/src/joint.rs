@@ -244,6 +244,15 @@ pub struct Predicted {
     pub variance_um2: f64,
 }
 
+/// Reading less prediction from all other places.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOut {
+    /// Mean of the readings at the place less prediction, in µm.
+    pub residual_um: f64,
+    /// Standard deviation expected of it, noise included, in µm.
+    pub std_um: f64,
+}
+
 /// What is to be predicted.
 pub struct Query<'a> {
     /// Places, in mm.

@@ -6,6 +6,7 @@
 
 mod campaign;
 pub mod compensate;
+mod conclusion;
 mod config;
 pub mod correlation;
 mod diagnose;
@@ -27,9 +28,8 @@ mod variogram;
 
 use runout_core::pipeline::registry::{Plugin, Registry};
 
-pub use config::{Compensate, Declared, Kriging, Letter, SpatialErrorConfig, Variogram};
+pub use config::{Compensate, Declared, Kriging, Letter, SpatialError, SpatialErrorConfig, Variogram};
 pub use query::Query;
-pub use separate::SpatialError;
 
 /// Adds the separator and the simulator `spatial-error`.
 pub fn register(registry: &mut Registry) {

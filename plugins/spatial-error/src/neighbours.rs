@@ -11,8 +11,7 @@ use nalgebra::DVector;
 
 use crate::{
     correlation::Scaled,
-    joint::{Covariance, Data, Joint, Observed, Predicted, Query, factor, matrix},
-    solve::LeftOut,
+    joint::{Covariance, Data, Joint, LeftOut, Observed, Predicted, Query, factor, matrix},
 };
 
 /// Places that a prediction takes, and that of a place left out.

@@ -7,14 +7,14 @@ use runout_core::{
 };
 
 use crate::{
-    campaign::Campaign,
+    campaign::{COMPONENTS, Campaign},
     compensate::{Chain, Correction},
-    joint::Predicted,
+    conclusion::{At, Conclusion},
+    joint::{LeftOut, Predicted},
     likelihood::PARAMETERS,
     noise::Noise,
     remarks,
-    separate::SpatialError,
-    solve::{LeftOut, Solution},
+    solve::Solution,
     terms::Term,
     variogram,
 };
@@ -23,8 +23,6 @@ use crate::{
 const SMALL: f64 = 0.1;
 /// A standard deviation above this share of the prior's is an extrapolation.
 const UNCERTAIN: f64 = 0.8;
-/// Components.
-pub const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
 
 /// The tables of the result.
 #[must_use]
@@ -60,32 +58,6 @@ pub fn tables(chain: &Chain) -> Vec<TableSpec> {
         variogram::table(),
         TableSpec::new("compensation", "corrections, without the placement of the tracker", compensation),
     ]
-}
-
-/// What a result is made of.
-pub struct Conclusion<'a> {
-    /// Configuration.
-    pub separator: &'a SpatialError,
-    /// Readings.
-    pub campaign: &'a Campaign,
-    /// The fit.
-    pub solution: &'a Solution,
-    /// Id and target of each added effect, with its term.
-    pub names: &'a [(String, String, Term)],
-}
-
-/// A prediction at a query.
-pub struct At {
-    /// The place, in mm.
-    pub place_mm: [f64; 3],
-    /// Each component.
-    pub predicted: [Predicted; 3],
-    /// Whether it is an extrapolation.
-    pub extrapolated: bool,
-    /// The correction; `None` where nothing is predicted.
-    pub correction: Option<Correction>,
-    /// The predicted error without the placement.
-    pub error_um: [f64; 3],
 }
 
 impl Conclusion<'_> {

@@ -4,12 +4,12 @@ use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 use crate::{
-    campaign::Campaign,
-    joint::{Joint, Predictor, Query},
+    campaign::{COMPONENTS, Campaign},
+    conclusion::{At, Conclusion},
+    joint::{Joint, LeftOut, Predictor, Query},
     neighbours::{NEAREST, Neighbours},
     noise::Noise,
-    outcome::{At, COMPONENTS, Conclusion},
-    solve::{LeftOut, Solution, estimated_from},
+    solve::{Solution, estimated_from},
     terms::Term,
 };
 

@@ -13,20 +13,11 @@ use runout_core::{
 
 use crate::{
     campaign::{COLUMNS, Campaign},
-    compensate::Chain,
-    config::{Declared, SpatialErrorConfig},
-    outcome::{Conclusion, tables},
-    query::Query,
+    conclusion::Conclusion,
+    config::{Declared, SpatialError, SpatialErrorConfig},
+    outcome::tables,
     solve::solve,
 };
-
-/// Universal kriging of the spatial error, and its compensation.
-#[derive(Debug, Clone)]
-pub struct SpatialError {
-    pub(crate) config: SpatialErrorConfig,
-    pub(crate) chain: Chain,
-    pub(crate) query: Query,
-}
 
 impl StageConfig for SpatialErrorConfig {
     type Stage = Separator;

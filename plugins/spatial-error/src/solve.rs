@@ -10,7 +10,7 @@ use crate::{
     campaign::Campaign,
     config::{Kriging, SpatialErrorConfig},
     correlation::Family,
-    joint::{Covariance, Data, Joint, Predicted, Predictor, Query, inverse},
+    joint::{Covariance, Data, Joint, LeftOut, Predicted, Predictor, Query, inverse},
     likelihood::{Criterion, Estimate, PARAMETERS, Prior, covariances, estimate},
     neighbours::Neighbours,
     noise::Noise,
@@ -54,15 +54,6 @@ pub struct Solution {
     /// Places of the fit.
     pub fitted: Option<Vec<usize>>,
     neighbours: Option<Neighbours>,
-}
-
-/// Reading less prediction from all other places.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeftOut {
-    /// Mean of the readings at the place less prediction, in µm.
-    pub residual_um: f64,
-    /// Standard deviation expected of it, noise included, in µm.
-    pub std_um: f64,
 }
 
 /// The columns that are not in the span of those before them, and the others.

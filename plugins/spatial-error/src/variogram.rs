@@ -2,7 +2,10 @@
 
 use runout_core::table::{ArrayRef, ColumnSpec, TableSpec, counts, numbers, texts};
 
-use crate::{campaign::Campaign, outcome::COMPONENTS, solve::Solution};
+use crate::{
+    campaign::{COMPONENTS, Campaign},
+    solve::Solution,
+};
 
 /// Classes of distance along each axis.
 const CLASSES: usize = 12;
