@@ -6,16 +6,15 @@ use std::{
 };
 
 pub use runout_core::separation::UM_PER_MM_URAD;
-use runout_core::{
-    Complex64,
-    azimuth::Azimuth,
-    numerics::least_squares::PivotedQr,
-    rig::Rig,
-    separation::{Assessment, OrderAssessment, Quantity},
-};
+use runout_core::{Complex64, azimuth::Azimuth, numerics::least_squares::PivotedQr, rig::Rig, separation::Quantity};
 
+mod first_order;
+mod observable;
+mod reference;
 mod systems;
 
+pub use first_order::FirstOrder;
+pub use reference::ToReference;
 pub use systems::System;
 use systems::Systems;
 
@@ -99,24 +98,6 @@ impl View {
     pub fn is_axial(self) -> bool {
         self != Self::Radial
     }
-}
-
-/// The unknowns at order 1, where each clamping has an eccentricity of its own in each section.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FirstOrder {
-    /// Eccentricity of a section in a setup, or how far its face is off square at the sensors' radius: Re C e^{+iα}.
-    Eccentricity {
-        /// Index of the setup.
-        setup: usize,
-        /// Index of the section.
-        section: usize,
-    },
-    /// The part of (x, y) that turns against the spindle: X, with Y = −iX.
-    CounterRotatingShift,
-    /// The part of the tilt that turns against the spindle: E_y, with E_x = iE_y.
-    CounterRotatingTilt,
-    /// All of z: along the axis no clamping makes 1/rev.
-    Axial,
 }
 
 impl Layout {
@@ -355,58 +336,6 @@ impl Layout {
         rows.flat_map(row).collect()
     }
 
-    /// The unknowns at order 1.
-    #[must_use]
-    pub fn first_order_unknowns(&self) -> Vec<FirstOrder> {
-        let setups = 0..self.setups;
-        let on_axis = |section: usize| {
-            self.readings.iter().any(|reading| reading.section == section && reading.view == View::OnAxis)
-        };
-        // Whatever a bounded form on the axis adds to 1/rev is within its bound.
-        let sections = self.sections.iter().copied();
-        let clamped: Vec<usize> =
-            sections.filter(|section| !on_axis(*section) || self.form_bound_um(*section).is_none()).collect();
-        let each = |setup| clamped.iter().map(move |section| FirstOrder::Eccentricity { setup, section: *section });
-        let mut unknowns: Vec<FirstOrder> = setups.flat_map(each).collect();
-        if self.readings.iter().any(|reading| !reading.view.is_axial()) {
-            unknowns.push(FirstOrder::CounterRotatingShift);
-        }
-        if self.unknowns.iter().any(|unknown| unknown.is_tilt()) {
-            unknowns.push(FirstOrder::CounterRotatingTilt);
-        }
-        if self.unknowns.contains(&Quantity::Z) {
-            unknowns.push(FirstOrder::Axial);
-        }
-        unknowns
-    }
-
-    /// The matrix at order 1, `[reading][first-order unknown]`.
-    ///
-    /// cos θ' X + sin θ' Y = X e^{−iθ'} where Y = −iX, and likewise z(cos θ' E_y − sin θ' E_x) = z E_y e^{−iθ'} where
-    /// E_x = iE_y; the other half, e^{+iθ'}, turns with the part and is what ISO 230-7 removes as centring.
-    #[must_use]
-    pub fn first_order_matrix(&self) -> Vec<Complex64> {
-        let unknowns = self.first_order_unknowns();
-        let row = |reading: &Reading| {
-            let against = Complex64::from_polar(reading.motion_ratio, -self.direction * reading.angle_rad);
-            let axial = reading.view.is_axial();
-            unknowns
-                .iter()
-                .map(|unknown| match unknown {
-                    FirstOrder::Eccentricity { setup, section } => {
-                        let seen = *setup == reading.setup && *section == reading.section;
-                        if seen { self.form_phase(reading, 1) } else { Complex64::ZERO }
-                    }
-                    FirstOrder::CounterRotatingShift if axial => Complex64::ZERO,
-                    FirstOrder::CounterRotatingShift => against,
-                    FirstOrder::CounterRotatingTilt => against * reading.lever_mm * UM_PER_MM_URAD,
-                    FirstOrder::Axial => Complex64::from(if axial { reading.motion_ratio } else { 0.0 }),
-                })
-                .collect::<Vec<_>>()
-        };
-        self.readings.iter().flat_map(row).collect()
-    }
-
     /// The equations of the orders from 1 to `max_order`; worked out once.
     #[must_use]
     pub fn systems(&self, max_order: usize) -> Vec<Arc<System>> {
@@ -425,23 +354,6 @@ impl Layout {
         PivotedQr::new(self.readings.len(), columns, matrix, RANK_TOLERANCE)
     }
 
-    /// Takes motion from the sensors' mean z, now at `mean_z_mm`, to the spindle's reference: x = X − z E_y,
-    /// y = Y + z E_x.
-    #[must_use]
-    pub fn to_reference(&self, mean_z_mm: f64) -> ToReference {
-        let lever = mean_z_mm * UM_PER_MM_URAD;
-        let pairs = self.shifts_with_tilts().map(|(shift, tilt, factor)| (shift, tilt, -factor * lever)).collect();
-        ToReference { width: self.unknowns.len(), pairs }
-    }
-
-    /// Places of the displacements and of the tilts that change them along z, where both are unknowns, and the factor.
-    fn shifts_with_tilts(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
-        self.unknowns.iter().enumerate().filter_map(|(shift, quantity)| {
-            let (tilt, factor) = quantity.moved_by_tilt()?;
-            Some((shift, self.unknowns.iter().position(|unknown| *unknown == tilt)?, factor))
-        })
-    }
-
     /// What to know of motion where all sensors look along one line.
     #[must_use]
     pub fn one_line_note(&self) -> Option<String> {
@@ -455,106 +367,6 @@ impl Layout {
             _ => None,
         }
     }
-
-    /// Whether each unknown can be told at an order.
-    ///
-    /// At order 1 form is 0 by definition and motion is its counter-rotating part; both are lost where one clamping
-    /// cannot tell eccentricity from co-rotating motion even in principle (A₁ is deficient), or no sensor pair tells
-    /// the counter-rotating part.
-    #[must_use]
-    pub fn observable(&self, order: usize) -> Vec<bool> {
-        self.told(&self.factor(order), order)
-    }
-
-    /// [`observable`](Self::observable) with an order's matrix.
-    pub(crate) fn observable_with(&self, matrix: &[Complex64], order: usize) -> Vec<bool> {
-        self.told(&self.factor_matrix(self.unknowns.len(), matrix), order)
-    }
-
-    fn told(&self, qr: &PivotedQr, order: usize) -> Vec<bool> {
-        let mut observable = qr.observable(NULL_TOLERANCE);
-        if order == 1 {
-            let unknowns = self.first_order_unknowns();
-            let first = self.factor_matrix(unknowns.len(), &self.first_order_matrix()).observable(NULL_TOLERANCE);
-            let told =
-                |wanted| !unknowns.contains(&wanted) || unknowns.iter().zip(&first).any(|(u, t)| *u == wanted && *t);
-            for (quantity, observable) in self.unknowns.iter().zip(&mut observable) {
-                // Of the face, 1/rev is how it was clamped, in each setup by itself: the equations of order 1 say all of z.
-                if *quantity == Quantity::Z {
-                    *observable = told(FirstOrder::Axial);
-                    continue;
-                }
-                *observable &= match quantity {
-                    Quantity::Form(_) | Quantity::FaceForm(_) => true,
-                    motion if motion.is_tilt() => told(FirstOrder::CounterRotatingTilt),
-                    _ => told(FirstOrder::CounterRotatingShift),
-                };
-            }
-        } else if self.max_noise_gain.is_finite() {
-            for (observable, noisy) in observable.iter_mut().zip(self.too_noisy(qr)) {
-                *observable &= !noisy;
-            }
-        }
-        // Motion is reported at the spindle's reference, where shift and tilt mix.
-        for (shift, tilt, _) in self.shifts_with_tilts() {
-            observable[shift] &= observable[tilt];
-        }
-        observable
-    }
-
-    /// Which unknowns carry more than [`max_noise_gain`](Self::max_noise_gain) times the readings' noise.
-    fn too_noisy(&self, qr: &PivotedQr) -> impl Iterator<Item = bool> {
-        let squares: f64 = self.readings.iter().map(|reading| reading.lever_mm.powi(2)).sum();
-        let rms_lever = (squares / self.readings.len() as f64).sqrt() * UM_PER_MM_URAD;
-        let (width, covariance) = (self.unknowns.len(), qr.covariance());
-        self.unknowns.iter().enumerate().map(move |(index, unknown)| {
-            let lever = if unknown.is_tilt() { rms_lever } else { 1.0 };
-            covariance[index * width + index].re.sqrt() * lever > self.max_noise_gain
-        })
-    }
-
-    /// What can be told at orders 1 to `max_order`, with plain (unweighted) least squares; motion at the spindle's
-    /// reference, with the carriage at 0.
-    #[must_use]
-    pub fn assess(&self, max_order: usize) -> Assessment {
-        let orders = (1..=max_order).map(|order| self.assess_order(order)).collect();
-        let notes = self.one_line_note().into_iter().collect();
-        Assessment { unknowns: self.unknowns.clone(), orders, unused: Vec::new(), notes }
-    }
-
-    fn assess_order(&self, order: usize) -> OrderAssessment {
-        let qr = self.factor(order);
-        let observable = self.told(&qr, order);
-        let covariance = qr.covariance();
-        let gains = self.to_reference(self.mean_z_mm).spread(&covariance);
-        let told = observable.iter().zip(gains);
-        let noise_gain = told.map(|(seen, gain)| if *seen { gain.sqrt() } else { f64::NAN }).collect();
-        let lost_because = observable.contains(&false).then(|| {
-            let lost = self.unknowns.iter().zip(&observable).filter(|(_, seen)| !**seen);
-            let mut names: Vec<&str> = lost.clone().map(|(quantity, _)| quantity.id()).collect();
-            let along = |quantity: &Quantity| matches!(quantity, Quantity::Z | Quantity::FaceForm(_));
-            let lost_along_axis_only = lost.into_iter().all(|(quantity, _)| along(quantity));
-            names.dedup();
-            if order == 1 && lost_along_axis_only {
-                format!("1/rev changes of {} can leave every reading as it is", names.join(", "))
-            } else if order == 1 {
-                "1/rev: eccentricity of the part and motion that turns with it are the same in every reading".to_owned()
-            } else if qr.rank() == self.unknowns.len() {
-                let limit = self.max_noise_gain;
-                format!("{order}/rev of {} would carry more than {limit} times the readings' noise", names.join(", "))
-            } else {
-                format!("{order}/rev changes of {} can leave every reading as it is", names.join(", "))
-            }
-        });
-        OrderAssessment {
-            order,
-            rank: qr.rank(),
-            residual_dof: self.readings.len() - qr.rank(),
-            observable,
-            noise_gain,
-            lost_because,
-        }
-    }
 }
 
 /// The line that all sensors look along, where that is neither x nor y; `off_axes` where some look across each of them.
@@ -562,53 +374,6 @@ fn one_line<'a>(mut readings: impl Iterator<Item = &'a Reading>, off_axes: bool)
     let first = readings.next().filter(|_| off_axes)?;
     let across = |reading: &Reading| (reading.angle_rad - first.angle_rad).sin().abs();
     readings.all(|reading| across(reading) <= ALONG_AXIS).then(|| Azimuth::of(first.angle_rad))
-}
-
-/// Moves motion along z: adds a multiple of a tilt to a shift.
-#[derive(Debug, Clone)]
-pub struct ToReference {
-    width: usize,
-    /// Shift, tilt, factor.
-    pairs: Vec<(usize, usize, f64)>,
-}
-
-impl ToReference {
-    /// Moves estimates, or the rows (`[unknown][row_length]`) of the operator that makes them.
-    pub fn apply(&self, rows: &mut [Complex64]) {
-        let length = rows.len() / self.width;
-        for (shift, tilt, factor) in &self.pairs {
-            for column in 0..length {
-                rows[shift * length + column] += rows[tilt * length + column] * *factor;
-            }
-        }
-    }
-
-    /// Moves a covariance, `[unknown][unknown]`: T·C·Tᴴ.
-    pub fn apply_about(&self, covariance: &mut [Complex64]) {
-        if self.pairs.is_empty() {
-            return;
-        }
-        for _ in 0..2 {
-            self.apply(covariance);
-            for row in 0..self.width {
-                for column in 0..=row {
-                    let (below, above) = (row * self.width + column, column * self.width + row);
-                    (covariance[below], covariance[above]) = (covariance[above].conj(), covariance[below].conj());
-                }
-            }
-        }
-    }
-
-    /// Variances after the move, from the covariance `[unknown][unknown]` before.
-    #[must_use]
-    pub fn spread(&self, covariance: &[Complex64]) -> Vec<f64> {
-        let entry = |row: usize, col: usize| covariance[row * self.width + col].re;
-        let mut variances: Vec<f64> = (0..self.width).map(|unknown| entry(unknown, unknown)).collect();
-        for (shift, tilt, factor) in &self.pairs {
-            variances[*shift] += 2.0 * factor * entry(*shift, *tilt) + factor * factor * entry(*tilt, *tilt);
-        }
-        variances
-    }
 }
 
 /// cos, with the exact 0 where the angle is a quarter turn: cos(π/2) is 6e-17 in floating point, which would make a
