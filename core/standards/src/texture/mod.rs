@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{areal::MaterialRatio, parameter::Parameter};
-use profile::Profile;
+use profile::{AT_AN_END, Profile};
 use runout_numerics::{
     filter::{Degree, Smoother, upr},
     lanes::{NullaryFnOnce, vectorised},
@@ -203,8 +203,9 @@ pub fn along(z_mm: &[f64], profile_um: &[f64], settings: &Settings) -> Texture {
     let mut heights = filtered(profile_um, settings, |wavelength_mm| Smoother::open(z_mm, wavelength_mm, Degree::One));
     let cropped_mm = end_effect_mm(z_mm, settings);
     let (first, last) = (z_mm.first().copied().unwrap_or(0.0), z_mm.last().copied().unwrap_or(0.0));
-    let from = z_mm.partition_point(|z| *z < first + cropped_mm * (1.0 - 1e-9));
-    let to = z_mm.partition_point(|z| *z <= last - cropped_mm * (1.0 - 1e-9));
+    let off_mm = AT_AN_END * (last - first) / count.max(1) as f64;
+    let from = z_mm.partition_point(|z| *z < first + cropped_mm - off_mm);
+    let to = z_mm.partition_point(|z| *z <= last - cropped_mm + off_mm);
     heights.truncate(to);
     heights.drain(..from);
     Texture { cropped_mm, ..Profile::new(&z_mm[from..to], heights, None).texture(settings) }

@@ -8,6 +8,9 @@ use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
 
 /// Spacings that differ by less than this share are equal.
 const EVEN: f64 = 1e-6;
+/// Share of the mean distance of points by which one may be off a limit and counts as at it: the axis of a cylinder, by which places
+/// along it are told, is fitted to noisy points.
+pub(super) const AT_AN_END: f64 = 1e-3;
 
 /// A profile about its mean line.
 pub(super) struct Profile<'a> {
@@ -49,15 +52,17 @@ impl<'a> Profile<'a> {
     pub(super) fn heights(&self, settings: &Settings) -> Texture {
         let (start, length) = self.extent();
         let wanted = settings.section_mm.or(settings.lambda_c_mm).unwrap_or(length / 5.0);
-        // A length that is whole sections but for rounding has them all.
-        let sections = ((length / wanted * (1.0 + EVEN)) as usize).clamp(1, self.heights_um.len().max(1));
+        // A length that is whole sections but for a little has them all.
+        let off_mm = AT_AN_END * length / self.heights_um.len().max(1) as f64;
+        let sections = (((length + off_mm) / wanted) as usize).clamp(1, self.heights_um.len().max(1));
         let section_mm = length / sections as f64;
-        let scale = (1.0 + 1e-12) / section_mm;
+        // A point at the end of a section is the next one's, also where its place is off a little.
+        let start = start - off_mm;
         let mut extremes = Vec::with_capacity(sections);
         let mut rest = (self.positions_mm, &self.heights_um[..]);
         for section in 0..sections {
             let last = section + 1 == sections;
-            let inside = |position: &f64| last || ((position - start) * scale) as usize <= section;
+            let inside = |position: &f64| last || ((position - start) / section_mm) as usize <= section;
             let (positions, heights) = rest;
             let count = positions.partition_point(inside).min(heights.len());
             extremes.push(vectorised(Ends(&heights[..count])));

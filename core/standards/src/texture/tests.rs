@@ -157,3 +157,23 @@ fn ends_where_the_filter_is_incomplete_are_left_out() {
     // Too short a line keeps its ends.
     assert!(along(&positions[..300], &profile[..300], &settings).cropped_mm.abs() < 1e-12);
 }
+
+/// Circles a millimetre apart end sections and cropped ends exactly: places that are off by what the fit of an axis to noisy points
+/// leaves change no value by a step.
+#[test]
+fn places_at_the_end_of_a_section_may_be_off_a_little() {
+    let settings = Settings { lambda_c_mm: Some(4.0), ..Settings::default() };
+    let profile: Vec<f64> = (0..25).map(|point| f64::from(point * point * 7919 % 101) / 50.0).collect();
+    let places = |off: f64| -> Vec<f64> {
+        (0..25).map(|point| f64::from(point) + off * f64::from(point * 31 % 7 - 3)).collect()
+    };
+    let exact = along(&places(0.0), &profile, &settings);
+    assert_eq!((exact.sections, exact.cropped_mm), (5, 2.0));
+    for off in [1e-7, -1e-7, 1e-5, -1e-5] {
+        let near = along(&places(off), &profile, &settings);
+        assert_eq!(near.sections, exact.sections);
+        for (near, exact) in [(near.ra, exact.ra), (near.rq, exact.rq), (near.rz, exact.rz), (near.rp, exact.rp)] {
+            assert!((near / exact - 1.0).abs() < 1e3 * off.abs(), "{near} for {exact}");
+        }
+    }
+}

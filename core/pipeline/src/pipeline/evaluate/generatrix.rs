@@ -13,7 +13,7 @@ use super::{
 use runout_numerics::Complex64;
 use runout_standards::{
     Value,
-    drawn::{PAIRS, in_pairs},
+    drawn::in_pairs,
     texture::{self, Kind, Settings},
     uncertainty::seed,
 };
@@ -21,6 +21,9 @@ use runout_turning::surface::{Section, Uncertain};
 
 /// Place of Rq in [`texture::PARAMETERS`].
 const RQ: usize = 1;
+/// Pairs of draws: profiles along the axis are few and short, and each is drawn from one seed, so that the standard deviation of few
+/// draws would be off alike in all recordings.
+const PAIRS: usize = 128;
 /// Points that a profile along the axis needs.
 const FEWEST: usize = 7;
 
