@@ -15,7 +15,7 @@ use rand_distr::{Distribution, StandardNormal};
 use runout_numerics::{Complex64, fourier::Fourier};
 
 /// Draws from one transform, turned by equal steps from a random start.
-pub(crate) const TURNS_OF_A_DRAW: usize = 25;
+pub const TURNS_OF_A_DRAW: usize = 25;
 
 /// Complex normal numbers of the table: more than the draws of one form take.
 const TABLE: usize = 1 << 17;

@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::errors::TURNS_OF_A_DRAW;
-pub use crate::errors::{DrawnErrors, Errors, Noise};
+pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 
@@ -127,14 +126,14 @@ pub fn without_noise(harmonics: &[Complex64], variance: &[f64]) -> Vec<Complex64
 /// Values with their uncertainty: `draw` computes them once from what was found (given false) and then `draws` times from
 /// what was drawn (given true), always the same ones in the same order. The interval is 2v − (the draws' 97.5 % point) to
 /// 2v − (their 2.5 % point) for a value v: the error of v about the truth is that of a draw about v. It ends at 0 for a
-/// value that no draw has below 0. A value that is not a number, or not in every draw, has no uncertainty. Each draw is of so many
-/// independent `profiles`.
+/// value that no draw has below 0. A value that is not a number, or not in every draw, has no uncertainty. All draws together
+/// are of so many independent `transforms`.
 pub fn monte_carlo_of(
     draws: usize,
-    profiles: usize,
+    transforms: usize,
     mut draw: impl FnMut(bool, &mut Vec<f64>),
 ) -> Vec<(f64, Option<Uncertainty>)> {
-    let transforms = (draws.div_ceil(TURNS_OF_A_DRAW) * profiles.max(1)) as f64;
+    let transforms = transforms.max(1) as f64;
     let mut found = Vec::new();
     draw(false, &mut found);
     let mut results: Vec<Vec<f64>> = found.iter().map(|_| Vec::with_capacity(draws)).collect();
@@ -166,7 +165,7 @@ pub fn monte_carlo<const N: usize>(
     }
     let (mut errors, mut fourier) = (Errors::new(variance, 2, seed)?, Fourier::new(form_um.len()));
     let mut drawn = form_um.to_vec();
-    let found = monte_carlo_of(DRAWS, 1, |disturbed, found| {
+    let found = monte_carlo_of(DRAWS, DRAWS.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
         if disturbed {
             errors.draw(&mut fourier, form_um, &mut drawn);
         }

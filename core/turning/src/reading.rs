@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::profile::Profile;
 use runout_numerics::{Complex64, fourier::Fourier};
-use runout_standards::uncertainty::{DRAWS, Errors, monte_carlo_of, seed};
+use runout_standards::uncertainty::{DRAWS, Errors, TURNS_OF_A_DRAW, monte_carlo_of, seed};
 
 /// Points a wave of the highest order: a crest between two of them is at most 2 % of that order's amplitude higher.
 const POINTS_A_WAVE: usize = 16;
@@ -125,7 +125,7 @@ fn run_out(mean: &[Complex64], variance: Option<&[f64]>, seed: u64) -> (f64, Opt
     let mut errors = variance.and_then(|variance| Errors::new(variance, 1, seed));
     let mut drawn = turn.clone();
     let draws = if errors.is_some() { DRAWS } else { 0 };
-    let found = monte_carlo_of(draws, 1, |disturbed, found| {
+    let found = monte_carlo_of(draws, draws.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
         if let (true, Some(errors)) = (disturbed, &mut errors) {
             errors.draw(&mut fourier, &turn, &mut drawn);
         }

@@ -16,7 +16,7 @@ use runout_standards::{
     gaps::Gaps,
     position::{Axis, Positions},
     roundness::Angles,
-    uncertainty::{DRAWS, Errors, LARGEST, Uncertainty, monte_carlo_of, seed, without_noise},
+    uncertainty::{DRAWS, Errors, LARGEST, TURNS_OF_A_DRAW, Uncertainty, monte_carlo_of, seed, without_noise},
 };
 use runout_turning::surface;
 
@@ -29,7 +29,7 @@ const FEWEST_DRAWS: usize = 50;
 /// Points at which a wall itself is looked at, at most: angles for [`POINTS_A_WAVE`] of its highest order, where there is room.
 const POINTS_FOUND: usize = 500_000;
 /// Draws of what is fitted to each of a wall's generatrices.
-const DRAWS_OF_LINES: usize = 100;
+const DRAWS_OF_LINES: usize = 200;
 
 /// Values of all sections together.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -122,6 +122,15 @@ enum About {
     WithoutNoise,
 }
 
+/// How many sections' errors a value depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum DecidedBy {
+    /// One, or a few.
+    OneSection,
+    /// All of them.
+    AllSections,
+}
+
 struct Ring {
     station: String,
     id: String,
@@ -192,35 +201,42 @@ impl Wall {
             self.errors(filter).map(|errors| LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max));
         let mut disturbed: Vec<Option<Disturbed>> = Vec::new();
         let draws = draws.clamp(FEWEST_DRAWS, DRAWS);
-        self.evaluate(filter, labels, draws, About::WithoutNoise, |sections, largest_um, found| {
-            let points = largest_um.is_none().then(|| Points::of_sections(self.radius_mm, sections));
-            for (index, reference) in references.iter().enumerate() {
-                let about = if let (None, Some(points)) = (largest_um, &points) {
-                    let prepare =
-                        |usual_um| Disturbed::new(*reference, sections, points, self.radius_mm, usual_um, !self.placed);
-                    let found = || points.reference(*reference).map(|cylinder| points.values(&cylinder));
-                    // The first wall is the one that errors are drawn about.
-                    if disturbed.len() < references.len() {
-                        disturbed.push(usual_um.and_then(prepare));
-                        disturbed.last().and_then(Option::as_ref).map_or_else(found, |wall| Some(wall.about()))
+        self.evaluate(
+            filter,
+            labels,
+            (draws, DecidedBy::AllSections),
+            About::WithoutNoise,
+            |sections, largest_um, found| {
+                let points = largest_um.is_none().then(|| Points::of_sections(self.radius_mm, sections));
+                for (index, reference) in references.iter().enumerate() {
+                    let about = if let (None, Some(points)) = (largest_um, &points) {
+                        let prepare = |usual_um| {
+                            Disturbed::new(*reference, sections, points, self.radius_mm, usual_um, !self.placed)
+                        };
+                        let found = || points.reference(*reference).map(|cylinder| points.values(&cylinder));
+                        // The first wall is the one that errors are drawn about.
+                        if disturbed.len() < references.len() {
+                            disturbed.push(usual_um.and_then(prepare));
+                            disturbed.last().and_then(Option::as_ref).map_or_else(found, |wall| Some(wall.about()))
+                        } else {
+                            found()
+                        }
                     } else {
-                        found()
+                        let prepared = disturbed.get(index).and_then(Option::as_ref);
+                        prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))
+                    };
+                    let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+                    found.push(of(|values| values.cylt_um));
+                    if *reference == Reference::LeastSquares {
+                        found.extend([
+                            of(|values| values.cylp_um),
+                            of(|values| values.cylv_um),
+                            of(|values| values.cylq_um),
+                        ]);
                     }
-                } else {
-                    let prepared = disturbed.get(index).and_then(Option::as_ref);
-                    prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))
-                };
-                let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
-                found.push(of(|values| values.cylt_um));
-                if *reference == Reference::LeastSquares {
-                    found.extend([
-                        of(|values| values.cylp_um),
-                        of(|values| values.cylv_um),
-                        of(|values| values.cylq_um),
-                    ]);
                 }
-            }
-        })
+            },
+        )
     }
 
     /// Why the wall does not have the reference cylinders that are asked for, each with its reason.
@@ -279,7 +295,7 @@ impl Wall {
         labels.push(Label::new("coaxiality", "µm", coaxiality, axis.clone()));
         labels.push(Label::new("total-run-out", "µm", "ISO 1101:2017, total run-out, radial", axis));
         let draws = (POINTS_DRAWN / (self.rings.len() * self.count).max(1)).clamp(FEWEST_DRAWS, DRAWS);
-        self.evaluate(filter, labels, draws, About::WithoutNoise, |sections, _, found| {
+        self.evaluate(filter, labels, (draws, DecidedBy::OneSection), About::WithoutNoise, |sections, _, found| {
             let of = |rings: &[usize]| rings.iter().filter_map(|ring| sections.get(*ring).copied()).collect::<Vec<_>>();
             let axis = Axis::through(&of(datums), self.radius_mm);
             let positions = axis.map(|axis| Positions::about(&of(others), self.radius_mm, &axis));
@@ -305,7 +321,8 @@ impl Wall {
             Label::new("coaxiality", "µm", coaxiality, "LSCY"),
             Label::new("parallelism", "µm", parallelism, "LSLI of the opposite generatrix"),
         ];
-        self.evaluate(&Filter::low_pass(None), labels, DRAWS_OF_LINES, About::Form, |sections, _, found| {
+        let draws = (DRAWS_OF_LINES, DecidedBy::OneSection);
+        self.evaluate(&Filter::low_pass(None), labels, draws, About::Form, |sections, _, found| {
             let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
             let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
             let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
@@ -340,18 +357,18 @@ impl Wall {
         &self,
         filter: &Filter,
         labels: Vec<Label>,
-        draws: usize,
+        (draws, decided_by): (usize, DecidedBy),
         about: About,
         mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<Value> {
-        let drawn = self.on_angles(&self.angles, filter, draws, about, &mut values);
+        let drawn = self.on_angles(&self.angles, filter, (draws, decided_by), about, &mut values);
         let room = POINTS_FOUND / (self.rings.len() * self.count).max(1);
         let times = (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.count).min(room).max(1);
         if times < 2 && about == About::Form {
             return labelled(labels, drawn, filter, &self.held, self.coverage());
         }
         let angles = Angles::equal(times * self.count);
-        let found = self.on_angles(&angles, filter, 0, About::Form, &mut values).into_iter().zip(drawn);
+        let found = self.on_angles(&angles, filter, (0, decided_by), About::Form, &mut values).into_iter().zip(drawn);
         let found = found.map(|((value, _), (drawn, known))| {
             let known = known.map(|known| match about {
                 About::Form => known.moved(value - drawn),
@@ -367,7 +384,7 @@ impl Wall {
         &self,
         angles: &Angles,
         filter: &Filter,
-        draws: usize,
+        (draws, decided_by): (usize, DecidedBy),
         about: About,
         mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
     ) -> Vec<(f64, Option<Uncertainty>)> {
@@ -385,12 +402,23 @@ impl Wall {
         let mut errors = self.errors(filter).unwrap_or_default();
         let draws = if errors.is_empty() { 0 } else { draws };
         let mut drawn = forms.clone();
-        monte_carlo_of(draws, self.rings.len(), |disturbed, found| {
-            let mut largest_um = disturbed.then_some(0.0);
+        // A turned error tells nothing new of a section's centre: where there is time, each draw is one of its own.
+        let fresh = draws * self.rings.len() * angles.len() <= POINTS_DRAWN;
+        let transforms = if fresh { draws } else { draws.div_ceil(TURNS_OF_A_DRAW) };
+        let transforms = if decided_by == DecidedBy::OneSection { transforms } else { transforms * self.rings.len() };
+        monte_carlo_of(draws, transforms, |disturbed, found| {
+            let mut largest_um = disturbed.then_some(0.0_f64);
             if disturbed {
                 for ((errors, form), drawn) in errors.iter_mut().zip(&forms).zip(&mut drawn) {
-                    errors.draw(&mut fourier, form, drawn);
-                    largest_um = largest_um.map(|largest_um| errors.largest_um().max(largest_um));
+                    if fresh {
+                        errors.fresh(&mut fourier, drawn);
+                        let largest = drawn.iter().fold(0.0, |largest: f64, error| largest.max(error.abs()));
+                        largest_um = largest_um.map(|largest_um| largest_um.max(largest));
+                        drawn.iter_mut().zip(form).for_each(|(error, form)| *error += form);
+                    } else {
+                        errors.draw(&mut fourier, form, drawn);
+                        largest_um = largest_um.map(|largest_um| errors.largest_um().max(largest_um));
+                    }
                 }
             }
             let sections = self.rings.iter().zip(&drawn);

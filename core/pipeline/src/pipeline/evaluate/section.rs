@@ -13,8 +13,8 @@ use runout_standards::{
     roundness::{Angles, Disturbed, Points, Reference, Series, Values},
     slope::{Drawn, steepest_um_per_rad},
     uncertainty::{
-        DRAWS, Errors, LARGEST, NORMAL_95, Noise, Uncertainty, extreme, monte_carlo_of, noise_95, seed, stand_in,
-        student_95,
+        DRAWS, Errors, LARGEST, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, extreme, monte_carlo_of, noise_95,
+        seed, stand_in, student_95,
     },
 };
 use runout_turning::{
@@ -241,7 +241,7 @@ impl Form {
         let mut errors = self.errors(filter);
         let draws = if errors.is_some() { draws } else { 0 };
         let mut drawn = form_um.clone();
-        monte_carlo_of(draws, 1, |disturbed, found| {
+        monte_carlo_of(draws, draws.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
             if let (true, Some(errors)) = (disturbed, &mut errors) {
                 errors.draw(&mut fourier, &form_um, &mut drawn);
             }
@@ -326,7 +326,7 @@ impl Form {
             (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um))
         };
         let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
-        monte_carlo_of(DRAWS, 1, |disturbed, found| {
+        monte_carlo_of(DRAWS, DRAWS.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
             let drawn = disturbed.then(|| errors.turned(&mut fourier));
             for (reference, circle) in &mut circles {
                 let values = match (circle, &drawn) {
