@@ -29,7 +29,7 @@ pub use runout_error::{Error, ErrorKind, Result};
 pub use runout_numerics::{self as numerics, Complex64};
 pub use runout_table as table;
 pub use runout_turning::{
-    azimuth, checksum, creep, encoder, inspection, marker, measurement, near_tone, neighbours, profile, provenance,
+    azimuth, checksum, creep, encoder, input_file, inspection, marker, measurement, near_tone, neighbours, profile, provenance,
     rig, separation, spread, surface,
 };
 

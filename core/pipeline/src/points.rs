@@ -3,6 +3,7 @@
 use std::{ops::Range, path::PathBuf};
 
 use runout_error::{Error, Result};
+use runout_turning::{input_file::InputFile, provenance::Input};
 
 /// Points in named columns, grouped into traces.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -11,6 +12,8 @@ pub struct Points {
     pub input: PathBuf,
     /// Further files behind them.
     pub besides: Vec<PathBuf>,
+    /// The same files as they were when they were first opened, where the loader remembers them.
+    pub opened: Vec<InputFile>,
     /// Columns of equal length; the unit is part of the name (`angle_deg`).
     pub columns: Vec<Column>,
     /// Columns of texts: names of balls, of setups.
@@ -100,6 +103,18 @@ impl Points {
     pub fn inputs(&self) -> Vec<PathBuf> {
         let files = std::iter::once(&self.input).chain(&self.besides);
         files.filter(|file| !file.as_os_str().is_empty()).cloned().collect()
+    }
+
+    /// The files with their checksums, for the provenance of a result.
+    ///
+    /// # Errors
+    /// When one cannot be read, or changed since it was first opened.
+    pub fn provenance(&self) -> Result<Vec<Input>> {
+        let checksum = |path: &PathBuf| match self.opened.iter().find(|file| file.path() == path) {
+            Some(file) => file.checksum(),
+            None => Input::of(path),
+        };
+        self.inputs().iter().map(checksum).collect()
     }
 
     /// A column by name.

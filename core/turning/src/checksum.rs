@@ -8,7 +8,6 @@ use std::{
     collections::HashMap,
     fs::File,
     io::{Read, Seek, SeekFrom},
-    path::{Path, PathBuf},
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
@@ -20,7 +19,7 @@ use blake3::{
     hazmat::{ChainingValue, HasherExt, Mode, left_subtree_len, merge_subtrees_non_root, merge_subtrees_root},
 };
 
-use crate::provenance::Input;
+use crate::{input_file::InputFile, provenance::Input};
 use runout_error::{Error, Result};
 
 /// Bytes of a branch that is hashed as a whole: a power of two.
@@ -29,7 +28,7 @@ const BRANCH: u64 = 1 << 18;
 /// What is known of a file's tree: the branches that were read, by their number in the file.
 #[derive(Debug, Clone)]
 pub struct Checksum {
-    path: PathBuf,
+    file: InputFile,
     begun: Arc<AtomicBool>,
     branches: Arc<Mutex<HashMap<u64, ChainingValue>>>,
 }
@@ -37,8 +36,8 @@ pub struct Checksum {
 impl Checksum {
     /// Of a file of which nothing was read. Readers pay for it only once it has [begun](Self::begin).
     #[must_use]
-    pub fn of(path: &Path) -> Self {
-        Self { path: path.to_owned(), begun: Arc::default(), branches: Arc::default() }
+    pub fn of(file: &InputFile) -> Self {
+        Self { file: file.clone(), begun: Arc::default(), branches: Arc::default() }
     }
 
     /// From now on, what is read is hashed.
@@ -55,18 +54,19 @@ impl Checksum {
     /// The checksum of the whole file; what was not read is read now.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// When it cannot be read, or changed since it was first opened.
     pub fn finish(&self) -> Result<Input> {
-        let shown = self.path.display().to_string();
-        let failure = |error: std::io::Error| Error::caused("checksum", &shown, error);
-        let mut file = File::open(&self.path).map_err(failure)?;
-        let bytes = file.metadata().map_err(failure)?.len();
+        let bytes = self.file.bytes();
         if bytes <= BRANCH {
-            return Input::of(&self.path);
+            return self.file.checksum();
         }
+        let shown = self.file.path().display().to_string();
+        let failure = |error: std::io::Error| Error::caused("checksum", &shown, error);
+        let mut file = self.file.open()?;
         let left = left_subtree_len(bytes);
         let mut half = |start, end| self.subtree(&mut file, start, end).map_err(failure);
         let hash = merge_subtrees_root(&half(0, left)?, &half(left, bytes)?, Mode::Hash);
+        self.file.check()?;
         Ok(Input { path: shown.clone(), bytes, blake3: hash.to_hex().to_string() })
     }
 
@@ -164,7 +164,7 @@ mod tests {
             let expected = Input::of(&path).unwrap();
             // Pieces of a size, from a place on; and nothing at all.
             for (start, piece) in [(0, branch / 3 + 7), (1000, 4096), (branch + 5, 3 * branch + 1), (length, 1)] {
-                let checksum = Checksum::of(&path);
+                let checksum = Checksum::of(&InputFile::new(&path).unwrap());
                 checksum.begin();
                 let mut reader = checksum.reader();
                 for from in (start.min(length)..length).step_by(piece) {
@@ -181,7 +181,7 @@ mod tests {
         let path = folder.path().join("file");
         let mut all = bytes(3 * BRANCH as usize);
         std::fs::write(&path, &all).unwrap();
-        let checksum = Checksum::of(&path);
+        let checksum = Checksum::of(&InputFile::new(&path).unwrap());
         checksum.reader().take(0, &all);
         assert_eq!(checksum.branches.lock().unwrap().len(), 0, "it has not begun");
         checksum.begin();
@@ -194,10 +194,10 @@ mod tests {
         one.take(BRANCH, &all[at(1)]);
         assert_eq!(checksum.branches.lock().unwrap().len(), 2);
         assert_eq!(checksum.finish().unwrap(), Input::of(&path).unwrap());
-        // The file changes behind the readers: the checksum is that of the data that were used.
-        let before = checksum.finish().unwrap();
+        // The file changes behind the readers.
         all[at(1)].fill(0);
+        all.push(0);
         std::fs::write(&path, &all).unwrap();
-        assert_eq!(checksum.finish().unwrap(), before);
+        assert!(checksum.finish().unwrap_err().to_string().contains("changed while it was read"));
     }
 }

@@ -26,6 +26,7 @@ pub mod checksum;
 pub mod creep;
 pub mod encoder;
 pub mod error_motion;
+pub mod input_file;
 pub mod inspection;
 pub mod marker;
 pub mod measurement;

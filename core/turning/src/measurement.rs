@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
-use crate::checksum::Checksum;
+use crate::{checksum::Checksum, input_file::InputFile};
 use runout_error::Result;
 use runout_numerics::statistics::upper_median;
 
@@ -27,6 +27,14 @@ pub trait Recording: Send + Sync {
 
     /// The files behind it, for their checksums.
     fn inputs(&self) -> Vec<PathBuf>;
+
+    /// The same files as they were when they were first opened; as they are now where a recording does not remember them.
+    ///
+    /// # Errors
+    /// When one cannot be read.
+    fn opened(&self) -> Result<Vec<InputFile>> {
+        self.inputs().iter().map(|path| InputFile::new(path)).collect()
+    }
 
     /// Where its checksum can be taken from what is read anyway, that checksum: complete when everything was read since it was
     /// [begun](Checksum::begin).

@@ -5,7 +5,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use runout_error::{Error, Result};
+use crate::input_file::InputFile;
+use runout_error::Result;
 
 /// Version of the toolkit.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -38,12 +39,6 @@ impl Input {
     /// # Errors
     /// When it cannot be read.
     pub fn of(path: &Path) -> Result<Self> {
-        let shown = path.display().to_string();
-        let failure = |error: std::io::Error| Error::caused("checksum", &shown, error);
-        let mut file = std::fs::File::open(path).map_err(failure)?;
-        let bytes = file.metadata().map_err(failure)?.len();
-        let mut hasher = blake3::Hasher::new();
-        hasher.update_reader(&mut file).map_err(failure)?;
-        Ok(Self { path: shown.clone(), bytes, blake3: hasher.finalize().to_hex().to_string() })
+        InputFile::new(path)?.checksum()
     }
 }

@@ -1,8 +1,8 @@
 //! The first line that is no comment: which column is what.
 
-use std::path::Path;
-
-use runout_core::{Error, ErrorKind, Result, marker::Marker, pipeline::error::known_names, rig::Rig};
+use runout_core::{
+    Error, ErrorKind, Result, input_file::InputFile, marker::Marker, pipeline::error::known_names, rig::Rig,
+};
 
 use crate::lines::{Stretch, Stretches, cells};
 
@@ -59,9 +59,9 @@ impl Phase {
 
 impl Header {
     /// Opens a file and reads its header; gives the stretch that it is in, from the first row on, and those behind.
-    pub(crate) fn open(path: &Path, rig: &Rig, marker: Option<&Marker>) -> Result<(Self, Stretch, Stretches)> {
-        let (mut stretches, mut stretch) = (Stretches::open(path)?, Stretch::default());
-        let shown = path.display().to_string();
+    pub(crate) fn open(input: &InputFile, rig: &Rig, marker: Option<&Marker>) -> Result<(Self, Stretch, Stretches)> {
+        let (mut stretches, mut stretch) = (Stretches::open(input)?, Stretch::default());
+        let shown = input.path().display().to_string();
         while stretches.next(&mut stretch)? {
             let mut lines = stretch.lines();
             let length = lines.ahead().len();

@@ -1,14 +1,10 @@
 //! A text file in stretches of whole lines, and their lines and cells.
 
-use std::{
-    fs::File,
-    io::{Cursor, Read},
-    path::Path,
-};
+use std::io::{Cursor, Read};
 
 use flate2::read::MultiGzDecoder;
 
-use runout_core::{Error, ErrorKind, Result};
+use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
 
 /// Text that is read at a time: what it holds, as numbers, stays in a core's own cache.
 const STRETCH: usize = 1 << 18;
@@ -41,10 +37,10 @@ pub(crate) struct Stretch {
 }
 
 impl Stretches {
-    pub(crate) fn open(path: &Path) -> Result<Self> {
-        let shown = path.display().to_string();
+    pub(crate) fn open(input: &InputFile) -> Result<Self> {
+        let shown = input.path().display().to_string();
+        let mut file = input.open()?;
         let open = || {
-            let mut file = File::open(path)?;
             let mut first = Vec::new();
             Read::by_ref(&mut file).take(GZIP.len() as u64).read_to_end(&mut first)?;
             let is_packed = first == GZIP;

@@ -5,6 +5,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use runout_core::{
     Error, ErrorKind, Result,
     encoder::EncoderScan,
+    input_file::InputFile,
     measurement::{Block, Capture, Recording, SampleStream, StationKey},
     rig::Rig,
 };
@@ -27,7 +28,7 @@ pub(crate) struct CsvRecording {
     rig: Rig,
     stations: Vec<StationKey>,
     /// `[station][setup]`.
-    paths: Vec<Vec<PathBuf>>,
+    files: Vec<Vec<InputFile>>,
     stated: Stated,
     remarks: Vec<String>,
     most_kept: usize,
@@ -46,8 +47,10 @@ impl CsvRecording {
         let mut remarks = Vec::new();
         let mut unknown: Vec<String> = Vec::new();
         let mut at_whole_samples = false;
-        for path in paths.iter().flatten() {
-            let (header, ..) = Header::open(path, rig, stated.marker.as_ref())?;
+        let remember = |paths: &Vec<PathBuf>| paths.iter().map(|path| InputFile::new(path)).collect();
+        let files: Vec<Vec<InputFile>> = paths.iter().map(remember).collect::<Result<_>>()?;
+        for file in files.iter().flatten() {
+            let (header, ..) = Header::open(file, rig, stated.marker.as_ref())?;
             remarks.extend(header.remarks);
             at_whole_samples |= matches!(header.phase, Phase::Index(_));
             for name in header.unknown {
@@ -62,7 +65,7 @@ impl CsvRecording {
         if at_whole_samples && rig.setups.len() > 1 {
             remarks.push(MARKS_AT_WHOLE_SAMPLES.into());
         }
-        Ok(Self { rig: rig.clone(), stations, paths, stated, remarks, most_kept: MOST_KEPT })
+        Ok(Self { rig: rig.clone(), stations, files, stated, remarks, most_kept: MOST_KEPT })
     }
 }
 
@@ -76,13 +79,13 @@ impl Recording for CsvRecording {
     }
 
     fn open_with(&self, threads: NonZeroUsize, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>> {
-        let path = self.paths.get(station).and_then(|setups| setups.get(setup));
-        let (Some(key), Some(path)) = (self.stations.get(station), path) else {
+        let file = self.files.get(station).and_then(|setups| setups.get(setup));
+        let (Some(key), Some(file)) = (self.stations.get(station), file) else {
             return Err(Error::new("open", format!("station {station} in setup {setup}"), "there is no such file")
                 .of(ErrorKind::MissingFile));
         };
         let marker = self.stated.marker.as_ref();
-        let rows = Rows::open(path, &self.rig, marker)?;
+        let rows = Rows::open(file, &self.rig, marker)?;
         let shown = rows.format.header.shown.clone();
         let at_whole_samples = matches!(rows.format.header.phase, Phase::Index(_));
         let mut scan = Scan::of(rows, marker, threads, self.most_kept)?;
@@ -117,12 +120,16 @@ impl Recording for CsvRecording {
         if let Some(kept) = scan.kept.take() {
             return Ok(Box::new(KeptStream { capture, blocks: kept.into_iter(), encoder: scan.encoder }));
         }
-        let rows = Rows::open(path, &self.rig, marker)?;
+        let rows = Rows::open(file, &self.rig, marker)?;
         Ok(Box::new(CsvStream { capture, rows, piece: Piece::default(), encoder: scan.encoder, next: 0 }))
     }
 
     fn inputs(&self) -> Vec<PathBuf> {
-        self.paths.iter().flatten().cloned().collect()
+        self.files.iter().flatten().map(|file| file.path().to_owned()).collect()
+    }
+
+    fn opened(&self) -> Result<Vec<InputFile>> {
+        Ok(self.files.iter().flatten().cloned().collect())
     }
 
     fn remarks(&self) -> Vec<String> {

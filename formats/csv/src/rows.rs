@@ -2,11 +2,10 @@
 
 use std::{
     num::NonZeroUsize,
-    path::Path,
     sync::mpsc::{Receiver, SyncSender, sync_channel},
 };
 
-use runout_core::{Error, ErrorKind, Result, marker::Marker, rig::Rig};
+use runout_core::{Error, ErrorKind, Result, input_file::InputFile, marker::Marker, rig::Rig};
 
 use crate::{
     header::Header,
@@ -73,8 +72,8 @@ impl Piece {
 
 impl Rows {
     /// Opens a file and reads its header.
-    pub(crate) fn open(path: &Path, rig: &Rig, marker: Option<&Marker>) -> Result<Self> {
-        let (header, next, stretches) = Header::open(path, rig, marker)?;
+    pub(crate) fn open(input: &InputFile, rig: &Rig, marker: Option<&Marker>) -> Result<Self> {
+        let (header, next, stretches) = Header::open(input, rig, marker)?;
         let roles = Role::of_columns(&header, rig);
         // Where the comma delimits, it cannot be in a number.
         let decimal = (header.delimiter == b',').then_some(b'.');

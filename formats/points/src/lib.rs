@@ -17,6 +17,7 @@ use std::{
 
 use runout_core::{
     Error, ErrorKind, Result,
+    input_file::InputFile,
     pipeline::{
         error::Fault,
         registry::{Context, Plugin, Registry, StageConfig},
@@ -87,7 +88,8 @@ impl StageConfig for PointsConfig {
 /// When it cannot be read, lacks a column, or a row is not what its columns say.
 pub fn read(path: &Path, columns: &[PointColumn]) -> Result<Points> {
     let config = PointsConfig { path: path.to_path_buf(), columns: BTreeMap::new(), selected: BTreeMap::new() };
-    select::points(RawTable::read(path)?, path, &config, columns)
+    let input = InputFile::new(path)?;
+    select::points(RawTable::read(&input)?, &input, &config, columns)
 }
 
 struct PointFile {
@@ -101,8 +103,9 @@ impl Loader for PointFile {
     }
 
     fn open(&self, wanted: &Request) -> Result<Source> {
-        let table = RawTable::read(&self.path)?;
-        select::points(table, &self.path, &self.config, wanted.columns).map(Source::Points)
+        let input = InputFile::new(&self.path)?;
+        let table = RawTable::read(&input)?;
+        select::points(table, &input, &self.config, wanted.columns).map(Source::Points)
     }
 }
 
@@ -129,10 +132,10 @@ enum RawColumn {
 }
 
 impl RawTable {
-    fn read(path: &Path) -> Result<Self> {
+    fn read(input: &InputFile) -> Result<Self> {
         let mut start = [0; 4];
-        let read = std::fs::File::open(path).and_then(|mut file| std::io::Read::read(&mut file, &mut start));
-        let length = read.map_err(|error| Error::caused("read", path.display().to_string(), error))?;
-        if start[..length] == *b"PAR1" { parquet::read(path) } else { text::read(path) }
+        let read = std::io::Read::read(&mut input.open()?, &mut start);
+        let length = read.map_err(|error| Error::caused("read", input.path().display().to_string(), error))?;
+        if start[..length] == *b"PAR1" { parquet::read(input) } else { text::read(input) }
     }
 }

@@ -1,7 +1,5 @@
 //! Parquet: columns of numbers, texts and flags.
 
-use std::{fs::File, path::Path};
-
 use arrow_array::{
     Array,
     cast::AsArray,
@@ -12,13 +10,13 @@ use arrow_array::{
 };
 use arrow_schema::DataType;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
-use runout_core::{Error, Result};
+use runout_core::{Error, Result, input_file::InputFile};
 
 use crate::{RawColumn, RawTable, failed};
 
-pub fn read(path: &Path) -> Result<RawTable> {
-    let shown = path.display().to_string();
-    let file = File::open(path).map_err(|error| failed(&shown, error))?;
+pub fn read(input: &InputFile) -> Result<RawTable> {
+    let shown = input.path().display().to_string();
+    let file = input.open()?;
     // The types of Parquet itself, so that dictionaries of another program are plain texts.
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder =

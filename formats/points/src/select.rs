@@ -4,6 +4,7 @@ use std::path::Path;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    input_file::InputFile,
     pipeline::error::known_names,
     points::{Column, Labels, PointColumn, PointKind, Points, Trace},
 };
@@ -15,7 +16,8 @@ const SAME: f64 = 1e-6;
 /// Two names as near as this (Jaro-Winkler) are one with a slip of the pen.
 const ALIKE: f64 = 0.93;
 
-pub fn points(table: RawTable, path: &Path, config: &PointsConfig, wanted: &[PointColumn]) -> Result<Points> {
+pub fn points(table: RawTable, input: &InputFile, config: &PointsConfig, wanted: &[PointColumn]) -> Result<Points> {
+    let path = input.path();
     let table = renamed(table, path, config)?;
     let file = Raw { file: path.display().to_string(), table };
     file.has_all(wanted)?;
@@ -24,7 +26,7 @@ pub fn points(table: RawTable, path: &Path, config: &PointsConfig, wanted: &[Poi
         let problem = if file.table.rows == 0 { "it holds no points" } else { "no point has the values of `where`" };
         return Err(Error::new("read", file.file, problem));
     }
-    let mut points = Points { input: path.to_path_buf(), ..Points::default() };
+    let mut points = Points { input: path.to_path_buf(), opened: vec![input.clone()], ..Points::default() };
     let mut traces = [None, None];
     for column in wanted {
         let Some(place) = file.place(column.name) else { continue };

@@ -3,17 +3,16 @@
 use std::{
     fs::File,
     io::{BufRead, BufReader, Read, Seek},
-    path::Path,
 };
 
 use csv::{ByteRecord, ReaderBuilder, Trim};
-use runout_core::{Error, ErrorKind, Result};
+use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
 
 use crate::{RawColumn, RawTable, failed};
 
-pub fn read(path: &Path) -> Result<RawTable> {
-    let shown = path.display().to_string();
-    let mut file = BufReader::new(File::open(path).map_err(|error| failed(&shown, error))?);
+pub fn read(input: &InputFile) -> Result<RawTable> {
+    let shown = input.path().display().to_string();
+    let mut file = BufReader::new(input.open()?);
     let delimiter = delimiter(&mut file).map_err(|error| failed(&shown, error))?;
     let mut reader = ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(file);
     let header = reader.byte_headers().map_err(|error| failed(&shown, error))?;

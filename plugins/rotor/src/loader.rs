@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use faer::Mat;
 use runout_core::{
     Error, Result,
+    input_file::InputFile,
     pipeline::{
         config::checked,
         document::{ConfigError, Document, Sources},
@@ -105,11 +106,22 @@ impl Loader for RotorLoader {
 
     fn open(&self, _wanted: &Request) -> Result<Source> {
         let (rotor, input) = match &self.place {
-            Place::File(path) => (read(path)?, path.clone()),
+            Place::File(path) => {
+                let file = InputFile::new(path)?;
+                let mut rotor = read(path)?;
+                rotor.opened.push(file);
+                (rotor, path.clone())
+            }
             Place::Here { folder, model } => (build("the rotor", folder, model)?, PathBuf::new()),
         };
         let points = transfer::to_points(&rotor.equations);
-        Ok(Source::Points(Points { input, besides: rotor.files, remarks: rotor.warnings, ..points }))
+        Ok(Source::Points(Points {
+            input,
+            besides: rotor.files,
+            opened: rotor.opened,
+            remarks: rotor.warnings,
+            ..points
+        }))
     }
 }
 
@@ -120,6 +132,8 @@ pub struct Rotor {
     pub equations: Equations,
     /// Files of matrices.
     pub files: Vec<PathBuf>,
+    /// The files that it was read from, as they were then.
+    pub opened: Vec<InputFile>,
     /// What looks like a mistake in it.
     pub warnings: Vec<String>,
 }
@@ -159,12 +173,18 @@ fn failure(error: ConfigError) -> Error {
 fn build(object: &str, folder: &Path, model: &RotorModel) -> Result<Rotor> {
     let warnings = plausible::warnings(model);
     match &model.matrices {
-        None => Ok(Rotor { equations: assemble::equations(object, model)?, files: Vec::new(), warnings }),
+        None => Ok(Rotor {
+            equations: assemble::equations(object, model)?,
+            files: Vec::new(),
+            opened: Vec::new(),
+            warnings,
+        }),
         Some(matrices) => {
             let files: Vec<(Role, PathBuf)> =
                 matrices.files().into_iter().map(|(role, file)| (role, folder.join(file))).collect();
+            let opened = files.iter().map(|(_, file)| InputFile::new(file)).collect::<Result<_>>()?;
             let equations = of_matrices(object, &files, matrices)?;
-            Ok(Rotor { equations, files: files.into_iter().map(|(_, file)| file).collect(), warnings })
+            Ok(Rotor { equations, files: files.into_iter().map(|(_, file)| file).collect(), opened, warnings })
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use faer::Mat;
 use nalgebra_sparse::io::load_coo_from_matrix_market_str;
-use runout_core::{Error, Result};
+use runout_core::{Error, Result, input_file::read_text};
 
 use crate::model::MOST_DEGREES_OF_FREEDOM;
 
@@ -14,7 +14,7 @@ use crate::model::MOST_DEGREES_OF_FREEDOM;
 /// When the file cannot be read, is not of this format, is not square, or is too large.
 pub fn read(path: &Path) -> Result<Mat<f64>> {
     let object = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| Error::new("read", &object, error))?;
+    let text = read_text(path).map_err(|error| Error::new("read", &object, error))?;
     parse(&text).map_err(|problem| {
         Error::new("read", &object, problem).help(
             "expected a Matrix Market file: `%%MatrixMarket matrix coordinate real symmetric`, sizes, then one element a line, \

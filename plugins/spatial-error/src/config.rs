@@ -286,7 +286,7 @@ impl Compensate {
                 let path = context.path(path);
                 let object = path.display();
                 let refuse = |problem: String| Fault::at("axes", format!("cannot read {object}: {problem}"));
-                let text = std::fs::read_to_string(&path).map_err(|error| refuse(error.to_string()))?;
+                let text = runout_core::input_file::read_text(&path).map_err(|error| refuse(error.to_string()))?;
                 let file: AxesFile = toml::from_str(&text).map_err(|error| refuse(error.to_string()))?;
                 file.axes
             }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use runout_core::{
     Error, Result,
+    input_file::read_text,
     pipeline::{error::Fault, registry::Context},
 };
 use schemars::JsonSchema;
@@ -85,7 +86,7 @@ fn grid(campaign: &Campaign, step_mm: [f64; 3]) -> Result<Vec<[f64; 3]>> {
 fn read(path: &std::path::Path) -> Result<Vec<[f64; 3]>> {
     let object = path.display().to_string();
     let refuse = |problem: String| Error::new("read", &object, problem);
-    let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
+    let text = read_text(path).map_err(|error| refuse(error.to_string()))?;
     let header = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or_default();
     let delimiter = [b'\t', b';', b','].into_iter().find(|mark| header.contains(char::from(*mark))).unwrap_or(b',');
     let mut reader = csv::ReaderBuilder::new()

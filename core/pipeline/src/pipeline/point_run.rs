@@ -13,7 +13,6 @@ use crate::{
 };
 use runout_closed_loop::diagnosis::Correction;
 use runout_error::Result;
-use runout_turning::provenance::Input;
 
 pub(super) fn run(
     pipeline: &Pipeline,
@@ -71,7 +70,6 @@ impl PointResult<'_> {
             remarks.extend(separator.remarks(points, surface.as_ref())?);
         }
         remarks.extend(points.remarks.iter().cloned());
-        let inputs = points.inputs().iter().map(|input| Input::of(input)).collect::<Result<_>>()?;
-        writer.finish(inputs, remarks, surface.as_ref())
+        writer.finish(points.provenance()?, remarks, surface.as_ref())
     }
 }

@@ -17,6 +17,7 @@ use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSepara
 use runout_error::{Error, ErrorKind, Result};
 use runout_turning::{
     calibrated::calibrated,
+    input_file::InputFile,
     inspection::{Inspection, Spike},
     measurement::{Capture, Recording, SampleStream, StationKey},
     profile::{Profile, RejectedTurn},
@@ -95,8 +96,9 @@ impl RecordReader<'_> {
         if let Some(checksum) = along {
             checksum.begin();
         }
+        let files = self.recording.opened()?;
         let inputs = std::thread::scope(|scope| {
-            let apart = || self.recording.inputs().iter().map(|path| Input::of(path)).collect::<Result<Vec<_>>>();
+            let apart = || files.iter().map(InputFile::checksum).collect::<Result<Vec<_>>>();
             let checksums = scope.spawn(move || if along.is_some() { Ok(Vec::new()) } else { apart() });
             for _ in 1..workers {
                 scope.spawn(worker);
@@ -105,6 +107,8 @@ impl RecordReader<'_> {
             checksums.join()
         });
         ordered_collector.outcome()?;
+        // The checksums may have been taken before the last sample was read.
+        files.iter().try_for_each(InputFile::check)?;
         if let Some(checksum) = along {
             return Ok(vec![checksum.finish()?]);
         }

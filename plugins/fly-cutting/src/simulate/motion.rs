@@ -1,10 +1,14 @@
 //! The synchronous error motion of a spindle run: `motion.parquet`.
 
-use std::{f64::consts::TAU, fs::File, path::Path};
+use std::{f64::consts::TAU, path::Path};
 
 use arrow_array::{Array, Float64Array, RecordBatch, StringArray, cast::AsArray};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use runout_core::{Error, Result, model::diagnosis::Diagnosis};
+use runout_core::{
+    Error, Result,
+    input_file::{open_regular, read_text},
+    model::diagnosis::Diagnosis,
+};
 
 /// Displacement and tilt of the axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -32,7 +36,7 @@ impl Synchronous {
     pub fn read(path: &Path, station: Option<&str>) -> Result<Self> {
         let shown = path.display().to_string();
         let failure = |problem: String| Error::new("read the motion from", &shown, problem);
-        let file = File::open(path).map_err(|error| failure(error.to_string()))?;
+        let file = open_regular(path).map_err(|error| failure(error.to_string()))?;
         let reader = ParquetRecordBatchReaderBuilder::try_new(file).and_then(ParquetRecordBatchReaderBuilder::build);
         let reader = reader.map_err(|error| failure(format!("expected `motion.parquet` of a spindle run: {error}")))?;
         let mut wanted = station.map(str::to_owned);
@@ -110,7 +114,7 @@ pub(super) struct FoundLine {
 pub(super) fn lines(path: &Path) -> Result<Vec<FoundLine>> {
     let shown = path.display().to_string();
     let failure = |problem: String| Error::new("read the diagnosis", &shown, problem);
-    let text = std::fs::read_to_string(path).map_err(|error| failure(error.to_string()))?;
+    let text = read_text(path).map_err(|error| failure(error.to_string()))?;
     let diagnosis: Diagnosis = serde_json::from_str(&text)
         .map_err(|error| failure(format!("expected `diagnosis.json` of a spindle's recording: {error}")))?;
     let lines = diagnosis.added.iter().filter(|added| added.effect == "asynchronous-line").filter_map(|added| {

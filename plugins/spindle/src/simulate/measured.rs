@@ -1,8 +1,8 @@
 //! A profile that someone measured, as harmonics.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use runout_core::{Complex64, numerics::fourier::Fourier};
+use runout_core::{Complex64, input_file::read_text, numerics::fourier::Fourier};
 
 use super::config::FormHarmonic;
 
@@ -17,7 +17,7 @@ const WIDEST_GAP_DEG: f64 = 10.0;
 /// What is wrong with the file, in words.
 pub(super) fn harmonics(path: &Path, max_order: usize) -> Result<Vec<FormHarmonic>, String> {
     let shown = path.display();
-    let text = fs::read_to_string(path).map_err(|error| format!("cannot read {shown}: {error}"))?;
+    let text = read_text(path).map_err(|error| format!("cannot read {shown}: {error}"))?;
     let points = points(&text).map_err(|problem| format!("cannot read {shown}: {problem}"))?;
     if max_order > ANGLES / 8 {
         return Err(format!("orders up to {} can be taken from a measured profile", ANGLES / 8));

@@ -25,7 +25,7 @@ use crate::{
 };
 use runout_error::{Error, Result};
 use runout_table::{Array, Float64Array, TableRows};
-use runout_turning::provenance::{Input, Provenance, VERSION};
+use runout_turning::provenance::{Provenance, VERSION};
 
 /// A separator of points that takes the pipeline's.
 pub struct PointMethod {
@@ -130,7 +130,7 @@ impl<'a> ComparingPoints<'a> {
             provenance: Provenance {
                 program: format!("runout {VERSION}"),
                 configuration: pipeline.configuration.clone(),
-                inputs: vec![Input::of(&points.input)?],
+                inputs: points.provenance()?,
             },
             reference: pipeline.separator.clone(),
             methods: methods.collect(),
