@@ -1,24 +1,30 @@
-//! Files that appear whole or not at all.
+//! Files that appear whole or not at all, one by one or together.
+
+mod faults;
+mod lock;
+mod publication;
 
 use std::{
     fs,
+    io::Write,
     path::{Component, Path, PathBuf},
-    sync::{
-        Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
+pub use lock::FolderLock;
 use runout_error::{Error, ErrorKind, Result};
 
 /// What this process has begun and not finished.
-static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new(), abandoning: 0 });
+static UNDER_WAY: Mutex<UnderWay> =
+    Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new(), locks: Vec::new(), abandoning: 0 });
 
 struct UnderWay {
     /// Temporary files.
     files: Vec<PathBuf>,
     /// Folders that were made.
     folders: Vec<PathBuf>,
+    /// Locks that are held.
+    locks: Vec<PathBuf>,
     /// How many [`Abandoned`] there are.
     abandoning: usize,
 }
@@ -33,20 +39,29 @@ impl UnderWay {
         self.files.retain(|file| file != temporary);
         // Nothing more can be done about a temporary file that will not go.
         let _ = fs::remove_file(temporary);
-        let made = temporary.ancestors().skip(1).take_while(|folder| self.folders.iter().any(|made| made == folder));
+        self.remove_made_folders(temporary);
+    }
+
+    /// Removes the folders that were made for a file, where nothing else came into them.
+    fn remove_made_folders(&mut self, file: &Path) {
+        let made = file.ancestors().skip(1).take_while(|folder| self.folders.iter().any(|made| made == folder));
         // Folders with something in them do not go.
         let _ = made.map(fs::remove_dir).take_while(std::result::Result::is_ok).count();
     }
 
-    /// Gives a file its final name.
-    fn finish(&mut self, file: &mut PendingFile) -> Result<PathBuf> {
-        if !self.files.contains(&file.temporary) {
-            return Err(file.failure(ABANDONED).of(ErrorKind::Interrupted));
+    /// Gives files their final names.
+    fn finish(&mut self, files: &mut [PendingFile]) -> Result<Vec<PathBuf>> {
+        if let Some(gone) = files.iter().find(|file| !self.files.contains(&file.temporary)) {
+            return Err(gone.failure(ABANDONED).of(ErrorKind::Interrupted));
         }
-        fs::rename(&file.temporary, &file.destination).map_err(|error| file.caused(error))?;
-        self.files.retain(|pending| *pending != file.temporary);
-        file.committed = true;
-        Ok(file.destination.clone())
+        files.iter().try_for_each(PendingFile::sync)?;
+        let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();
+        publication::publish(&names)?;
+        for file in &mut *files {
+            self.files.retain(|pending| *pending != file.temporary);
+            file.committed = true;
+        }
+        Ok(files.iter().map(|file| file.destination.clone()).collect())
     }
 }
 
@@ -61,6 +76,10 @@ pub fn abandon_all() -> Abandoned {
     under_way.abandoning += 1;
     while let Some(file) = under_way.files.pop() {
         under_way.remove(&file);
+    }
+    while let Some(lock) = under_way.locks.pop() {
+        let _ = fs::remove_file(&lock);
+        under_way.remove_made_folders(&lock);
     }
     Abandoned(())
 }
@@ -92,7 +111,6 @@ impl PendingFile {
     /// # Errors
     /// When the folder cannot be made, `destination` is a folder, or all work is [abandoned](abandon_all).
     pub fn new(destination: impl Into<PathBuf>) -> Result<Self> {
-        static SERIAL: AtomicU64 = AtomicU64::new(0);
         let destination = destination.into();
         let shown = destination.display().to_string();
         // A rename would put a file in the place of a folder, a device or a pipe.
@@ -104,21 +122,10 @@ impl PendingFile {
             .ok_or_else(|| Error::new("write", &shown, "the path ends in no file name").of(ErrorKind::Configuration))?
             .to_string_lossy()
             .into_owned();
-        let folder = match destination.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        make(folder).map_err(|error| {
-            let file = folder.ancestors().find(|above| above.is_file());
-            let failure = Error::caused("create the folder", folder.display().to_string(), error);
-            match file {
-                Some(file) => failure.help(format!("{} is a file; name another folder", file.display())),
-                None => failure,
-            }
-        })?;
+        let folder = folder_of(&destination);
+        make(folder).map_err(|error| no_folder(folder, error))?;
         remove_stale(folder, &name);
-        let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
-        let temporary = folder.join(format!(".{name}.{}-{serial}.partial", std::process::id()));
+        let temporary = folder.join(format!(".{name}.{}{PARTIAL}", unpredictable()));
         let mut under_way = UnderWay::now();
         if under_way.abandoning > 0 {
             return Err(Error::new("write", &shown, ABANDONED).of(ErrorKind::Interrupted));
@@ -144,7 +151,23 @@ impl PendingFile {
     /// # Errors
     /// When the file system refuses.
     pub fn create(&self) -> Result<fs::File> {
-        fs::File::create(&self.temporary).map_err(|error| self.caused(error))
+        // Neither a file nor a link may be there already.
+        let create = || fs::File::options().read(true).write(true).create_new(true).open(&self.temporary);
+        faults::step().and_then(|()| create()).map_err(|error| self.caused(error))
+    }
+
+    /// Creates the temporary file with these contents.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn write(&self, contents: &[u8]) -> Result<()> {
+        self.create()?.write_all(contents).map_err(|error| self.caused(error))
+    }
+
+    /// Has the contents last, whatever happens to the machine.
+    fn sync(&self) -> Result<()> {
+        let sync = || fs::File::options().write(true).open(&self.temporary)?.sync_all();
+        faults::step().and_then(|()| sync()).map_err(|error| self.caused(error))
     }
 
     /// Refuses to begin what may not fit: a library that the disk fails in the middle of a file may not survive it.
@@ -178,8 +201,9 @@ impl PendingFile {
     ///
     /// # Errors
     /// When the file system refuses the rename, or the file was [abandoned](abandon_all).
-    pub fn commit(mut self) -> Result<PathBuf> {
-        UnderWay::now().finish(&mut self)
+    pub fn commit(self) -> Result<PathBuf> {
+        let destination = self.destination.clone();
+        commit_all(vec![self]).map(|_| destination)
     }
 }
 
@@ -188,6 +212,37 @@ impl Drop for PendingFile {
         if !self.committed {
             UnderWay::now().remove(&self.temporary);
         }
+    }
+}
+
+/// What temporary names end in.
+const PARTIAL: &str = ".partial";
+
+/// A part of a name that nobody knows before: this process and a random number.
+fn unpredictable() -> String {
+    format!("{}-{:016x}", std::process::id(), rand::random::<u64>())
+}
+
+/// Whether there is a process of this number; where the system does not say (no /proc), there may be.
+fn is_alive(process: u32) -> bool {
+    !Path::new("/proc/self").exists() || Path::new(&format!("/proc/{process}")).exists()
+}
+
+/// The folder that a file lies in.
+fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Why a folder cannot be made.
+fn no_folder(folder: &Path, error: std::io::Error) -> Error {
+    let file = folder.ancestors().find(|above| above.is_file());
+    let failure = Error::caused("create the folder", folder.display().to_string(), error);
+    match file {
+        Some(file) => failure.help(format!("{} is a file; name another folder", file.display())),
+        None => failure,
     }
 }
 
@@ -203,27 +258,27 @@ fn make(folder: &Path) -> std::io::Result<()> {
 /// Removes what runs that were killed left of the same file: temporary files of processes that are no more. Where the
 /// system does not tell (no /proc), they stay.
 fn remove_stale(folder: &Path, name: &str) {
-    let (Ok(entries), true) = (fs::read_dir(folder), Path::new("/proc/self").exists()) else { return };
+    let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
         let found = entry.file_name();
         let process = found
             .to_str()
-            .and_then(|found| found.strip_prefix('.')?.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(".partial"))
+            .and_then(|found| found.strip_prefix('.')?.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(PARTIAL))
             .and_then(|rest| rest.split_once('-')?.0.parse::<u32>().ok());
-        if process.is_some_and(|process| !Path::new(&format!("/proc/{process}")).exists()) {
+        if process.is_some_and(|process| !is_alive(process)) {
             // Another run may have removed it just now.
             let _ = fs::remove_file(entry.path());
         }
     }
 }
 
-/// Gives finished files their names, one right after the other.
+/// Gives finished files their names: all of them, or none. Their contents are synced before, the folders after it.
 ///
 /// # Errors
-/// When the file system refuses a rename.
+/// When the file system refuses a rename; those before it are taken back.
 pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
     let mut under_way = UnderWay::now();
-    let finished = files.iter_mut().map(|file| under_way.finish(file)).collect();
+    let finished = under_way.finish(&mut files);
     // Files that are left need it for their removal.
     drop(under_way);
     finished
@@ -257,7 +312,7 @@ pub fn resolved(path: &Path) -> PathBuf {
 /// When the folder or the file cannot be written.
 pub fn write(destination: impl Into<PathBuf>, contents: &[u8]) -> Result<PathBuf> {
     let pending = PendingFile::new(destination)?;
-    fs::write(pending.path(), contents).map_err(|error| pending.caused(error))?;
+    pending.write(contents)?;
     pending.commit()
 }
 
@@ -277,6 +332,33 @@ mod tests {
         fs::write(folder.path().join("file"), "").unwrap();
         let error = PendingFile::new(folder.path().join("file/deeper/x.csv")).unwrap_err();
         assert!(error.advice().is_some_and(|advice| advice.contains("file is a file")), "{error:?}");
+    }
+
+    #[test]
+    fn files_get_their_names_together_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let names = ["a", "deep/b", "c"].map(|name| folder.path().join(name));
+        let written = |text: &str| -> Vec<PendingFile> {
+            let file = |name: &PathBuf| {
+                let file = PendingFile::new(name).unwrap();
+                file.write(text.as_bytes()).unwrap();
+                file
+            };
+            names.iter().map(file).collect()
+        };
+        commit_all(written("old")).unwrap();
+        let pending = written("new");
+        // What cannot be replaced: a folder with something in it.
+        fs::remove_file(&names[2]).unwrap();
+        fs::create_dir_all(names[2].join("in the way")).unwrap();
+        assert!(commit_all(pending).unwrap_err().to_string().contains("/c"));
+        let left = |path: &Path| fs::read_dir(path).unwrap().count();
+        assert_eq!([0, 1].map(|place: usize| fs::read_to_string(&names[place]).unwrap()), ["old", "old"]);
+        assert_eq!((left(folder.path()), left(&folder.path().join("deep"))), (3, 1));
+        fs::remove_dir_all(&names[2]).unwrap();
+        commit_all(written("new")).unwrap();
+        assert!(names.iter().all(|name| fs::read_to_string(name).unwrap() == "new"));
+        assert_eq!((left(folder.path()), left(&folder.path().join("deep"))), (3, 1));
     }
 
     #[test]

@@ -200,11 +200,13 @@ impl Pipeline {
         }
         let title = match root.get_ref().get("title") {
             None => "Untitled".to_owned(),
-            Some(value) => value
-                .get_ref()
-                .as_str()
-                .ok_or_else(|| Fault::span(value.span(), "expected the title in quotes"))?
-                .to_owned(),
+            Some(value) => match value.get_ref().as_str() {
+                Some(title) if title.contains('\0') => {
+                    return Err(Fault::span(value.span(), "the title must not hold NUL, which ends a text in HDF5"));
+                }
+                Some(title) => title.to_owned(),
+                None => return Err(Fault::span(value.span(), "expected the title in quotes")),
+            },
         };
         let rig_table = table(root, "rig")?;
         let rig = rig_table.as_ref().map(|table| checked::<RigConfig, _>(table, RigConfig::check)).transpose()?;

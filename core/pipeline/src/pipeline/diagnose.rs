@@ -220,6 +220,6 @@ fn commit(exports: Finished, path: Option<PathBuf>, mut diagnosis: Diagnosis) ->
 fn pending(path: PathBuf, diagnosis: &Diagnosis) -> Result<PendingFile> {
     let file = PendingFile::new(path)?;
     let text = serde_json::to_vec_pretty(diagnosis).map_err(|error| file.caused(error))?;
-    std::fs::write(file.path(), text).map_err(|error| file.caused(error))?;
+    file.write(&text)?;
     Ok(file)
 }

@@ -1,6 +1,7 @@
 //! TOML text with places: a file, the files that it includes and overrides, read as one document.
 
 use std::{
+    io::Read,
     ops::Range,
     path::{Path, PathBuf},
 };
@@ -16,6 +17,10 @@ use super::{
     pinpoint::pinpoint,
 };
 use runout_error::{Error, ErrorKind};
+use runout_turning::input_file::open_regular;
+
+/// Keys in a path, at most.
+const DEEPEST: usize = 64;
 
 /// A table whose every key and value knows its place.
 pub type Table<'a> = Spanned<DeTable<'a>>;
@@ -142,6 +147,11 @@ impl Sources {
     }
 
     fn parse<'a>(&self, part: &'a Part) -> Result<Table<'a>, Diagnostic> {
+        if let Some(start) = too_deep(part.text()) {
+            let span = part.start + start..part.start + start + 1;
+            let message = format!("expected a path of at most {DEEPEST} keys");
+            return Err(self.locate_span(Fault::span(span, message)));
+        }
         DeTable::parse(&part.padded).map_err(|error| {
             self.locate_span(Fault::span(error.span().unwrap_or(part.start..part.start), error.message()))
         })
@@ -209,6 +219,9 @@ impl<'a> Document<'a> {
                     continue;
                 }
                 let steps: Vec<&str> = path.split('.').map(str::trim).collect();
+                if steps.len() > DEEPEST {
+                    return Err(refuse(format!("expected a path of at most {DEEPEST} keys, found {}", steps.len())));
+                }
                 assign(root.get_mut(), &steps, value).map_err(refuse)?;
             }
         }
@@ -226,6 +239,22 @@ impl<'a> Document<'a> {
     pub fn diagnose(&self, fault: Fault) -> Diagnostic {
         self.sources.locate_span(resolve(fault, &self.root))
     }
+}
+
+/// Where a dotted key begins that has more parts than a configuration has levels: each part is a table within the one before.
+fn too_deep(text: &str) -> Option<usize> {
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let mut from = start;
+        for segment in line.split_inclusive(['=', ',', '{', '[', '#']) {
+            if segment.matches('.').count() > DEEPEST && !line.trim_start().starts_with('#') {
+                return Some(from);
+            }
+            from += segment.len();
+        }
+        start += line.len();
+    }
+    None
 }
 
 fn insert<'a>(table: &mut DeTable<'a>, key: &str, span: Range<usize>, value: Spanned<DeValue<'a>>) {
@@ -271,7 +300,9 @@ fn assign<'a>(table: &mut DeTable<'a>, steps: &[&str], value: Spanned<DeValue<'a
 
 fn read_text(path: &Path) -> Result<String, Error> {
     let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|error| Error::caused("read", &shown, error))?;
+    let mut bytes = Vec::new();
+    let read = open_regular(path).and_then(|mut file| file.read_to_end(&mut bytes));
+    read.map_err(|error| Error::caused("read", &shown, error))?;
     String::from_utf8(bytes).map_err(|error| {
         Error::new("read", &shown, format!("expected UTF-8, found {}", error.utf8_error()))
             .of(ErrorKind::DamagedData)

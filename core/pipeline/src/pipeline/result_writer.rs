@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use super::{
     config::Pipeline,
     evaluate::{Evaluate, Group, PartSummary, add_areal, add_generatrices, decide, part_summary},
-    exports::summary_path,
+    exports::{summary_path, written},
     steadiness::inflated,
     summary::{LostOrders, StationSummary, Summary, SurfaceSummary, summarise},
     tables::{StationTables, correction_rows, named_value_rows},
 };
 use crate::{
-    atomic_file::{PendingFile, commit_all},
+    atomic_file::{FolderLock, PendingFile, commit_all},
     stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
 };
 use runout_closed_loop::diagnosis::{self, Correction};
@@ -62,6 +62,8 @@ pub(super) struct ResultWriter {
     convention: String,
     summary: Summary,
     summary_path: Option<PathBuf>,
+    /// Given back last.
+    lock: FolderLock,
 }
 
 impl ResultWriter {
@@ -72,6 +74,8 @@ impl ResultWriter {
             tables: pipeline.tables.clone(),
             longest_name: longest_name(pipeline.rig.as_ref(), stations),
         };
+        let outputs = written(exporters, &pipeline.tables);
+        let lock = FolderLock::of(outputs.iter().map(PathBuf::as_path))?;
         let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(&info)).collect();
         let tested = pipeline.route.point_separator().is_some_and(PointSeparator::needs_surface);
         let takes = |takes: Takes| exporters.iter().any(|exporter| exporter.takes() == takes);
@@ -98,6 +102,7 @@ impl ResultWriter {
             convention: String::new(),
             summary: begun(pipeline),
             summary_path: summary_path(exporters, &pipeline.tables),
+            lock,
         })
     }
 
@@ -212,7 +217,7 @@ impl ResultWriter {
         for export in self.exports {
             complete.extend(export.finish(&completed)?);
         }
-        Ok(Finished { summary: self.summary, complete, summary_path: self.summary_path })
+        Ok(Finished { summary: self.summary, complete, summary_path: self.summary_path, lock: self.lock })
     }
 }
 
@@ -230,6 +235,8 @@ pub(super) struct Finished {
     summary: Summary,
     complete: Vec<PendingFile>,
     summary_path: Option<PathBuf>,
+    /// Given back last.
+    lock: FolderLock,
 }
 
 impl Finished {
@@ -251,10 +258,11 @@ impl Finished {
         if let Some(path) = self.summary_path {
             let file = PendingFile::new(path)?;
             let text = serde_json::to_vec_pretty(&self.summary).map_err(|error| file.caused(error))?;
-            std::fs::write(file.path(), text).map_err(|error| file.caused(error))?;
+            file.write(&text)?;
             self.complete.push(file);
         }
         commit_all(self.complete)?;
+        drop(self.lock);
         Ok(self.summary)
     }
 }
