@@ -5,15 +5,14 @@
 //! length that overflows. So they are looked at before it reads texts; what else may be wrong with them it finds itself.
 
 use std::{
-    fs,
+    collections::HashSet,
     io::{Read, Seek, SeekFrom},
     ops::Range,
-    path::Path,
 };
 
-use hdf5_metno::{File, Group};
+use hdf5_metno::{Dataset, File, Group, LinkType, LocationType};
 use memchr::memmem;
-use runout_core::{Error, ErrorKind, Result};
+use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
 
 /// What a collection begins with: its signature, and the one version that there is.
 const SIGNATURE: &[u8] = b"GCOL\x01\0\0\0";
@@ -26,17 +25,18 @@ const PIECE: usize = 1 << 20;
 const LONGEST: u64 = 1 << 24;
 /// In larger files, data are passed over, which costs a look at every dataset.
 const SMALL: u64 = 1 << 24;
-/// Groups in groups that data are looked for in.
+/// Groups in groups that data are looked for in, and objects that are looked at. What lies in others is looked through.
 const DEEPEST: usize = 6;
+const MOST_OBJECTS: usize = 20_000;
 
 /// Refuses a file with a heap that has no end.
-pub(crate) fn check(file: &File, path: &Path) -> Result<()> {
-    let failure = |error: std::io::Error| Error::caused("read", path.display().to_string(), error);
-    let mut source = fs::File::open(path).map_err(&failure)?;
-    let end = source.metadata().map_err(&failure)?.len();
+pub(crate) fn check(file: &File, input: &InputFile) -> Result<()> {
+    let shown = input.path().display().to_string();
+    let failure = |error: std::io::Error| Error::caused("read", &shown, error);
+    let (mut source, end) = (input.open()?, input.bytes());
     let mut data = Vec::new();
     if end > SMALL {
-        extents(file, DEEPEST, &mut data);
+        Objects::default().extents(file, DEEPEST, &mut data);
         data.sort_unstable_by_key(|extent| extent.start);
     }
     let mut from = 0;
@@ -44,7 +44,7 @@ pub(crate) fn check(file: &File, path: &Path) -> Result<()> {
         let endless = find(&mut source, from..extent.start.min(end)).map_err(&failure)?;
         if let Some(place) = endless {
             let problem = format!("it is damaged: the texts at byte {place} have no end");
-            let error = Error::new("read", path.display().to_string(), problem).of(ErrorKind::DamagedData);
+            let error = Error::new("read", &shown, problem).of(ErrorKind::DamagedData);
             return Err(error.help("copy the file again from where it was recorded"));
         }
         from = from.max(extent.end);
@@ -52,22 +52,54 @@ pub(crate) fn check(file: &File, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Where the numbers of all datasets lie.
-fn extents(group: &Group, deepest: usize, found: &mut Vec<Range<u64>>) {
-    for dataset in group.datasets().unwrap_or_default() {
-        match dataset.offset() {
-            Some(start) => found.push(start..start.saturating_add(dataset.storage_size())),
-            // What is not told is looked through.
-            None => {
-                let _ = dataset.chunks_visit(|chunk| {
-                    found.push(chunk.addr..chunk.addr.saturating_add(chunk.size));
-                    0
-                });
+/// Objects on a walk through a file, each of which is visited once.
+#[derive(Default)]
+struct Objects {
+    /// Those with several links, which may lead in a circle, by their tokens' text: tokens cannot be hashed.
+    known: HashSet<String>,
+    visited: usize,
+}
+
+impl Objects {
+    /// Where the numbers of the datasets lie.
+    fn extents(&mut self, group: &Group, deepest: usize, found: &mut Vec<Range<u64>>) {
+        let mut groups = Vec::new();
+        // What the library cannot say is looked through.
+        let _ = group.iter_visit_default(|name, link| {
+            self.visited += 1;
+            if link.link_type != LinkType::Hard || self.visited > MOST_OBJECTS {
+                return Ok(());
+            }
+            let Ok(info) = group.loc_info_by_name(name) else { return Ok(()) };
+            if info.num_links > 1 && !self.known.insert(format!("{:?}", info.token)) {
+                return Ok(());
+            }
+            match info.loc_type {
+                LocationType::Group => groups.push(name.to_owned()),
+                LocationType::Dataset => group.dataset(name).iter().for_each(|dataset| extent(dataset, found)),
+                _ => {}
+            }
+            Ok(())
+        });
+        if deepest > 0 {
+            for group in groups.iter().filter_map(|name| group.group(name).ok()) {
+                self.extents(&group, deepest - 1, found);
             }
         }
     }
-    if deepest > 0 {
-        group.groups().unwrap_or_default().iter().for_each(|group| extents(group, deepest - 1, found));
+}
+
+/// Where the numbers of a dataset lie.
+fn extent(dataset: &Dataset, found: &mut Vec<Range<u64>>) {
+    match dataset.offset() {
+        Some(start) => found.push(start..start.saturating_add(dataset.storage_size())),
+        // What is not told is looked through.
+        None => {
+            let _ = dataset.chunks_visit(|chunk| {
+                found.push(chunk.addr..chunk.addr.saturating_add(chunk.size));
+                0
+            });
+        }
     }
 }
 

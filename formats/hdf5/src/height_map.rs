@@ -6,7 +6,10 @@
 //! /truth       scenario: what a simulation declares to be true
 //! ```
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use hdf5_metno::File;
 use ndarray::ArrayView2;
@@ -18,6 +21,7 @@ use runout_core::{
         error::Fault,
         registry::{Context, StageConfig},
     },
+    points::Points,
     provenance,
     stage::{Loader, Request, Source, SourceKind},
 };
@@ -26,8 +30,10 @@ use serde::Deserialize;
 
 use crate::{
     MEASUREMENT_FORMAT, RESULT_FORMAT, SURFACE_FORMAT, VERSION,
+    links::Links,
     measurement::TRUTH,
     node::{self, Place},
+    superblock,
 };
 
 /// The dataset of heights.
@@ -45,6 +51,9 @@ const DEFLATE: u8 = 1;
 pub struct HeightMapConfig {
     /// HDF5 file with the root attribute `format = "runout-surface"` and the dataset `height_nm`, relative to the TOML.
     pub path: PathBuf,
+    /// Follows external links, virtual data sets and data in other files, all of which are then inputs.
+    #[serde(default)]
+    pub follow_links: bool,
 }
 
 impl StageConfig for HeightMapConfig {
@@ -57,12 +66,13 @@ impl StageConfig for HeightMapConfig {
         if self.path.as_os_str().is_empty() {
             return Err(Fault::at("path", "expected the name of a file"));
         }
-        Ok(Box::new(HeightMapFile { path: context.path(&self.path) }))
+        Ok(Box::new(HeightMapFile { path: context.path(&self.path), follow_links: self.follow_links }))
     }
 }
 
 struct HeightMapFile {
     path: PathBuf,
+    follow_links: bool,
 }
 
 impl Loader for HeightMapFile {
@@ -77,7 +87,12 @@ impl Loader for HeightMapFile {
             let help = "its points have x_mm, y_mm and height_nm; the separator `fly-cutting` takes these";
             return Err(Error::new("read", self.path.display().to_string(), problem).help(help));
         }
-        Ok(Source::Points(read_height_map(&self.path)?.points(self.path.clone())))
+        let (grid, links) = read(&self.path, self.follow_links)?;
+        let inputs = links.inputs();
+        let besides = inputs.iter().skip(1).map(|file| file.path().to_owned()).collect();
+        let mut points = Points { besides, opened: inputs, ..grid.points(self.path.clone()) };
+        points.remarks.extend(superblock::remark(links.input())?);
+        Ok(Source::Points(points))
     }
 }
 
@@ -86,7 +101,11 @@ impl Loader for HeightMapFile {
 /// # Errors
 /// When the file is no height map of version 1, a step is not above 0, it has fewer than two rows or columns, or no heights.
 pub fn read_height_map(path: &Path) -> Result<HeightGrid> {
-    let (file, place) = node::open(path)?;
+    read(path, false).map(|(grid, _)| grid)
+}
+
+fn read(path: &Path, follow_links: bool) -> Result<(HeightGrid, Arc<Links>)> {
+    let (file, place, links) = node::open(path, follow_links)?;
     check_format(&file, &place)?;
     let step = |name: &str| node::needed(node::positive(&file, &place, name)?, &place, name);
     let origin = |name: &str| node::needed(node::number(&file, &place, name)?, &place, name);
@@ -121,7 +140,7 @@ pub fn read_height_map(path: &Path) -> Result<HeightGrid> {
     }
     match rows * columns - grid.holes() {
         measured @ 0..2 => Err(place.error(format!("{measured} of {} points have a height", rows * columns))),
-        _ => Ok(grid),
+        _ => Ok((grid, links)),
     }
 }
 
@@ -163,7 +182,7 @@ pub fn write_height_map(grid: &HeightGrid, path: &Path, title: &str, scenario: O
     let shape = (grid.rows(), grid.columns);
     let heights = ArrayView2::from_shape(shape, &grid.height_nm).map_err(|error| pending.failure(error))?;
     let write = || -> hdf5_metno::Result<()> {
-        let file = File::with_options().with_fapl(|access| access.libver_v110()).create(pending.path())?;
+        let file = File::with_options().with_fapl(|access| access.libver_v110()).create_excl(pending.path())?;
         node::put_text(&file, "format", SURFACE_FORMAT)?;
         node::put(&file, "version", &VERSION)?;
         node::put_text(&file, "program", &format!("runout {}", provenance::VERSION))?;
@@ -179,7 +198,7 @@ pub fn write_height_map(grid: &HeightGrid, path: &Path, title: &str, scenario: O
         let dataset = file.new_dataset::<f64>().chunk(chunk).shuffle().deflate(DEFLATE).shape(shape).create(HEIGHTS)?;
         dataset.write(heights)?;
         if let Some(scenario) = scenario {
-            node::put_text(&*file.create_group(TRUTH)?, "scenario", scenario)?;
+            node::put_text(&*node::create_group(&file, TRUTH)?, "scenario", scenario)?;
         }
         // What the disk refuses comes out here, and not when the file is closed.
         file.flush()

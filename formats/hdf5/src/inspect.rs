@@ -1,6 +1,6 @@
 //! A look into a file: what it holds.
 
-use std::path::Path;
+use std::{collections::HashMap, path::Path};
 
 use hdf5_metno::{File, LocationType};
 use runout_core::Result;
@@ -83,7 +83,7 @@ pub struct TableReport {
 /// # Errors
 /// When it cannot be read, or does not hold what its format promises.
 pub fn inspect(path: &Path) -> Result<FileReport> {
-    let (file, place) = node::open(path)?;
+    let (file, place, _) = node::open(path, false)?;
     let version = node::number(&file, &place, "version").ok().flatten();
     let mut report = FileReport {
         format: node::text(&file, &place, "format")?,
@@ -105,6 +105,7 @@ pub fn inspect(path: &Path) -> Result<FileReport> {
 }
 
 fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()> {
+    let mut places: HashMap<String, usize> = HashMap::new();
     for setup in node::members(file, place)? {
         if setup == TRUTH {
             report.truth = !node::group(file, place, TRUTH)?.0.is_empty();
@@ -112,8 +113,7 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
         }
         let (group, place) = node::group(file, place, &setup)?;
         for station in node::members(&group, &place)? {
-            let kind = group.loc_type_by_name(&station).map_err(|error| place.child(&station).error(error))?;
-            if kind != LocationType::Group {
+            if node::kind(&group, &place, &station)? != LocationType::Group {
                 continue;
             }
             let source = CaptureSource::open(&group, &place, &station, None)?;
@@ -134,9 +134,10 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
                 turns: marks.len().saturating_sub(1),
                 channels: source.stored.sensors,
             };
-            match report.stations.iter_mut().find(|known| known.station == station) {
-                Some(known) => known.captures.push(capture),
+            match places.get(&station) {
+                Some(place) => report.stations[*place].captures.push(capture),
                 None => {
+                    places.insert(station.clone(), report.stations.len());
                     report.stations.push(StationReport { station, z_mm: source.z_mm, captures: vec![capture] });
                 }
             }
@@ -150,8 +151,7 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
 fn tables(file: &File, place: &Place) -> Result<Vec<TableReport>> {
     let mut tables = Vec::new();
     for table in node::members(file, place)? {
-        let kind = file.loc_type_by_name(&table).map_err(|error| place.child(&table).error(error))?;
-        if kind != LocationType::Group || table == "provenance" {
+        if table == "provenance" || node::kind(file, place, &table)? != LocationType::Group {
             continue;
         }
         let (group, place) = node::group(file, place, &table)?;

@@ -21,9 +21,12 @@
 mod heaps;
 mod height_map;
 mod inspect;
+mod links;
 mod measurement;
 mod node;
+mod raw;
 mod result;
+mod superblock;
 mod text;
 mod type_name;
 

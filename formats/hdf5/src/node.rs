@@ -1,31 +1,52 @@
 //! Groups, datasets and attributes with their place in the file, so that every error can name it.
 
-use std::{fmt, path::Path};
+use std::{fmt, path::Path, sync::Arc};
 
 use hdf5_metno::{
-    Attribute, Dataset, File, Group, H5Type, Location,
+    Attribute, Dataset, File, Group, H5Type, Location, LocationType,
     dataset::Layout,
     types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode},
 };
-use runout_core::{Error, ErrorKind, Result};
+use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
 
-use crate::{heaps, text, type_name::type_name};
+use crate::{
+    heaps,
+    links::{self, Links},
+    raw, text,
+    type_name::type_name,
+};
 
 /// Where something stands: `shaft.h5:/initial/s01`.
 #[derive(Debug, Clone)]
 pub(crate) struct Place {
     file: String,
     path: String,
+    links: Option<Arc<Links>>,
 }
 
 impl Place {
     pub(crate) fn root(file: &Path) -> Self {
-        Self { file: file.display().to_string(), path: "/".into() }
+        Self { file: file.display().to_string(), path: "/".into(), links: None }
     }
 
     pub(crate) fn child(&self, name: &str) -> Self {
         let separator = if self.path == "/" { "" } else { "/" };
-        Self { file: self.file.clone(), path: format!("{}{separator}{name}", self.path) }
+        Self { file: self.file.clone(), path: format!("{}{separator}{name}", self.path), links: self.links.clone() }
+    }
+
+    /// The root of the same file.
+    pub(crate) fn top(&self) -> Self {
+        Self { path: "/".into(), ..self.clone() }
+    }
+
+    /// The path in the file.
+    pub(crate) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// What is known of the file's links; nothing of a file that is being written.
+    pub(crate) fn links(&self) -> Option<&Links> {
+        self.links.as_deref()
     }
 
     #[allow(clippy::needless_pass_by_value, reason = "callers give text and errors alike")]
@@ -52,24 +73,22 @@ fn without_build_paths(problem: &str) -> String {
     }
 }
 
-/// Opens a file for reading.
-pub(crate) fn open(path: &Path) -> Result<(File, Place)> {
-    let place = Place::root(path);
+/// Opens a file for reading; links out of it are followed where this is allowed.
+pub(crate) fn open(path: &Path, follow_links: bool) -> Result<(File, Place, Arc<Links>)> {
     let shown = path.display().to_string();
+    raw::forbid_plugins();
     // The file system's own answer is clearer than the library's.
-    let bytes = std::fs::File::open(path)
-        .and_then(|file| file.metadata())
-        .map_err(|error| Error::caused("open", &shown, error))?;
-    if bytes.is_dir() {
-        return Err(Error::new("open", &shown, "expected an HDF5 file, found a folder").of(ErrorKind::DamagedData));
-    }
+    let input = InputFile::new(path)?;
     let file = File::open(path).map_err(|error| {
         Error::new("open", &shown, format!("no HDF5 file, or a damaged one: {error}"))
             .of(ErrorKind::DamagedData)
             .help("a file whose writing was interrupted is often truncated")
     })?;
-    heaps::check(&file, path)?;
-    Ok((file, place))
+    input.check()?;
+    heaps::check(&file, &input)?;
+    let links = Arc::new(Links::of(&file, &input, follow_links));
+    let place = Place { links: Some(Arc::clone(&links)), ..Place::root(path) };
+    Ok((file, place, links))
 }
 
 /// Names of the members of a group, sorted.
@@ -81,19 +100,40 @@ pub(crate) fn members(group: &Group, place: &Place) -> Result<Vec<String>> {
 
 /// A member that must be a group.
 pub(crate) fn group(parent: &Group, place: &Place, name: &str) -> Result<(Group, Place)> {
-    let place = place.child(name);
+    let (parent_place, place) = (place, place.child(name));
+    if let Some(links) = place.links() {
+        links.check(parent, parent_place, name)?;
+    }
     let group = parent.group(name).map_err(|error| place.error(format!("expected a group: {error}")))?;
+    if let Some(links) = place.links() {
+        links.opened(&group, &place)?;
+    }
     Ok((group, place))
 }
 
 /// A member that must be a dataset.
 pub(crate) fn dataset(parent: &Group, place: &Place, name: &str) -> Result<(Dataset, Place)> {
-    let place = place.child(name);
+    let (parent_place, place) = (place, place.child(name));
     if !parent.link_exists(name) {
         return Err(place.error("expected a dataset, found nothing of that name"));
     }
+    if let Some(links) = place.links() {
+        links.check(parent, parent_place, name)?;
+    }
     let dataset = parent.dataset(name).map_err(|error| place.error(format!("expected a dataset: {error}")))?;
+    if let Some(links) = place.links() {
+        links.opened(&dataset, &place)?;
+        links.check_dataset(&dataset, &place)?;
+    }
     Ok((dataset, place))
+}
+
+/// What kind of object a member is.
+pub(crate) fn kind(parent: &Group, place: &Place, name: &str) -> Result<LocationType> {
+    if let Some(links) = place.links() {
+        links.check(parent, place, name)?;
+    }
+    parent.loc_type_by_name(name).map_err(|error| place.child(name).error(error))
 }
 
 /// Of what holds names or settings: a rig has fewer sensors.
@@ -221,6 +261,14 @@ pub(crate) fn written_shape(dataset: &Dataset, place: &Place) -> Result<Vec<usiz
             if chunk.len() != shape.len() || chunk.contains(&0) {
                 return Err(place.error(format!("the chunk shape {chunk:?} does not fit the shape {shape:?}")));
             }
+            if let Some(links) = place.links() {
+                // A chunk is unpacked as a whole.
+                links::within(&chunk, width as u64, links.input().bytes()).map_err(|problem| {
+                    place
+                        .error(format!("a chunk of it is too large: {problem}"))
+                        .help("repack it in smaller chunks: h5repack -l CHUNK=8192x4 IN OUT")
+                })?;
+            }
             let counts = shape.iter().zip(&chunk).map(|(extent, side)| extent.div_ceil(*side));
             let expected = counts.fold(1_usize, usize::saturating_mul);
             if bytes > 0 && found < expected {
@@ -236,6 +284,11 @@ pub(crate) fn written_shape(dataset: &Dataset, place: &Place) -> Result<Vec<usiz
         Layout::Virtual => {}
     }
     Ok(shape)
+}
+
+/// Creates a group without times: equal contents are equal files.
+pub(crate) fn create_group(parent: &Group, name: &str) -> hdf5_metno::Result<Group> {
+    parent.create_group_builder().obj_track_times(false).create(name)
 }
 
 /// Writes a text attribute.

@@ -121,8 +121,13 @@ pub fn load(path: &Path, rig: &Rig) -> Result<Box<dyn Recording>> {
 
 /// The same, with the mark as an analogue trace.
 pub fn load_marked(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Box<dyn Recording>> {
+    load_as(rig, Hdf5Config { path: path.to_owned(), marker, follow_links: false })
+}
+
+/// The same, with other settings.
+pub fn load_as(rig: &Rig, config: Hdf5Config) -> Result<Box<dyn Recording>> {
     let context = Context { folder: Path::new(""), rig: Some(rig) };
-    let loader = Hdf5Config { path: path.to_owned(), marker }.check(&context).unwrap();
+    let loader = config.check(&context).unwrap();
     match loader.open(&Request { rig: Some(rig), columns: &[] })? {
         Source::Turns(recording) => Ok(recording),
         Source::Points(_) => Err(Error::new("load", "a measurement", "it gave points")),

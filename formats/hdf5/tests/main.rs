@@ -5,6 +5,7 @@ mod beside_csv;
 mod damage;
 mod double;
 mod foreign;
+mod harmful;
 mod height_map;
 mod mismatch;
 mod other_programs;

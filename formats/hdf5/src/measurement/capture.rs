@@ -9,6 +9,7 @@ use runout_core::{
 
 use super::{
     ANGLE, INDEX, SAMPLES,
+    extent::Extent,
     line::{Line, each},
     samples::StoredSamples,
 };
@@ -61,6 +62,15 @@ impl CaptureSource {
             None => Phase::open(&group, &place, stored.samples)?,
         };
         Ok(Self { place, z_mm, speed_rpm, dataset, samples_place, stored, phase })
+    }
+
+    /// The bytes of the file that its numbers take, where they lie in one piece.
+    pub(super) fn extents(&self) -> impl Iterator<Item = Extent> {
+        let line = match &self.phase {
+            Phase::Index(line) | Phase::Angle(line) | Phase::Trace(Trace::Line(line), _) => line.extent(),
+            Phase::Trace(Trace::Channel(_), _) | Phase::Unknown(_) => None,
+        };
+        Extent::of(&self.dataset, &self.samples_place).into_iter().chain(line)
     }
 
     /// Sample positions at which turns begin, and the scan that says how to read the encoder.

@@ -7,6 +7,7 @@ use ndarray::s;
 use runout_core::Result;
 
 use crate::{
+    measurement::extent::Extent,
     node::{self, Place},
     type_name::type_name,
 };
@@ -53,6 +54,11 @@ impl Line {
 
     pub(crate) fn place(&self) -> &Place {
         &self.place
+    }
+
+    /// The bytes of the file that it takes, where it lies in one piece.
+    pub(crate) fn extent(&self) -> Option<Extent> {
+        Extent::of(&self.dataset, &self.place)
     }
 
     pub(crate) fn length(&self) -> usize {

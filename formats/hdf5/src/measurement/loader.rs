@@ -1,11 +1,15 @@
 //! The loader: matches a file's groups with the rig.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use hdf5_metno::{File, LocationType, dataset::Layout};
 use runout_core::{
     Error, ErrorKind, Result,
     checksum::Checksum,
+    input_file::InputFile,
     marker::Marker,
     measurement::{Recording, SampleStream, StationKey, StationTruth},
     pipeline::{
@@ -21,13 +25,16 @@ use serde::Deserialize;
 use super::{
     TRUTH,
     capture::{CaptureSource, Phase},
+    extent,
     orientation::Orientation,
     stream::{Hdf5Stream, columns_of},
     truth,
 };
 use crate::{
     MEASUREMENT_FORMAT, VERSION,
+    links::Links,
     node::{self, Place},
+    superblock,
 };
 
 /// `[load] plugin = "hdf5"`: a measurement file of version 1.
@@ -39,6 +46,10 @@ pub struct Hdf5Config {
     /// The once-per-turn mark as an analogue trace, instead of a dataset `index`: a channel of the samples, or a dataset of the
     /// station. A turn begins where it crosses a threshold, between two samples.
     pub marker: Option<Marker>,
+    /// Follows external links, virtual data sets and data in other files, all of which are then inputs with a checksum; by default they
+    /// are refused.
+    #[serde(default)]
+    pub follow_links: bool,
 }
 
 impl StageConfig for Hdf5Config {
@@ -53,13 +64,18 @@ impl StageConfig for Hdf5Config {
         if let Some(marker) = &self.marker {
             marker.check_with(context.rig).map_err(|fault| fault.under("marker"))?;
         }
-        Ok(Box::new(Hdf5Loader { path: context.path(&self.path), marker: self.marker }))
+        Ok(Box::new(Hdf5Loader {
+            path: context.path(&self.path),
+            marker: self.marker,
+            follow_links: self.follow_links,
+        }))
     }
 }
 
 struct Hdf5Loader {
     path: PathBuf,
     marker: Option<Marker>,
+    follow_links: bool,
 }
 
 impl Loader for Hdf5Loader {
@@ -72,7 +88,7 @@ impl Loader for Hdf5Loader {
             Error::new("open", self.path.display().to_string(), "recorded turns need a [rig] to tell the sensors")
                 .of(ErrorKind::Configuration)
         })?;
-        Ok(Source::Turns(Box::new(Hdf5Recording::open(&self.path, rig, self.marker.clone())?)))
+        Ok(Source::Turns(Box::new(Hdf5Recording::open(&self.path, rig, self.marker.clone(), self.follow_links)?)))
     }
 }
 
@@ -80,7 +96,7 @@ impl Loader for Hdf5Loader {
 struct Hdf5Recording {
     file: File,
     place: Place,
-    path: PathBuf,
+    links: Arc<Links>,
     rig: Rig,
     marker: Option<Marker>,
     stations: Vec<StationKey>,
@@ -95,8 +111,8 @@ const SAME_STATION_MM: f64 = 0.001;
 
 impl Hdf5Recording {
     /// Opens a file and checks everything but the samples themselves.
-    fn open(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Self> {
-        let (file, place) = node::open(path)?;
+    fn open(path: &Path, rig: &Rig, marker: Option<Marker>, follow_links: bool) -> Result<Self> {
+        let (file, place, links) = node::open(path, follow_links)?;
         check_format(&file, &place)?;
         let mut remarks = Vec::new();
         let setups = setups(&file, &place, rig, &mut remarks)?;
@@ -104,12 +120,14 @@ impl Hdf5Recording {
         let mut keys: Vec<StationKey> = Vec::with_capacity(names.len());
         let mut extra_channels = Vec::new();
         let mut is_plain = true;
+        let mut extents = Vec::new();
         for name in names {
             let mut z_mm = None;
             for setup in &setups {
                 let (group, setup_place) = node::group(&file, &place, setup)?;
                 let source = CaptureSource::open(&group, &setup_place, &name, marker.as_ref())?;
                 source.phase.check()?;
+                extents.extend(source.extents());
                 columns_of(&source.stored.sensors, rig, &source.samples_place)?;
                 is_plain &= source.dataset.layout() == Layout::Contiguous
                     && source.stored.orientation == Orientation::SampleRows;
@@ -137,13 +155,18 @@ impl Hdf5Recording {
             }
             keys.push(StationKey { name, z_mm: z_mm.map_or(0.0, |(_, z_mm)| z_mm) });
         }
+        if links.is_one_file() {
+            extent::check(extents, links.input().bytes())?;
+        }
         if !extra_channels.is_empty() {
             remarks.push(format!("{place}: channels that the rig does not name: {}", extra_channels.join(", ")));
         }
         keys.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm).then_with(|| a.name.cmp(&b.name)));
-        let (path, rig, stations) = (path.to_owned(), rig.clone(), keys);
-        let checksum = Checksum::of(&path);
-        Ok(Self { file, place, path, rig, marker, stations, remarks, checksum, is_plain })
+        remarks.extend(superblock::remark(links.input())?);
+        let (rig, stations) = (rig.clone(), keys);
+        let checksum = Checksum::of(links.input());
+        is_plain &= links.is_one_file();
+        Ok(Self { file, place, links, rig, marker, stations, remarks, checksum, is_plain })
     }
 }
 
@@ -163,7 +186,11 @@ impl Recording for Hdf5Recording {
     }
 
     fn inputs(&self) -> Vec<PathBuf> {
-        vec![self.path.clone()]
+        self.links.inputs().iter().map(|file| file.path().to_owned()).collect()
+    }
+
+    fn opened(&self) -> Result<Vec<InputFile>> {
+        Ok(self.links.inputs())
     }
 
     fn checksum(&self) -> Option<&Checksum> {
@@ -228,8 +255,7 @@ fn stations(file: &File, place: &Place, rig: &Rig, remarks: &mut Vec<String>) ->
         let (group, place) = node::group(file, place, &setup.id)?;
         let mut names = Vec::new();
         for name in node::members(&group, &place)? {
-            let kind = group.loc_type_by_name(&name).map_err(|error| place.child(&name).error(error))?;
-            if kind == LocationType::Group {
+            if node::kind(&group, &place, &name)? == LocationType::Group {
                 names.push(name);
             } else {
                 remarks.push(format!("{}: no group, and so no station", place.child(&name)));

@@ -2,6 +2,7 @@
 
 mod capture;
 mod coding;
+mod extent;
 mod line;
 pub mod loader;
 mod orientation;

@@ -35,7 +35,11 @@ impl Rows {
         checksum: Reader,
     ) -> Result<Self> {
         let mut rows = Self { dataset, place, orientation, columns, plain: None, checksum };
-        rows.plain = rows.beginning::<T>().and_then(|start| Some((File::open(rows.dataset.filename()).ok()?, start)));
+        if let (Some(start), Some(links)) = (rows.beginning::<T>(), rows.place.links())
+            && links.is_home_of(&rows.dataset)
+        {
+            rows.plain = Some((links.input().open()?, start));
+        }
         if rows.plain.is_some() && !rows.agree::<T>()? {
             rows.plain = None;
         }
@@ -107,9 +111,9 @@ mod tests {
     const COLUMNS: usize = 3;
 
     /// Rows 7 to 432, and whether they came straight from the file.
-    fn read(dataset: Dataset, orientation: Orientation, columns: Range<usize>) -> (Vec<f64>, bool) {
-        let place = Place::root(std::path::Path::new("rows.h5"));
-        let checksum = Checksum::of(std::path::Path::new("rows.h5")).reader();
+    fn read(place: &Place, dataset: Dataset, orientation: Orientation, columns: Range<usize>) -> (Vec<f64>, bool) {
+        let place = place.clone();
+        let checksum = Checksum::of(place.links().unwrap().input()).reader();
         let mut rows = Rows::new::<f64>(dataset, place, orientation, columns, checksum).unwrap();
         let mut found = vec![9.0; 4];
         rows.read(&(7..433), &mut found).unwrap();
@@ -135,18 +139,22 @@ mod tests {
             file.new_dataset_builder().with_data(&turned).create("turned").unwrap();
             file.new_dataset_builder().with_data(&turned).chunk((1, 64)).deflate(1).create("turned, packed").unwrap();
         }
-        let file = hdf5_metno::File::open(&path).unwrap();
+        let (file, place, _) = crate::node::open(&path, true).unwrap();
         let expected: Vec<f64> = values.slice(s![7..433, ..]).iter().copied().collect();
         for (name, straight) in [("plain", true), ("packed", false), ("single", false), ("external", false)] {
-            let found = read(file.dataset(name).unwrap(), Orientation::SampleRows, 0..COLUMNS);
+            let found = read(&place, file.dataset(name).unwrap(), Orientation::SampleRows, 0..COLUMNS);
             assert_eq!(found, (expected.clone(), straight), "{name}");
         }
         let some: Vec<f64> = values.slice(s![7..433, 1..3]).iter().copied().collect();
-        assert_eq!(read(file.dataset("plain").unwrap(), Orientation::SampleRows, 1..3), (some.clone(), false));
+        assert_eq!(read(&place, file.dataset("plain").unwrap(), Orientation::SampleRows, 1..3), (some.clone(), false));
         for name in ["turned", "turned, packed"] {
             let dataset = || file.dataset(name).unwrap();
-            assert_eq!(read(dataset(), Orientation::ChannelRows, 0..COLUMNS), (expected.clone(), false), "{name}");
-            assert_eq!(read(dataset(), Orientation::ChannelRows, 1..3), (some.clone(), false), "{name}");
+            assert_eq!(
+                read(&place, dataset(), Orientation::ChannelRows, 0..COLUMNS),
+                (expected.clone(), false),
+                "{name}"
+            );
+            assert_eq!(read(&place, dataset(), Orientation::ChannelRows, 1..3), (some.clone(), false), "{name}");
         }
     }
 }

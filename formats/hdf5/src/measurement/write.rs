@@ -69,7 +69,7 @@ pub fn write_measurement(
         let file = File::with_options()
             // From this version on HDF5 protects its own structures by checksums.
             .with_fapl(|access| access.libver_v110())
-            .create(pending.path())
+            .create_excl(pending.path())
             .map_err(failure)?;
         describe(&file, options).map_err(failure)?;
         for (index, station) in recording.stations().iter().enumerate() {

@@ -102,7 +102,7 @@ impl<const N: usize> ResultExport<N> {
 
 /// A result file with its head.
 fn create(path: &Path, title: &str) -> hdf5_metno::Result<File> {
-    let file = File::with_options().with_fapl(|access| access.libver_v110()).create(path)?;
+    let file = File::with_options().with_fapl(|access| access.libver_v110()).create_excl(path)?;
     node::put_text(&file, "format", RESULT_FORMAT)?;
     node::put(&file, "version", &VERSION)?;
     node::put_text(&file, "title", title)?;
@@ -126,9 +126,9 @@ fn complete(file: &File, result: &Completed) -> hdf5_metno::Result<()> {
     put_dataset(file, "summary", &json)?;
     put_texts(file, "warnings", summary.all_warnings())?;
     put_texts(file, "effects", summary.effects.iter().map(ToString::to_string))?;
-    let group = file.create_group("provenance")?;
+    let group = node::create_group(file, "provenance")?;
     put_dataset(&group, "configuration", &provenance.configuration)?;
-    let inputs = group.create_group("inputs")?;
+    let inputs = node::create_group(&group, "inputs")?;
     put_texts(&inputs, "path", provenance.inputs.iter().map(|input| &input.path))?;
     put_texts(&inputs, "blake3", provenance.inputs.iter().map(|input| &input.blake3))?;
     let bytes: Vec<u64> = provenance.inputs.iter().map(|Input { bytes, .. }| *bytes).collect();

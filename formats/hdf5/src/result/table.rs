@@ -40,7 +40,7 @@ pub(super) struct TableGroup<const N: usize> {
 
 impl<const N: usize> TableGroup<N> {
     pub(super) fn create(file: &File, table: &TableSpec) -> Result<Self> {
-        let group = file.create_group(&table.name)?;
+        let group = node::create_group(file, &table.name)?;
         node::put_text(&group, "about", &table.about)?;
         let columns = table.columns.iter().map(|column| ColumnData::create(&group, column)).collect::<Result<_>>()?;
         Ok(Self { name: table.name.clone(), columns })

@@ -1,0 +1,34 @@
+//! Two calls of the C library that the `hdf5-metno` crate does not have.
+#![allow(unsafe_code, reason = "calls of a C library")]
+
+use std::{ffi::CString, sync::Once};
+
+use hdf5_metno::{Group, sync::sync};
+use hdf5_metno_sys::{h5l::H5Lget_val, h5p::H5P_DEFAULT, h5pl::H5PLset_loading_state};
+
+/// Bytes of a link's value: names of files and paths are shorter.
+const LONGEST_VALUE: usize = 8192;
+
+/// Keeps the library from loading filters as programs from `HDF5_PLUGIN_PATH` or the folder it was built with: what a file names is
+/// not to be run.
+pub(crate) fn forbid_plugins() {
+    static ONCE: Once = Once::new();
+    // SAFETY: the C function takes a mask by value (`unsigned int`), which the binding declares as a pointer; a null pointer is the mask
+    // 0, no plugins of any kind. Nothing is dereferenced.
+    ONCE.call_once(|| {
+        sync(|| unsafe { H5PLset_loading_state(std::ptr::null_mut()) });
+    });
+}
+
+/// The value of a soft or external link: a path; or flags, a file and a path, each ended by NUL (HDF5 reference, H5Lget_val and
+/// H5Lunpack_elink_val). `None` where there is none, or it is too long.
+pub(crate) fn link_value(group: &Group, name: &str) -> Option<Vec<u8>> {
+    let name = CString::new(name).ok()?;
+    let mut value = vec![0_u8; LONGEST_VALUE];
+    // SAFETY: the name is ended by NUL, the buffer as long as said, and both outlive the call, which the library's lock guards.
+    let status = sync(|| unsafe {
+        H5Lget_val(group.id(), name.as_ptr(), value.as_mut_ptr().cast(), LONGEST_VALUE, H5P_DEFAULT)
+    });
+    // A longer value fills the buffer to its end.
+    (status >= 0 && value.last() == Some(&0)).then_some(value)
+}
