@@ -1,6 +1,6 @@
 //! What can go wrong, how it is shown, and the exit status that it gives.
 
-use std::{io, process::ExitCode};
+use std::{borrow::Cow, io, process::ExitCode};
 
 use runout_core::{
     Error, ErrorKind,
@@ -12,6 +12,11 @@ use crate::render::{self, diagnostic};
 
 /// The kind of a mistake in the command line, in the JSON document.
 const COMMAND_LINE: &str = "command-line";
+
+/// The exit status of a mistake in the program.
+const PROGRAM: u8 = 101;
+const REPORT: &str =
+    "this is a mistake in the program: report it with the command and its files; no result was published";
 
 /// Why a command did not do its work.
 #[derive(Debug)]
@@ -35,6 +40,8 @@ pub enum Failure {
     Warnings(usize),
     /// Standard output cannot be written to.
     Output(io::Error),
+    /// The program itself failed: a mistake in it.
+    Program(String),
 }
 
 impl From<clap::Error> for Failure {
@@ -79,13 +86,19 @@ impl Failure {
         ExitCode::from(match self {
             Self::CommandLine(_) | Self::Name { .. } | Self::Configuration(_) => 2,
             Self::Work(_) | Self::Limit(_) | Self::Warnings(_) | Self::Output(_) => 1,
+            Self::Program(_) => PROGRAM,
         })
     }
 
     fn text(&self) -> String {
         match self {
-            Self::CommandLine(error) if render::fancy_stderr() => error.render().ansi().to_string(),
-            Self::CommandLine(error) => error.render().to_string(),
+            Self::CommandLine(error) => {
+                let text = error.render().to_string();
+                match render::printable(&text) {
+                    Cow::Borrowed(_) if render::fancy_stderr() => error.render().ansi().to_string(),
+                    harmless => harmless.into_owned(),
+                }
+            }
             Self::Name { message, help } => plain(message, Some(help)),
             Self::Configuration(ConfigError::Text(diagnostic)) => diagnostic::report(diagnostic),
             Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
@@ -101,6 +114,7 @@ impl Failure {
                 plain(&format!("{count} warning{s}, and --fail-on-warning"), None)
             }
             Self::Output(error) => plain(&format!("cannot write to stdout: {error}"), None),
+            Self::Program(message) => plain(&format!("the program failed: {message}"), Some(REPORT)),
         }
     }
 
@@ -135,11 +149,12 @@ impl Failure {
             Self::Limit(open) => json!({ "kind": "limit", "message": "not proven to be kept", "limits": open }),
             Self::Warnings(count) => json!({ "kind": "warnings", "message": "there are warnings", "warnings": count }),
             Self::Output(error) => json!({ "kind": ErrorKind::Io.name(), "message": error.to_string() }),
+            Self::Program(message) => json!({ "kind": "program", "message": message, "help": REPORT }),
         }
     }
 }
 
 fn plain(message: &str, help: Option<&str>) -> String {
     let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
-    format!("error: {message}\n{help}")
+    render::printable(&format!("error: {message}\n{help}")).into_owned()
 }

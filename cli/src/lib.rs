@@ -19,8 +19,12 @@ mod render;
 
 use std::{
     io::{self, Write},
+    panic::{self, AssertUnwindSafe},
     process::ExitCode,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use clap::Parser;
@@ -34,7 +38,7 @@ use failure::Failure;
 pub fn main_with(registry: &Registry) -> ExitCode {
     leave_nothing_half();
     let (json, outcome) = match CommandLine::try_parse() {
-        Ok(line) => (line.json, commands::execute(line.command, line.json, registry)),
+        Ok(line) => (line.json, guarded(|| commands::execute(line.command, line.json, registry))),
         Err(error) if error.use_stderr() => (std::env::args_os().any(|word| word == "--json"), Err(error.into())),
         // `--help` and `--version` come this way, and clap knows best how to print them.
         Err(error) => (false, error.print().map_err(Failure::Output)),
@@ -51,6 +55,21 @@ pub fn main_with(registry: &Registry) -> ExitCode {
     }
 }
 
+/// Does work; a panic in it is a failure with words, as a document too.
+fn guarded(work: impl FnOnce() -> Result<(), Failure>) -> Result<(), Failure> {
+    static PLACE: Mutex<String> = Mutex::new(String::new());
+    panic::set_hook(Box::new(|found| {
+        let place = found.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
+        *PLACE.lock().unwrap_or_else(PoisonError::into_inner) = place;
+    }));
+    panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
+        let text = payload.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("without words");
+        let place = PLACE.lock().unwrap_or_else(PoisonError::into_inner);
+        Err(Failure::Program(format!("{text}{place}")))
+    })
+}
+
 /// Whether the program was interrupted and ends.
 static ENDS: AtomicBool = AtomicBool::new(false);
 
@@ -65,4 +84,16 @@ fn leave_nothing_half() {
         let _ = writeln!(io::stderr(), "\ninterrupted: what was not finished is taken away");
         std::process::exit(INTERRUPTED);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_a_failure_with_words() {
+        let failure = guarded(|| panic!("index {} out of range", 7));
+        assert!(matches!(failure, Err(Failure::Program(text)) if text.starts_with("index 7 out of range (cli")));
+        assert!(guarded(|| Ok(())).is_ok());
+    }
 }

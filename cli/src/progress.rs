@@ -5,6 +5,8 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use runout_core::pipeline::run::Observer;
 
+use crate::render::printable;
+
 /// A bar that fills as things get done.
 pub struct Progress {
     bar: ProgressBar,
@@ -32,7 +34,7 @@ impl Progress {
 
     /// One more thing is done.
     pub fn advance(&self, done: &str) {
-        self.bar.set_message(done.to_owned());
+        self.bar.set_message(printable(done).into_owned());
         self.bar.inc(1);
     }
 }

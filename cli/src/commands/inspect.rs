@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fs::File, io::Read, path::Path};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use runout_core::{Error, ErrorKind, Result};
+use runout_core::{Error, ErrorKind, Result, input_file::open_regular};
 use runout_hdf5::FileReport;
 use serde::Serialize;
 
@@ -57,7 +57,7 @@ pub fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failur
 
 fn report(path: &Path) -> Result<Report> {
     let mut signature = Vec::new();
-    let start = File::open(path).and_then(|file| file.take(8).read_to_end(&mut signature));
+    let start = open_regular(path).and_then(|file| file.take(8).read_to_end(&mut signature));
     start.map_err(|error| Error::caused("inspect", path.display().to_string(), error))?;
     if signature == *b"\x89HDF\r\n\x1a\n" {
         return runout_hdf5::inspect(path).map(Report::Hdf5);

@@ -1,20 +1,27 @@
 //! Configuration mistakes: the place in the text, what is wrong, what to do.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
 use runout_core::pipeline::error::Diagnostic;
 
 use textwrap::WordSplitter;
 
-use super::fancy_stderr;
+use super::{fancy_stderr, printable};
 
 /// Columns of a report that no terminal bounds.
 const PLAIN_WIDTH: usize = 100;
+/// Bytes of a line that is drawn, at most; lines around a mistake that are drawn with it, and characters where nothing is drawn.
+const LONGEST_LINE: usize = 1000;
+const AROUND: usize = 2;
+const EXCERPT: usize = 60;
 
 /// The report for stderr: in colour on a terminal, in ASCII elsewhere.
 #[must_use]
 pub fn report(diagnostic: &Diagnostic) -> String {
+    if !can_be_drawn(diagnostic) {
+        return plain(diagnostic);
+    }
     let handler = if fancy_stderr() {
         GraphicalReportHandler::new_themed(GraphicalTheme::unicode())
     } else {
@@ -33,11 +40,33 @@ pub fn report(diagnostic: &Diagnostic) -> String {
         .render_report(&mut text, &shown)
         .is_err()
     {
-        // A report that cannot be drawn still has to be read.
-        let (line, column) = diagnostic.line_and_column();
-        text = format!("error: {}:{line}:{column}: {}\n", diagnostic.source_name, diagnostic.message);
+        text = plain(diagnostic);
     }
     text.trim_start_matches(' ').to_owned()
+}
+
+/// Whether the lines around the mistake are short enough to be drawn, and all of it harmless on a terminal.
+fn can_be_drawn(diagnostic: &Diagnostic) -> bool {
+    let Diagnostic { message, help, source_name, source_text, span } = diagnostic;
+    let line = source_text.get(..span.start).map_or(0, |before| before.matches('\n').count());
+    let lines = source_text.get(span.clone()).map_or(0, |inside| inside.matches('\n').count());
+    let near = source_text.lines().skip(line.saturating_sub(AROUND)).take(2 * AROUND + 1 + lines);
+    let harmless = |text: &str| matches!(printable(text), Cow::Borrowed(_));
+    near.into_iter().all(|line| line.len() <= LONGEST_LINE && harmless(line))
+        && harmless(message)
+        && harmless(source_name)
+        && harmless(help.as_deref().unwrap_or_default())
+}
+
+/// The report without a drawing.
+fn plain(diagnostic: &Diagnostic) -> String {
+    let Diagnostic { message, help, source_name, source_text, span } = diagnostic;
+    let (line, column) = diagnostic.line_and_column();
+    let rest = source_text.get(span.start..).unwrap_or_default().lines().next().unwrap_or_default();
+    let excerpt: String = rest.chars().take(EXCERPT).collect();
+    let help = help.as_ref().map(|help| format!("  help: {help}\n")).unwrap_or_default();
+    let text = format!("error: {message}\n  at {source_name}:{line}:{column}: {excerpt}\n{help}");
+    printable(&text).into_owned()
 }
 
 /// The core's diagnostic as miette knows it.

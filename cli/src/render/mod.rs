@@ -14,9 +14,34 @@ pub mod plan_points;
 pub mod summary;
 pub mod table;
 
-use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::{
+    borrow::Cow,
+    io::{self, ErrorKind, IsTerminal, Write},
+};
 
 use serde::Serialize;
+
+/// Whether a character may change what a terminal shows of others: control characters, and marks that turn the direction of text.
+fn is_harmful(character: char) -> bool {
+    (character.is_control() && !matches!(character, '\n' | '\t'))
+        || matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// A text as a terminal may show it, whatever file it comes from: control characters as `\u{1b}`.
+#[must_use]
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_harmful) {
+        return Cow::Borrowed(text);
+    }
+    let escaped = |shown: String, character: char| {
+        if is_harmful(character) {
+            shown + &character.escape_unicode().to_string()
+        } else {
+            shown + character.encode_utf8(&mut [0; 4])
+        }
+    };
+    Cow::Owned(text.chars().fold(String::new(), escaped))
+}
 
 /// Writes to stdout. Whoever closed it early (`| head`) has seen enough: that is no failure.
 ///
@@ -24,7 +49,7 @@ use serde::Serialize;
 /// When stdout cannot be written to.
 pub fn to_stdout(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+    match stdout.write_all(printable(text).as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         outcome => outcome,
     }
@@ -41,7 +66,14 @@ pub fn to_stderr(text: &str) {
 /// # Errors
 /// When stdout cannot be written to.
 pub fn document(value: &impl Serialize) -> io::Result<()> {
-    let mut text = serde_json::to_string_pretty(value)?;
+    let mut text = String::new();
+    for character in serde_json::to_string_pretty(value)?.chars() {
+        // Only texts have them; JSON knows no other spelling.
+        match character {
+            harmful if is_harmful(harmful) => text.push_str(&format!("\\u{:04x}", u32::from(harmful))),
+            other => text.push(other),
+        }
+    }
     text.push('\n');
     to_stdout(&text)
 }

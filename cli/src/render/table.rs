@@ -1,5 +1,20 @@
 //! Tables of text.
 
+use super::printable;
+
+/// Characters of a cell, at most: a name from a file may have any length.
+const LONGEST: usize = 400;
+
+/// A cell as a terminal may show it.
+fn cut(cell: String) -> String {
+    let mut shown = printable(&cell).into_owned();
+    if let Some((end, _)) = shown.char_indices().nth(LONGEST) {
+        shown.truncate(end);
+        shown.push('…');
+    }
+    shown
+}
+
 /// Rows under a header; columns as wide as they need.
 #[derive(Debug, Clone)]
 pub struct Table {
@@ -17,7 +32,7 @@ impl Table {
 
     /// Adds a row.
     pub fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
-        self.rows.push(cells.into_iter().map(Into::into).collect());
+        self.rows.push(cells.into_iter().map(|cell| cut(cell.into())).collect());
     }
 
     /// Whether it has no rows yet.
@@ -35,11 +50,12 @@ impl Table {
         let used = |column: &usize| self.rows[1..].iter().any(|row| !cell(row, *column).is_empty());
         let columns: Vec<usize> = (0..header.len()).filter(used).collect();
         let width = |column: usize| self.rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..header.len()).map(width).collect();
         let mut text = String::new();
         for row in &self.rows {
             let mut line = String::new();
             for &column in &columns {
-                let (cell, width) = (cell(row, column), width(column));
+                let (cell, width) = (cell(row, column), widths[column]);
                 line.push_str("  ");
                 let cell = if column < self.words { format!("{cell:<width$}") } else { format!("{cell:>width$}") };
                 line.push_str(&cell);
@@ -62,5 +78,13 @@ mod tests {
         table.row(["bearing", "", "12.50"]);
         assert_eq!(table.text(), "  section  rms µm\n  a          4.01\n  bearing   12.50\n");
         assert_eq!(Table::new(0, ["x"]).text(), "");
+    }
+
+    #[test]
+    fn cells_from_files_are_cut_and_shown_harmless() {
+        let mut table = Table::new(1, ["station", "z mm"]);
+        table.row(["s".repeat(70_000), "\u{1b}[2J".into()]);
+        let text = table.text();
+        assert!(text.contains("ss…") && text.contains("\\u{1b}[2J") && !text.contains('\u{1b}'), "{text}");
     }
 }

@@ -125,3 +125,174 @@ fn an_interrupted_program_leaves_nothing() {
     assert!(said.contains("interrupted: what was not finished is taken away"), "{said}");
     assert!(!out.exists());
 }
+
+/// Every file below a folder, with its contents.
+fn contents(folder: &std::path::Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.path().is_dir() {
+            found.extend(contents(&entry.path()));
+        } else {
+            found.insert(entry.path(), fs::read(entry.path()).unwrap());
+        }
+    }
+    found
+}
+
+#[test]
+fn equal_runs_give_equal_files() {
+    let folder = campaign(&(pipeline() + "\n[[export]]\nplugin = \"hdf5\"\npath = \"out/result.h5\"\n"));
+    let run = || {
+        assert_eq!(folder.run(&["run", "pipeline.toml"]).status, 0);
+        contents(&folder.path().join("out"))
+    };
+    let first = run();
+    // Times in HDF5 are whole seconds.
+    std::thread::sleep(std::time::Duration::from_millis(1100));
+    let second = run();
+    let other: Vec<_> =
+        first.iter().filter(|(path, bytes)| second.get(*path) != Some(bytes)).map(|(path, _)| path).collect();
+    assert!(other.is_empty() && first.len() == second.len(), "{other:?}");
+}
+
+/// After a kill at any step, the next run succeeds and leaves nothing else; until it, what is there is old or new as a whole, or a journal
+/// says that it is neither. A step that fails takes back those before it.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_kill_at_any_step_leaves_old_or_new_results() {
+    let text = pipeline() + "\n[[export]]\nplugin = \"hdf5\"\npath = \"elsewhere/result.h5\"\n";
+    let folder = campaign(&text);
+    let results = || -> std::collections::BTreeMap<_, _> {
+        ["out", "elsewhere"].iter().flat_map(|name| contents(&folder.path().join(name))).collect()
+    };
+    let shown = |files: &std::collections::BTreeMap<std::path::PathBuf, Vec<u8>>| {
+        files
+            .iter()
+            .filter(|(path, _)| !path.file_name().unwrap().to_string_lossy().starts_with('.'))
+            .map(|(path, bytes)| (path.clone(), bytes.clone()))
+            .collect::<std::collections::BTreeMap<_, _>>()
+    };
+    let run = |title: &str, fault: Option<String>| {
+        let mut command = assert_cmd::cargo::cargo_bin_cmd!("runout");
+        command.current_dir(folder.path()).args(["run", "pipeline.toml", "--set", &format!("title={title}")]);
+        command.envs(fault.map(|fault| ("RUNOUT_TEST_FAULT", fault))).output().unwrap().status.code()
+    };
+    let whole = |title: &str| {
+        assert_eq!(run(title, None), Some(0));
+        results()
+    };
+    let (new, old) = (whole("new"), whole("old"));
+    assert!(new.len() > 4 && new.keys().eq(old.keys()));
+    for kind in ["kill", "fail"] {
+        let mut interrupted = 0;
+        for step in 1.. {
+            assert!(step < 200, "the steps do not end");
+            let code = run("new", Some(format!("{kind}:{step}")));
+            let left = results();
+            let journal = left.keys().any(|path| path.extension().is_some_and(|extension| extension == "journal"));
+            let state = shown(&left);
+            if code == Some(0) && kind == "kill" {
+                break;
+            }
+            if kind == "fail" && code == Some(0) {
+                // A step that only cleans up, or none.
+                assert!(state == new, "{kind}:{step}");
+                if left == new {
+                    break;
+                }
+            } else {
+                interrupted += usize::from(state != old && state != new);
+                assert!(
+                    state == old || state == new || (journal && kind == "kill"),
+                    "{kind}:{step}: {:?}",
+                    state.keys()
+                );
+            }
+            assert!(whole("old") == old, "{kind}:{step}: the next run leaves other files");
+        }
+        assert!(interrupted <= new.len(), "{kind}: {interrupted}");
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn what_is_read_may_not_change_meanwhile() {
+    use std::time::Duration;
+    let folder = campaign(&pipeline());
+    assert_eq!(folder.run(&["run", "pipeline.toml"]).status, 0);
+    let before = contents(&folder.path().join("out"));
+    // A pipeline that takes long enough, and a recording that comes in the place of the one that is read.
+    let long = ["recording.stations={ first_z_mm = 0, step_mm = 0.01, count = 60 }", "output=long.h5"];
+    assert_eq!(folder.run(&["simulate", "scenario.toml", "--set", long[0], "--set", long[1]]).status, 0);
+    fs::copy(folder.path().join("long.h5"), folder.path().join("other.h5")).unwrap();
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("runout"));
+    command.current_dir(folder.path()).args(["run", "pipeline.toml", "--set", "load.path=long.h5"]);
+    let child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let locked = folder.path().join("out/.runout.lock");
+    while !locked.exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let second = folder.run(&["run", "pipeline.toml"]);
+    assert!(second.status == 1 && second.stderr.contains(&format!("process {}", child.id())), "{}", second.stderr);
+    fs::rename(folder.path().join("other.h5"), folder.path().join("long.h5")).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && said.contains("another file took its place"), "{said}");
+    assert!(contents(&folder.path().join("out")) == before);
+}
+
+#[test]
+fn what_a_file_or_a_key_says_harms_neither_program_nor_terminal() {
+    let folder = campaign(&pipeline());
+    let deep = format!("{}=1", vec!["a"; 30_000].join("."));
+    let long = format!("title = \"{}\"\nx = 1", "x".repeat(70_000));
+    let escapes = pipeline().replace("Turned shaft", "\\u001b[2J\\u202eshaft");
+    let dotted = format!("{}\n{deep}\n", pipeline());
+    for (name, text) in [("long.toml", &long), ("escapes.toml", &escapes), ("deep.toml", &dotted)] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    fs::write(folder.path().join("column.toml"), format!("rig = {{ {}x = [}}", " ".repeat(70_000))).unwrap();
+    for (arguments, status) in [
+        (&["check", "pipeline.toml", "--json", "--set", &deep][..], 2),
+        (&["check", "deep.toml", "--json"], 2),
+        (&["check", "long.toml", "--json"], 2),
+        (&["check", "column.toml", "--json"], 2),
+        (&["check", "pipeline.toml", "--json", "--set", "title=\"a\\u0000b\""], 2),
+        (&["run", "escapes.toml"], 0),
+        (&["run", "escapes.toml", "--json"], 0),
+    ] {
+        let ran = folder.run(arguments);
+        let named = arguments[..2].join(" ");
+        assert_eq!(ran.status, status, "{named}: {}", ran.stderr);
+        assert!(
+            !ran.stdout.contains(['\u{1b}', '\u{202e}']) && !ran.stderr.contains(['\u{1b}', '\u{202e}']),
+            "{named}"
+        );
+        assert!(!arguments.contains(&"--json") || serde_json::from_str::<Value>(&ran.stdout).is_ok(), "{named}");
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn what_is_no_file_is_refused_at_once() {
+    let folder = campaign(&pipeline());
+    assert!(std::process::Command::new("mkfifo").arg(folder.path().join("pipe")).status().unwrap().success());
+    for path in ["pipe", "/dev/zero", "."] {
+        for arguments in [
+            &["inspect", path][..],
+            &["check", path],
+            &["run", "pipeline.toml", "--set", &format!("load.path=\"{path}\"")],
+        ] {
+            let ran = folder.run(arguments);
+            assert!(
+                ran.status != 0 && ran.stderr.contains("expected a file, found a"),
+                "{arguments:?}: {}",
+                ran.stderr
+            );
+        }
+    }
+    for angle in ["1e308", "-1e308", "nan"] {
+        let ran = folder.run(&["run", "pipeline.toml", "--set", &format!("rig.sensors.0.angle_deg={angle}")]);
+        assert!(ran.status != 101 && ran.status != 0, "{angle}: {}", ran.stdout);
+    }
+}
