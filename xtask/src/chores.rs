@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, fs, path::Path, process::Command, time::SystemTime};
 
 use crate::{
-    foreign, house,
+    foreign, fuzz, house, kill_test,
     process::{Outcome, answer, root, run, say, target},
     setup::{self, cargo},
 };
@@ -33,6 +33,11 @@ pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
     run(&mut tests)?;
     run(&mut cargo(&["test", "--workspace", "--doc", "--quiet"])?)?;
     run_example(&target().join("debug/runout"))?;
+    if complete {
+        let program = target().join("debug/runout").display().to_string();
+        kill_test::test(&["--kills", "100", &program])?;
+        fuzz::fuzz(&["--minutes", "2", &program])?;
+    }
     let skips = Skips::read(&fs::read_to_string(&skips).unwrap_or_default());
     say(&skips.text());
     let there = std::env::var_os("RUNOUT_DATA").is_some() || target().join("data").is_dir();
@@ -72,6 +77,14 @@ impl Skips {
         );
         self.lines.iter().map(String::as_str).chain([counts.as_str()]).collect::<Vec<_>>().join("\n")
     }
+}
+
+/// Advisories, licences, yanked versions and sources of dependencies.
+pub fn deny() -> Outcome {
+    if answer("cargo-deny", &["--version"]).is_none() {
+        run(&mut cargo(&["install", "--locked", "cargo-deny"])?)?;
+    }
+    run(&mut cargo(&["deny", "check"])?)
 }
 
 /// Writes schemas/ anew.
@@ -122,6 +135,11 @@ mod tests {
     fn a_test_counts_once_whatever_it_lacks() {
         let list = "skipped: circles: a.csv is not there; fetch it\nskipped: circles: b.csv is not there\n\
                     skipped: circles: a.csv is not there; fetch it\nnot compared: cylinders: c.csv is not there\n";
+        if complete {
+            let program = target().join("debug/runout").display().to_string();
+            kill_test::test(&["--kills", "100", &program])?;
+            fuzz::fuzz(&["--minutes", "2", &program])?;
+        }
         let skips = Skips::read(list);
         assert_eq!((skips.skipped, skips.not_compared, skips.lines.len()), (1, 1, 3));
         assert!(skips.text().ends_with("measured data: 1; without a file that only some folders of data hold: 1"));

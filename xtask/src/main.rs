@@ -6,8 +6,11 @@ mod chores;
 #[cfg(any(test, feature = "data"))]
 mod data;
 mod foreign;
+mod fuzz;
 mod house;
+mod kill_test;
 mod process;
+mod random;
 mod results;
 mod setup;
 
@@ -29,6 +32,11 @@ cargo xtask COMMAND
   check-house [--strict]
                 print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, and
                 on a cycle of modules; with --strict also on long files without a reason
+  fuzz [--inputs N] [--minutes M] [--seed S] [PROGRAM]
+                give mutated configurations, tables, HDF5 files and overrides to the program; 2 minutes without more
+  kill-test [--kills N] [--seed S] [PROGRAM]
+                kill runs at every step and at all times, and look at what is left; 1000 kills without more
+  deny          advisories, licences, yanked versions and sources of dependencies (deny.toml), by cargo-deny
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types
   bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]
@@ -81,6 +89,9 @@ fn main() -> ExitCode {
         ["demo"] => chores::demo(),
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1"), false),
         ["test", "--ci"] => chores::test(true, true),
+        ["fuzz", ref rest @ ..] => fuzz::fuzz(rest),
+        ["kill-test", ref rest @ ..] => kill_test::test(rest),
+        ["deny"] => chores::deny(),
         ["check-house", ref rest @ ..] => house::check(rest),
         ["data", ref rest @ ..] => measured_data(rest),
         ["schemas"] => chores::schemas(),
