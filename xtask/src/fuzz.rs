@@ -118,12 +118,9 @@ fn drive(program: &Path, inputs: u64, until: Option<Instant>, seed: u64) -> Outc
     let dropped = ["pattern", "stations", "sample_rate_hz", "speed_rpm"];
     let hdf5 = hdf5.lines().filter(|line| dropped.iter().all(|key| !line.starts_with(key)));
     let hdf5 = hdf5.collect::<Vec<_>>().join("\n");
-    let made = Command::new(program)
-        .args(["simulate"])
-        .arg(example.join("scenario.toml"))
-        .arg("--out")
-        .arg(place.join("seed.h5"));
-    let made = { made }.stdout(Stdio::null()).stderr(Stdio::null()).status().map_err(words)?;
+    let mut simulate = Command::new(program);
+    simulate.arg("simulate").arg(example.join("scenario.toml")).arg("--out").arg(place.join("seed.h5"));
+    let made = simulate.stdout(Stdio::null()).stderr(Stdio::null()).status().map_err(words)?;
     if !made.success() {
         return Err("the recording that is to be damaged cannot be made".into());
     }

@@ -185,7 +185,8 @@ fn a_kill_at_any_step_leaves_old_or_new_results() {
     assert!(new.len() > 4 && new.keys().eq(old.keys()));
     for kind in ["kill", "fail"] {
         let mut interrupted = 0;
-        for step in 1.. {
+        // Kills at every step; failures, which take back what was renamed, at some.
+        for step in (1..).step_by(if kind == "kill" { 1 } else { 3 }) {
             assert!(step < 200, "the steps do not end");
             let code = run("new", Some(format!("{kind}:{step}")));
             let left = results();

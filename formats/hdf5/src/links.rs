@@ -155,20 +155,19 @@ impl Links {
                 return Err("it is a virtual data set, whose numbers lie in others".into());
             }
             let mut held = self.input.bytes();
-            for mapping in settings.get_virtual_map().map_err(words)? {
-                let source = &mapping.src_filename;
+            for (source, path) in raw::virtual_sources(&settings).ok_or("its sources cannot be read")? {
                 let file = if source == "." {
                     dataset.file().map_err(words)?
                 } else {
-                    self.take_near(source)?;
-                    let near = self.near(source).find(|path| path.is_file());
-                    let path = near.ok_or_else(|| format!("the file `{source}` of its numbers is not there"))?;
-                    held += path.metadata().map_or(0, |found| found.len());
-                    File::open(path).map_err(words)?
+                    self.take_near(&source)?;
+                    let near = self.near(&source).find(|path| path.is_file());
+                    let near = near.ok_or_else(|| format!("the file `{source}` of its numbers is not there"))?;
+                    held += near.metadata().map_or(0, |found| found.len());
+                    File::open(near).map_err(words)?
                 };
-                let source = file.dataset(&mapping.src_dataset).map_err(words)?;
+                let source = file.dataset(&path).map_err(words)?;
                 if source.layout() == Layout::Virtual {
-                    return Err(format!("its numbers lie in `{}`, a virtual data set itself", mapping.src_dataset));
+                    return Err(format!("its numbers lie in `{path}`, a virtual data set itself"));
                 }
                 self.storage(&source, place)?;
                 filters(&source, place).map_err(|error| error.to_string())?;
@@ -188,7 +187,9 @@ impl Links {
             let path = Path::new(&part.name);
             self.take(path)?;
             let found = path.metadata().map_err(|error| error.to_string())?.len();
-            held += found.saturating_sub(part.offset as u64).min(part.size as u64);
+            // All that follows is stated as 0.
+            let size = if part.size == 0 { u64::MAX } else { part.size as u64 };
+            held += found.saturating_sub(part.offset as u64).min(size);
         }
         let elements = dataset.shape().iter().try_fold(bytes, |product, side| product.checked_mul(*side as u64));
         match elements {

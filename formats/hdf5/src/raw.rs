@@ -1,10 +1,13 @@
-//! Two calls of the C library that the `hdf5-metno` crate does not have.
+//! Calls of the C library that the `hdf5-metno` crate does not have, or not for all files.
 #![allow(unsafe_code, reason = "calls of a C library")]
 
-use std::{ffi::CString, sync::Once};
+use std::{
+    ffi::{CString, c_char},
+    sync::Once,
+};
 
-use hdf5_metno::{Group, sync::sync};
-use hdf5_metno_sys::{h5l::H5Lget_val, h5p::H5P_DEFAULT, h5pl::H5PLset_loading_state};
+use hdf5_metno::{Group, plist::DatasetCreate, sync::sync};
+use hdf5_metno_sys::{h5l::H5Lget_val, h5p::{H5P_DEFAULT, H5Pget_virtual_count, H5Pget_virtual_dsetname, H5Pget_virtual_filename}, h5pl::H5PLset_loading_state};
 
 /// Bytes of a link's value: names of files and paths are shorter.
 const LONGEST_VALUE: usize = 8192;
@@ -31,4 +34,21 @@ pub(crate) fn link_value(group: &Group, name: &str) -> Option<Vec<u8>> {
     });
     // A longer value fills the buffer to its end.
     (status >= 0 && value.last() == Some(&0)).then_some(value)
+}
+
+/// The sources of a virtual data set, `(file, data set)`, `.` for the same file; `None` where they cannot be read. The crate reads their
+/// selections with them, not all of which it knows.
+pub(crate) fn virtual_sources(settings: &DatasetCreate) -> Option<Vec<(String, String)>> {
+    let mut count = 0;
+    // SAFETY: the property list lives, the number outlives the call, which the library's lock guards.
+    let status = sync(|| unsafe { H5Pget_virtual_count(settings.id(), &raw mut count) });
+    let name = |read: unsafe extern "C" fn(i64, usize, *mut c_char, usize) -> isize, index| {
+        let mut text = vec![0_u8; LONGEST_VALUE];
+        // SAFETY: as above; the buffer is as long as said.
+        let length = sync(|| unsafe { read(settings.id(), index, text.as_mut_ptr().cast(), LONGEST_VALUE) });
+        text.truncate(usize::try_from(length).ok().filter(|length| *length < LONGEST_VALUE)?);
+        String::from_utf8(text).ok()
+    };
+    let source = |index| Some((name(H5Pget_virtual_filename, index)?, name(H5Pget_virtual_dsetname, index)?));
+    (status >= 0).then(|| (0..count).map(source).collect())?
 }

@@ -102,7 +102,11 @@ impl<const N: usize> ResultExport<N> {
 
 /// A result file with its head.
 fn create(path: &Path, title: &str) -> hdf5_metno::Result<File> {
-    let file = File::with_options().with_fapl(|access| access.libver_v110()).create_excl(path)?;
+    let file = File::with_options()
+        .with_fapl(|access| access.libver_v110())
+        // Without times: equal contents are equal files.
+        .with_fcpl(|create| create.obj_track_times(false))
+        .create_excl(path)?;
     node::put_text(&file, "format", RESULT_FORMAT)?;
     node::put(&file, "version", &VERSION)?;
     node::put_text(&file, "title", title)?;
