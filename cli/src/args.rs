@@ -35,6 +35,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Say what a rig can separate and how well, what to add to it, and better angles for its sensors.
     Plan(PlanArgs),
+    /// Write an earlier result as one page to look at, for a browser and for print.
+    Report(ReportArgs),
     /// List the plugins, or the keys of one.
     Plugins(PluginsArgs),
     /// Print JSON Schemas of configurations and results.
@@ -229,6 +231,17 @@ pub struct SchemaArgs {
 pub struct InspectArgs {
     /// A measurement, a result or a table.
     pub file: PathBuf,
+}
+
+/// `runout report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// A result file, which `[[export]] plugin = "hdf5"` of a run or a diagnosis wrote.
+    #[arg(value_name = "RESULT.h5")]
+    pub result: PathBuf,
+    /// Write the report here; beside the result without it, as RESULT.html.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// `runout completions`.

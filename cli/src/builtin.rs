@@ -24,6 +24,7 @@ pub fn registry() -> Registry {
         runout_gltf::register,
         runout_obj::register,
         runout_figures::register,
+        runout_report::register,
     ] {
         register(&mut registry);
     }

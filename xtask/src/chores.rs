@@ -99,6 +99,7 @@ pub fn demo() -> Outcome {
     run_example(&program)?;
     let shown = program.strip_prefix(root()).unwrap_or(&program).display();
     say(&format!("\nThe program is {shown}; meshes open in MeshLab and Blender, tables in Python."));
+    say(&format!("Open the report in a browser: {}", root().join("examples/01-four-sensor/out/report.html").display()));
     Ok(())
 }
 

@@ -1,4 +1,5 @@
-//! Readers that others wrote, for tests of our files: h5py, pyarrow, trimesh, MeshLab, and the Khronos glTF validator.
+//! Readers that others wrote, for tests of our files: h5py, pyarrow, trimesh, MeshLab, the Khronos glTF validator, and Chromium with
+//! the accessibility checks of axe.
 
 use std::process::Command;
 
@@ -19,7 +20,14 @@ const PYTHON_PACKAGES: [[&str; 2]; 8] = [
     ["pykrige"; 2],
 ];
 /// The Khronos validator's releases are pre-releases to npm: the version has to be named.
-const NODE_PACKAGES: [&str; 1] = ["gltf-validator@2.0.0-dev.3.10"];
+const NODE_PACKAGES: [&str; 3] = ["gltf-validator@2.0.0-dev.3.10", "puppeteer-core@24", "axe-core@4"];
+/// Names of the browser, by distribution.
+const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+
+/// The browser's name, where it is installed.
+pub fn browser() -> Option<&'static str> {
+    BROWSERS.into_iter().find(|name| answer(name, &["--version"]).is_some())
+}
 
 /// Tells a test run where the readers are, installing them below target/ where they are not yet.
 pub fn equip(tests: &mut Command) -> Outcome {
@@ -34,7 +42,11 @@ pub fn equip(tests: &mut Command) -> Outcome {
     if answer("node", &["--version"]).is_none() {
         setup::install(&["nodejs"], "Node.js")?;
     }
-    if !node.join("node_modules/gltf-validator/package.json").is_file() {
+    let is_there = |package: &str| {
+        let name = package.split('@').next().unwrap_or(package);
+        node.join("node_modules").join(name).join("package.json").is_file()
+    };
+    if !NODE_PACKAGES.into_iter().all(is_there) {
         if answer("npm", &["--version"]).is_none() {
             setup::install(&["npm"], "npm")?;
         }
@@ -42,7 +54,12 @@ pub fn equip(tests: &mut Command) -> Outcome {
         let quiet = ["install", "--no-audit", "--no-fund", "--no-save", "--loglevel=error", "--prefix"];
         run(Command::new("npm").args(quiet).arg(&node).args(NODE_PACKAGES))?;
     }
+    if browser().is_none() {
+        setup::install(&["chromium"], "Chromium")?;
+    }
+    let browser = browser().ok_or("Chromium is not installed, and no package of it could be installed")?;
     tests
+        .env("RUNOUT_CHROMIUM", browser)
         .env("RUNOUT_PYTHON", interpreter)
         .env("RUNOUT_NODE_MODULES", node.join("node_modules"))
         .env("RUNOUT_REQUIRE_FOREIGN", "1");

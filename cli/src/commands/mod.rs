@@ -7,6 +7,7 @@ pub mod diagnose;
 pub mod inspect;
 pub mod plan;
 pub mod plugins;
+pub mod report;
 pub mod run;
 pub mod schema;
 pub mod simulate;
@@ -35,6 +36,7 @@ pub fn execute(command: Command, json: bool, registry: &Registry) -> Result<(), 
         Command::Plugins(args) => plugins::execute(&args, json, registry),
         Command::Schema(args) => schema::execute(&args, json, registry),
         Command::Inspect(args) => inspect::execute(&args, json),
+        Command::Report(args) => report::execute(&args, json),
         Command::Completions(args) => completions::execute(&args, json),
     }
 }

@@ -1,6 +1,6 @@
 //! What the closed loop found, for people.
 
-use runout_core::model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step, Verdict};
+use runout_core::model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step};
 
 use super::{
     foresight::WHOLE,
@@ -14,24 +14,7 @@ use super::{
 #[must_use]
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut page = Page::default();
-    let headline = match diagnosis.verdict {
-        _ if diagnosis.nothing_separated => {
-            "Nothing is separated: each reading is form, eccentricity and error motion together"
-        }
-        _ if diagnosis.after.degrees_of_freedom == 0 => {
-            "Nothing found: the residual has no degrees of freedom, so nothing checks the declared model"
-        }
-        Verdict::AtNoiseFloor => "At the noise floor: the declared model leaves noise only",
-        Verdict::Explained => "Explained: with what was added, noise only is left",
-        Verdict::Unexplained => "Unexplained: something is left that no known effect explains",
-        Verdict::Improved => {
-            "Improved: effects were added. The noise level is not known, so the residual may hold more"
-        }
-        Verdict::NothingFound => {
-            "Nothing found: no effect was added. The noise level is not known, so the residual may hold more"
-        }
-    };
-    page.line(headline);
+    page.line(diagnosis.headline());
     for set in undecided(&diagnosis.added) {
         page.line(format_args!("Not decided: {set}. The stated ± include each of them"));
     }
@@ -127,25 +110,19 @@ fn named(one: &Added) -> [String; 2] {
         .collect();
     match others {
         Some(others) => [one.effect.clone(), [&[targets.as_str()], &others[..]].concat().join(" or ")],
-        None => [members(one), String::new()],
+        None => [one.members(), String::new()],
     }
 }
 
-/// All that a confounded set may be: "effect target or effect target".
-fn members(one: &Added) -> String {
-    let first = place(&one.effect, &one.targets);
-    std::iter::once(&first).chain(&one.confounded_with).cloned().collect::<Vec<_>>().join(" or ")
-}
-
 fn undecided(added: &[Added]) -> impl Iterator<Item = String> + '_ {
-    added.iter().filter(|one| !one.confounded_with.is_empty()).map(members)
+    added.iter().filter(|one| !one.confounded_with.is_empty()).map(Added::members)
 }
 
 fn confounded(added: &[Added]) -> Vec<String> {
     let sets = added.iter().filter(|one| !one.confounded_with.is_empty());
     sets.map(|one| {
         let by = one.told_apart_by.as_ref().map(|by| format!("; to decide: {by}")).unwrap_or_default();
-        format!("{}{by}", members(one))
+        format!("{}{by}", one.members())
     })
     .collect()
 }

@@ -7,7 +7,6 @@ pub mod diagnostic;
 pub mod file;
 pub mod foresight;
 pub mod keys;
-pub mod number;
 pub mod page;
 pub mod plan;
 pub mod plan_points;
@@ -19,6 +18,7 @@ use std::{
     io::{self, ErrorKind, IsTerminal, Write},
 };
 
+pub use runout_core::table::number;
 use serde::Serialize;
 
 /// Whether a character may change what a terminal shows of others: control characters, and marks that turn the direction of text.

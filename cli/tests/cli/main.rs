@@ -13,6 +13,7 @@ mod one_line;
 mod other_rigs;
 mod points;
 mod reading;
+mod report;
 mod rotor;
 mod safety;
 mod schemas;

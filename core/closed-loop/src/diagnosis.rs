@@ -40,6 +40,30 @@ pub struct Diagnosis {
     pub outputs: Vec<PathBuf>,
 }
 
+impl Diagnosis {
+    /// The verdict in one sentence.
+    #[must_use]
+    pub fn headline(&self) -> &'static str {
+        match self.verdict {
+            _ if self.nothing_separated => {
+                "Nothing is separated: each reading is form, eccentricity and error motion together"
+            }
+            _ if self.after.degrees_of_freedom == 0 => {
+                "Nothing found: the residual has no degrees of freedom, so nothing checks the declared model"
+            }
+            Verdict::AtNoiseFloor => "At the noise floor: the declared model leaves noise only",
+            Verdict::Explained => "Explained: with what was added, noise only is left",
+            Verdict::Unexplained => "Unexplained: something is left that no known effect explains",
+            Verdict::Improved => {
+                "Improved: effects were added. The noise level is not known, so the residual may hold more"
+            }
+            Verdict::NothingFound => {
+                "Nothing found: no effect was added. The noise level is not known, so the residual may hold more"
+            }
+        }
+    }
+}
+
 /// A diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -139,6 +163,16 @@ pub struct Correction {
     pub parameters: Vec<Estimated>,
     /// Whether `[diagnose] known` declares it; the loop added it else.
     pub known: bool,
+}
+
+impl Added {
+    /// All that it may be: "effect target", of a confounded set "effect target or effect target".
+    #[must_use]
+    pub fn members(&self) -> String {
+        let targets = self.targets.iter().map(String::as_str);
+        let first = std::iter::once(self.effect.as_str()).chain(targets).collect::<Vec<_>>().join(" ");
+        std::iter::once(&first).chain(&self.confounded_with).cloned().collect::<Vec<_>>().join(" or ")
+    }
 }
 
 impl From<&Added> for Correction {

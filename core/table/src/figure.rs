@@ -1,7 +1,9 @@
 //! Figures as data: what to draw of a table's rows. A table declares its figures; what draws them knows no domain.
 
+use serde::{Deserialize, Serialize};
+
 /// A figure of a table: panels side by side, each with curves.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Figure {
     /// Its id, which names its files: `form-polar`.
     pub id: String,
@@ -11,14 +13,14 @@ pub struct Figure {
     pub panels: Vec<String>,
     /// Columns of names that part the rows of a panel into curves.
     pub curves: Vec<String>,
-    /// A column of names, and the name of the rows that are drawn; without it all rows are.
-    pub only: Option<(String, String)>,
+    /// A column of names, and the names of the rows that are drawn; without it all rows are.
+    pub only: Option<(String, Vec<String>)>,
     /// How its rows are drawn.
     pub drawing: Drawing,
 }
 
 /// How rows are drawn. All fields name columns of the figure's table; rows with NaN or null are left out.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Drawing {
     /// Deviations about a reference circle, over an angle in degrees, counterclockwise from the right.
     Polar {
@@ -40,6 +42,8 @@ pub enum Drawing {
         order: String,
         /// Real and imaginary part.
         parts: [String; 2],
+        /// Standard uncertainty of the complex number, both parts together.
+        std: Option<String>,
     },
     /// A height over a rectangle, as colours.
     Map {
@@ -53,7 +57,7 @@ pub enum Drawing {
 }
 
 /// A column of values, and that of their standard uncertainty where there is one.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measure {
     /// The values.
     pub column: String,
@@ -119,9 +123,10 @@ impl Figure {
         title: impl Into<String>,
         order: impl Into<String>,
         [real, imaginary]: [&str; 2],
+        std: Option<&str>,
     ) -> Self {
-        let parts = [real.to_owned(), imaginary.to_owned()];
-        Self::new(id, title, Drawing::Amplitudes { order: order.into(), parts })
+        let (parts, std) = ([real.to_owned(), imaginary.to_owned()], std.map(str::to_owned));
+        Self::new(id, title, Drawing::Amplitudes { order: order.into(), parts, std })
     }
 
     /// A height over a rectangle.
@@ -142,10 +147,10 @@ impl Figure {
         Self { curves: columns.into_iter().map(Into::into).collect(), ..self }
     }
 
-    /// The same of the rows with this name in a column.
+    /// The same of the rows with one of these names in a column.
     #[must_use]
-    pub fn only(self, column: impl Into<String>, name: impl Into<String>) -> Self {
-        Self { only: Some((column.into(), name.into())), ..self }
+    pub fn only<T: Into<String>>(self, column: impl Into<String>, names: impl IntoIterator<Item = T>) -> Self {
+        Self { only: Some((column.into(), names.into_iter().map(Into::into).collect())), ..self }
     }
 
     /// The columns of its table that it needs.
@@ -163,8 +168,9 @@ impl Figure {
                         .map(String::as_str),
                 );
             }
-            Drawing::Amplitudes { order, parts } => {
+            Drawing::Amplitudes { order, parts, std } => {
                 columns.extend([order.as_str(), parts[0].as_str(), parts[1].as_str()]);
+                columns.extend(std.as_deref());
             }
             Drawing::Map { x, y, value } => columns.extend([x.as_str(), y.as_str(), value.as_str()]),
         }

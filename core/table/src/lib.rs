@@ -17,6 +17,8 @@
 //! ```
 
 pub mod figure;
+pub mod number;
+pub mod panels;
 
 use std::{collections::HashMap, sync::Arc};
 

@@ -8,9 +8,10 @@ use kuva::{
     },
     render::{figure::Figure, layout::Layout, plots::Plot, render::render_multiple},
 };
-use runout_core::surface::Surface;
-
-use crate::panels::{Axis, Curve, Kind, Panel, Panels, Point};
+use runout_core::{
+    surface::Surface,
+    table::panels::{Axis, Curve, Grid, Kind, Panel, Panels, Point},
+};
 
 pub(crate) use kuva::render::render::Scene;
 
@@ -37,8 +38,8 @@ pub(crate) fn png(scene: &Scene) -> Result<Vec<u8>, String> {
 pub(crate) fn figure(figure: &Panels) -> Option<Scene> {
     let drawn = |panel: &&Panel| panel.curves.iter().any(|curve| !curve.points.is_empty());
     let panels: Vec<&Panel> = figure.drawn.iter().filter(drawn).collect();
-    let (scale, unit) = scaled(figure, &panels);
-    let cells = panels.iter().map(|panel| cell(figure, panel, scale, &unit));
+    let (scale, unit) = figure.scaled();
+    let cells = panels.iter().map(|panel| cell(figure, panel, scale, unit));
     let (plots, layouts): (Vec<_>, Vec<_>) = cells.unzip();
     let count = plots.len();
     let title = match figure.count() {
@@ -90,53 +91,21 @@ fn size(kind: Kind) -> [f64; 2] {
     }
 }
 
-/// A factor for the vertical axis and the unit that it gives: nm and nrad where µm and µrad have no digits left of 0.1.
-fn scaled(figure: &Panels, panels: &[&Panel]) -> (f64, String) {
-    let unit = figure.axes[1].unit.as_str();
-    let points = panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| &curve.points);
-    let largest = points.map(|point| point.y.abs()).fold(0.0, f64::max);
-    let small = largest > 0.0 && largest < 0.1;
-    match unit {
-        "um" if small && figure.kind != Kind::Map => (1e3, "nm".into()),
-        "urad" if small && figure.kind != Kind::Map => (1e3, "nrad".into()),
-        _ => (1.0, unit.into()),
-    }
-}
-
 fn cell(figure: &Panels, panel: &Panel, scale: f64, unit: &str) -> (Vec<Plot>, Layout) {
     let unscaled = &figure.axes;
     let axes = [unscaled[0].clone(), Axis { name: unscaled[1].name.clone(), unit: unit.to_owned() }];
     let curves: Vec<Curve> =
-        panel.curves.iter().filter(|curve| !curve.points.is_empty()).map(|curve| thinned(curve, scale)).collect();
+        panel.curves.iter().filter(|curve| !curve.points.is_empty()).map(|curve| curve.thinned(MOST_POINTS, scale)).collect();
     let (plots, layout) = match figure.kind {
         Kind::Polar => polar(&curves, &axes[1]),
         Kind::Lines => lines(&curves, &axes),
         Kind::Amplitudes => amplitudes(&curves, &axes),
         Kind::Map => {
             let points = panel.curves.iter().flat_map(|curve| curve.points.iter().copied()).collect::<Vec<_>>();
-            map(&points, &axes, &figure.height("nm"))
+            map(&points, &axes, figure.height())
         }
     };
     (plots, layout.with_title(panel.name.clone()))
-}
-
-/// The curve with its vertical axis scaled: of many points the lowest and the highest of each of equal stretches.
-fn thinned(curve: &Curve, scale: f64) -> Curve {
-    let stretch = (2 * curve.points.len()).div_ceil(MOST_POINTS).max(1);
-    let scaled = |point: Point| Point { x: point.x, y: scale * point.y, third: scale * point.third };
-    let mut points = Vec::with_capacity(MOST_POINTS);
-    if stretch <= 2 {
-        points.extend(curve.points.iter().copied());
-    } else {
-        for points_of in curve.points.chunks(stretch) {
-            let by_height = |a: &&Point, b: &&Point| a.y.total_cmp(&b.y);
-            let ends = [points_of.iter().min_by(by_height), points_of.iter().max_by(by_height)];
-            let mut ends: Vec<Point> = ends.into_iter().flatten().copied().collect();
-            ends.sort_by(|a, b| a.x.total_cmp(&b.x));
-            points.extend(ends);
-        }
-    }
-    Curve { name: curve.name.clone(), points: points.into_iter().map(scaled).collect() }
 }
 
 fn colour(index: usize) -> &'static str {
@@ -221,17 +190,9 @@ fn amplitudes(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
 const HIGHEST_ORDER: f64 = 50.0;
 
 fn map(points: &[Point], axes: &[Axis; 2], height: &Axis) -> (Vec<Plot>, Layout) {
-    let x = Cells::of(points.iter().map(|point| point.x), MOST_CELLS[1]);
-    let y = Cells::of(points.iter().map(|point| point.y), MOST_CELLS[0]);
-    let mut sums = vec![vec![(0.0, 0_u32); x.count]; y.count];
-    for point in points.iter().filter(|point| point.third.is_finite()) {
-        // Pictures count rows from the top.
-        let cell = &mut sums[y.count - 1 - y.index(point.y)][x.index(point.x)];
-        cell.0 += point.third;
-        cell.1 += 1;
-    }
-    let mean = |(sum, count): (f64, u32)| if count == 0 { f64::NAN } else { sum / f64::from(count) };
-    let rows: Vec<Vec<f64>> = sums.into_iter().map(|row| row.into_iter().map(mean).collect()).collect();
+    let Grid { x, y, mut rows } = Grid::of(points, MOST_CELLS);
+    // Pictures count rows from the top.
+    rows.reverse();
     let plot = Heatmap::new()
         .with_data(rows)
         .with_color_map(ColorMap::Viridis)
@@ -249,32 +210,6 @@ fn map(points: &[Point], axes: &[Axis; 2], height: &Axis) -> (Vec<Plot>, Layout)
         .with_y_axis_min(y.from)
         .with_y_axis_max(y.to);
     (plots, layout)
-}
-
-/// Equal cells along an axis of a map.
-struct Cells {
-    from: f64,
-    to: f64,
-    count: usize,
-}
-
-impl Cells {
-    /// As many cells as there are places, or as can be seen.
-    fn of(places: impl Iterator<Item = f64>, most: usize) -> Self {
-        let mut places: Vec<f64> = places.collect();
-        places.sort_unstable_by(f64::total_cmp);
-        let [first, last] = [places.first(), places.last()].map(|place| place.copied().unwrap_or_default());
-        // Places that agree to a millionth of the range are one.
-        places.dedup_by(|a, b| (*a - *b).abs() <= 1e-6 * (last - first));
-        let half = 0.5 * (last - first) / (places.len().max(2) - 1) as f64;
-        let half = if half > 0.0 { half } else { 0.5 };
-        Self { from: first - half, to: last + half, count: places.len().clamp(1, most) }
-    }
-
-    fn index(&self, place: f64) -> usize {
-        let share = (place - self.from) / (self.to - self.from);
-        ((share * self.count as f64) as usize).min(self.count - 1)
-    }
 }
 
 /// The next of 1, 1.5, 2, 3, 4, 5, 6, 8 and 10 times a power of ten.
@@ -310,34 +245,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_thinned_curve_keeps_its_peak() {
-        let mut points: Vec<Point> =
-            (0..100_000).map(|index| Point { x: f64::from(index), y: 0.0, third: f64::NAN }).collect();
-        points[43_211].y = 7.0;
-        points[43_214].y = -3.0;
-        let thin = thinned(&Curve { name: "a".into(), points }, 1000.0);
-        assert!(thin.points.len() <= MOST_POINTS, "{} points", thin.points.len());
-        for (x, y) in [(43_211.0, 7000.0), (43_214.0, -3000.0)] {
-            assert!(thin.points.iter().any(|point| (point.x, point.y) == (x, y)));
-        }
-        assert!(thin.points.windows(2).all(|pair| pair[0].x <= pair[1].x));
-    }
-
-    #[test]
     fn polar_plots_have_round_circles() {
         for (value, expected) in
             [(0.0, 1.0), (0.93, 1.0), (1.0, 1.0), (1.2, 1.5), (23.0, 30.0), (6.1e-3, 8e-3), (9.7, 10.0)]
         {
             assert!((rounded_up(value) - expected).abs() < 1e-12 * expected, "{value}: {}", rounded_up(value));
         }
-    }
-
-    #[test]
-    fn cells_of_a_map_are_as_many_as_the_grid_has() {
-        let cells = Cells::of((0..50).map(|step| 0.1 * f64::from(step)).chain([0.1]), 320);
-        assert_eq!(cells.count, 50);
-        assert_eq!([0.0, 2.0, 4.9].map(|place| cells.index(place)), [0, 20, 49]);
-        assert_eq!(Cells::of([3.0, 3.0].into_iter(), 320).count, 1);
     }
 
     #[test]

@@ -4,7 +4,6 @@
 //! `surface.svg`, `surface.png` where the result has a surface. A figure has one panel a station, of at most `panels` stations.
 
 mod draw;
-mod panels;
 
 use std::path::{Path, PathBuf};
 
@@ -16,12 +15,10 @@ use runout_core::{
         registry::{Context, Plugin, Registry, StageConfig},
     },
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
-    table::{RecordBatch, TableSpec},
+    table::{RecordBatch, TableSpec, panels::Panels},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-use panels::Panels;
 
 /// Adds the exporter `figures`.
 pub fn register(registry: &mut Registry) {

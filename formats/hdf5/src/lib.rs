@@ -37,7 +37,7 @@ pub use measurement::{
     samples::{SampleFormat, Scale},
     write::{WriteOptions, write_measurement},
 };
-pub use result::ResultConfig;
+pub use result::{ResultConfig, StoredResult, read_result};
 use runout_core::pipeline::registry::{Plugin, Registry};
 
 /// `format` of a measurement file.

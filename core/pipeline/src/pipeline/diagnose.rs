@@ -135,6 +135,7 @@ fn diagnose_turns(
     if pipeline.evaluate.has(Group::ErrorMotion) && !diagnosis.added.is_empty() {
         remarks.push(UNCORRECTED_SPREAD.into());
     }
+    writer.diagnosed(&diagnosis);
     let mut finished = writer.finish(inputs, remarks, surface.as_ref())?;
     if let Some(path) = rig {
         finished.add(corrected_rig::pending(path, pipeline, &changes)?);
@@ -167,7 +168,7 @@ fn diagnose_points(
     let mut diagnosis = found.diagnosis;
     diagnosis.lost_orders.clone_from(&outcome.lost_orders);
     diagnosis.warnings.extend(outcome.notes.iter().cloned());
-    let result = PointResult { outcome, remarks: None, effects };
+    let result = PointResult { outcome, remarks: None, effects, diagnosis: Some(&diagnosis) };
     let finished = result.write(pipeline, &pipeline.diagnosed, points, observer)?;
     commit(finished, pipeline.diagnosis_path(), diagnosis)
 }

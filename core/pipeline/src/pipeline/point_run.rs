@@ -11,7 +11,7 @@ use crate::{
     points::Points,
     stage::{Exporter, Form, Outcome, PointSeparator},
 };
-use runout_closed_loop::diagnosis::Correction;
+use runout_closed_loop::diagnosis::{Correction, Diagnosis};
 use runout_error::Result;
 
 pub(super) fn run(
@@ -22,7 +22,7 @@ pub(super) fn run(
 ) -> Result<Summary> {
     spare_inputs(&pipeline.outputs(), &points.inputs())?;
     let outcome = separator.separate(points)?;
-    let result = PointResult { outcome, remarks: Some(separator), effects: Vec::new() };
+    let result = PointResult { outcome, remarks: Some(separator), effects: Vec::new(), diagnosis: None };
     result.write(pipeline, &pipeline.exporters, points, observer)?.commit(None)
 }
 
@@ -33,6 +33,8 @@ pub(super) struct PointResult<'a> {
     pub remarks: Option<&'a dyn PointSeparator>,
     /// Effects that the result is corrected for.
     pub effects: Vec<Correction>,
+    /// What the closed loop found.
+    pub diagnosis: Option<&'a Diagnosis>,
 }
 
 impl PointResult<'_> {
@@ -46,6 +48,9 @@ impl PointResult<'_> {
         let Outcome { convention, tables, values, form, lost_orders, mut remarks, notes } = self.outcome;
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
+        if let Some(diagnosis) = self.diagnosis {
+            writer.diagnosed(diagnosis);
+        }
         writer.take_values(values, convention);
         writer.lost_orders(lost_orders);
         writer.note(notes);

@@ -14,7 +14,7 @@ use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all},
     stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
 };
-use runout_closed_loop::diagnosis::{self, Correction};
+use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_error::{Error, Result};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
@@ -61,6 +61,8 @@ pub(super) struct ResultWriter {
     /// Signs and references of a domain's own tables.
     convention: String,
     summary: Summary,
+    /// What the closed loop found.
+    diagnosis: Option<Diagnosis>,
     summary_path: Option<PathBuf>,
     /// Given back last.
     lock: FolderLock,
@@ -101,6 +103,7 @@ impl ResultWriter {
             interrupted: false,
             convention: String::new(),
             summary: begun(pipeline),
+            diagnosis: None,
             summary_path: summary_path(exporters, &pipeline.tables),
             lock,
         })
@@ -170,7 +173,11 @@ impl ResultWriter {
         self.summary.effects = effects;
     }
 
-    /// Completes the exports.
+    /// Takes what the closed loop found.
+    pub(super) fn diagnosed(&mut self, diagnosis: &Diagnosis) {
+        self.diagnosis = Some(diagnosis.clone());
+    }
+
     /// Takes what the user should know and that is as it should be.
     pub(super) fn note(&mut self, notes: Vec<String>) {
         self.summary.warnings.extend(notes.iter().cloned());
@@ -184,6 +191,7 @@ impl ResultWriter {
         }
     }
 
+    /// Completes the exports.
     pub(super) fn finish(
         mut self,
         inputs: Vec<Input>,
@@ -212,7 +220,7 @@ impl ResultWriter {
         } else {
             About { convention: std::mem::take(&mut self.convention), ..About::default() }
         };
-        let completed = Completed { summary: &self.summary, about: &about, surface };
+        let completed = Completed { summary: &self.summary, about: &about, surface, diagnosis: self.diagnosis.as_ref() };
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&completed)?);

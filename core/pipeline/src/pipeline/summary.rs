@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::PathBuf};
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{
     evaluate::{LimitSummary, PartSummary, PlacedValue},
@@ -183,7 +183,9 @@ pub struct SectionSummary {
     pub section: String,
     /// Its place, in mm.
     pub z_mm: f64,
-    /// Root mean square of the form, in µm.
+    /// Root mean square of the form, in µm; null where nothing is separated.
+    #[serde(deserialize_with = "nan_for_null")]
+    #[schemars(with = "Option<f64>")]
     pub form_rms_um: f64,
     /// Standard uncertainty of the form at any one angle, from the covariance of the averages, in µm.
     pub form_std_um: Option<f64>,
@@ -191,6 +193,11 @@ pub struct SectionSummary {
     pub values: Vec<Value>,
     /// True error of the form (root mean square over orders from 2 that could be told), where the truth is known.
     pub truth_form_rms_error_um: Option<f64>,
+}
+
+/// NaN, which JSON has no number for, is written as null.
+pub(super) fn nan_for_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// True errors of the motion: root mean square over orders from 2 that could be told.

@@ -136,7 +136,7 @@ impl StationTables {
         surface: Option<&Surface>,
     ) -> Result<Vec<PendingFile>> {
         export.rows(&self.values, &self.value_rows(summary)?.rows)?;
-        export.finish(&Completed { summary, about: &self.about(summary), surface })
+        export.finish(&Completed { summary, about: &self.about(summary), surface, diagnosis: None })
     }
 
     /// What the numbers are.
@@ -258,10 +258,16 @@ fn harmonics() -> TableSpec {
         ],
     )
     .figure(
-        Figure::amplitudes("form-harmonics", "Harmonics of the form", "order", ["re", "im"])
+        Figure::amplitudes("form-harmonics", "Harmonics of the form", "order", ["re", "im"], Some("std"))
             .panels(["station"])
             .curves(["section"])
-            .only("quantity", "form"),
+            .only("quantity", ["form"]),
+    )
+    .figure(
+        Figure::amplitudes("motion-harmonics", "Harmonics of the error motion", "order", ["re", "im"], Some("std"))
+            .panels(["station"])
+            .curves(["quantity"])
+            .only("quantity", ["x", "y", "along", "z"]),
     )
 }
 

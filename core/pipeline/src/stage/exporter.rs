@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::{atomic_file::PendingFile, pipeline::summary::Summary};
+use runout_closed_loop::diagnosis::Diagnosis;
 use runout_error::Result;
 use runout_table::{RecordBatch, TableSpec};
 use runout_turning::surface::Surface;
@@ -69,6 +70,8 @@ pub struct Completed<'a> {
     pub about: &'a About,
     /// Form over angle and z, where an exporter or a value needs it.
     pub surface: Option<&'a Surface>,
+    /// What the closed loop found, where the result is that of its final model.
+    pub diagnosis: Option<&'a Diagnosis>,
 }
 
 /// What a result's numbers are, for files that explain themselves.

@@ -8,13 +8,20 @@
 //! /warnings    [n] texts: the run's, then each station's behind its name
 //! /effects     [n] texts: the effects that the results are corrected for, with their values; none after a run
 //! /summary     the run's summary as JSON
+//! /diagnosis   what the closed loop found, as JSON; of `diagnose` only
+//! /surface_map form over angle and z, where the run built it: z_mm [rings], deviation_um [rings, angles], radius_mm; angles are
+//!              equally spaced from 0
 //! ```
 //!
 //! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; names are UTF-8 of fixed length, other
-//! texts of any length (`.asstr()` in h5py). Each column has the attributes `unit` and `about`. What was not solved for, and lost
+//! texts of any length (`.asstr()` in h5py). Each column has the attributes `unit` and `about`, and a table of which something is
+//! drawn has the attribute `figures` (JSON). What was not solved for, and lost
 //! orders, are NaN.
 
+mod read;
 mod table;
+
+pub use read::{StoredResult, read_result};
 
 use std::path::{Path, PathBuf};
 
@@ -28,6 +35,7 @@ use runout_core::{
     },
     provenance::Input,
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
+    surface::Surface,
     table::{RecordBatch, TableSpec},
 };
 use schemars::JsonSchema;
@@ -127,7 +135,15 @@ fn complete(file: &File, result: &Completed) -> hdf5_metno::Result<()> {
     }
     let json = serde_json::to_string_pretty(*summary)
         .map_err(|error| hdf5_metno::Error::from(format!("the summary: {error}")))?;
-    put_dataset(file, "summary", &json)?;
+    put_dataset(file, read::SUMMARY, &json)?;
+    if let Some(diagnosis) = result.diagnosis {
+        let json = serde_json::to_string_pretty(diagnosis)
+            .map_err(|error| hdf5_metno::Error::from(format!("the diagnosis: {error}")))?;
+        put_dataset(file, read::DIAGNOSIS, &json)?;
+    }
+    if let Some(surface) = result.surface {
+        put_surface(file, surface)?;
+    }
     put_texts(file, "warnings", summary.all_warnings())?;
     put_texts(file, "effects", summary.effects.iter().map(ToString::to_string))?;
     let group = node::create_group(file, "provenance")?;
@@ -163,6 +179,23 @@ impl<const N: usize> Export for ResultExport<N> {
         drop((tables, file));
         Ok(vec![pending])
     }
+}
+
+/// Group of the surface.
+const SURFACE: &str = "surface_map";
+
+fn put_surface(file: &File, surface: &Surface) -> hdf5_metno::Result<()> {
+    let group = file.create_group(SURFACE)?;
+    node::put(&group, "radius_mm", &surface.radius_mm)?;
+    node::put_text(&group, "interpolation", surface.interpolation)?;
+    let column = |name: &str, unit: &str, shape: &[usize], values: &[f64]| -> hdf5_metno::Result<()> {
+        let dataset = group.new_dataset::<f64>().shape(shape).create(name)?;
+        dataset.write_raw(values)?;
+        node::put_text(&dataset, "unit", unit)
+    };
+    let rings = surface.z_mm.len();
+    column("z_mm", "mm", &[rings], &surface.z_mm)?;
+    column("deviation_um", "um", &[rings, surface.angles], &surface.deviation_um)
 }
 
 fn put_dataset(group: &Group, name: &str, text: &str) -> hdf5_metno::Result<()> {

@@ -1,25 +1,32 @@
-//! Rows of a table as panels with curves.
+//! Rows of a table as the panels and curves of a figure, for whatever draws them.
+
+mod grid;
 
 use std::collections::HashMap;
 
 use arrow_array::{Array, Float64Array, RecordBatch, StringArray, UInt32Array, cast::AsArray, types::Float64Type};
-use runout_core::{
-    Error, Result,
-    table::{
-        Figure, TableSpec,
-        figure::{Drawing, Measure},
-    },
+use runout_error::{Error, Result};
+
+use crate::{
+    TableSpec,
+    figure::{Drawing, Figure, Measure},
 };
+pub use grid::{Cells, Grid};
 
 /// The rows of one figure, collected while they come.
-pub(crate) struct Panels {
-    pub(crate) id: String,
-    pub(crate) title: String,
-    pub(crate) table: String,
-    pub(crate) kind: Kind,
+pub struct Panels {
+    /// Id of the figure.
+    pub id: String,
+    /// Its title, without units.
+    pub title: String,
+    /// Name of its table.
+    pub table: String,
+    /// How curves are drawn.
+    pub kind: Kind,
     /// What is along the horizontal axis, and along the vertical one.
-    pub(crate) axes: [Axis; 2],
-    pub(crate) drawn: Vec<Panel>,
+    pub axes: [Axis; 2],
+    /// The panels that are kept, in the order in which they came.
+    pub drawn: Vec<Panel>,
     /// Panels that there were.
     numbers: HashMap<String, usize>,
     /// Each so many of them are kept.
@@ -27,46 +34,62 @@ pub(crate) struct Panels {
     most: usize,
     panel_columns: Vec<String>,
     curve_columns: Vec<String>,
-    only: Option<(String, String)>,
+    only: Option<(String, Vec<String>)>,
     values: Vec<Source>,
+    height: Axis,
 }
 
 /// How curves are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub enum Kind {
+    /// Deviations about a reference circle.
     Polar,
+    /// Over a common axis.
     Lines,
+    /// Absolute values over the order.
     Amplitudes,
+    /// Heights over a rectangle.
     Map,
 }
 
 /// What an axis shows.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Axis {
-    pub(crate) name: String,
-    pub(crate) unit: String,
+pub struct Axis {
+    /// Its name, without the unit.
+    pub name: String,
+    /// Its unit; empty for what has none.
+    pub unit: String,
 }
 
 /// Curves of one combination of names.
-pub(crate) struct Panel {
+pub struct Panel {
     number: usize,
-    pub(crate) name: String,
-    pub(crate) curves: Vec<Curve>,
+    /// The names, joined; empty where the figure has one panel.
+    pub name: String,
+    /// Its curves.
+    pub curves: Vec<Curve>,
 }
 
 /// Points that are joined.
-pub(crate) struct Curve {
-    pub(crate) name: String,
-    pub(crate) points: Vec<Point>,
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Curve {
+    /// Its name in the legend; empty where the panel has one curve.
+    pub name: String,
+    /// Its points.
+    pub points: Vec<Point>,
+    /// Places along the horizontal axis without a value: of amplitudes the lost orders.
+    pub missing: Vec<f64>,
 }
 
 /// A point of a curve, or a cell of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Point {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
+pub struct Point {
+    /// Along the horizontal axis.
+    pub x: f64,
+    /// Along the vertical axis, or the deviation from the reference circle.
+    pub y: f64,
     /// Standard uncertainty of y, NaN where there is none; of a map the height.
-    pub(crate) third: f64,
+    pub third: f64,
 }
 
 /// Where the numbers of a curve are: x, y, and the third number.
@@ -79,8 +102,11 @@ struct Source {
 }
 
 impl Panels {
-    /// None yet.
-    pub(crate) fn new(table: &TableSpec, figure: &Figure, most: usize) -> Result<Self> {
+    /// None yet; of more than `most` panels, those at equal distances are kept.
+    ///
+    /// # Errors
+    /// When the figure names a column that the table lacks.
+    pub fn new(table: &TableSpec, figure: &Figure, most: usize) -> Result<Self> {
         let missing = |column: &str| {
             Error::new(
                 "draw",
@@ -106,9 +132,9 @@ impl Panels {
                 (Kind::Polar, [axis(x), values_axis(values)], curves(x, values, &axis))
             }
             Drawing::Lines { x, values } => (Kind::Lines, [axis(x), values_axis(values)], curves(x, values, &axis)),
-            Drawing::Amplitudes { order, parts: [real, imaginary] } => {
+            Drawing::Amplitudes { order, parts: [real, imaginary], std } => {
                 let y = [Some(real.clone()), Some(imaginary.clone())];
-                let source = Source { name: String::new(), x: order.clone(), y, third: None };
+                let source = Source { name: String::new(), x: order.clone(), y, third: std.clone() };
                 // Coefficients of several quantities share a column; its unit begins with that of form.
                 let unit = axis(real).unit.split(';').next().unwrap_or_default().to_owned();
                 let amplitude = Axis { name: "amplitude".into(), unit };
@@ -124,7 +150,12 @@ impl Panels {
                 (Kind::Map, [axis(x), axis(y)], vec![source])
             }
         };
+        let height = match &figure.drawing {
+            Drawing::Map { value, .. } => axis(value),
+            _ => axis(""),
+        };
         Ok(Self {
+            height,
             id: figure.id.clone(),
             title: figure.title.clone(),
             table: table.name.clone(),
@@ -142,26 +173,41 @@ impl Panels {
     }
 
     /// Panels that there were, drawn or not.
-    pub(crate) fn count(&self) -> usize {
+    #[must_use]
+    pub fn count(&self) -> usize {
         self.numbers.len()
     }
 
     /// Axis of the heights of a map.
-    pub(crate) fn height(&self, unit: &str) -> Axis {
-        let name = self.values.first().map_or("", |value| value.name.as_str());
-        Axis { name: without_unit(name, unit), unit: unit.to_owned() }
+    #[must_use]
+    pub fn height(&self) -> &Axis {
+        &self.height
+    }
+
+    /// A factor for the vertical axis and the unit that it gives: nm and nrad where µm and µrad have no digits left of 0.1.
+    #[must_use]
+    pub fn scaled(&self) -> (f64, &str) {
+        let unit = self.axes[1].unit.as_str();
+        let points = self.drawn.iter().flat_map(|panel| &panel.curves).flat_map(|curve| &curve.points);
+        let largest = points.map(|point| point.y.abs()).fold(0.0, f64::max);
+        let small = largest > 0.0 && largest < 0.1;
+        match unit {
+            "um" if small && self.kind != Kind::Map => (1e3, "nm"),
+            "urad" if small && self.kind != Kind::Map => (1e3, "nrad"),
+            _ => (1.0, unit),
+        }
     }
 
     /// Takes rows of the table.
-    pub(crate) fn add(&mut self, rows: &RecordBatch) {
+    pub fn add(&mut self, rows: &RecordBatch) {
         let names = |columns: &[String]| columns.iter().map(|column| Names::of(rows, column)).collect::<Vec<_>>();
         let (panel_names, curve_names) = (names(&self.panel_columns), names(&self.curve_columns));
-        let only = self.only.as_ref().map(|(column, name)| (Names::of(rows, column), name.clone()));
+        let only = self.only.as_ref().map(|(column, names)| (Names::of(rows, column), names.clone()));
         let columns: Vec<[Option<Numbers>; 4]> = self.values.iter().map(|value| value.columns(rows)).collect();
         let mut last: Option<(String, String)> = None;
         let mut at: Option<(usize, usize)> = None;
         for row in 0..rows.num_rows() {
-            if only.as_ref().is_some_and(|(column, name)| column.get(row) != name) {
+            if only.as_ref().is_some_and(|(column, names)| names.iter().all(|name| column.get(row) != name)) {
                 continue;
             }
             let key = (joined(&panel_names, row), joined(&curve_names, row));
@@ -175,8 +221,11 @@ impl Panels {
                 let [x, y, second, third] =
                     [number(&columns[0]), number(&columns[1]), number(&columns[2]), number(&columns[3])];
                 let y = if columns[2].is_some() { y.hypot(second) } else { y };
+                let curve = &mut self.drawn[panel].curves[first + offset];
                 if x.is_finite() && y.is_finite() {
-                    self.drawn[panel].curves[first + offset].points.push(Point { x, y, third });
+                    curve.points.push(Point { x, y, third });
+                } else if x.is_finite() {
+                    curve.missing.push(x);
                 }
             }
         }
@@ -215,8 +264,31 @@ impl Panels {
             return Some((index, first));
         }
         let first = curves.len();
-        curves.extend(self.values.iter().map(|value| Curve { name: full(value), points: Vec::new() }));
+        curves.extend(self.values.iter().map(|value| Curve { name: full(value), ..Curve::default() }));
         Some((index, first))
+    }
+}
+
+impl Curve {
+    /// The curve with its vertical axis scaled: of more than `most` points the lowest and the highest of each of equal
+    /// stretches.
+    #[must_use]
+    pub fn thinned(&self, most: usize, scale: f64) -> Self {
+        let stretch = (2 * self.points.len()).div_ceil(most.max(2)).max(1);
+        let scaled = |point: Point| Point { x: point.x, y: scale * point.y, third: scale * point.third };
+        let mut points = Vec::with_capacity(self.points.len().min(most));
+        if stretch <= 2 {
+            points.extend(self.points.iter().copied());
+        } else {
+            for points_of in self.points.chunks(stretch) {
+                let by_height = |a: &&Point, b: &&Point| a.y.total_cmp(&b.y);
+                let ends = [points_of.iter().min_by(by_height), points_of.iter().max_by(by_height)];
+                let mut ends: Vec<Point> = ends.into_iter().flatten().copied().collect();
+                ends.sort_by(|a, b| a.x.total_cmp(&b.x));
+                points.extend(ends);
+            }
+        }
+        Self { points: points.into_iter().map(scaled).collect(), ..self.clone() }
     }
 }
 
@@ -292,9 +364,8 @@ impl<'a> Numbers<'a> {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
-    use runout_core::table::{ColumnSpec, counts, numbers, texts};
-
     use super::*;
+    use crate::{ColumnSpec, counts, numbers, texts};
 
     fn table() -> TableSpec {
         TableSpec::new(
@@ -328,6 +399,7 @@ mod tests {
         assert_eq!(panels.drawn[1].curves.len(), 1);
         let heights: Vec<f64> = panels.drawn[1].curves[0].points.iter().map(|point| point.y).collect();
         assert_eq!(heights, [8.0, 1.0, 0.5, 0.5, 0.5]);
+        assert_eq!(panels.drawn[1].curves[0].missing, [240.0]);
     }
 
     #[test]
@@ -335,6 +407,20 @@ mod tests {
         let figure = Figure::lines("residual", "Residual", "order", [Measure::new("after")]);
         let error = Panels::new(&table(), &figure, 4).err().unwrap().to_string();
         assert!(error.contains("residual") && error.contains("has no column after"), "{error}");
+    }
+
+    #[test]
+    fn a_thinned_curve_keeps_its_peak() {
+        let mut points: Vec<Point> =
+            (0..100_000).map(|index| Point { x: f64::from(index), y: 0.0, third: f64::NAN }).collect();
+        points[43_211].y = 7.0;
+        points[43_214].y = -3.0;
+        let thin = Curve { points, ..Curve::default() }.thinned(1440, 1000.0);
+        assert!(thin.points.len() <= 1440, "{} points", thin.points.len());
+        for (x, y) in [(43_211.0, 7000.0), (43_214.0, -3000.0)] {
+            assert!(thin.points.iter().any(|point| (point.x, point.y) == (x, y)));
+        }
+        assert!(thin.points.windows(2).all(|pair| pair[0].x <= pair[1].x));
     }
 
     #[test]

@@ -1,0 +1,195 @@
+//! Reports: what is in the file, and what Chromium makes of it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use crate::folder::{self, Folder};
+
+const SCENARIO: &str = r#"
+plugin = "spindle"
+output = "shaft.h5"
+seed = 3
+rig = "rig.toml"
+
+[recording]
+revolutions = 8
+samples_per_rev = 128
+stations = { count = 5, step_mm = 40 }
+
+[form]
+rms_um = 2
+max_order = 12
+
+[noise]
+rms_um = 0.02
+"#;
+
+const EXPORT: &str = "\n[[export]]\nplugin = \"report\"\npath = \"out/report.html\"\n\n[[export]]\nplugin = \"hdf5\"\npath = \"out/result.h5\"\n";
+
+/// A name that a page could stumble over, as TOML writes it.
+const HOSTILE: &str = r#""</script><b>\"'&amp; <!-- %{y} \u05e9\u05dc\u05d5\u05dd Prüf\nling""#;
+
+/// A simulated spindle with its report; sensors and title have hostile names when asked.
+fn spindle(hostile: bool) -> Folder {
+    let name = |text: String| {
+        let named = text.replace("\"S1\"", HOSTILE).replace("title = \"Turned shaft\"", &format!("title = {HOSTILE}"));
+        if hostile { named } else { text }
+    };
+    let limit = "\n[[limit]]\nsymbol = \"RONt\"\nupper = 30.0\nunit = \"um\"\n";
+    let pipeline = name(folder::pipeline() + limit + EXPORT);
+    let rig = name(folder::RIG.to_owned());
+    let folder = Folder::with(&[("pipeline.toml", &pipeline), ("rig.toml", &rig), ("scenario.toml", SCENARIO)]);
+    let simulated = folder.run(&["simulate", "scenario.toml"]);
+    assert_eq!(simulated.status, 0, "{}", simulated.stderr);
+    folder
+}
+
+fn page(path: &Path) -> String {
+    fs::read_to_string(path).unwrap()
+}
+
+/// What of a page a browser reads as elements: everything but the scripts.
+fn elements(page: &str) -> String {
+    let mut rest = page;
+    let mut kept = String::new();
+    while let Some((before, after)) = rest.split_once("<script") {
+        kept.push_str(before);
+        rest = after.split_once("</script>").unwrap().1;
+    }
+    kept + rest
+}
+
+#[test]
+fn a_run_writes_a_report_and_an_earlier_result_gives_the_same() {
+    let folder = spindle(false);
+    let ran = folder.run(&["run", "pipeline.toml"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let written = page(&folder.path().join("out/report.html"));
+    assert!(written.starts_with("<!DOCTYPE html>") && written.len() < 8_000_000, "{} bytes", written.len());
+    for part in ["Turned shaft", "The limit is kept", "Setup <bdi>reversed", "\"form\"", "data-map=\"surface\"", "BLAKE3"] {
+        assert!(written.contains(part), "{part}");
+    }
+    assert!(written.contains("default-src 'none'") && !elements(&written).contains("http"), "a request");
+    let ran = folder.run(&["report", "out/result.h5", "--out", "again.html"]);
+    assert_eq!((ran.status, ran.stdout.as_str()), (0, "again.html\n"), "{}", ran.stderr);
+    assert_eq!(page(&folder.path().join("again.html")), written);
+}
+
+#[test]
+fn hostile_names_stay_names() {
+    let folder = spindle(true);
+    let ran = folder.run(&["run", "pipeline.toml"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let written = page(&folder.path().join("out/report.html"));
+    let shown = elements(&written);
+    assert!(!shown.contains("<b>") && !shown.contains("<!-- %"), "a name became an element");
+    assert!(shown.contains("&lt;/script&gt;&lt;b&gt;"), "the title is missing");
+    // Canvas, charts, drawing and program, behind the data.
+    assert_eq!(written.matches("</script>").count(), 5);
+}
+
+#[test]
+fn a_diagnosis_has_its_report() {
+    let folder = spindle(false);
+    let wrong = page(&folder.path().join("pipeline.toml"))
+        .replace("id = \"reversed\", part_deg = 180", "id = \"reversed\", part_deg = 179.5");
+    fs::write(folder.path().join("pipeline.toml"), wrong).unwrap();
+    let ran = folder.run(&["diagnose", "pipeline.toml"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let written = page(&folder.path().join("out/diagnosed/report.html"));
+    for part in ["Closed loop", "effect by effect", "What to change in the rig", "setups.1.part_deg"] {
+        assert!(written.contains(part), "{part}");
+    }
+    let ran = folder.run(&["report", "out/diagnosed/result.h5", "--out", "again.html"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    assert!(page(&folder.path().join("again.html")).contains("setups.1.part_deg"));
+}
+
+#[test]
+fn what_is_no_result_is_refused() {
+    let folder = spindle(false);
+    for (arguments, status, said) in [
+        (&["report", "shaft.h5"][..], 1, "expected a file of the format runout-result"),
+        (&["report", "none.h5"], 1, "none.h5"),
+        (&["report", "scenario.toml"], 1, "no HDF5 file"),
+        (&["report", "shaft.h5", "--out", "./shaft.h5"], 2, "is the result itself"),
+    ] {
+        let ran = folder.run(arguments);
+        assert!(ran.status == status && ran.stderr.contains(said), "{arguments:?}: {}", ran.shown());
+    }
+    assert!(!folder.path().join("shaft.html").exists(), "a half report");
+}
+
+/// Chromium and the modules that drive it; nothing, with the reason printed, where they are missing.
+fn browser() -> Option<(PathBuf, String)> {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser");
+    let modules = std::env::var_os("RUNOUT_NODE_MODULES").map_or_else(|| here.join("node_modules"), PathBuf::from);
+    let chromium = std::env::var("RUNOUT_CHROMIUM").unwrap_or_else(|_| "chromium".into());
+    let missing = if !modules.join("puppeteer-core").is_dir() || !modules.join("axe-core").is_dir() {
+        "puppeteer-core and axe-core are not installed in RUNOUT_NODE_MODULES"
+    } else if Command::new(&chromium).arg("--version").output().is_err() {
+        "Chromium is not installed (RUNOUT_CHROMIUM names it)"
+    } else {
+        return Some((modules, chromium));
+    };
+    assert!(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_none(), "{missing}");
+    eprintln!("skipped: {missing}");
+    None
+}
+
+/// What Chromium finds in a report.
+fn look(report: &Path) -> Option<serde_json::Value> {
+    let (modules, chromium) = browser()?;
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/look.mjs");
+    // The program is named as a path: the browser is not looked up by puppeteer.
+    let chromium = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())
+        .map(|folder| folder.join(&chromium))
+        .find(|path| path.is_file())
+        .unwrap_or_else(|| PathBuf::from(chromium));
+    let output = Command::new("node").arg(script).arg(modules).arg(chromium).arg(report).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+/// No console message, no request, nothing serious for people who do not see the page; sizes and times are printed.
+fn assert_quiet(name: &str, found: &serde_json::Value) {
+    assert_eq!(found["console"], serde_json::json!([]), "{name}");
+    assert_eq!(found["requests"], serde_json::json!([]), "{name}");
+    let serious = |one: &&serde_json::Value| one["impact"] == "serious" || one["impact"] == "critical";
+    let axe: Vec<_> = found["axe"].as_array().unwrap().iter().filter(serious).collect();
+    assert!(axe.is_empty(), "{name}: {axe:#?}");
+    eprintln!("{name}: {} bytes, usable after {} ms, complete after {} ms", found["bytes"], found["usable_ms"], found["complete_ms"]);
+}
+
+#[test]
+fn chromium_draws_what_the_tables_hold_and_the_controls_work() {
+    let folder = spindle(true);
+    assert_eq!(folder.run(&["run", "pipeline.toml"]).status, 0);
+    let Some(found) = look(&folder.path().join("out/report.html")) else { return };
+    assert_quiet("spindle", &found);
+    // The table in HDF5 holds the numbers of the one in Parquet.
+    let result = hdf5_metno::File::open(folder.path().join("out/result.h5")).unwrap();
+    let rows = result.dataset("form/form_um").unwrap().read_raw::<f64>().unwrap();
+    // The first station's two sections, with the first angle once more at the end.
+    let curves = found["plots"]["plot-form"].as_array().unwrap().iter().filter(|trace| trace["meta"] == "values");
+    let drawn: Vec<f64> = curves.map(|trace| trace["sum"].as_f64().unwrap()).collect();
+    let angles = rows.len() / 10;
+    for (section, drawn) in drawn.iter().enumerate() {
+        let curve = &rows[section * angles..(section + 1) * angles];
+        let sum: f64 = curve.iter().sum::<f64>() + curve[0];
+        // Numbers of the page are f32.
+        assert!((sum - drawn).abs() < 1e-4, "section {section}: {sum} {drawn}");
+    }
+    assert_eq!(drawn.len(), 2);
+    let of = |plot: &str| found["plots"][plot][0].clone();
+    assert!(of("map-surface")["count"].as_u64() > Some(1000) && of("solid-surface")["count"].as_u64() > Some(1000));
+    let controls = &found["controls"];
+    for (plot, control) in [("plot-form", "panel"), ("plot-form", "filter"), ("plot-motion", "filter"), ("plot-form-harmonics", "panel")] {
+        assert_eq!(controls[plot][control], true, "{plot} {control}");
+    }
+    assert_eq!(controls["slider"], true);
+    assert!(found["pointed"].as_str().unwrap().contains("deviation") && found["ring"].is_array(), "{found:#}");
+}

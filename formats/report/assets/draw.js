@@ -1,0 +1,277 @@
+// From the page's data to charts: traces and layouts of plotly.js, and nothing that touches the page.
+"use strict";
+
+const Draw = (() => {
+  const COVERAGE = 2; // Standard uncertainties on each side of an interval of 95 %.
+  const MM_PER_PX = 25.4 / 96; // As CSS defines them.
+
+  function numbers(data) {
+    if (data === undefined) return null;
+    if (typeof data === "string") {
+      const bytes = Uint8Array.from(atob(data), (character) => character.charCodeAt(0));
+      return Array.from(new Float32Array(bytes.buffer));
+    }
+    const at = "same" in data ? () => data.same : (place) => data.from + place * data.step;
+    return Array.from({ length: data.count }, (_, place) => at(place));
+  }
+
+  // plotly.js reads some HTML in texts.
+  const plain = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
+  const label = (axis) => plain(axis.unit ? (axis.name ? `${axis.name} / ${axis.unit}` : axis.unit) : axis.name);
+
+  // Digits that a standard uncertainty gives a meaning to; five significant ones without it.
+  function shown(value, std) {
+    if (!Number.isFinite(value)) return "not known";
+    const size = std > 0 ? std : Math.abs(value) * 1e-3 || 1;
+    const decimals = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(size))));
+    return std > 0 ? `${value.toFixed(decimals)} ± ${std.toFixed(decimals)}` : value.toFixed(decimals);
+  }
+
+  function colours() {
+    const style = getComputedStyle(document.documentElement);
+    const of = (name) => style.getPropertyValue(`--${name}`).trim();
+    return { ink: of("ink"), faint: of("faint"), line: of("line"), curves: [0, 1, 2, 3, 4, 5, 6].map((index) => of(`c${index}`)) };
+  }
+
+  const clear = (colour, share) => colour + Math.round(255 * share).toString(16).padStart(2, "0");
+
+  function layout(more) {
+    const { ink, faint } = colours();
+    const base = {
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 13, family: "system-ui, sans-serif" },
+      margin: { l: 64, r: 24, t: 32, b: 52 }, hovermode: "closest", modebar: { bgcolor: "rgba(0,0,0,0)", color: faint, activecolor: ink }, legend: { orientation: "h", x: 0.5, xanchor: "center", y: -0.2, yanchor: "top" },
+    };
+    return { ...base, ...more };
+  }
+
+  function axis(of, more) {
+    const { line, faint } = colours();
+    return { title: { text: label(of), standoff: 8 }, gridcolor: line, zerolinecolor: faint, linecolor: faint, automargin: true, ...more };
+  }
+
+  // The next of 1, 1.5, 2, 3, 4, 5, 6, 8 and 10 times a power of ten.
+  function roundedUp(value) {
+    if (!(value > 0)) return 1;
+    const power = 10 ** Math.floor(Math.log10(value));
+    const step = [1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((one) => one * power >= value * (1 - 1e-12));
+    return (step ?? 10) * power;
+  }
+
+  // Whether angles go once around the part.
+  function closed(angles) {
+    const count = angles.length;
+    const span = angles[count - 1] - angles[0];
+    return count > 8 && 360 - span < (3 * span) / (count - 1);
+  }
+
+  // The Gaussian low-pass of ISO 16610-21 on a closed profile: order n passes by 2^-(n/cutoff)^2.
+  function gaussian(angles, values, cutoff) {
+    const count = values.length;
+    const turn = Math.PI / 180;
+    const weights = angles.map((angle, place) => {
+      const before = place ? angles[place - 1] : angles[count - 1] - 360;
+      const after = place + 1 < count ? angles[place + 1] : angles[0] + 360;
+      return (after - before) / 720;
+    });
+    const filtered = new Float64Array(count);
+    const highest = Math.min(Math.floor(count / 2) - 1, Math.ceil(3.2 * cutoff));
+    for (let order = 0; order <= highest; order++) {
+      let cosine = 0, sine = 0;
+      for (let place = 0; place < count; place++) {
+        const phase = order * angles[place] * turn;
+        cosine += weights[place] * values[place] * Math.cos(phase);
+        sine += weights[place] * values[place] * Math.sin(phase);
+      }
+      const passes = (order ? 2 : 1) * 2 ** -((order / cutoff) ** 2);
+      for (let place = 0; place < count; place++) {
+        const phase = order * angles[place] * turn;
+        filtered[place] += passes * (cosine * Math.cos(phase) + sine * Math.sin(phase));
+      }
+    }
+    return Array.from(filtered);
+  }
+
+  function polar(figure, panel, cutoff) {
+    const { line, faint, curves: palette } = colours();
+    const traces = [];
+    const curves = panel.curves.map((curve) => {
+      const theta = numbers(curve.x);
+      const whole = closed(theta);
+      const filtered = cutoff > 0 && whole;
+      const values = filtered ? gaussian(theta, numbers(curve.y), cutoff) : numbers(curve.y);
+      // What a filter leaves of an uncertainty is not known here.
+      const std = filtered ? null : numbers(curve.std);
+      return { name: curve.name, theta, values, std, whole };
+    });
+    let largest = 0;
+    for (const { values, std } of curves) {
+      values.forEach((value, place) => { largest = Math.max(largest, Math.abs(value) + COVERAGE * (std?.[place] || 0)); });
+    }
+    const span = roundedUp(largest);
+    const around = Array.from({ length: 181 }, (_, step) => 2 * step);
+    traces.push({
+      type: "scatterpolar", mode: "lines", name: "reference circle", theta: around, r: around.map(() => 0), hoverinfo: "skip",
+      line: { color: faint, width: 1.2, dash: "dash" }, showlegend: true,
+    });
+    curves.forEach(({ name, theta, values, std, whole }, index) => {
+      const colour = palette[index % palette.length];
+      const again = (list) => (whole ? [...list, list[0]] : list);
+      if (std?.some((one) => COVERAGE * one > 0.002 * span)) {
+        const side = (sign) => again(values.map((value, place) => value + sign * COVERAGE * (std[place] || 0)));
+        traces.push({
+          type: "scatterpolar", mode: "lines", theta: [...again(theta), ...again(theta).reverse()], r: [...side(1), ...side(-1).reverse()],
+          fill: "toself", fillcolor: clear(colour, 0.25), line: { width: 0 }, hoverinfo: "skip", showlegend: false, name: `${plain(name)} ± 2 std`,
+        });
+      }
+      const text = again(values.map((value, place) => shown(value, std?.[place])));
+      traces.push({
+        type: "scatterpolar", mode: "lines", name: plain(name) || plain(figure.title), theta: again(theta), r: again(values), text,
+        line: { color: colour, width: 1.8 }, meta: "values", showlegend: curves.length > 1 || name !== "",
+        hovertemplate: `%{theta:.2f}°, %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
+      });
+    });
+    const angular = { gridcolor: line, linecolor: faint, ticksuffix: "°", showticksuffix: "all", dtick: 45, direction: "counterclockwise", rotation: 0 };
+    const radial = {
+      range: [-2 * span, span], tickvals: [-span, 0, span], ticktext: [`−${span}`, "0", `+${span}`].map((text) => `${text} ${figure.y.unit}`),
+      angle: 22.5, tickangle: 22.5, gridcolor: line, linecolor: "rgba(0,0,0,0)", tickfont: { size: 11, color: faint },
+    };
+    const place = layout({
+      polar: { bgcolor: "rgba(0,0,0,0)", radialaxis: radial, angularaxis: angular }, margin: { l: 48, r: 48, t: 32, b: 32 }, height: 480,
+    });
+    place.legend = { ...place.legend, y: -0.1 };
+    const magnification = (plot) => {
+      const radius = plot._fullLayout.polar._subplot?.radius;
+      const um = { "µm": 1, nm: 1e-3, mm: 1e3 }[figure.y.unit];
+      if (!radius || !um) return "";
+      const times = (1e3 * MM_PER_PX * radius) / (3 * span * um);
+      return `magnification ${Number(times.toPrecision(2)).toLocaleString("en")} : 1 in print`;
+    };
+    const bounds = curves.map(({ name, std }) => {
+      const same = std?.every((one) => Math.abs(one - std[0]) <= 1e-6 * std[0]) && std[0] > 0;
+      return same ? `${name || figure.title}: U = ${(COVERAGE * std[0]).toPrecision(2)} ${figure.y.unit}` : "";
+    });
+    const said = bounds.filter(Boolean);
+    return { traces, layout: place, magnification, said: said.length && said.length <= 4 ? `${said.join(", ")} (k = 2)` : "" };
+  }
+
+  function lines(figure, panel) {
+    const { curves: palette } = colours();
+    const traces = [];
+    panel.curves.forEach((curve, index) => {
+      const colour = palette[index % palette.length];
+      const [x, y, std] = [numbers(curve.x), numbers(curve.y), numbers(curve.std)];
+      if (std) {
+        const side = (sign) => y.map((value, place) => value + sign * COVERAGE * (std[place] || 0));
+        traces.push({
+          type: "scatter", mode: "lines", x: [...x, ...[...x].reverse()], y: [...side(1), ...side(-1).reverse()], fill: "toself",
+          fillcolor: clear(colour, 0.2), line: { width: 0 }, hoverinfo: "skip", showlegend: false,
+        });
+      }
+      traces.push({
+        type: "scatter", mode: "lines", x, y, text: y.map((value, place) => shown(value, std?.[place])), name: plain(curve.name) || plain(figure.title),
+        line: { color: colour, width: 1.5 }, meta: "values", showlegend: panel.curves.length > 1,
+        hovertemplate: `%{x} ${figure.x.unit}: %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
+      });
+    });
+    return { traces, layout: layout({ xaxis: axis(figure.x), yaxis: axis(figure.y), height: 400 }) };
+  }
+
+  const FIRST_ORDERS = 50; // Shown at first; the axis can be moved to higher ones.
+
+  function amplitudes(figure, panel) {
+    const { curves: palette, faint } = colours();
+    const lost = new Set();
+    let highest = 0;
+    const traces = panel.curves.map((curve, index) => {
+      const [x, y, std] = [numbers(curve.x), numbers(curve.y), numbers(curve.std)];
+      curve.missing.forEach((order) => lost.add(order));
+      // Eccentricity is no form, and would hide it.
+      const kept = x.map((_, place) => place).filter((place) => x[place] >= 2);
+      highest = Math.max(highest, ...kept.map((place) => x[place]));
+      const of = (list) => kept.map((place) => list[place]);
+      return {
+        type: "bar", x: of(x), y: of(y), name: plain(curve.name) || "amplitude", marker: { color: palette[index % palette.length] }, meta: "values",
+        error_y: std ? { type: "data", array: of(std).map((one) => COVERAGE * one * Math.SQRT1_2), thickness: 1, width: 0, color: faint } : undefined,
+        text: kept.map((place) => shown(y[place], std ? std[place] * Math.SQRT1_2 : undefined)), textposition: "none",
+        showlegend: panel.curves.length > 1, hovertemplate: `order %{x}: %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
+      };
+    });
+    const orders = [...lost].filter((order) => order >= 2);
+    if (orders.length) {
+      highest = Math.max(highest, ...orders);
+      const top = Math.max(...traces.flatMap((trace) => trace.y), 0) || 1;
+      traces.push({
+        type: "bar", x: orders, y: orders.map(() => top), name: "lost order", width: 0.9, hovertemplate: "order %{x} is lost<extra></extra>",
+        marker: { color: "rgba(0,0,0,0)", line: { width: 0 }, pattern: { shape: "/", fgcolor: faint, size: 6 } }, showlegend: true,
+      });
+    }
+    const range = [1.4, Math.min(highest, FIRST_ORDERS) + 0.6];
+    const across = axis({ name: "order", unit: "UPR" }, { range, tickformat: "d" });
+    return { traces, layout: layout({ xaxis: across, yaxis: axis(figure.y, { rangemode: "tozero" }), height: 380, barmode: "group", bargap: 0.25 }) };
+  }
+
+  // A map's numbers: columns, rows, and heights row by row.
+  function grid(map) {
+    const [x, y, heights] = [numbers(map.xs), numbers(map.ys), numbers(map.heights)];
+    const rows = y.map((_, row) => heights.slice(row * x.length, (row + 1) * x.length));
+    return { x, y, rows };
+  }
+
+  const SCALE = "Viridis";
+  const bar = (map) => ({ title: { text: label(map.height), side: "right" }, thickness: 14, outlinewidth: 0 });
+
+  function map(of, { x, y, rows }) {
+    const trace = { type: "heatmap", x, y, z: rows, colorscale: SCALE, colorbar: bar(of), hoverinfo: "none", zsmooth: false };
+    const across = axis(of.x, of.radius_mm ? { dtick: 45, range: [x[0], 360] } : {});
+    return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
+  }
+
+  const MOST_SOLID = [160, 180]; // Rings and angles that a phone can still turn.
+
+  // Places of a list, at most so many at equal distances.
+  function some(list, most) {
+    const stride = Math.ceil(list.length / most);
+    return list.map((_, place) => place).filter((place) => place % stride === 0);
+  }
+
+  // The surface in space, with deviations so many times as large; rings are closed.
+  function solid(of, { x, y, rows }, times) {
+    const [rings, angles] = [some(y, MOST_SOLID[0]), some(x, MOST_SOLID[1])];
+    const round = of.radius_mm !== null && of.radius_mm !== undefined;
+    const around = round ? [...angles, angles[0]] : angles;
+    const each = (value) => rings.map((ring) => around.map((angle) => value(ring, angle)));
+    const heights = each((ring, angle) => rows[ring][angle]);
+    const turn = Math.PI / 180;
+    const radius = (ring, angle) => of.radius_mm + (times * rows[ring][angle]) / 1e3;
+    const places = round
+      ? {
+        x: each((ring) => y[ring]),
+        y: each((ring, angle) => radius(ring, angle) * Math.cos(x[angle] * turn)),
+        z: each((ring, angle) => radius(ring, angle) * Math.sin(x[angle] * turn)),
+      }
+      : { x: angles.map((angle) => x[angle]), y: rings.map((ring) => y[ring]), z: each((ring, angle) => times * rows[ring][angle]) };
+    const trace = {
+      type: "surface", ...places, surfacecolor: heights, colorscale: SCALE, showscale: false, hoverinfo: "none",
+      lighting: { ambient: 0.75, diffuse: 0.5, specular: 0.1 }, contours: { x: { highlight: false }, y: { highlight: false }, z: { highlight: false } },
+    };
+    const { line } = colours();
+    const side = (axis) => ({ title: { text: label(axis) }, gridcolor: line, zeroline: false, showspikes: false, backgroundcolor: "rgba(0,0,0,0)" });
+    const scene = round
+      ? { xaxis: side(of.y), yaxis: side({ name: "x", unit: "mm" }), zaxis: side({ name: "y", unit: "mm" }), aspectmode: "data", camera: { eye: { x: 1.1, y: -1.85, z: 0.9 } } }
+      : { xaxis: side(of.x), yaxis: side(of.y), zaxis: side(times === 1 ? of.height : { name: `${of.height.name} × ${times}`, unit: of.height.unit }), aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.4 } };
+    return { traces: [trace], layout: layout({ scene, height: 460, margin: { l: 0, r: 0, t: 0, b: 0 } }), rings, angles };
+  }
+
+  // One ring of a surface, or one row of a map.
+  function ring(of, { x, y, rows }, row) {
+    const panel = { name: "", curves: [{ name: "", x: null, y: null, missing: [] }] };
+    const title = `${of.y.name} = ${Number(y[row].toPrecision(6))} ${of.y.unit}`;
+    const figure = { title, x: of.x, y: of.height };
+    const curve = panel.curves[0];
+    const encoded = (list) => btoa(String.fromCharCode(...new Uint8Array(new Float32Array(list).buffer)));
+    [curve.x, curve.y] = [encoded(x), encoded(rows[row])];
+    return { title, ...(of.radius_mm ? polar(figure, panel, 0) : lines(figure, panel)) };
+  }
+
+  return { amplitudes, grid, lines, map, polar, ring, shown, solid, roundedUp };
+})();

@@ -1,0 +1,182 @@
+// The page: where charts are drawn, what their controls do, and the table of values.
+"use strict";
+
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  const FILTERS = [15, 50, 150, 500];
+  const redraws = [];
+
+  function element(name, attributes = {}, ...children) {
+    const made = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) key in made ? (made[key] = value) : made.setAttribute(key, value);
+    made.append(...children);
+    return made;
+  }
+
+  function labelled(text, control) {
+    return element("label", {}, text, control);
+  }
+
+  // Draws into a place of the chart's own height, and as wide as there is room.
+  function put(place, { traces, layout: { height, ...layout } }) {
+    place.style.height = `${height}px`;
+    return Plotly.react(place, traces, { ...layout, autosize: true }, CONFIG);
+  }
+
+  // Figures with panels of the same names show the same one.
+  const followers = new Map();
+
+  function chooser(figure, show) {
+    const names = figure.panels.map((panel) => panel.name);
+    const key = JSON.stringify(names);
+    const select = element("select", {}, ...names.map((name, index) => element("option", { value: index, textContent: name, dir: "auto" })));
+    const follow = (index) => { select.value = index; show(index); };
+    followers.set(key, [...(followers.get(key) ?? []), follow]);
+    const choose = (index) => followers.get(key).forEach((one) => one(Math.min(names.length - 1, Math.max(0, index))));
+    select.addEventListener("change", () => choose(Number(select.value)));
+    const step = (by, text, name) => element("button", { type: "button", textContent: text, ariaLabel: name, onclick: () => choose(Number(select.value) + by) });
+    return [step(-1, "‹", "previous"), labelled("of", select), step(1, "›", "next"), element("span", { textContent: `${names.length} in all` })];
+  }
+
+  function chart(figure, box) {
+    const controls = element("p", { className: "controls" });
+    const readout = element("p", { className: "readout" });
+    const state = { panel: 0, cutoff: 0 };
+    if (figure.kind === "map") {
+      box.append(controls);
+      const holder = element("div", { className: "map" });
+      box.append(holder);
+      const show = (index) => { holder.replaceChildren(); surface(figure.panels[index].map, holder, figure.id); };
+      if (figure.panels.length > 1) controls.append(...chooser(figure, show));
+      show(0);
+      return;
+    }
+    const plot = element("div", { className: "plot", id: `plot-${figure.id}` });
+    const draw = () => {
+      const drawn = Draw[figure.kind](figure, figure.panels[state.panel], state.cutoff);
+      return put(plot, drawn).then(() => {
+        readout.textContent = [drawn.said, drawn.magnification?.(plot)].filter(Boolean).join("; ");
+      });
+    };
+    if (figure.panels.length > 1) controls.append(...chooser(figure, (index) => { state.panel = index; draw(); }));
+    if (figure.kind === "polar") {
+      const options = [["0", "none"], ...FILTERS.map((upr) => [upr, `Gaussian ${upr} UPR`])];
+      const select = element("select", {}, ...options.map(([value, textContent]) => element("option", { value, textContent })));
+      select.addEventListener("change", () => { state.cutoff = Number(select.value); draw(); });
+      controls.append(labelled("Filter", select));
+    }
+    if (controls.childNodes.length) box.append(controls);
+    box.append(plot, readout);
+    draw();
+    redraws.push(draw);
+  }
+
+  // A map beside its body in space; a click on either opens the ring below.
+  function surface(of, box, id) {
+    const grid = Draw.grid(of);
+    const flat = element("div", { className: "plot", id: `map-${id}` });
+    const readout = element("p", { className: "readout", textContent: "Point at the map for a value; click for the ring." });
+    const space = element("div", { className: "plot", id: `solid-${id}` });
+    const slider = element("input", { type: "range", min: 0, max: 100, value: 50, ariaLabel: "exaggeration of the deviation" });
+    const times = element("output", {});
+    const ring = element("div", { className: "plot", id: `ring-${id}` });
+    const title = element("h3", { textContent: "" });
+    const opened = element("div", { hidden: true }, title, ring);
+    const chosen = { row: null };
+    box.append(
+      element("div", {}, flat, readout, opened),
+      element("div", {}, element("p", { className: "controls" }, labelled("Exaggeration", slider), times), space),
+    );
+    const heights = grid.rows.flat().filter(Number.isFinite);
+    const span = heights.reduce((most, one) => Math.max(most, Math.abs(one)), 0) || 1;
+    // At the slider's middle, the largest deviation is a sixth of the radius.
+    const middle = of.radius_mm ? (1e3 * of.radius_mm) / (6 * span) : 1;
+    const magnified = () => Number((middle * 10 ** ((Number(slider.value) - 50) / 50)).toPrecision(2));
+    const value = (row, column) => {
+      const place = `${of.x.name} ${Number(grid.x[column].toPrecision(6))} ${of.x.unit}, ${of.y.name} ${Number(grid.y[row].toPrecision(6))} ${of.y.unit}`;
+      readout.textContent = `${place}: ${of.height.name} ${Draw.shown(grid.rows[row][column])} ${of.height.unit}`;
+    };
+    const open = (row) => {
+      chosen.row = row;
+      opened.hidden = false;
+      const drawn = Draw.ring(of, grid, row);
+      title.textContent = drawn.title;
+      put(ring, drawn);
+    };
+    const solid = () => {
+      const drawn = Draw.solid(of, grid, magnified());
+      times.textContent = `${magnified().toLocaleString("en")} times`;
+      return put(space, { ...drawn, layout: { ...drawn.layout, uirevision: "turned" } }).then(() => drawn);
+    };
+    const map = () => put(flat, Draw.map(of, grid));
+    map().then(() => {
+      flat.on("plotly_hover", ({ points: [{ pointIndex: [row, column] }] }) => value(row, column));
+      flat.on("plotly_click", ({ points: [{ pointIndex: [row] }] }) => open(row));
+    });
+    const begin = () => solid().then(({ rings, angles }) => {
+      const of = ({ points: [{ pointNumber: [column, row] }] }) => [rings[row], angles[column % angles.length]];
+      space.on("plotly_hover", (event) => value(...of(event)));
+      space.on("plotly_click", (event) => open(of(event)[0]));
+      slider.addEventListener("input", solid);
+      redraws.push(solid);
+    });
+    // The page is usable before the body in space is drawn.
+    (window.requestIdleCallback ?? setTimeout)(begin);
+    redraws.push(map, () => chosen.row !== null && open(chosen.row));
+  }
+
+  function table() {
+    const body = document.querySelector("#rows tbody");
+    if (!body) return;
+    const MOST = 200;
+    const [filter, count] = [document.getElementById("filter"), document.getElementById("shown")];
+    const keys = ["place", "symbol", "shown", "unit", "interval", "refers", "about"];
+    let [rows, sorted, down] = [data.values, null, false];
+    const show = () => {
+      const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
+      rows = data.values.filter((row) => { const text = keys.map((key) => row[key]).join(" ").toLowerCase(); return words.every((word) => text.includes(word)); });
+      if (sorted) {
+        const [key, sign] = [sorted, down ? -1 : 1];
+        rows.sort((a, b) => sign * (key === "value" ? (a.value ?? Infinity) - (b.value ?? Infinity) : a[key].localeCompare(b[key], "en", { numeric: true })));
+      }
+      const cell = (row, key) => {
+        const made = element("td", key === "shown" || key === "interval" ? { className: "number" } : {});
+        made.append(key === "place" ? element("bdi", { textContent: row[key] }) : row[key]);
+        return made;
+      };
+      body.replaceChildren(...rows.slice(0, MOST).map((row) => element("tr", {}, ...keys.map((key) => cell(row, key)))));
+      count.textContent = rows.length > MOST ? `the first ${MOST} of ${rows.length} values` : `${rows.length} values`;
+    };
+    filter.addEventListener("input", show);
+    document.querySelectorAll("#rows th button").forEach((button) => button.addEventListener("click", () => {
+      down = sorted === button.dataset.key && !down;
+      sorted = button.dataset.key;
+      document.querySelectorAll("#rows th").forEach((head) => head.removeAttribute("aria-sort"));
+      button.parentElement.setAttribute("aria-sort", down ? "descending" : "ascending");
+      show();
+    }));
+    document.getElementById("copy").addEventListener("click", async () => {
+      const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+      const columns = ["place", "symbol", "value", "std", "unit", "refers", "about"];
+      const csv = [columns, ...rows.map((row) => columns.map((key) => row[key] ?? ""))].map((row) => row.map((one) => quoted(String(one))).join(",")).join("\n");
+      const area = element("textarea", { value: csv });
+      document.body.append(area);
+      area.select();
+      // A page opened as a file may have no other clipboard.
+      await navigator.clipboard?.writeText(csv).catch(() => document.execCommand("copy"));
+      area.remove();
+      count.textContent = `${rows.length} values copied`;
+    });
+    show();
+  }
+
+  const redraw = () => redraws.forEach((one) => one());
+  document.querySelectorAll("[data-figure]").forEach((box) => chart(data.figures[Number(box.dataset.figure)], box.querySelector(".drawn")));
+  if (data.surface) surface(data.surface, document.querySelector('[data-map="surface"]'), "surface");
+  table();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  // Print has its own colours and width.
+  for (const moment of ["beforeprint", "afterprint"]) addEventListener(moment, redraw);
+  document.documentElement.dataset.ready = "true";
+})();

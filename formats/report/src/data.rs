@@ -1,0 +1,253 @@
+//! What the page's program draws: figures, surface and values as JSON, with numbers in base64.
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use runout_core::{
+    surface::Surface,
+    table::panels::{Axis, Curve, Grid, Kind, Panels, Point},
+};
+use serde::Serialize;
+
+use crate::{symbol, values::Row};
+
+/// Points of a curve that are drawn: more are not visible on a screen.
+const MOST_POINTS: usize = 2880;
+/// Points of all curves together, of which a file of a few megabytes consists.
+const MOST_POINTS_TOGETHER: usize = 1_500_000;
+/// Points of a curve that are left of very many curves.
+const FEWEST_POINTS: usize = 360;
+/// Cells of a map, along the vertical and along the horizontal axis.
+const MOST_CELLS: [usize; 2] = [400, 720];
+
+/// All that is drawn.
+#[derive(Serialize)]
+pub(crate) struct Data<'a> {
+    pub(crate) figures: Vec<FigureData>,
+    pub(crate) surface: Option<MapData>,
+    pub(crate) values: &'a [Row],
+}
+
+/// A figure with its panels.
+#[derive(Serialize)]
+pub(crate) struct FigureData {
+    pub(crate) id: String,
+    pub(crate) title: String,
+    kind: &'static str,
+    x: AxisData,
+    y: AxisData,
+    pub(crate) panels: Vec<PanelData>,
+    pub(crate) thinned: bool,
+}
+
+#[derive(Serialize)]
+struct AxisData {
+    name: String,
+    unit: String,
+}
+
+#[derive(Serialize)]
+pub(crate) struct PanelData {
+    name: String,
+    curves: Vec<CurveData>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    map: Option<MapData>,
+}
+
+#[derive(Serialize)]
+struct CurveData {
+    name: String,
+    x: Numbers,
+    y: Numbers,
+    /// Standard uncertainty of y.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    std: Option<Numbers>,
+    /// Places without a value.
+    missing: Vec<f64>,
+}
+
+/// Heights on a grid, row by row along y.
+#[derive(Serialize)]
+pub(crate) struct MapData {
+    x: AxisData,
+    y: AxisData,
+    height: AxisData,
+    xs: Numbers,
+    ys: Numbers,
+    heights: Numbers,
+    /// Nominal radius where x is the angle around a part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    radius_mm: Option<f64>,
+    pub(crate) thinned: bool,
+}
+
+/// Numbers as short as they can be written.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Numbers {
+    /// All the same.
+    Same { same: f64, count: usize },
+    /// At equal steps.
+    Steps { from: f64, step: f64, count: usize },
+    /// Little-endian f32 in base64.
+    Each(String),
+}
+
+impl Numbers {
+    fn of(numbers: &[f64]) -> Self {
+        let count = numbers.len();
+        if let (Some(first), Some(last)) = (numbers.first(), numbers.last())
+            && count > 2
+        {
+            let step = (last - first) / (count - 1) as f64;
+            let near = |place: usize, number: f64| {
+                (number - (first + step * place as f64)).abs() <= 1e-9 * first.abs().max(last.abs())
+            };
+            if numbers.iter().enumerate().all(|(place, number)| near(place, *number)) {
+                return if step == 0.0 {
+                    Self::Same { same: *first, count }
+                } else {
+                    Self::Steps { from: *first, step, count }
+                };
+            }
+        }
+        let bytes: Vec<u8> = numbers.iter().flat_map(|number| (*number as f32).to_le_bytes()).collect();
+        Self::Each(BASE64_STANDARD.encode(bytes))
+    }
+}
+
+impl AxisData {
+    fn of(axis: &Axis, unit: &str) -> Self {
+        Self { name: axis.name.clone(), unit: symbol(unit) }
+    }
+}
+
+/// The figures that have something to draw.
+pub(crate) fn figures(all: &[Panels]) -> Vec<FigureData> {
+    let points = |figure: &Panels| -> usize {
+        figure.drawn.iter().flat_map(|panel| &panel.curves).map(|curve| curve.points.len().min(MOST_POINTS)).sum()
+    };
+    let curves = |figure: &Panels| -> usize { figure.drawn.iter().map(|panel| panel.curves.len()).sum() };
+    let drawn = || all.iter().filter(|figure| figure.kind != Kind::Map);
+    let most = match drawn().map(points).sum::<usize>() {
+        together if together > MOST_POINTS_TOGETHER => {
+            let curves = drawn().map(curves).sum::<usize>().max(1);
+            (MOST_POINTS_TOGETHER / curves).clamp(FEWEST_POINTS, MOST_POINTS)
+        }
+        _ => MOST_POINTS,
+    };
+    all.iter().map(|panels| figure(panels, most)).filter(|figure| !figure.panels.is_empty()).collect()
+}
+
+fn figure(figure: &Panels, most: usize) -> FigureData {
+    let (scale, unit) = figure.scaled();
+    let [x, y] = &figure.axes;
+    let mut thinned = false;
+    let mut panels = Vec::new();
+    for panel in &figure.drawn {
+        let drawn = |curve: &&Curve| !curve.points.is_empty();
+        let mut data = PanelData { name: one_line(&panel.name), curves: Vec::new(), map: None };
+        if figure.kind == Kind::Map {
+            let points: Vec<Point> = panel.curves.iter().flat_map(|curve| curve.points.iter().copied()).collect();
+            data.map = (!points.is_empty()).then(|| map(figure, &points));
+            thinned |= data.map.as_ref().is_some_and(|map| map.thinned);
+        } else {
+            thinned |= panel.curves.iter().any(|curve| curve.points.len() > most);
+            data.curves.extend(panel.curves.iter().filter(drawn).map(|one| curve(&one.thinned(most, scale))));
+        }
+        if data.map.is_some() || !data.curves.is_empty() {
+            panels.push(data);
+        }
+    }
+    let kind = match figure.kind {
+        Kind::Polar => "polar",
+        Kind::Lines => "lines",
+        Kind::Amplitudes => "amplitudes",
+        Kind::Map => "map",
+    };
+    let (x, y) = (AxisData::of(x, &x.unit), AxisData::of(y, unit));
+    FigureData { id: figure.id.clone(), title: figure.title.clone(), kind, x, y, panels, thinned }
+}
+
+fn curve(curve: &Curve) -> CurveData {
+    let numbers = |of: fn(&Point) -> f64| -> Vec<f64> { curve.points.iter().map(of).collect() };
+    let std = numbers(|point| point.third);
+    CurveData {
+        name: one_line(&curve.name),
+        x: Numbers::of(&numbers(|point| point.x)),
+        y: Numbers::of(&numbers(|point| point.y)),
+        std: std.iter().any(|std| std.is_finite()).then(|| Numbers::of(&std)),
+        missing: curve.missing.clone(),
+    }
+}
+
+fn map(figure: &Panels, points: &[Point]) -> MapData {
+    let Grid { x, y, rows } = Grid::of(points, MOST_CELLS);
+    let [across, up] = &figure.axes;
+    let middles = |from: f64, to: f64, count: usize| {
+        let step = (to - from) / count as f64;
+        let middles: Vec<f64> = (0..count).map(|cell| from + step * (cell as f64 + 0.5)).collect();
+        Numbers::of(&middles)
+    };
+    MapData {
+        x: AxisData::of(across, &across.unit),
+        y: AxisData::of(up, &up.unit),
+        height: AxisData::of(figure.height(), &figure.height().unit),
+        xs: middles(x.from, x.to, x.count),
+        ys: middles(y.from, y.to, y.count),
+        thinned: x.count == MOST_CELLS[1] || y.count == MOST_CELLS[0],
+        heights: Numbers::of(&rows.concat()),
+        radius_mm: None,
+    }
+}
+
+/// The surface, unrolled; of many angles and rings each second, third, ….
+pub(crate) fn surface(surface: &Surface) -> MapData {
+    let around = surface.angles.div_ceil(MOST_CELLS[1]).max(1);
+    let along = surface.z_mm.len().div_ceil(MOST_CELLS[0]).max(1);
+    let degrees = 360.0 / surface.angles.max(1) as f64;
+    let angles: Vec<f64> = (0..surface.angles).step_by(around).map(|angle| degrees * angle as f64).collect();
+    let rings = (0..surface.z_mm.len()).step_by(along);
+    let heights: Vec<f64> =
+        rings.flat_map(|ring| surface.ring(ring).iter().step_by(around).copied().collect::<Vec<_>>()).collect();
+    let places: Vec<f64> = surface.z_mm.iter().step_by(along).copied().collect();
+    let axis = |name: &str, unit: &str| AxisData { name: name.into(), unit: unit.into() };
+    MapData {
+        x: axis("angle on the part", "°"),
+        y: axis("z", "mm"),
+        height: axis("deviation", "µm"),
+        xs: Numbers::of(&angles),
+        ys: Numbers::of(&places),
+        heights: Numbers::of(&heights),
+        radius_mm: Some(surface.radius_mm),
+        thinned: around > 1 || along > 1,
+    }
+}
+
+/// A name without what would break a line or hide.
+pub(crate) fn one_line(name: &str) -> String {
+    name.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    fn json(numbers: &[f64]) -> String {
+        serde_json::to_string(&Numbers::of(numbers)).unwrap()
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(json(&[0.0, 0.5, 1.0, 1.5]), r#"{"from":0.0,"step":0.5,"count":4}"#);
+        assert_eq!(json(&[0.25; 3]), r#"{"same":0.25,"count":3}"#);
+        assert_eq!(json(&[1.0]), "\"AACAPw==\"");
+        assert_eq!(json(&[]), "\"\"");
+        assert!(json(&[f64::NAN; 4]).starts_with('"'));
+    }
+
+    #[test]
+    fn names_are_on_one_line() {
+        assert_eq!(one_line("a\nb\t\u{7}c"), "a b  c");
+    }
+}

@@ -1,0 +1,145 @@
+//! Limits: each value with its 95 % interval beside the tolerance, decided by ISO 14253-1.
+
+use maud::{Markup, html};
+use runout_core::{
+    pipeline::run::{Decision, Limit, LimitSummary, LimitValue},
+    table::number::significant,
+};
+
+use crate::symbol;
+
+/// Values of a limit that are shown unfolded.
+const SHOWN: usize = 8;
+
+/// One word for a decision, and its class in the style sheet.
+pub(crate) fn word(decision: Decision) -> (&'static str, &'static str) {
+    match decision {
+        Decision::Conforms => ("kept", "good"),
+        Decision::DoesNotConform => ("broken", "bad"),
+        Decision::Undecided => ("undecided", "open"),
+    }
+}
+
+/// The limits with what was found.
+pub(crate) fn section(limits: &[LimitSummary]) -> Markup {
+    html! {
+        section #limits {
+            h2 { "Limits" }
+            @for limit in limits {
+                @let (decision, class) = word(limit.decision);
+                h3 { bdi { (shown(&limit.limit)) } " " span.badge.(class) { (decision) } }
+                @let sorted = by_risk(limit);
+                @if sorted.is_empty() { p { "No value has this name." } }
+                @if !sorted.is_empty() { (table(&limit.limit, &sorted[..sorted.len().min(SHOWN)])) }
+                @if sorted.len() > SHOWN {
+                    details {
+                        summary { (sorted.len() - SHOWN) " more values, farther from the limit" }
+                        (table(&limit.limit, &sorted[SHOWN..]))
+                    }
+                }
+            }
+            p.note {
+                "Kept: the whole 95 % interval keeps the limit. Broken: the whole interval lies beyond it. Undecided: neither is proven \
+                 (ISO 14253-1)."
+            }
+        }
+    }
+}
+
+/// "RONt of section a ≤ 5 µm".
+pub(crate) fn shown(limit: &Limit) -> String {
+    let name = limit.name();
+    match name.strip_suffix(&limit.unit) {
+        Some(rest) => format!("{rest}{}", symbol(&limit.unit)),
+        None => name,
+    }
+}
+
+/// Values, those nearest to breaking the limit first.
+fn by_risk(limit: &LimitSummary) -> Vec<&LimitValue> {
+    let Limit { lower, upper, .. } = limit.limit;
+    let room = |value: &LimitValue| {
+        let [low, high] = value.interval_95.unwrap_or([value.value; 2]);
+        let room = |end: Option<f64>| end.unwrap_or(f64::INFINITY);
+        room(upper.map(|upper| upper - high)).min(room(lower.map(|lower| low - lower)))
+    };
+    let mut values: Vec<&LimitValue> = limit.values.iter().collect();
+    values.sort_by(|a, b| room(a).total_cmp(&room(b)));
+    values
+}
+
+fn table(limit: &Limit, values: &[&LimitValue]) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(format!("Values of {}", limit.name())) {
+            table.limits {
+                thead {
+                    tr {
+                        th { "where" } th { "reference, filter" } th.number { "value / " (symbol(&limit.unit)) }
+                        th.number { "95 % interval" } th { "beside the tolerance" } th { "" }
+                    }
+                }
+                tbody {
+                    @for value in values {
+                        @let (decision, class) = word(value.decision);
+                        tr {
+                            td { bdi { (place(value)) } }
+                            td { (value.reference) ", " (value.filter) }
+                            td.number { (digits(value.value, value)) }
+                            td.number {
+                                @if let Some([low, high]) = value.interval_95 { (digits(low, value)) " … " (digits(high, value)) }
+                                @else { "unknown" }
+                            }
+                            td { (bar(limit, value, class)) }
+                            td {
+                                span.badge.(class) { (decision) }
+                                @if let Some(missing) = &value.missing { br; small { (missing) } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn place(value: &LimitValue) -> String {
+    match (&value.station, &value.section) {
+        (None, None) => "whole part".into(),
+        (Some(station), None) => station.clone(),
+        (None, Some(section)) => format!("section {section}"),
+        (Some(station), Some(section)) => format!("{station}, section {section}"),
+    }
+}
+
+/// A number with the digits that the interval gives a meaning to.
+fn digits(number: f64, value: &LimitValue) -> String {
+    match value.interval_95 {
+        Some([low, high]) if high > low => {
+            let decimals = (1.0 - (0.25 * (high - low)).log10().floor()).clamp(0.0, 9.0) as usize;
+            format!("{number:.decimals$}")
+        }
+        _ => significant(number, 5),
+    }
+}
+
+/// The tolerance as a band, the interval as a bar, the value as a line.
+fn bar(limit: &Limit, value: &LimitValue, class: &str) -> Markup {
+    const WIDTH: f64 = 220.0;
+    let [low, high] = value.interval_95.unwrap_or([value.value; 2]);
+    let lower = limit.lower.unwrap_or_else(|| low.min(0.0).min(limit.upper.unwrap_or(0.0)));
+    let upper = limit.upper.unwrap_or_else(|| high.max(limit.lower.unwrap_or(high)) * 1.2);
+    let (from, to) = (lower.min(low), upper.max(high));
+    let margin = 0.06 * (to - from).max(f64::MIN_POSITIVE);
+    let (from, to) = (from - margin, to + margin);
+    let x = |number: f64| (WIDTH * (number - from) / (to - from)).clamp(0.0, WIDTH);
+    let interval = (x(high) - x(low)).max(2.0);
+    html! {
+        svg.bar viewBox="0 0 220 22" role="img" aria-label="value and 95 % interval beside the tolerance" {
+            rect.tolerance x=(x(lower)) y="3" width=(x(upper) - x(lower)) height="16" {}
+            @if limit.lower.is_some() { line.end x1=(x(lower)) x2=(x(lower)) y1="1" y2="21" {} }
+            @if limit.upper.is_some() { line.end x1=(x(upper)) x2=(x(upper)) y1="1" y2="21" {} }
+            rect.(class) x=(x(low)) y="8" width=(interval) height="6" {}
+            line.value x1=(x(value.value)) x2=(x(value.value)) y1="4" y2="18" {}
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The page as a whole: its head with the content security policy, and its sections in their order.
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use runout_core::{Error, Result, stage::Completed, table::panels::Panels};
+use sha2::{Digest, Sha256};
+
+use crate::{
+    closed_loop,
+    data::{self, Data, FigureData},
+    facts, limits, origin, rig, values,
+};
+
+/// Charts: see `assets/plotly/README.md`.
+const CHARTS: &str = include_str!("../assets/plotly/plotly.min.js");
+const CANVAS: &str = include_str!("../assets/canvas.js");
+const PROGRAM: &str = include_str!("../assets/report.js");
+const DRAWING: &str = include_str!("../assets/draw.js");
+const STYLE: &str = include_str!("../assets/report.css");
+
+/// The page of a result.
+///
+/// # Errors
+/// Never in practice: its data can be written as JSON.
+pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Result<Markup> {
+    let Completed { summary, about, surface, diagnosis } = *result;
+    let title = if title.is_empty() { "Result" } else { title };
+    let rows = values::rows(summary);
+    let drawn = data::figures(figures);
+    let surface_data = surface.map(data::surface);
+    let rig = rig::declared(&summary.provenance.configuration);
+    let (verdict, class) = facts::verdict(summary, diagnosis);
+    let body = html! {
+        header {
+            h1 { bdi { (title) } }
+            p.verdict.(class) role="status" { (verdict) }
+            (facts::list(summary, rig.as_ref(), surface))
+        }
+        @if let Some(rig) = &rig { section #rig { h2 { "Rig" } (rig::drawing(rig)) } }
+        @if !summary.limits.is_empty() { (limits::section(&summary.limits)) }
+        @if !drawn.is_empty() {
+            section #figures {
+                h2 { "Figures" }
+                div.charts { @for (index, figure) in drawn.iter().enumerate() { (chart(index, figure)) } }
+            }
+        }
+        @if let Some(map) = &surface_data {
+            section #surface {
+                h2 { "Surface" }
+                @if map.thinned { p.note { "Of many angles and rings, each second, third, … is drawn." } }
+                div.map data-map="surface" {}
+            }
+        }
+        @if let Some(diagnosis) = diagnosis { (closed_loop::section(diagnosis)) }
+        @if !rows.is_empty() { (table(rows.len())) }
+        (origin::turns(summary))
+        (origin::warnings(summary))
+        (origin::provenance(summary, about))
+    };
+    let data = Data { figures: drawn, surface: surface_data, values: &rows };
+    let json = serde_json::to_string(&data).map_err(|error| Error::caused("write", "the report's data", error))?;
+    Ok(document(title, &body, &json))
+}
+
+fn chart(index: usize, figure: &FigureData) -> Markup {
+    html! {
+        figure.chart data-figure=(index) {
+            figcaption { h3 { (figure.title) } }
+            div.drawn {}
+            @if figure.thinned { p.note { "Of many points, the lowest and the highest of each stretch are drawn." } }
+        }
+    }
+}
+
+/// The frame of the values; the page's program fills in the rows.
+fn table(count: usize) -> Markup {
+    html! {
+        section #values {
+            h2 { "Values" }
+            p.controls {
+                label { "Filter " input #filter type="search" placeholder="RONt section a"; }
+                button #copy type="button" { "Copy as CSV" }
+                span #shown role="status" { (count) " values" }
+            }
+            div.scroll tabindex="0" role="region" aria-label="Values" {
+                table #rows {
+                    thead {
+                        tr {
+                            th scope="col" { button type="button" data-key="place" { "where" } }
+                            th scope="col" { button type="button" data-key="symbol" { "symbol" } }
+                            th.number scope="col" { button type="button" data-key="value" { "value ± std" } }
+                            th scope="col" { button type="button" data-key="unit" { "unit" } }
+                            th.number scope="col" { "95 % interval" }
+                            th scope="col" { button type="button" data-key="refers" { "reference, filter" } }
+                            th scope="col" { "standard, band" }
+                        }
+                    }
+                    tbody {}
+                }
+            }
+        }
+    }
+}
+
+/// A whole document of a body and the data that its program draws.
+fn document(title: &str, body: &Markup, json: &str) -> Markup {
+    // Nothing in a text ends the element that the data are in.
+    let json = json.replace('<', "\\u003c");
+    let hashes: Vec<String> = [CANVAS, CHARTS, DRAWING, PROGRAM].map(hash).into();
+    // The chart library sets styles of its elements: styles alone cannot fetch anything here.
+    let policy = format!(
+        "default-src 'none'; script-src {}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'",
+        hashes.join(" ")
+    );
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(policy);
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta name="generator" content="runout";
+                link rel="icon" href="data:,";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main { (body) }
+                noscript { p { "Figures and the table of values need JavaScript." } }
+                script #data type="application/json" { (PreEscaped(json)) }
+                script { (PreEscaped(CANVAS)) }
+                script { (PreEscaped(CHARTS)) }
+                script { (PreEscaped(DRAWING)) }
+                script { (PreEscaped(PROGRAM)) }
+            }
+        }
+    }
+}
+
+/// A script's hash as a content security policy names it.
+fn hash(script: &str) -> String {
+    format!("'sha256-{}'", BASE64_STANDARD.encode(Sha256::digest(script.as_bytes())))
+}
