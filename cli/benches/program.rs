@@ -89,7 +89,9 @@ fn mesh(plugin: &str, extension: &str, surface: &Surface) -> u64 {
     let exporter = registry().exporters.build(&DeTable::parse(&config).unwrap(), &context).unwrap();
     let export = exporter.begin(&ResultInfo { title: "bench".into(), ..ResultInfo::default() }).unwrap();
     let (summary, about) = (summary(), About::default());
-    let files = export.finish(&Completed { summary: &summary, about: &about, surface: Some(surface), diagnosis: None }).unwrap();
+    let files = export
+        .finish(&Completed { summary: &summary, about: &about, surface: Some(surface), diagnosis: None })
+        .unwrap();
     // The files are not kept: they go as they are dropped.
     files.iter().map(|file| fs::metadata(file.path()).unwrap().len()).sum()
 }

@@ -69,7 +69,9 @@ fn a_run_writes_a_report_and_an_earlier_result_gives_the_same() {
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     let written = page(&folder.path().join("out/report.html"));
     assert!(written.starts_with("<!DOCTYPE html>") && written.len() < 8_000_000, "{} bytes", written.len());
-    for part in ["Turned shaft", "The limit is kept", "Setup <bdi>reversed", "\"form\"", "data-map=\"surface\"", "BLAKE3"] {
+    for part in
+        ["Turned shaft", "The limit is kept", "Setup <bdi>reversed", "\"form\"", "data-map=\"surface\"", "BLAKE3"]
+    {
         assert!(written.contains(part), "{part}");
     }
     assert!(written.contains("default-src 'none'") && !elements(&written).contains("http"), "a request");
@@ -161,7 +163,10 @@ fn assert_quiet(name: &str, found: &serde_json::Value) {
     let serious = |one: &&serde_json::Value| one["impact"] == "serious" || one["impact"] == "critical";
     let axe: Vec<_> = found["axe"].as_array().unwrap().iter().filter(serious).collect();
     assert!(axe.is_empty(), "{name}: {axe:#?}");
-    eprintln!("{name}: {} bytes, usable after {} ms, complete after {} ms", found["bytes"], found["usable_ms"], found["complete_ms"]);
+    eprintln!(
+        "{name}: {} bytes, usable after {} ms, complete after {} ms",
+        found["bytes"], found["usable_ms"], found["complete_ms"]
+    );
 }
 
 #[test]
@@ -187,7 +192,9 @@ fn chromium_draws_what_the_tables_hold_and_the_controls_work() {
     let of = |plot: &str| found["plots"][plot][0].clone();
     assert!(of("map-surface")["count"].as_u64() > Some(1000) && of("solid-surface")["count"].as_u64() > Some(1000));
     let controls = &found["controls"];
-    for (plot, control) in [("plot-form", "panel"), ("plot-form", "filter"), ("plot-motion", "filter"), ("plot-form-harmonics", "panel")] {
+    for (plot, control) in
+        [("plot-form", "panel"), ("plot-form", "filter"), ("plot-motion", "filter"), ("plot-form-harmonics", "panel")]
+    {
         assert_eq!(controls[plot][control], true, "{plot} {control}");
     }
     assert_eq!(controls["slider"], true);

@@ -94,8 +94,12 @@ fn size(kind: Kind) -> [f64; 2] {
 fn cell(figure: &Panels, panel: &Panel, scale: f64, unit: &str) -> (Vec<Plot>, Layout) {
     let unscaled = &figure.axes;
     let axes = [unscaled[0].clone(), Axis { name: unscaled[1].name.clone(), unit: unit.to_owned() }];
-    let curves: Vec<Curve> =
-        panel.curves.iter().filter(|curve| !curve.points.is_empty()).map(|curve| curve.thinned(MOST_POINTS, scale)).collect();
+    let curves: Vec<Curve> = panel
+        .curves
+        .iter()
+        .filter(|curve| !curve.points.is_empty())
+        .map(|curve| curve.thinned(MOST_POINTS, scale))
+        .collect();
     let (plots, layout) = match figure.kind {
         Kind::Polar => polar(&curves, &axes[1]),
         Kind::Lines => lines(&curves, &axes),

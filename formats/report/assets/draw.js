@@ -205,9 +205,10 @@ const Draw = (() => {
         marker: { color: "rgba(0,0,0,0)", line: { width: 0 }, pattern: { shape: "/", fgcolor: faint, size: 6 } }, showlegend: true,
       });
     }
+    const tallest = traces.reduce((most, { y, error_y: error }) => y.reduce((high, one, place) => Math.max(high, one + (error?.array[place] || 0)), most), 0) || 1;
     const range = [1.4, Math.min(highest, FIRST_ORDERS) + 0.6];
     const across = axis({ name: "order", unit: "UPR" }, { range, tickformat: "d" });
-    return { traces, layout: layout({ xaxis: across, yaxis: axis(figure.y, { rangemode: "tozero" }), height: 380, barmode: "group", bargap: 0.25 }) };
+    return { traces, layout: layout({ xaxis: across, yaxis: axis(figure.y, { range: [0, 1.06 * tallest] }), height: 380, barmode: "group", bargap: 0.25 }) };
   }
 
   // A map's numbers: columns, rows, and heights row by row.
@@ -223,7 +224,7 @@ const Draw = (() => {
   function map(of, { x, y, rows }) {
     const trace = { type: "heatmap", x, y, z: rows, colorscale: SCALE, colorbar: bar(of), hoverinfo: "none", zsmooth: false };
     const across = axis(of.x, of.radius_mm ? { dtick: 45, range: [x[0], 360] } : {});
-    return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
+    return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y, of.radius_mm ? { range: [y[0], y[y.length - 1]] } : {}), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
   }
 
   const MOST_SOLID = [160, 180]; // Rings and angles that a phone can still turn.
@@ -257,7 +258,7 @@ const Draw = (() => {
     const { line } = colours();
     const side = (axis) => ({ title: { text: label(axis) }, gridcolor: line, zeroline: false, showspikes: false, backgroundcolor: "rgba(0,0,0,0)" });
     const scene = round
-      ? { xaxis: side(of.y), yaxis: side({ name: "x", unit: "mm" }), zaxis: side({ name: "y", unit: "mm" }), aspectmode: "data", camera: { eye: { x: 1.1, y: -1.85, z: 0.9 } } }
+      ? { xaxis: side(of.y), yaxis: side({ name: "x", unit: "mm" }), zaxis: side({ name: "y", unit: "mm" }), aspectmode: "data", camera: { eye: { x: 1.25, y: -2.05, z: 1.0 } } }
       : { xaxis: side(of.x), yaxis: side(of.y), zaxis: side(times === 1 ? of.height : { name: `${of.height.name} × ${times}`, unit: of.height.unit }), aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.4 } };
     return { traces: [trace], layout: layout({ scene, height: 460, margin: { l: 0, r: 0, t: 0, b: 0 } }), rings, angles };
   }

@@ -20,7 +20,8 @@
 
   // Draws into a place of the chart's own height, and as wide as there is room.
   function put(place, { traces, layout: { height, ...layout } }) {
-    place.style.height = `${height}px`;
+    // Two charts beside each other on paper.
+    place.style.height = `${matchMedia("print").matches ? 0.72 * height : height}px`;
     return Plotly.react(place, traces, { ...layout, autosize: true }, CONFIG);
   }
 
@@ -76,7 +77,7 @@
   function surface(of, box, id) {
     const grid = Draw.grid(of);
     const flat = element("div", { className: "plot", id: `map-${id}` });
-    const readout = element("p", { className: "readout", textContent: "Point at the map for a value; click for the ring." });
+    const readout = element("p", { className: "readout", textContent: `Point at the map for a value; click for the ${of.radius_mm ? "ring" : "profile along " + of.x.name}.` });
     const space = element("div", { className: "plot", id: `solid-${id}` });
     const slider = element("input", { type: "range", min: 0, max: 100, value: 50, ariaLabel: "exaggeration of the deviation" });
     const times = element("output", {});
@@ -129,8 +130,8 @@
   function table() {
     const body = document.querySelector("#rows tbody");
     if (!body) return;
-    const MOST = 200;
-    const [filter, count] = [document.getElementById("filter"), document.getElementById("shown")];
+    let most = 50;
+    const [filter, count, all] = ["filter", "shown", "all"].map((id) => document.getElementById(id));
     const keys = ["place", "symbol", "shown", "unit", "interval", "refers", "about"];
     let [rows, sorted, down] = [data.values, null, false];
     const show = () => {
@@ -145,10 +146,12 @@
         made.append(key === "place" ? element("bdi", { textContent: row[key] }) : row[key]);
         return made;
       };
-      body.replaceChildren(...rows.slice(0, MOST).map((row) => element("tr", {}, ...keys.map((key) => cell(row, key)))));
-      count.textContent = rows.length > MOST ? `the first ${MOST} of ${rows.length} values` : `${rows.length} values`;
+      body.replaceChildren(...rows.slice(0, most).map((row) => element("tr", {}, ...keys.map((key) => cell(row, key)))));
+      all.hidden = rows.length <= most;
+      count.textContent = rows.length > most ? `the first ${most} of ${rows.length} values` : `${rows.length} values`;
     };
     filter.addEventListener("input", show);
+    all.addEventListener("click", () => { most = Infinity; show(); });
     document.querySelectorAll("#rows th button").forEach((button) => button.addEventListener("click", () => {
       down = sorted === button.dataset.key && !down;
       sorted = button.dataset.key;

@@ -56,7 +56,9 @@ pub(crate) fn section(diagnosis: &Diagnosis) -> Markup {
 /// The residual, step by step, as bars of one scale.
 fn steps(diagnosis: &Diagnosis, unit: &str) -> Markup {
     let mut rows = vec![("as declared".to_owned(), Some(diagnosis.before.residual_rms_um), "before")];
-    rows.extend(diagnosis.added.iter().map(|one| (format!("with {}", one.members()), one.residual_rms_um.after, "after")));
+    rows.extend(
+        diagnosis.added.iter().map(|one| (format!("with {}", one.members()), one.residual_rms_um.after, "after")),
+    );
     if let Some(floor) = diagnosis.after.noise_floor_um {
         rows.push(("expected from noise".into(), Some(floor), "floor"));
     }

@@ -35,7 +35,7 @@ pub(crate) struct FigureData {
     x: AxisData,
     y: AxisData,
     pub(crate) panels: Vec<PanelData>,
-    pub(crate) thinned: bool,
+    thinned: bool,
 }
 
 #[derive(Serialize)]
@@ -117,6 +117,17 @@ impl Numbers {
 impl AxisData {
     fn of(axis: &Axis, unit: &str) -> Self {
         Self { name: axis.name.clone(), unit: symbol(unit) }
+    }
+}
+
+impl FigureData {
+    /// What of the table is not drawn, where something is not.
+    pub(crate) fn note(&self) -> Option<&'static str> {
+        match self.kind {
+            _ if !self.thinned => None,
+            "map" => Some("Of many points, the mean of those in each cell is drawn."),
+            _ => Some("Of many points, the lowest and the highest of each stretch are drawn."),
+        }
     }
 }
 

@@ -29,14 +29,30 @@ pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (Stri
         (Some((limits, class)), None) => (format!("{limits}."), class),
         (Some((limits, class)), Some((found, _))) => (format!("{limits}. {found}."), class),
         (None, Some((found, class))) => (format!("{found}."), class),
-        (None, None) => match misfits(summary) {
-            0 => ("No limit is set. The readings agree with the declared rig within their noise, as far as it is known.".into(), "open"),
-            count => (
-                format!("No limit is set. At {count} of {} stations the residual exceeds the noise; the declared rig may be wrong.", summary.stations.len()),
-                "bad",
-            ),
-        },
+        (None, None) => without_limits(summary),
     }
+}
+
+/// What the residual and the warnings give, where nothing is to be decided.
+fn without_limits(summary: &Summary) -> (String, &'static str) {
+    let known: Vec<f64> = summary.stations.iter().filter_map(|station| station.chi2_per_dof).collect();
+    let misfits = known.iter().filter(|chi2| **chi2 > MISFIT_CHI2).count();
+    let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();
+    let warned = match warnings {
+        0 => String::new(),
+        1 => " One warning is below.".into(),
+        count => format!(" {count} warnings are below."),
+    };
+    let (found, class) = match (misfits, known.len()) {
+        (0, 0) => (String::new(), "open"),
+        (0, _) => (" The residual agrees with the measured noise.".into(), "open"),
+        (count, all) => {
+            let found =
+                format!(" At {count} of {all} stations the residual exceeds the noise; the declared rig may be wrong.");
+            (found, "bad")
+        }
+    };
+    (format!("No limit is set.{found}{warned}"), class)
 }
 
 fn limits_kept(summary: &Summary) -> Option<(String, &'static str)> {
@@ -53,10 +69,6 @@ fn limits_kept(summary: &Summary) -> Option<(String, &'static str)> {
         (0, open) => Some((format!("{open} of {all} limits undecided: {}", undecided.join("; ")), "open")),
         (count, _) => Some((format!("{count} of {all} limits broken: {}", broken.join("; ")), "bad")),
     }
-}
-
-fn misfits(summary: &Summary) -> usize {
-    summary.stations.iter().filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > MISFIT_CHI2)).count()
 }
 
 /// Facts of the part and the measurement.

@@ -5,7 +5,8 @@ use runout_core::{pipeline::summary::Summary, stage::About};
 
 /// Turns that were left out, one row a capture.
 pub(crate) fn turns(summary: &Summary) -> Markup {
-    let captures = || summary.stations.iter().flat_map(|station| station.captures.iter().map(move |one| (station, one)));
+    let captures =
+        || summary.stations.iter().flat_map(|station| station.captures.iter().map(move |one| (station, one)));
     let rejected: usize = captures().map(|(_, capture)| capture.rejected.len()).sum();
     let touched = || captures().filter(|(_, capture)| !capture.rejected.is_empty());
     html! {

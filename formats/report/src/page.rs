@@ -67,7 +67,7 @@ fn chart(index: usize, figure: &FigureData) -> Markup {
         figure.chart data-figure=(index) {
             figcaption { h3 { (figure.title) } }
             div.drawn {}
-            @if figure.thinned { p.note { "Of many points, the lowest and the highest of each stretch are drawn." } }
+            @if let Some(note) = figure.note() { p.note { (note) } }
         }
     }
 }
@@ -80,6 +80,7 @@ fn table(count: usize) -> Markup {
             p.controls {
                 label { "Filter " input #filter type="search" placeholder="RONt section a"; }
                 button #copy type="button" { "Copy as CSV" }
+                button #all type="button" hidden { "Show all" }
                 span #shown role="status" { (count) " values" }
             }
             div.scroll tabindex="0" role="region" aria-label="Values" {

@@ -106,7 +106,8 @@ fn directions(rig: &Rig, sensors_rad: f64) -> Vec<(Vec<String>, f64)> {
 /// The part from the side, with the sections of the sensors.
 fn along(rig: &Rig) -> Markup {
     let places: Vec<f64> = rig.sensors.iter().map(|sensor| sensor.z_mm).collect();
-    let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(*z), high.max(*z)));
+    let (low, high) =
+        places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(*z), high.max(*z)));
     let x = |z: f64| if high > low { 60.0 + 120.0 * (z - low) / (high - low) } else { MIDDLE };
     let mut sections: Vec<(f64, String, Vec<String>)> = Vec::new();
     for sensor in &rig.sensors {

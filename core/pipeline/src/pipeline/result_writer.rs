@@ -220,7 +220,8 @@ impl ResultWriter {
         } else {
             About { convention: std::mem::take(&mut self.convention), ..About::default() }
         };
-        let completed = Completed { summary: &self.summary, about: &about, surface, diagnosis: self.diagnosis.as_ref() };
+        let completed =
+            Completed { summary: &self.summary, about: &about, surface, diagnosis: self.diagnosis.as_ref() };
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&completed)?);

@@ -6,6 +6,7 @@
 //!              harmonics and values; of measured points those of their separator
 //! /provenance  configuration, inputs/{path, bytes, blake3}
 //! /warnings    [n] texts: the run's, then each station's behind its name
+//! /notes       [n] texts: those of the warnings that say nothing wrong
 //! /effects     [n] texts: the effects that the results are corrected for, with their values; none after a run
 //! /summary     the run's summary as JSON
 //! /diagnosis   what the closed loop found, as JSON; of `diagnose` only
@@ -14,8 +15,8 @@
 //! ```
 //!
 //! One dataset a column reads as `pandas.DataFrame({name: table[name][:] for name in table})`; names are UTF-8 of fixed length, other
-//! texts of any length (`.asstr()` in h5py). Each column has the attributes `unit` and `about`, and a table of which something is
-//! drawn has the attribute `figures` (JSON). What was not solved for, and lost
+//! texts of any length (`.asstr()` in h5py). Each column has the attributes `unit` and `about`, and the
+//! attribute `figures` of the file is what to draw of which table, as JSON. What was not solved for, and lost
 //! orders, are NaN.
 
 mod read;
@@ -99,6 +100,7 @@ impl<const N: usize> ResultExport<N> {
         let pending = PendingFile::new(path)?;
         let begin = || -> hdf5_metno::Result<_> {
             let file = create(pending.path(), &result.title)?;
+            node::put_text(&file, read::FIGURES, &read::figures(&result.tables)?)?;
             let always = result.tables.iter().filter(|table| !table.optional);
             let tables = always.map(|table| TableGroup::create(&file, table)).collect::<hdf5_metno::Result<_>>()?;
             Ok((tables, file))
@@ -145,6 +147,7 @@ fn complete(file: &File, result: &Completed) -> hdf5_metno::Result<()> {
         put_surface(file, surface)?;
     }
     put_texts(file, "warnings", summary.all_warnings())?;
+    put_texts(file, read::NOTES, summary.notes.iter())?;
     put_texts(file, "effects", summary.effects.iter().map(ToString::to_string))?;
     let group = node::create_group(file, "provenance")?;
     put_dataset(&group, "configuration", &provenance.configuration)?;

@@ -50,26 +50,28 @@ pub struct StoredResult {
 pub fn read_result(path: &Path) -> Result<StoredResult> {
     let (file, place) = node::open(path)?;
     if node::text(&file, &place, "format")?.as_deref() != Some(RESULT_FORMAT) {
-        let error = Error::new("read", path.display().to_string(), format!("expected a file of the format {RESULT_FORMAT}"));
+        let error =
+            Error::new("read", path.display().to_string(), format!("expected a file of the format {RESULT_FORMAT}"));
         return Err(error.of(ErrorKind::DamagedData).help("`[[export]] plugin = \"hdf5\"` of a run writes one"));
     }
+    let figures = node::text(&file, &place, FIGURES)?.unwrap_or_else(|| "[]".into());
+    let figures: Vec<(String, Vec<Figure>)> =
+        serde_json::from_str(&figures).map_err(|error| place.error(format!("attribute `{FIGURES}`: {error}")))?;
     let mut tables = Vec::new();
-    for name in node::members(&file, &place)? {
-        if file.dataset(&name).is_ok() {
-            continue;
-        }
+    // A result may lack a table that is optional.
+    for (name, figures) in figures.into_iter().filter(|(name, _)| file.link_exists(name)) {
         let (group, place) = node::group(&file, &place, &name)?;
-        if let Some(figures) = node::text(&group, &place, "figures")? {
-            let figures: Vec<Figure> = serde_json::from_str(&figures).map_err(|error| place.error(error))?;
-            tables.push(table(&group, &place, &name, figures)?);
-        }
+        tables.push(table(&group, &place, &name, figures)?);
     }
     let convention = node::text(&file, &place, "convention")?.unwrap_or_default();
+    let mut summary: Summary = document(&file, &place, SUMMARY)?;
+    let has_notes = file.dataset(NOTES).is_ok_and(|notes| notes.size() > 0);
+    summary.notes = if has_notes { node::texts_of(&file, &place, NOTES)? } else { Vec::new() };
     let has_diagnosis = file.link_exists(DIAGNOSIS);
     Ok(StoredResult {
         title: node::text(&file, &place, "title")?.unwrap_or_default(),
         tables,
-        summary: document(&file, &place, SUMMARY)?,
+        summary,
         about: About { convention, ..About::default() },
         surface: file.link_exists(SURFACE).then(|| surface(&file, &place)).transpose()?,
         diagnosis: has_diagnosis.then(|| document(&file, &place, DIAGNOSIS)).transpose()?,
@@ -78,18 +80,34 @@ pub fn read_result(path: &Path) -> Result<StoredResult> {
 
 pub(super) const SUMMARY: &str = "summary";
 pub(super) const DIAGNOSIS: &str = "diagnosis";
+pub(super) const NOTES: &str = "notes";
+pub(super) const FIGURES: &str = "figures";
+
+/// What to draw of which table, in the order in which they are declared.
+pub(super) fn figures(tables: &[TableSpec]) -> hdf5_metno::Result<String> {
+    let drawn = tables.iter().filter(|table| !table.figures.is_empty());
+    let figures: Vec<(&str, &[Figure])> = drawn.map(|table| (table.name.as_str(), table.figures.as_slice())).collect();
+    serde_json::to_string(&figures).map_err(|error| format!("the figures: {error}").into())
+}
 
 /// A text that is JSON.
 fn document<T: DeserializeOwned>(file: &File, place: &Place, name: &str) -> Result<T> {
     let (dataset, place) = node::dataset(file, place, name)?;
     let text = dataset.read_scalar::<VarLenUnicode>().map_err(|error| place.error(error))?;
     serde_json::from_str(&text).map_err(|error| {
-        place.error(error).help("the file is of another version of runout: repeat the run, or use the version that wrote it")
+        place
+            .error(error)
+            .help("the file is of another version of runout: repeat the run, or use the version that wrote it")
     })
 }
 
 /// A table with the columns that its figures need.
-fn table(group: &hdf5_metno::Group, place: &Place, name: &str, figures: Vec<Figure>) -> Result<(TableSpec, RecordBatch)> {
+fn table(
+    group: &hdf5_metno::Group,
+    place: &Place,
+    name: &str,
+    figures: Vec<Figure>,
+) -> Result<(TableSpec, RecordBatch)> {
     let mut wanted: Vec<&str> = figures.iter().flat_map(Figure::columns).collect();
     wanted.sort_unstable();
     wanted.dedup();
@@ -98,7 +116,11 @@ fn table(group: &hdf5_metno::Group, place: &Place, name: &str, figures: Vec<Figu
         let (dataset, place) = node::dataset(group, place, column)?;
         let unit = node::text(&dataset, &place, "unit")?.unwrap_or_default();
         let (values, is_number) = column_values(&dataset, &place)?;
-        specs.push(if is_number { ColumnSpec::number(column, unit, "").or_null() } else { ColumnSpec::name(column, "") });
+        specs.push(if is_number {
+            ColumnSpec::number(column, unit, "").or_null()
+        } else {
+            ColumnSpec::name(column, "")
+        });
         columns.push(values);
     }
     let mut spec = TableSpec::new(name, node::text(group, place, "about")?.unwrap_or_default(), specs);
@@ -133,7 +155,9 @@ fn surface(file: &File, place: &Place) -> Result<Surface> {
     let (group, place) = node::group(file, place, SURFACE)?;
     let column = |name: &str| -> Result<Vec<f64>> {
         let (dataset, place) = node::dataset(&group, &place, name)?;
-        if node::written_shape(&dataset, &place)?.iter().fold(1, |product: usize, side| product.saturating_mul(*side)) > MOST_ROWS {
+        if node::written_shape(&dataset, &place)?.iter().fold(1, |product: usize, side| product.saturating_mul(*side))
+            > MOST_ROWS
+        {
             return Err(place.error(format!("expected at most {MOST_ROWS} points")));
         }
         dataset.read_raw::<f64>().map_err(|error| place.error(error))

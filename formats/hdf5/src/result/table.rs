@@ -42,11 +42,6 @@ impl<const N: usize> TableGroup<N> {
     pub(super) fn create(file: &File, table: &TableSpec) -> Result<Self> {
         let group = node::create_group(file, &table.name)?;
         node::put_text(&group, "about", &table.about)?;
-        if !table.figures.is_empty() {
-            let figures = serde_json::to_string(&table.figures)
-                .map_err(|error| hdf5_metno::Error::from(format!("the figures of {}: {error}", table.name)))?;
-            node::put_text(&group, "figures", &figures)?;
-        }
         let columns = table.columns.iter().map(|column| ColumnData::create(&group, column)).collect::<Result<_>>()?;
         Ok(Self { name: table.name.clone(), columns })
     }
