@@ -24,7 +24,7 @@ page.on("request", (request) => {
   if (url !== address && !url.startsWith("data:") && !url.startsWith("blob:")) found.requests.push(url);
 });
 const ready = () => page.waitForFunction(() => document.documentElement.dataset.ready === "true");
-const drawn = () => page.waitForFunction(() => [...document.querySelectorAll(".plot[id^=solid-]")].every((one) => one.data));
+const drawn = () => page.waitForFunction(() => document.documentElement.dataset.complete === "true");
 await page.setViewport({ width: 1440, height: 900 });
 await page.goto(address, { waitUntil: "load" });
 await ready();

@@ -25,6 +25,16 @@
     return Plotly.react(place, traces, { ...layout, autosize: true }, CONFIG);
   }
 
+  // Charts are drawn one after the other, so that the page can be used before the last one is there.
+  const waiting = [];
+  async function drawAll() {
+    for (const job of waiting) {
+      await new Promise((go) => (window.requestIdleCallback ?? setTimeout)(go, { timeout: 100 }));
+      await job();
+    }
+    document.documentElement.dataset.complete = "true";
+  }
+
   // Figures with panels of the same names show the same one.
   const followers = new Map();
 
@@ -69,7 +79,7 @@
     }
     if (controls.childNodes.length) box.append(controls);
     box.append(plot, readout);
-    draw();
+    waiting.push(draw);
     redraws.push(draw);
   }
 
@@ -111,19 +121,20 @@
       return put(space, { ...drawn, layout: { ...drawn.layout, uirevision: "turned" } }).then(() => drawn);
     };
     const map = () => put(flat, Draw.map(of, grid));
-    map().then(() => {
+    const beginFlat = () => map().then(() => {
       flat.on("plotly_hover", ({ points: [{ pointIndex: [row, column] }] }) => value(row, column));
       flat.on("plotly_click", ({ points: [{ pointIndex: [row] }] }) => open(row));
     });
-    const begin = () => solid().then(({ rings, angles }) => {
+    const beginSolid = () => solid().then(({ rings, angles }) => {
       const of = ({ points: [{ pointNumber: [column, row] }] }) => [rings[row], angles[column % angles.length]];
       space.on("plotly_hover", (event) => value(...of(event)));
       space.on("plotly_click", (event) => open(of(event)[0]));
       slider.addEventListener("input", solid);
       redraws.push(solid);
     });
-    // The page is usable before the body in space is drawn.
-    (window.requestIdleCallback ?? setTimeout)(begin);
+    // Later than at first, when another panel was chosen.
+    if (document.documentElement.dataset.complete) beginFlat().then(beginSolid);
+    else waiting.push(beginFlat, beginSolid);
     redraws.push(map, () => chosen.row !== null && open(chosen.row));
   }
 
@@ -182,4 +193,5 @@
   // Print has its own colours and width.
   for (const moment of ["beforeprint", "afterprint"]) addEventListener(moment, redraw);
   document.documentElement.dataset.ready = "true";
+  drawAll();
 })();
