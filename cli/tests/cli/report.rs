@@ -69,15 +69,21 @@ fn a_run_writes_a_report_and_an_earlier_result_gives_the_same() {
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     let written = page(&folder.path().join("out/report.html"));
     assert!(written.starts_with("<!DOCTYPE html>") && written.len() < 8_000_000, "{} bytes", written.len());
-    for part in
-        ["Turned shaft", "The limit is kept", "Setup <bdi>reversed", "\"form\"", "data-map=\"surface\"", "BLAKE3"]
-    {
+    for part in [
+        "Turned shaft",
+        "The limit is undecided: RONt ≤ 30 µm",
+        "Setup <bdi>reversed",
+        "\"form\"",
+        "data-map=\"surface\"",
+        "BLAKE3",
+    ] {
         assert!(written.contains(part), "{part}");
     }
     assert!(written.contains("default-src 'none'") && !elements(&written).contains("http"), "a request");
     let ran = folder.run(&["report", "out/result.h5", "--out", "again.html"]);
     assert_eq!((ran.status, ran.stdout.as_str()), (0, "again.html\n"), "{}", ran.stderr);
-    assert_eq!(page(&folder.path().join("again.html")), written);
+    // Numbers that were JSON in between may differ by their last bit.
+    assert_eq!(elements(&page(&folder.path().join("again.html"))), elements(&written));
 }
 
 #[test]
@@ -96,18 +102,21 @@ fn hostile_names_stay_names() {
 #[test]
 fn a_diagnosis_has_its_report() {
     let folder = spindle(false);
-    let wrong = page(&folder.path().join("pipeline.toml"))
-        .replace("id = \"reversed\", part_deg = 180", "id = \"reversed\", part_deg = 179.5");
+    // What the rig declares of a sensor is not so.
+    let wrong = page(&folder.path().join("pipeline.toml")).replace(
+        "angle_deg = 0,  z_mm = 230, section = \"b\" }",
+        "angle_deg = 0, z_mm = 230, section = \"b\", gain = 1.02 }",
+    );
     fs::write(folder.path().join("pipeline.toml"), wrong).unwrap();
     let ran = folder.run(&["diagnose", "pipeline.toml"]);
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     let written = page(&folder.path().join("out/diagnosed/report.html"));
-    for part in ["Closed loop", "effect by effect", "What to change in the rig", "setups.1.part_deg"] {
+    for part in ["Closed loop", "effect by effect", "What the declared model lacks", "What moved"] {
         assert!(written.contains(part), "{part}");
     }
     let ran = folder.run(&["report", "out/diagnosed/result.h5", "--out", "again.html"]);
     assert_eq!(ran.status, 0, "{}", ran.stderr);
-    assert!(page(&folder.path().join("again.html")).contains("setups.1.part_deg"));
+    assert_eq!(elements(&page(&folder.path().join("again.html"))), elements(&written));
 }
 
 #[test]

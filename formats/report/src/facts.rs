@@ -66,6 +66,8 @@ fn limits_kept(summary: &Summary) -> Option<(String, &'static str)> {
         _ if all == 0 => None,
         (0, 0) if all == 1 => Some(("The limit is kept".into(), "good")),
         (0, 0) => Some((format!("All {all} limits are kept"), "good")),
+        (0, 1) if all == 1 => Some((format!("The limit is undecided: {}", undecided.join("; ")), "open")),
+        (1, _) if all == 1 => Some((format!("The limit is broken: {}", broken.join("; ")), "bad")),
         (0, open) => Some((format!("{open} of {all} limits undecided: {}", undecided.join("; ")), "open")),
         (count, _) => Some((format!("{count} of {all} limits broken: {}", broken.join("; ")), "bad")),
     }

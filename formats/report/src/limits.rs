@@ -131,14 +131,15 @@ fn bar(limit: &Limit, value: &LimitValue, class: &str) -> Markup {
     let (from, to) = (lower.min(low), upper.max(high));
     let margin = 0.06 * (to - from).max(f64::MIN_POSITIVE);
     let (from, to) = (from - margin, to + margin);
-    let x = |number: f64| (WIDTH * (number - from) / (to - from)).clamp(0.0, WIDTH);
-    let interval = (x(high) - x(low)).max(2.0);
+    // A tenth of a pixel is enough.
+    let x = |number: f64| ((10.0 * WIDTH * (number - from) / (to - from)).round() / 10.0).clamp(0.0, WIDTH);
+    let width = |low: f64, high: f64, least: f64| format!("{:.1}", (x(high) - x(low)).max(least));
     html! {
         svg.bar viewBox="0 0 220 22" role="img" aria-label="value and 95 % interval beside the tolerance" {
-            rect.tolerance x=(x(lower)) y="3" width=(x(upper) - x(lower)) height="16" {}
+            rect.tolerance x=(x(lower)) y="3" width=(width(lower, upper, 0.0)) height="16" {}
             @if limit.lower.is_some() { line.end x1=(x(lower)) x2=(x(lower)) y1="1" y2="21" {} }
             @if limit.upper.is_some() { line.end x1=(x(upper)) x2=(x(upper)) y1="1" y2="21" {} }
-            rect.(class) x=(x(low)) y="8" width=(interval) height="6" {}
+            rect.(class) x=(x(low)) y="8" width=(width(low, high, 2.0)) height="6" {}
             line.value x1=(x(value.value)) x2=(x(value.value)) y1="4" y2="18" {}
         }
     }
