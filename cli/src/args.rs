@@ -31,6 +31,8 @@ pub enum Command {
     Diagnose(DiagnoseArgs),
     /// Run several separators on the same data: values side by side, differences with their uncertainty, E_n.
     Compare(CompareArgs),
+    /// Run one pipeline on many recordings: a data set of their results, and control charts of all values.
+    Batch(BatchArgs),
     /// Make a campaign with declared truth and effects, as a measurement file.
     Simulate(SimulateArgs),
     /// Say what a rig can separate and how well, what to add to it, and better angles for its sensors.
@@ -82,6 +84,26 @@ pub struct RunArgs {
     /// notes that `check` gives without the data do not count.
     #[arg(long)]
     pub fail_on_warning: bool,
+}
+
+/// `runout batch`.
+#[derive(Debug, Args)]
+pub struct BatchArgs {
+    #[command(flatten)]
+    pub pipeline: PipelineArgs,
+    /// The recordings: each takes the place of the file that [load] names. A folder is one recording whose files have the names
+    /// that [load] gives them.
+    #[arg(value_name = "RECORDINGS", required = true)]
+    pub recordings: Vec<PathBuf>,
+    /// Folder of the data set. Recordings whose results are there and up to date are skipped.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Recordings worked on at a time, each by one thread; as many as there are processors without it.
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub jobs: Option<NonZeroUsize>,
+    /// Folders of a recording's path that belong to its name, for files of the same name in different folders.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub name_folders: usize,
 }
 
 /// `runout diagnose`.
@@ -219,7 +241,7 @@ pub struct PluginsArgs {
 /// `runout schema`.
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
-    /// `pipeline`, `scenario`, `rig`, `summary`, `diagnosis`, `compare`, `check`, `plan`, `plan-points`, or a plugin's name; all the files' schemas without it.
+    /// `pipeline`, `scenario`, `rig`, `summary`, `diagnosis`, `compare`, `batch`, `check`, `plan`, `plan-points`, or a plugin's name; all the files' schemas without it.
     pub name: Option<String>,
     /// Write each file's schema to `NAME.schema.json` in this folder.
     #[arg(long, value_name = "DIR", conflicts_with = "name")]

@@ -38,6 +38,8 @@ pub enum Failure {
     Limit(Vec<String>),
     /// So many warnings, after a result that has been shown with them.
     Warnings(usize),
+    /// So many recordings of a batch failed, after a report that names them.
+    Recordings(usize),
     /// Standard output cannot be written to.
     Output(io::Error),
     /// The program itself failed: a mistake in it.
@@ -79,13 +81,13 @@ impl Failure {
     pub fn report(&self, json: bool) -> ExitCode {
         render::to_stderr(&self.text());
         // The result itself is the one document then.
-        if json && !matches!(self, Self::Limit(_) | Self::Warnings(_)) {
+        if json && !matches!(self, Self::Limit(_) | Self::Warnings(_) | Self::Recordings(_)) {
             // When stdout cannot be written to either, the exit status has to tell.
             let _ = render::document(&json!({ "error": self.document() }));
         }
         ExitCode::from(match self {
             Self::CommandLine(_) | Self::Name { .. } | Self::Configuration(_) => 2,
-            Self::Work(_) | Self::Limit(_) | Self::Warnings(_) | Self::Output(_) => 1,
+            Self::Work(_) | Self::Limit(_) | Self::Warnings(_) | Self::Recordings(_) | Self::Output(_) => 1,
             Self::Program(_) => PROGRAM,
         })
     }
@@ -113,6 +115,7 @@ impl Failure {
                 let s = if *count == 1 { "" } else { "s" };
                 plain(&format!("{count} warning{s}, and --fail-on-warning"), None)
             }
+            Self::Recordings(failed) => plain(&format!("{} failed", render::count(*failed, "recording")), None),
             Self::Output(error) => plain(&format!("cannot write to stdout: {error}"), None),
             Self::Program(message) => plain(&format!("the program failed: {message}"), Some(REPORT)),
         }
@@ -148,6 +151,9 @@ impl Failure {
             }
             Self::Limit(open) => json!({ "kind": "limit", "message": "not proven to be kept", "limits": open }),
             Self::Warnings(count) => json!({ "kind": "warnings", "message": "there are warnings", "warnings": count }),
+            Self::Recordings(failed) => {
+                json!({ "kind": "recordings", "message": "recordings failed", "recordings": failed })
+            }
             Self::Output(error) => json!({ "kind": ErrorKind::Io.name(), "message": error.to_string() }),
             Self::Program(message) => json!({ "kind": "program", "message": message, "help": REPORT }),
         }

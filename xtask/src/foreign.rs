@@ -9,11 +9,13 @@ use crate::{
 };
 
 /// Modules, and the packages that bring them.
-const PYTHON_PACKAGES: [[&str; 2]; 8] = [
+const PYTHON_PACKAGES: [[&str; 2]; 10] = [
     ["numpy"; 2],
     ["scipy"; 2],
     ["h5py"; 2],
     ["pyarrow"; 2],
+    ["polars"; 2],
+    ["duckdb"; 2],
     ["trimesh"; 2],
     ["pymeshlab"; 2],
     ["sklearn", "scikit-learn"],

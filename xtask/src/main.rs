@@ -2,6 +2,7 @@
 
 mod areal;
 mod bench;
+mod bench_batch;
 mod chores;
 #[cfg(any(test, feature = "data"))]
 mod data;
@@ -49,6 +50,8 @@ cargo xtask COMMAND
                 time reference circles of 2560 and 36 000 points beside SciPy and others
   bench-kriging [POINTS QUERIES ROUNDS]
                 time predictions from 1000 measured points beside scikit-learn and pykrige, one thread
+  bench-batch [SCRATCH] [--recordings N] [--rounds N] [--jobs A,B] [--program FILE]
+                time `runout batch` of 1000 recordings of 2 MB on one job and on two; 2 GB in target/bench/batch
   areal-peers [RINGS POINTS ROUNDS]
                 print areal and profile values of one surface beside surfalize's, with both times
   record-results FOLDER [PROGRAM]
@@ -100,6 +103,7 @@ fn main() -> ExitCode {
         ["compare-results", ref rest @ ..] => results::compare(rest),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
         ["bench-peers", ref rest @ ..] => bench::all_peers(rest),
+        ["bench-batch", ref rest @ ..] => bench_batch::batch(rest),
         ["bench-stages", ref rest @ ..] => bench::stages(rest),
         ["bench-roundness"] => bench::roundness(),
         ["bench-kriging", ref rest @ ..] => bench::kriging(rest),

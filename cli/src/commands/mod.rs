@@ -1,5 +1,6 @@
 //! What each command does.
 
+pub mod batch;
 pub mod check;
 pub mod compare;
 pub mod completions;
@@ -31,6 +32,7 @@ pub fn execute(command: Command, json: bool, registry: &Registry) -> Result<(), 
         Command::Check(args) => check::execute(&args, json, registry),
         Command::Diagnose(args) => diagnose::execute(&args, json, registry),
         Command::Compare(args) => compare::execute(&args, json, registry),
+        Command::Batch(args) => batch::execute(&args, json, registry),
         Command::Simulate(args) => simulate::execute(&args, json, registry),
         Command::Plan(args) => plan::execute(&args, json, registry),
         Command::Plugins(args) => plugins::execute(&args, json, registry),

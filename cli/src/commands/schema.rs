@@ -7,6 +7,7 @@ use runout_core::{
     model::diagnosis::Diagnosis,
     pipeline::{
         Registry,
+        batch::BatchReport,
         compare::Comparison,
         config::{choice, pipeline_schema},
         run::Summary,
@@ -48,6 +49,7 @@ fn files(registry: &Registry) -> Vec<(&'static str, Value)> {
         ("summary", of::<Summary>("runout summary", SchemaSettings::default().for_serialize())),
         ("diagnosis", of::<Diagnosis>("runout diagnosis", SchemaSettings::default().for_serialize())),
         ("compare", of::<Comparison>("runout compare", SchemaSettings::default().for_serialize())),
+        ("batch", of::<BatchReport>("runout batch", SchemaSettings::default().for_serialize())),
         ("check", of::<check::Report>("runout check", SchemaSettings::default().for_serialize())),
         ("plan", of::<plan::Report>("runout plan", SchemaSettings::default().for_serialize())),
         (

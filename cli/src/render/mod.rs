@@ -1,5 +1,6 @@
 //! Terminal text.
 
+pub mod batch;
 pub mod check;
 pub mod compare;
 pub mod diagnosis;

@@ -1,6 +1,7 @@
 //! The program as its users meet it: arguments in, text, files and exit status out.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
+mod batch;
 mod commands;
 mod compare;
 mod diagnosed;

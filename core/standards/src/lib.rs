@@ -1,6 +1,7 @@
 //! The standards' values: of closed and open profiles, walls and height maps.
 
 pub mod areal;
+pub mod control_chart;
 pub mod cylindricity;
 pub mod drawn;
 mod errors;

@@ -22,12 +22,12 @@ pub mod panels;
 
 use std::{collections::HashMap, sync::Arc};
 
-use arrow_array::{BooleanArray, StringArray, UInt32Array};
+use arrow_array::{BooleanArray, UInt32Array};
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 
 use runout_error::{Error, Result};
 
-pub use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch};
+pub use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray};
 pub use figure::{Figure, Measure};
 
 /// What a column holds.

@@ -2,10 +2,11 @@
 //!
 //! Its path is a folder that receives one file a table, named by it (`form.parquet`). Every column carries its `unit` and what it
 //! is (`about`) as metadata, every file the configuration, the checksums of the inputs, the effects that the result is corrected
-//! for and the warnings.
+//! for and the warnings. A [`DataSet`] keeps the tables of many recordings side by side.
 
 mod about;
 mod comparison;
+mod data_set;
 mod table;
 
 use std::path::PathBuf;
@@ -24,6 +25,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use comparison::ComparisonTable;
+pub use data_set::DataSet;
+use data_set::Partition;
 use table::TableFile;
 
 /// Adds the exporter `parquet`.
@@ -50,7 +53,7 @@ impl StageConfig for ParquetConfig {
         if self.path.as_os_str().is_empty() {
             return Err(Fault::at("path", "expected the name of a folder"));
         }
-        Ok(Box::new(Parquet { folder: context.path(&self.path) }))
+        Ok(Box::new(Parquet { folder: context.path(&self.path), partition: None }))
     }
 }
 
@@ -58,11 +61,16 @@ impl StageConfig for ParquetConfig {
 #[derive(Debug, Clone)]
 struct Parquet {
     folder: PathBuf,
+    /// Where the result is one recording's in a data set, the recording.
+    partition: Option<Partition>,
 }
 
 impl Parquet {
     fn file(&self, table: &TableSpec) -> PathBuf {
-        self.folder.join(format!("{}.parquet", table.name))
+        match &self.partition {
+            None => self.folder.join(format!("{}.parquet", table.name)),
+            Some(partition) => partition.file(&self.folder, &table.name),
+        }
     }
 }
 
@@ -73,6 +81,13 @@ impl Exporter for Parquet {
 
     fn outputs(&self, tables: &[TableSpec]) -> Vec<PathBuf> {
         tables.iter().map(|table| self.file(table)).collect()
+    }
+
+    fn summary(&self, tables: &[TableSpec]) -> Option<PathBuf> {
+        match &self.partition {
+            None => self.outputs(tables).first().map(|path| path.with_file_name("summary.json")),
+            Some(partition) => Some(partition.summary(&self.folder)),
+        }
     }
 
     fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
@@ -109,7 +124,13 @@ impl Export for TableFiles {
     }
 
     fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
-        let complete = close_all(self.begun, result)?;
+        let complete = match self.place.partition {
+            None => close_all(self.begun, result)?,
+            // The other threads have recordings of their own.
+            Some(_) => (self.begun.into_iter())
+                .map(|(file, table)| file.close(&about::entries(&table, result)))
+                .collect::<Result<_>>()?,
+        };
         // An earlier run's motion beside this run's form would be taken for this run's.
         for path in self.optional.iter().map(|table| self.place.file(table)).filter(|path| path.is_file()) {
             std::fs::remove_file(&path)

@@ -55,6 +55,7 @@ pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &d
                 averager: &**averager,
                 hold_out,
                 projections: projections(pipeline, &**separator, rig),
+                alone: false,
             };
             diagnose_turns(pipeline, &line, threads, (&**separator, &**model), observer)
         }

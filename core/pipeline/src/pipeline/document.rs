@@ -126,6 +126,11 @@ impl Sources {
         files.map(|part| Path::new(&part.name))
     }
 
+    /// Overrides one more key; `value` is a TOML value.
+    pub(super) fn set(&mut self, key: &str, value: &str) {
+        self.add(&format!("--set {key}={value}"), Role::Override(key.to_owned()), &format!("value = {value}"));
+    }
+
     fn add(&mut self, name: &str, role: Role, text: &str) {
         let start = self.parts.last().map_or(0, |part| part.padded.len() + 1);
         self.parts.push(Part { name: name.into(), role, padded: " ".repeat(start) + text, start });

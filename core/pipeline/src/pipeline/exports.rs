@@ -31,9 +31,9 @@ pub(super) fn beside_the_first(exporters: &[Box<dyn Exporter>], tables: &[TableS
     exporters.iter().find_map(|exporter| exporter.outputs(tables).first().map(|path| beside(path, name)))
 }
 
-/// Where the summary of these exports goes: beside the first of their files.
+/// Where the summary of these exports goes: where the first exporter has it.
 pub(super) fn summary_path(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Option<PathBuf> {
-    beside_the_first(exporters, tables, SUMMARY)
+    exporters.iter().find_map(|exporter| exporter.summary(tables))
 }
 
 pub(super) fn written(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Vec<PathBuf> {

@@ -1,5 +1,6 @@
 //! The pipeline: configuration, what is registered, and the run.
 
+pub mod batch;
 pub mod compare;
 pub mod config;
 pub mod diagnose;

@@ -38,6 +38,8 @@ pub struct RecordReader<'a> {
     pub hold_out: Option<f64>,
     /// How motion follows from the readings of each setup, where the spread over the turns is wanted.
     pub projections: Vec<Option<Projection>>,
+    /// Whether one thread does all: the others have recordings of their own.
+    pub alone: bool,
 }
 
 impl RecordReader<'_> {
@@ -90,7 +92,11 @@ impl RecordReader<'_> {
                     }
                 }
             };
-            if workers < processors { read_ahead(captures, work_on) } else { read_along(captures, work_on) }
+            if workers < processors && !self.alone {
+                read_ahead(captures, work_on)
+            } else {
+                read_along(captures, work_on)
+            }
         };
         let along = self.recording.checksum();
         if let Some(checksum) = along {

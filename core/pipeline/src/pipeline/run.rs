@@ -64,10 +64,24 @@ impl Pipeline {
 /// # Errors
 /// When the data or a file fails. Exports that had begun leave nothing behind.
 pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Summary> {
+    run_with(pipeline, threads, false, observer)
+}
+
+/// Runs a pipeline on one thread, which also reads and writes: other threads have recordings of their own.
+pub(super) fn run_alone(pipeline: &Pipeline) -> Result<Summary> {
+    run_with(pipeline, Some(NonZeroUsize::MIN), true, &Silent)
+}
+
+fn run_with(
+    pipeline: &Pipeline,
+    threads: Option<NonZeroUsize>,
+    alone: bool,
+    observer: &dyn Observer,
+) -> Result<Summary> {
     let source = pipeline.loader.open(&pipeline.request())?;
     let summary = match (&source, &pipeline.route) {
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator, .. }) => {
-            run_turns(pipeline, &**recording, (conditioners, &**averager, &**separator), threads, observer)?
+            run_turns(pipeline, &**recording, (conditioners, &**averager, &**separator), (threads, alone), observer)?
         }
         (Source::Points(points), Route::Points { separator, .. }) => {
             point_run::run(pipeline, points, &**separator, observer)?
@@ -82,7 +96,7 @@ fn run_turns(
     pipeline: &Pipeline,
     recording: &dyn Recording,
     (conditioners, averager, separator): (&[Box<dyn Conditioner>], &dyn Averager, &dyn StationSeparator),
-    threads: Option<NonZeroUsize>,
+    (threads, alone): (Option<NonZeroUsize>, bool),
     observer: &dyn Observer,
 ) -> Result<Summary> {
     spare_inputs(&pipeline.outputs(), &recording.inputs())?;
@@ -97,6 +111,7 @@ fn run_turns(
         averager,
         hold_out: None,
         projections: projections(pipeline, separator, rig),
+        alone,
     };
     let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
     let work = |index, station: Station| {
@@ -108,13 +123,15 @@ fn run_turns(
         Ok(with_motion_values(result, &pipeline.evaluate.centres, rig.part_radius_mm))
     };
     let mut steadiness = Steadiness::default();
-    let inputs = write_behind(
-        |result: StationResult| {
-            steadiness.take(&result.station, &result.profiles, rig);
-            writer.take(&result, Some(rig))
-        },
-        |take| line.run(threads, observer, work, take),
-    )?;
+    let mut take = |result: StationResult| {
+        steadiness.take(&result.station, &result.profiles, rig);
+        writer.take(&result, Some(rig))
+    };
+    let inputs = if alone {
+        line.run(threads, observer, work, &mut take)?
+    } else {
+        write_behind(take, |take| line.run(threads, observer, work, take))?
+    };
     let remarks = recording.remarks().into_iter().chain(steadiness.warning(rig)).collect();
     let surface = writer.build_surface(rig.part_radius_mm)?;
     writer.finish(inputs, remarks, surface.as_ref())?.commit(None)

@@ -34,6 +34,15 @@ const SECTION: &str = "id of the section";
 /// Unit of coefficients, whose rows are of all quantities.
 const MIXED: &str = "um; urad for tilt";
 
+/// The table of values, and that of a domain's own values beside it.
+const VALUES: &str = "values";
+const NAMED_VALUES: &str = "named_values";
+
+/// Whether the table of this name holds values.
+pub(super) fn holds_values(table: &str) -> bool {
+    [VALUES, NAMED_VALUES].contains(&table)
+}
+
 /// The tables of form, motion and the values that are computed from them.
 #[derive(Debug, Clone)]
 pub struct StationTables {
@@ -365,7 +374,7 @@ fn values() -> TableSpec {
     };
     let order = |name: &str, about: &str| ColumnSpec::count(name, "1/rev", about);
     TableSpec::new(
-        "values",
+        VALUES,
         "the standards' values of sections, stations and the whole part",
         vec![
             ColumnSpec::name("station", "name of the axial station; null for the whole part").or_null(),
@@ -441,7 +450,7 @@ fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
 pub fn named_values(of_form: bool) -> TableSpec {
     TableSpec::new(
         // Beside those that are computed from form.
-        if of_form { "named_values" } else { "values" },
+        if of_form { NAMED_VALUES } else { VALUES },
         "values of the result",
         vec![
             ColumnSpec::text("symbol", "the standard's symbol, or a short name"),

@@ -17,6 +17,11 @@ pub trait Exporter: Send + Sync {
     /// always there.
     fn outputs(&self, tables: &[TableSpec]) -> Vec<PathBuf>;
 
+    /// Where the run's summary goes if this is the first exporter: beside the first of its files.
+    fn summary(&self, tables: &[TableSpec]) -> Option<PathBuf> {
+        self.outputs(tables).first().map(|path| path.with_file_name("summary.json"))
+    }
+
     /// Begins an export. Files appear under their names only when it is finished.
     ///
     /// # Errors

@@ -121,6 +121,7 @@ impl<'a> Comparing<'a> {
             averager: self.averager,
             hold_out: None,
             projections: Vec::new(),
+            alone: false,
         };
         let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref());
         let inputs = line.run(threads, observer, work, take)?;

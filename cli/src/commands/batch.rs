@@ -1,0 +1,51 @@
+//! `runout batch`: one pipeline on many recordings.
+
+use std::{num::NonZeroUsize, thread::available_parallelism};
+
+use runout_core::{
+    atomic_file::resolved,
+    pipeline::{
+        Registry,
+        batch::{Batch, Recording, recordings},
+        config::INCLUDE_KEY,
+        document::Sources,
+    },
+};
+use runout_parquet::DataSet;
+
+use super::print;
+use crate::{args::BatchArgs, failure::Failure, progress::Progress, render};
+
+/// Runs a pipeline on every recording that is not up to date, and says how the values of all of them run.
+///
+/// # Errors
+/// When the command line or the configuration is wrong, or the data set cannot be written; after the report, when a recording failed.
+pub fn execute(args: &BatchArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+    let sources = Sources::read(&args.pipeline.pipeline, &args.pipeline.overrides.set, INCLUDE_KEY)?;
+    let recordings = recordings(&args.recordings, args.name_folders).map_err(|error| Failure::Name {
+        message: error.to_string(),
+        help: error.advice().unwrap_or("name files or folders").to_owned(),
+    })?;
+    are_apart(args, &recordings)?;
+    let store = DataSet::new(args.out.clone())?;
+    let batch = Batch::new(&sources, registry, &store, &recordings)?;
+    let jobs = args.jobs.or_else(|| available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
+    let progress = Progress::new("recordings");
+    let report = batch.run(&recordings, jobs, &progress)?;
+    drop(progress);
+    print(&report, json, render::batch::text)?;
+    if report.failed.is_empty() { Ok(()) } else { Err(Failure::Recordings(report.failed.len())) }
+}
+
+/// Refuses recordings that lie in the data set: its own tables would be read as recordings.
+fn are_apart(args: &BatchArgs, recordings: &[Recording]) -> Result<(), Failure> {
+    let folder = resolved(&args.out);
+    match recordings.iter().find(|recording| resolved(&recording.path).starts_with(&folder)) {
+        None => Ok(()),
+        Some(recording) => {
+            let (path, out) = (recording.path.display(), args.out.display());
+            let help = "name another folder with --out".to_owned();
+            Err(Failure::Name { message: format!("the recording {path} lies in the data set {out}"), help })
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! A batch: one pipeline, many recordings. Each recording is a run of its own, whose result is kept by a [`ResultStore`]; one that is up
+//! to date is skipped, one that fails does not stop the others.
+
+mod exports;
+mod recording;
+mod report;
+mod trend;
+
+use std::{
+    collections::HashSet,
+    fs,
+    num::NonZeroUsize,
+    path::Path,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+pub use recording::{Recording, by_name, recordings};
+pub use report::{BatchReport, Failed, LimitCount};
+pub use trend::{RECORDING, Series, Signals, recording_column};
+
+use super::{
+    config::Pipeline,
+    document::{ConfigError, Document, Sources},
+    evaluate::Decision,
+    registry::Registry,
+    run::{Observer, run_alone},
+    summary::Summary,
+    tables,
+};
+use crate::{
+    atomic_file::{self, PendingFile, commit_all},
+    stage::{About, Completed, Exporter, ResultInfo, Source},
+};
+use recording::{of_recording, without_recording};
+use runout_error::{Error, ErrorKind, Result};
+use runout_table::{RecordBatch, TableSpec};
+use runout_turning::provenance::{Input, Provenance, VERSION};
+use trend::Trend;
+
+/// Keeps the results of recordings side by side, as a data set.
+pub trait ResultStore: Sync {
+    /// Writes the result of a recording; its summary, which comes last, says that the result is complete.
+    fn exporter(&self, recording: &str) -> Box<dyn Exporter>;
+
+    /// Removes all that is kept of a recording, the summary first.
+    ///
+    /// # Errors
+    /// When a file cannot be removed.
+    fn remove(&self, recording: &str) -> Result<()>;
+
+    /// The recordings of which anything is kept.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    fn recordings(&self) -> Result<Vec<String>>;
+
+    /// The rows of a table of these recordings as one table, behind a column with the recording's name.
+    ///
+    /// # Errors
+    /// When a file cannot be read or written.
+    fn gather(&self, table: &TableSpec, recordings: &[String]) -> Result<Box<dyn Gathered>>;
+
+    /// Writes tables of the whole batch.
+    fn exporter_of_all(&self) -> Box<dyn Exporter>;
+
+    /// Where the batch is and where its report goes.
+    fn folder(&self) -> &Path;
+}
+
+/// One table of all recordings, complete but for its name.
+pub trait Gathered {
+    /// Gives all rows, some at a time, in the order of the recordings.
+    ///
+    /// # Errors
+    /// When they cannot be read, and those of `take`.
+    fn each(&self, take: &mut dyn FnMut(&RecordBatch) -> Result<()>) -> Result<()>;
+
+    /// The file.
+    fn finish(self: Box<Self>) -> PendingFile;
+}
+
+/// A pipeline for many recordings.
+pub struct Batch<'a> {
+    sources: &'a Sources,
+    registry: &'a Registry,
+    store: &'a dyn ResultStore,
+    /// The pipeline as it is for any recording.
+    pipeline: Pipeline,
+    /// Its configuration without what is a recording's own.
+    key: Option<toml::Table>,
+    /// What takes the tables of the batch.
+    exporters: Vec<Box<dyn Exporter>>,
+}
+
+/// What became of a recording.
+enum Outcome {
+    Done(Vec<Decision>),
+    Skipped(Vec<Decision>),
+    Failed(Error),
+}
+
+impl<'a> Batch<'a> {
+    /// Checks a pipeline for these recordings.
+    ///
+    /// # Errors
+    /// The first mistake of the configuration, with its place.
+    pub fn new(
+        sources: &'a Sources,
+        registry: &'a Registry,
+        store: &'a dyn ResultStore,
+        recordings: &[Recording],
+    ) -> std::result::Result<Self, ConfigError> {
+        let first = recordings.first().map(|first| of_recording(sources, &first.path)).transpose()?;
+        let pipeline = Pipeline::from_sources(first.as_ref().unwrap_or(sources), registry)?;
+        let key = without_recording(&pipeline.configuration);
+        let document = Document::parse(sources)?;
+        let exporters =
+            exports::of_batch(document.root(), sources, registry, pipeline.rig.as_ref(), store, &[trend::table()])
+                .map_err(|fault| document.diagnose(fault))?;
+        Ok(Self { sources, registry, store, pipeline, key, exporters })
+    }
+
+    /// Runs the pipeline on each recording that is not up to date, so many at a time, and writes what all of them say together.
+    ///
+    /// # Errors
+    /// When the tables of the batch cannot be written. A recording that fails is none: the report names it.
+    pub fn run(&self, recordings: &[Recording], jobs: NonZeroUsize, observer: &dyn Observer) -> Result<BatchReport> {
+        let outcomes = self.work(recordings, jobs, observer);
+        let mut report = BatchReport::begun(&self.pipeline, self.store.folder());
+        let (mut complete, mut given) = (Vec::new(), HashSet::new());
+        for (recording, outcome) in recordings.iter().zip(outcomes) {
+            given.insert(recording.name.as_str());
+            let decisions = match outcome {
+                Outcome::Done(decisions) => {
+                    report.done += 1;
+                    decisions
+                }
+                Outcome::Skipped(decisions) => {
+                    report.skipped += 1;
+                    decisions
+                }
+                Outcome::Failed(error) => {
+                    report.failed.push(Failed::of(recording, &error));
+                    continue;
+                }
+            };
+            report.count(&decisions);
+            complete.push(recording.name.clone());
+        }
+        for name in self.store.recordings()?.into_iter().filter(|name| !given.contains(name.as_str())) {
+            match self.summary(&name).filter(|summary| self.is_of_configuration(summary)) {
+                Some(summary) => {
+                    report.count(&decisions(&summary));
+                    report.earlier += 1;
+                    complete.push(name);
+                }
+                None => report.other_configuration.push(name),
+            }
+        }
+        complete.sort_by(|a, b| by_name(a, b));
+        report.other_configuration.sort_by(|a, b| by_name(a, b));
+        self.conclude(&complete, report)
+    }
+
+    fn work(&self, recordings: &[Recording], jobs: NonZeroUsize, observer: &dyn Observer) -> Vec<Outcome> {
+        let next = AtomicUsize::new(0);
+        let outcomes: Mutex<Vec<Option<Outcome>>> = Mutex::new(recordings.iter().map(|_| None).collect());
+        observer.begin(recordings.len());
+        let work = || {
+            while let Some((index, recording)) =
+                Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|index| Some((index, recordings.get(index)?)))
+            {
+                let outcome = self.one(recording).unwrap_or_else(Outcome::Failed);
+                outcomes.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(outcome);
+                observer.station(&recording.name);
+            }
+        };
+        std::thread::scope(|scope| {
+            let others = jobs.get().min(recordings.len()).saturating_sub(1);
+            (0..others).for_each(|_| drop(scope.spawn(work)));
+            work();
+        });
+        let outcomes = outcomes.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let stopped = || Error::new("run", "the recording", "its thread stopped").of(ErrorKind::Interrupted);
+        outcomes.into_iter().map(|outcome| outcome.unwrap_or_else(|| Outcome::Failed(stopped()))).collect()
+    }
+
+    fn one(&self, recording: &Recording) -> Result<Outcome> {
+        let named = |error: ConfigError| match error {
+            ConfigError::File(error) => error,
+            ConfigError::Text(mistake) => {
+                Error::new("run", &recording.name, &mistake.message).of(ErrorKind::Configuration)
+            }
+        };
+        let sources = of_recording(self.sources, &recording.path).map_err(named)?;
+        let mut pipeline = Pipeline::from_sources(&sources, self.registry).map_err(named)?;
+        if let Some(summary) = self.summary(&recording.name)
+            && self.is_of_configuration(&summary)
+            && is_of_inputs(&summary, &pipeline)?
+        {
+            return Ok(Outcome::Skipped(decisions(&summary)));
+        }
+        self.store.remove(&recording.name)?;
+        pipeline.exporters = vec![self.store.exporter(&recording.name)];
+        pipeline.diagnosed.clear();
+        let summary = run_alone(&pipeline)?;
+        Ok(Outcome::Done(decisions(&summary)))
+    }
+
+    /// The summary of a complete result; nothing where there is none that can be read.
+    fn summary(&self, recording: &str) -> Option<Summary> {
+        let path = self.store.exporter(recording).summary(&self.pipeline.tables)?;
+        serde_json::from_slice(&fs::read(path).ok()?).ok()
+    }
+
+    fn is_of_configuration(&self, summary: &Summary) -> bool {
+        summary.provenance.program == program()
+            && self.key.is_some()
+            && without_recording(&summary.provenance.configuration) == self.key
+    }
+
+    /// Writes the values of all recordings and their trend, and the report.
+    fn conclude(&self, complete: &[String], mut report: BatchReport) -> Result<BatchReport> {
+        let mut gathered = Vec::new();
+        for table in self.pipeline.tables.iter().filter(|table| tables::holds_values(&table.name)) {
+            gathered.push(self.store.gather(table, complete)?);
+        }
+        let mut trend = Trend::default();
+        for pass in [Trend::estimate, Trend::judge] {
+            trend.rewind();
+            for table in &gathered {
+                trend.begin_table();
+                table.each(&mut |rows| {
+                    pass(&mut trend, rows);
+                    Ok(())
+                })?;
+            }
+        }
+        trend.rewind();
+        let spec = trend::table();
+        let info = ResultInfo { title: self.pipeline.title.clone(), tables: vec![spec.clone()], longest_name: None };
+        let mut exports = self.exporters.iter().map(|exporter| exporter.begin(&info)).collect::<Result<Vec<_>>>()?;
+        for table in &gathered {
+            trend.begin_table();
+            table.each(&mut |rows| {
+                let rows = trend.rows(rows)?;
+                exports.iter_mut().try_for_each(|export| export.rows(&spec, &rows))
+            })?;
+        }
+        report.trend = trend.into_series();
+        let summary = Summary {
+            title: self.pipeline.title.clone(),
+            provenance: Provenance {
+                program: program(),
+                configuration: self.pipeline.configuration.clone(),
+                inputs: Vec::new(),
+            },
+            ..Summary::default()
+        };
+        let completed = Completed { summary: &summary, about: &About::default(), surface: None };
+        let mut files: Vec<PendingFile> = gathered.into_iter().map(Gathered::finish).collect();
+        for export in exports {
+            files.extend(export.finish(&completed)?);
+        }
+        report.outputs = files.iter().map(|file| file.destination().to_owned()).collect();
+        commit_all(files)?;
+        let path = self.store.folder().join("batch.json");
+        report.outputs.push(path.clone());
+        let text = serde_json::to_vec_pretty(&report)
+            .map_err(|error| Error::caused("write", path.display().to_string(), error))?;
+        atomic_file::write(path, &text)?;
+        Ok(report)
+    }
+}
+
+fn program() -> String {
+    format!("runout {VERSION}")
+}
+
+fn decisions(summary: &Summary) -> Vec<Decision> {
+    summary.limits.iter().map(|limit| limit.decision).collect()
+}
+
+/// Whether a result is of the files that the pipeline loads now, by their checksums.
+fn is_of_inputs(summary: &Summary, pipeline: &Pipeline) -> Result<bool> {
+    let inputs = match pipeline.loader.open(&pipeline.request())? {
+        Source::Turns(recording) => recording.inputs(),
+        Source::Points(points) => points.inputs(),
+    };
+    let known = &summary.provenance.inputs;
+    if inputs.len() != known.len() {
+        return Ok(false);
+    }
+    for (path, known) in inputs.iter().zip(known) {
+        let now = Input::of(path)?;
+        if (now.bytes, &now.blake3) != (known.bytes, &known.blake3) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}

@@ -1,0 +1,108 @@
+//! What a batch found, for people and programs.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{recording::Recording, trend::Series};
+use crate::pipeline::{
+    config::Pipeline,
+    evaluate::{Decision, Limit},
+};
+use runout_error::Error;
+
+/// What a batch found.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct BatchReport {
+    /// The pipeline's title.
+    pub title: String,
+    /// The folder of the data set.
+    pub folder: PathBuf,
+    /// Recordings of this call that were run.
+    pub done: usize,
+    /// Recordings of this call whose result was up to date.
+    pub skipped: usize,
+    /// Recordings of earlier calls with the same configuration; they count in the limits and in the trend.
+    pub earlier: usize,
+    /// Recordings that failed; nothing is kept of them.
+    pub failed: Vec<Failed>,
+    /// Recordings in the data set whose results are of another configuration or version: they are in no value and no trend. Given
+    /// again they are brought up to date.
+    pub other_configuration: Vec<String>,
+    /// The limits of the pipeline, in their order.
+    pub limits: Vec<LimitCount>,
+    /// Control charts of all values.
+    pub trend: Vec<Series>,
+    /// Files of the whole batch.
+    pub outputs: Vec<PathBuf>,
+}
+
+/// A recording that failed.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Failed {
+    /// Its name.
+    pub recording: String,
+    /// Its path.
+    pub path: PathBuf,
+    /// The kind of the error: `missing-file`, `damaged-data`.
+    pub kind: String,
+    /// The error.
+    pub message: String,
+    /// What to do, where that is known.
+    pub help: Option<String>,
+}
+
+/// How many recordings keep a limit.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LimitCount {
+    /// The limit.
+    pub limit: Limit,
+    /// Recordings that are proven to keep it.
+    pub conforms: usize,
+    /// Recordings that are proven not to keep it.
+    pub does_not_conform: usize,
+    /// Recordings of which neither is proven.
+    pub undecided: usize,
+}
+
+impl Failed {
+    pub(super) fn of(recording: &Recording, error: &Error) -> Self {
+        Self {
+            recording: recording.name.clone(),
+            path: recording.path.clone(),
+            kind: error.kind().name().to_owned(),
+            message: error.to_string(),
+            help: error.advice().map(str::to_owned),
+        }
+    }
+}
+
+impl BatchReport {
+    pub(super) fn begun(pipeline: &Pipeline, folder: &Path) -> Self {
+        let count = |limit: &Limit| LimitCount { limit: limit.clone(), conforms: 0, does_not_conform: 0, undecided: 0 };
+        Self {
+            title: pipeline.title.clone(),
+            folder: folder.to_owned(),
+            done: 0,
+            skipped: 0,
+            earlier: 0,
+            failed: Vec::new(),
+            other_configuration: Vec::new(),
+            limits: pipeline.evaluate.limits().iter().map(count).collect(),
+            trend: Vec::new(),
+            outputs: Vec::new(),
+        }
+    }
+
+    /// Counts what was decided of one recording.
+    pub(super) fn count(&mut self, decisions: &[Decision]) {
+        for (limit, decision) in self.limits.iter_mut().zip(decisions) {
+            *match decision {
+                Decision::Conforms => &mut limit.conforms,
+                Decision::DoesNotConform => &mut limit.does_not_conform,
+                Decision::Undecided => &mut limit.undecided,
+            } += 1;
+        }
+    }
+}

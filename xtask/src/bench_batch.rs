@@ -1,0 +1,154 @@
+//! How `runout batch` scales with the number of jobs: `cargo xtask bench-batch`.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::atomic::{AtomicUsize, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    process::{Outcome, root, run, say, target},
+    setup::cargo,
+};
+
+/// What is asked for.
+struct Wanted {
+    scratch: PathBuf,
+    recordings: usize,
+    rounds: usize,
+    jobs: Vec<usize>,
+    program: Option<PathBuf>,
+}
+
+impl Wanted {
+    fn read(words: &[&str]) -> Outcome<Self> {
+        let scratch = target().join("bench/batch");
+        let mut wanted = Self { scratch, recordings: 1000, rounds: 1, jobs: vec![1, 2], program: None };
+        let mut words = words.iter();
+        while let Some(word) = words.next() {
+            let mut value = || words.next().ok_or_else(|| format!("{word} needs a value"));
+            let number = |text: &str| {
+                let number = text.parse().ok().filter(|number| *number > 0);
+                number.ok_or_else(|| format!("{word} needs numbers of at least 1, found `{text}`"))
+            };
+            match *word {
+                "--recordings" => wanted.recordings = number(value()?)?,
+                "--rounds" => wanted.rounds = number(value()?)?,
+                "--jobs" => wanted.jobs = value()?.split(',').map(number).collect::<Outcome<_>>()?,
+                "--program" => wanted.program = Some(root().join(value()?)),
+                option if option.starts_with('-') => {
+                    return Err(format!(
+                        "unknown option `{option}`; known: --recordings N, --rounds N, --jobs A,B, --program FILE"
+                    ));
+                }
+                folder => {
+                    wanted.scratch = std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?;
+                }
+            }
+        }
+        Ok(wanted)
+    }
+}
+
+/// Simulates recordings of 2 MB once, runs the batch with each number of jobs in turns and prints a table.
+pub fn batch(words: &[&str]) -> Outcome {
+    let wanted = Wanted::read(words)?;
+    let program = match &wanted.program {
+        Some(program) => program.clone(),
+        None => {
+            run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
+            target().join("release/runout")
+        }
+    };
+    let recordings = simulate(&wanted, &program)?;
+    let mut times = vec![Vec::new(); wanted.jobs.len()];
+    let mut peaks = vec![0; wanted.jobs.len()];
+    for _ in 0..wanted.rounds {
+        for (at, jobs) in wanted.jobs.iter().enumerate() {
+            let (seconds, peak_kb) = timed(&wanted, &program, &recordings, *jobs)?;
+            times[at].push(seconds);
+            peaks[at] = peak_kb.max(peaks[at]);
+        }
+    }
+    let median = |times: &mut Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    };
+    let medians: Vec<f64> = times.iter_mut().map(median).collect();
+    let processors = thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    say(&format!(
+        "{} recordings, {processors} processors, median of {}\n\n| jobs | time, s | recordings a second | times the first | peak memory, MiB |\n\
+         | --- | --- | --- | --- | --- |",
+        wanted.recordings, wanted.rounds
+    ));
+    for ((jobs, seconds), peak_kb) in wanted.jobs.iter().zip(&medians).zip(&peaks) {
+        let (rate, gain) = (wanted.recordings as f64 / seconds, medians[0] / seconds);
+        let peak = if *peak_kb == 0 { "-".to_owned() } else { (peak_kb / 1024).to_string() };
+        say(&format!("| {jobs} | {seconds:.2} | {rate:.1} | {gain:.2} | {peak} |"));
+    }
+    Ok(())
+}
+
+/// The recordings, those that are not there yet made by as many programs as there are processors.
+fn simulate(wanted: &Wanted, program: &Path) -> Outcome<Vec<PathBuf>> {
+    let folder = wanted.scratch.join("recordings");
+    fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let all: Vec<PathBuf> = (1..=wanted.recordings).map(|number| folder.join(format!("part-{number}.h5"))).collect();
+    let next = AtomicUsize::new(0);
+    let work = || -> Outcome {
+        while let Some(path) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if path.is_file() {
+                continue;
+            }
+            let seed = path.file_stem().and_then(|stem| stem.to_str()).and_then(|stem| stem.strip_prefix("part-"));
+            let mut simulate = Command::new(program);
+            simulate.arg("simulate").arg(root().join("benchmarks/batch/scenario.toml")).arg("--out").arg(path);
+            simulate.args(["--set", &format!("seed={}", seed.unwrap_or("1"))]).stdout(Stdio::null());
+            let status = simulate.status().map_err(|error| format!("cannot start {}: {error}", program.display()))?;
+            if !status.success() {
+                return Err(format!("cannot simulate {} ({status})", path.display()));
+            }
+        }
+        Ok(())
+    };
+    let workers = thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    thread::scope(|scope| {
+        let workers: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().unwrap_or_else(|_| Err("a thread stopped".into())))
+    })?;
+    Ok(all)
+}
+
+/// Seconds from start to end of one batch into an empty folder, and its peak memory in kB where the system tells it.
+fn timed(wanted: &Wanted, program: &Path, recordings: &[PathBuf], jobs: usize) -> Outcome<(f64, u64)> {
+    let out = wanted.scratch.join("out");
+    if out.exists() {
+        fs::remove_dir_all(&out).map_err(|error| format!("{}: {error}", out.display()))?;
+    }
+    let mut batch = Command::new(program);
+    batch.arg("batch").arg(root().join("benchmarks/batch/pipeline.toml")).args(recordings);
+    batch.arg("--out").arg(&out).args(["--jobs", &jobs.to_string()]).stdout(Stdio::null());
+    let start = Instant::now();
+    let mut running = batch.spawn().map_err(|error| format!("cannot start {}: {error}", program.display()))?;
+    let status_of = format!("/proc/{}/status", running.id());
+    let mut peak_kb = 0;
+    loop {
+        let ended = running.try_wait().map_err(|error| format!("cannot wait for the batch: {error}"))?;
+        if let Some(status) = ended {
+            let seconds = start.elapsed().as_secs_f64();
+            say(&format!("{jobs} jobs: {seconds:.2} s"));
+            return if status.success() { Ok((seconds, peak_kb)) } else { Err(format!("the batch failed ({status})")) };
+        }
+        peak_kb = fs::read_to_string(&status_of).ok().and_then(|text| peak(&text)).unwrap_or(peak_kb);
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// The largest resident size so far.
+fn peak(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse().ok()
+}
