@@ -1,11 +1,12 @@
 //! What can go wrong, how it is shown, and the exit status that it gives.
 
-use std::{borrow::Cow, io, process::ExitCode};
+use std::{borrow::Cow, io};
 
 use runout_core::{
     Error, ErrorKind,
     pipeline::{document::ConfigError, error::Diagnostic},
 };
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::render::{self, diagnostic};
@@ -78,18 +79,18 @@ impl From<io::Error> for Failure {
 
 impl Failure {
     /// Shows it on stderr, with `json` also as a document on stdout, and gives its exit status.
-    pub fn report(&self, json: bool) -> ExitCode {
+    pub(crate) fn report(&self, json: bool) -> u8 {
         render::to_stderr(&self.text());
         // The result itself is the one document then.
         if json && !matches!(self, Self::Limit(_) | Self::Warnings(_) | Self::Recordings(_)) {
             // When stdout cannot be written to either, the exit status has to tell.
             let _ = render::document(&json!({ "error": self.document() }));
         }
-        ExitCode::from(match self {
+        match self {
             Self::CommandLine(_) | Self::Name { .. } | Self::Configuration(_) => 2,
             Self::Work(_) | Self::Limit(_) | Self::Warnings(_) | Self::Recordings(_) | Self::Output(_) => 1,
             Self::Program(_) => PROGRAM,
-        })
+        }
     }
 
     fn text(&self) -> String {
@@ -121,7 +122,9 @@ impl Failure {
         }
     }
 
-    fn document(&self) -> Value {
+    /// What went wrong, as the document that `--json` prints: `kind`, `message`, `help`, and the place or the causes.
+    #[must_use]
+    pub fn document(&self) -> Value {
         match self {
             Self::CommandLine(error) => {
                 let text = error.render().to_string();
@@ -158,6 +161,11 @@ impl Failure {
             Self::Program(message) => json!({ "kind": "program", "message": message, "help": REPORT }),
         }
     }
+}
+
+/// A result as a document.
+pub(crate) fn to_value(result: &impl Serialize) -> Result<Value, Failure> {
+    serde_json::to_value(result).map_err(|error| Failure::Output(error.into()))
 }
 
 fn plain(message: &str, help: Option<&str>) -> String {

@@ -13,11 +13,13 @@
 mod args;
 pub mod builtin;
 mod commands;
+pub mod documents;
 mod failure;
 mod progress;
 mod render;
 
 use std::{
+    ffi::OsString,
     io::{self, Write},
     panic::{self, AssertUnwindSafe},
     process::ExitCode,
@@ -31,20 +33,27 @@ use clap::Parser;
 use runout_core::{atomic_file::abandon_all, pipeline::Registry};
 
 use args::CommandLine;
-use failure::Failure;
+pub use failure::Failure;
 
 /// Does what the command line asks for with what is registered.
 #[must_use]
 pub fn main_with(registry: &Registry) -> ExitCode {
+    ExitCode::from(status_of(std::env::args_os().skip(1).collect(), registry))
+}
+
+/// Does what these words after the program's name ask for, and gives the exit status. What interrupts the process ends it.
+#[must_use]
+pub fn status_of(words: Vec<OsString>, registry: &Registry) -> u8 {
     leave_nothing_half();
-    let (json, outcome) = match CommandLine::try_parse() {
+    let json = words.iter().any(|word| word == "--json");
+    let (json, outcome) = match CommandLine::try_parse_from(std::iter::once("runout".into()).chain(words)) {
         Ok(line) => (line.json, guarded(|| commands::execute(line.command, line.json, registry))),
-        Err(error) if error.use_stderr() => (std::env::args_os().any(|word| word == "--json"), Err(error.into())),
+        Err(error) if error.use_stderr() => (json, Err(error.into())),
         // `--help` and `--version` come this way, and clap knows best how to print them.
         Err(error) => (false, error.print().map_err(Failure::Output)),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             // Work that fails because it was abandoned leaves the exit status to the handler.
             while ENDS.load(Ordering::SeqCst) {

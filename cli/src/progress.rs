@@ -17,7 +17,16 @@ impl Progress {
     #[must_use]
     pub fn new(things: &'static str) -> Self {
         // Hidden by itself where stderr is no terminal.
-        let bar = ProgressBar::new(0);
+        Self::shown_by(ProgressBar::new(0), things)
+    }
+
+    /// A bar that never shows.
+    #[must_use]
+    pub fn hidden() -> Self {
+        Self::shown_by(ProgressBar::hidden(), "")
+    }
+
+    fn shown_by(bar: ProgressBar, things: &'static str) -> Self {
         if let Ok(style) = ProgressStyle::with_template("{bar:32} {pos}/{len} {prefix} {msg} ({elapsed}, {eta} to go)")
         {
             bar.set_style(style);

@@ -158,7 +158,11 @@ pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(
     print(&report, json, render::check::text)
 }
 
-fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
+/// What can be said of a pipeline.
+///
+/// # Errors
+/// When a check of it fails.
+pub fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
     let source = pipeline.loader.open(&pipeline.request());
     match &source {

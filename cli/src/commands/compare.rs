@@ -70,7 +70,10 @@ fn points(
 }
 
 /// Refuses names that no separator has.
-fn known(names: &[String], registry: &Registry) -> std::result::Result<(), Failure> {
+///
+/// # Errors
+/// The first that none has.
+pub fn known(names: &[String], registry: &Registry) -> std::result::Result<(), Failure> {
     let known = || registry.separators.iter().map(|plugin| plugin.name);
     match names.iter().find(|name| !known().any(|known| known == name.as_str())) {
         None => Ok(()),

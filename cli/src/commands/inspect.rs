@@ -55,7 +55,11 @@ pub fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failur
     print(&report, json, render::file::text)
 }
 
-fn report(path: &Path) -> Result<Report> {
+/// What a file holds.
+///
+/// # Errors
+/// When it cannot be read, or is of no known kind.
+pub fn report(path: &Path) -> Result<Report> {
     let mut signature = Vec::new();
     let start = open_regular(path).and_then(|file| file.take(8).read_to_end(&mut signature));
     start.map_err(|error| Error::caused("inspect", path.display().to_string(), error))?;

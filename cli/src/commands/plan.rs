@@ -22,10 +22,12 @@ use runout_spindle::{
     separators::face_notes,
 };
 
+use serde_json::Value;
+
 use super::{check::Separability, print};
 use crate::{
     args::{Criterion, Optimise, PlanArgs},
-    failure::Failure,
+    failure::{Failure, to_value},
     progress::Progress,
     render,
 };
@@ -36,15 +38,39 @@ pub use report::{Arrangement, Gain, Optimised, Report, Score, Suggested, Unresol
 /// # Errors
 /// When the rig or the pipeline is wrong, the sensors have no room, or the map cannot be written.
 pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+    match planned(args, registry, &Progress::new("steps"))? {
+        Planned::Rig(report) => print(&*report, json, render::plan::text),
+        Planned::Points(report) => print(&*report, json, render::plan_points::text),
+    }
+}
+
+/// The same as a document.
+///
+/// # Errors
+/// As [`execute`].
+pub fn document(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<Value, Failure> {
+    match planned(args, registry, progress)? {
+        Planned::Rig(report) => to_value(&*report),
+        Planned::Points(report) => to_value(&*report),
+    }
+}
+
+/// What was planned.
+enum Planned {
+    Rig(Box<Report>),
+    Points(Box<points::PointReport>),
+}
+
+fn planned(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<Planned, Failure> {
     // A rig file includes no other.
     let sources = Sources::read(&args.rig, &args.overrides.set, "")?;
     if points::is_pipeline(&sources)? {
-        return points::execute(args, &sources, json, registry);
+        return Ok(Planned::Points(Box::new(points::report(args, &sources, registry)?)));
     }
     let rig = rig(&sources)?;
     map::refuse(args.map.as_deref(), &sources)?;
     let across = across(&rig);
-    let optimum = args.optimise.map(|Optimise::Angles| better_angles(&across, args)).transpose()?;
+    let optimum = args.optimise.map(|Optimise::Angles| better_angles(&across, args, progress)).transpose()?;
     let suggestions = plan::suggest(&rig, &args.orders, args.clearance);
     let foresight = plan::foresee_rig(&rig)?;
     let changes = plan::changes(&rig, &foresight, &suggestions, args.clearance)?;
@@ -56,7 +82,7 @@ pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), F
     if let Some(path) = &args.map {
         report.map = Some(map::write(path, &rig, &args.orders, &suggestions, optimum.as_ref())?);
     }
-    print(&report, json, render::plan::text)
+    Ok(Planned::Rig(Box::new(report)))
 }
 
 /// What helps form's noise gain and what changes which effects would show, best first.
@@ -112,7 +138,7 @@ fn assess(rig: &Rig, orders: &RangeInclusive<usize>) -> Separability {
 /// A tolerance that turns the highest order by more leaves open whether the layout sees it at all.
 const MOST_TURNED_DEG: f64 = 45.0;
 
-fn better_angles(rig: &Rig, args: &PlanArgs) -> Result<Optimum, Failure> {
+fn better_angles(rig: &Rig, args: &PlanArgs, progress: &Progress) -> Result<Optimum, Failure> {
     if rig.sensors.len() < 2 {
         return Err(Failure::Name {
             message: "one radial sensor has no angle to choose: the first sensor stays where it is".into(),
@@ -140,7 +166,6 @@ fn better_angles(rig: &Rig, args: &PlanArgs) -> Result<Optimum, Failure> {
         },
         seed: args.seed,
     };
-    let progress = Progress::new("steps");
     progress.expect(optimise::PROGRESS_STEPS);
     optimise(rig, &search, &mut |best| progress.advance(best)).map_err(|tight| too_tight(&tight, args.clearance))
 }

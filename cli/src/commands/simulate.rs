@@ -24,7 +24,7 @@ use crate::{args::SimulateArgs, failure::Failure, progress::Progress, render::co
 
 /// What was made. What is hidden in it stays hidden.
 #[derive(Debug, Serialize)]
-struct Report {
+pub struct Report {
     title: String,
     output: PathBuf,
     bytes: u64,
@@ -47,12 +47,19 @@ enum Made {
 /// # Errors
 /// When the scenario is wrong, cannot be computed, or the file cannot be written.
 pub fn execute(args: &SimulateArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+    print(&report(args, registry, &Progress::new("captures"))?, json, text)
+}
+
+/// Computes a campaign, writes it, and gives its size.
+///
+/// # Errors
+/// When the scenario is wrong, cannot be computed, or the file cannot be written.
+pub fn report(args: &SimulateArgs, registry: &Registry, progress: &Progress) -> Result<Report, Failure> {
     let sources = Sources::read(&args.scenario, &args.overrides.set, INCLUDE_KEY)?;
     let document = Document::parse(&sources)?;
     let scenario = Scenario::build(document.root(), &sources, args.out.clone(), registry)
         .map_err(|fault| document.diagnose(fault))?;
-    let report = write(&scenario)?;
-    print(&report, json, text)
+    Ok(write(&scenario, progress)?)
 }
 
 /// A checked scenario.
@@ -106,9 +113,9 @@ fn samples(root: &Table) -> SampleFormat {
     }
 }
 
-fn write(scenario: &Scenario) -> Result<Report, Error> {
+fn write(scenario: &Scenario, progress: &Progress) -> Result<Report, Error> {
     let made = match scenario.simulator.simulate()? {
-        Simulation::Turns { rig, recording } => write_turns(scenario, rig, &*recording)?,
+        Simulation::Turns { rig, recording } => write_turns(scenario, rig, &*recording, progress)?,
         Simulation::Points { table, rows } => {
             let about = [("title", scenario.title.as_str()), ("scenario", scenario.simulator.scenario())];
             runout_points::write(&scenario.output, &table, &rows, &about)?;
@@ -127,7 +134,7 @@ fn write(scenario: &Scenario) -> Result<Report, Error> {
     Ok(Report { title: scenario.title.clone(), output, bytes: bytes.len(), effects: scenario.effects, made })
 }
 
-fn write_turns(scenario: &Scenario, rig: &Rig, recording: &dyn Recording) -> Result<Made, Error> {
+fn write_turns(scenario: &Scenario, rig: &Rig, recording: &dyn Recording, progress: &Progress) -> Result<Made, Error> {
     let stations = recording.stations().len();
     let first = recording.open(0, 0)?.capture().clone();
     let options = WriteOptions {
@@ -136,7 +143,6 @@ fn write_turns(scenario: &Scenario, rig: &Rig, recording: &dyn Recording) -> Res
         scenario: Some(scenario.simulator.scenario()),
         ..WriteOptions::default()
     };
-    let progress = Progress::new("captures");
     progress.expect(stations * rig.setups.len());
     write_measurement(recording, rig, &scenario.output, &options, &mut |name| progress.advance(name))?;
     Ok(Made::Turns {

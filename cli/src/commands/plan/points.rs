@@ -10,7 +10,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::{args::PlanArgs, commands::print, failure::Failure, render};
+use crate::{args::PlanArgs, failure::Failure};
 
 /// What a layout of measured points tells and how well, and what to add to it.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -38,7 +38,7 @@ pub fn is_pipeline(sources: &Sources) -> Result<bool, Failure> {
 ///
 /// # Errors
 /// When the pipeline is wrong, or has nothing to plan.
-pub fn execute(args: &PlanArgs, sources: &Sources, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub fn report(args: &PlanArgs, sources: &Sources, registry: &Registry) -> Result<PointReport, Failure> {
     let of_a_rig = [("--optimise", args.optimise.is_some()), ("--map", args.map.is_some())];
     if let Some((option, _)) = of_a_rig.iter().find(|(_, given)| *given) {
         let message = format!("{option} is for a rig; this is a pipeline of measured points");
@@ -61,6 +61,5 @@ pub fn execute(args: &PlanArgs, sources: &Sources, json: bool, registry: &Regist
     };
     let mut plan = separator.plan(points.as_ref())?.ok_or_else(nothing)?;
     plan.notes.extend(notes);
-    let report = PointReport { title: pipeline.title.clone(), separator: pipeline.separator.clone(), plan };
-    print(&report, json, render::plan_points::text)
+    Ok(PointReport { title: pipeline.title.clone(), separator: pipeline.separator.clone(), plan })
 }

@@ -1,0 +1,137 @@
+"""The commands of the program, as functions."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Union
+
+from . import _native, _toml
+from .pipeline import Source, job
+from .recording import Recording
+from .result import Diagnosis, Result
+
+Progress = Callable[[int, int, str], object]
+"""Called with the number of stations that are done, of all, and the name of the last one. What it raises stops the work."""
+Path = Union[str, os.PathLike[str]]
+Overrides = Mapping[str, Any]
+
+
+def run(
+    pipeline: Source,
+    recording: Recording | None = None,
+    *,
+    set: Overrides | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    surface: bool = False,
+) -> Result:
+    """Loads, preprocesses, separates, evaluates and exports.
+
+    `pipeline` is a TOML file, a dictionary with its keys, or a `Pipeline`. `recording` takes the place of its `[load]`. `set`
+    overrides keys: `{"preprocess.0.cutoff_hz": 300}`. With `surface` the form over angle and z is kept as well; it is kept
+    in any case where an exporter or a value needs it.
+
+    Raises `ConfigurationError` for a mistake in the pipeline, `DataError` for data and files. Ctrl-C stops it; nothing
+    half-written remains.
+    """
+    return Result(*_native.run(job(pipeline, recording, set), threads, progress, surface))
+
+
+def diagnose(
+    pipeline: Source,
+    recording: Recording | None = None,
+    *,
+    set: Overrides | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    surface: bool = False,
+) -> Diagnosis:
+    """Runs the closed loop: finds what the declared model lacks, and adds it. Arguments and exceptions as of `run`."""
+    return Diagnosis(*_native.diagnose(job(pipeline, recording, set), threads, progress, surface))
+
+
+def compare(
+    pipeline: Source,
+    methods: Sequence[str] = (),
+    recording: Recording | None = None,
+    *,
+    set: Overrides | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Compares separators on the same data, as the document of `compare.schema.json`.
+
+    Without `methods`, all of `[[compare]]`, or else every other separator. Arguments and exceptions as of `run`.
+    """
+    if isinstance(methods, str):
+        raise TypeError("expected a list of separators, found a string")
+    return _document(_native.compare(job(pipeline, recording, set), list(methods), threads, progress))
+
+
+def check(pipeline: Source, recording: Recording | None = None, *, set: Overrides | None = None) -> dict[str, Any]:
+    """Says what is known without the data, as the document of `check.schema.json`."""
+    return _document(_native.check(job(pipeline, recording, set)))
+
+
+def plan(
+    rig: Union[Path, Mapping[str, Any]],
+    *,
+    orders: tuple[int, int] | None = None,
+    clearance_deg: float | None = None,
+    optimise_angles: bool = False,
+    angle_tolerance_deg: float | None = None,
+    criterion: str | None = None,
+    seed: int | None = None,
+    set: Overrides | None = None,
+) -> dict[str, Any]:
+    """Says what a rig can separate and how well, as the document of `plan.schema.json`.
+
+    `rig` is a file or a dictionary with the keys of `[rig]`; or a pipeline of measured points, as a file or a dictionary.
+    `orders` are the first and the last. The other arguments are the options of `runout plan`.
+    """
+    words: list[str] = []
+    if orders is not None:
+        first, last = orders
+        words += ["--orders", f"{first}..{last}"]
+    words += [] if clearance_deg is None else ["--clearance", f"{clearance_deg}deg"]
+    words += ["--optimise", "angles"] if optimise_angles else []
+    words += [] if angle_tolerance_deg is None else ["--angle-tolerance", f"{angle_tolerance_deg}deg"]
+    words += [] if criterion is None else ["--criterion", criterion]
+    words += [] if seed is None else ["--seed", str(seed)]
+    return _of_file("plan", rig, words, set)
+
+
+def simulate(
+    scenario: Union[Path, Mapping[str, Any]], out: Path | None = None, *, set: Overrides | None = None
+) -> dict[str, Any]:
+    """Makes a campaign with declared truth and effects, and says how large the file is that it wrote.
+
+    `scenario` is a file or a dictionary with its keys; `out` is written in place of its `output`.
+    """
+    if isinstance(scenario, Mapping) and out is None:
+        raise ValueError("a scenario that is a dictionary is in no folder: name the file to write by `out`")
+    return _of_file("simulate", scenario, [] if out is None else ["--out", os.fspath(out)], set)
+
+
+def inspect(file: Path) -> dict[str, Any]:
+    """Says what a measurement, a result or a Parquet file holds."""
+    return _document(_native.document(["inspect", "--", os.fspath(file)]))
+
+
+def _of_file(command: str, file: Union[Path, Mapping[str, Any]], words: list[str], overrides: Overrides | None) -> dict[str, Any]:
+    words = [command, *words, *(f"--set={name}={_toml.value(of, name)}" for name, of in (overrides or {}).items())]
+    if not isinstance(file, Mapping):
+        return _document(_native.document([*words, "--", os.fspath(file)]))
+    with tempfile.TemporaryDirectory() as folder:
+        written = os.path.join(folder, f"{command}.toml")
+        with open(written, "w", encoding="utf-8") as text:
+            text.write(_toml.document(file))
+        return _document(_native.document([*words, "--", written]))
+
+
+def _document(text: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(text)
+    return found

@@ -1,0 +1,87 @@
+"""From results to files.
+
+Generated from schemas/ by python/tools/generate.py: every class has the keys of its table in TOML. A key that is None is left out.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal, Union
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Hdf5:
+    """One file with the tables of a result and where they came from"""
+
+    plugin: ClassVar[str] = "hdf5"
+
+    path: str
+    """The file to write, relative to the TOML."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Parquet:
+    """The tables of a result, one file each"""
+
+    plugin: ClassVar[str] = "parquet"
+
+    path: str
+    """Folder for the tables, one file each: form.parquet, motion.parquet, harmonics.parquet, values.parquet; of measured points
+    those of their separator. Made where it is missing."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Gltf:
+    """Writes the surface as a glTF binary mesh, coloured by deviation"""
+
+    plugin: ClassVar[str] = "gltf"
+
+    capped: Union[bool, None] = None
+    """Closes both ends with flat discs, so that the mesh is a solid. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius drawn so many times
+    larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Obj:
+    """Writes the surface as a Wavefront OBJ mesh in mm, coloured by deviation"""
+
+    plugin: ClassVar[str] = "obj"
+
+    capped: Union[bool, None] = None
+    """Closes both ends with flat discs, so that the mesh is a solid. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius drawn so many times
+    larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Figures:
+    """Figures of a result as SVG and PNG"""
+
+    plugin: ClassVar[str] = "figures"
+
+    formats: Union[Sequence[Union[Literal['svg'], Literal['png']]], None] = None
+    """The formats: `svg` for print, `png` for pages and mails. Both without it."""
+
+    panels: Union[int, None] = None
+    """Panels of a figure, at most: with more stations, panels are spread evenly over them. 12 without it. Default: 12."""
+
+    path: str
+    """Folder for the figures. Made where it is missing."""

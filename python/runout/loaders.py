@@ -1,0 +1,105 @@
+"""From files to recordings or points.
+
+Generated from schemas/ by python/tools/generate.py: every class has the keys of its table in TOML. A key that is None is left out.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal, Union
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Hdf5:
+    """A measurement file: setups and stations with their samples, read in blocks"""
+
+    plugin: ClassVar[str] = "hdf5"
+
+    marker: Union[Mapping[str, Any], None] = None
+    """The once-per-turn mark as an analogue trace, instead of a dataset `index`: a channel of the samples, or a dataset of the
+    station. A turn begins where it crosses a threshold, between two samples."""
+
+    path: str
+    """The file, relative to the TOML."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class HeightMap:
+    """Heights of a surface on a grid, from HDF5 (runout-surface, version 1)"""
+
+    plugin: ClassVar[str] = "height-map"
+
+    path: str
+    """HDF5 file with the root attribute `format = "runout-surface"` and the dataset `height_nm`, relative to the TOML."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Csv:
+    """Text files of columns, one a setup and station; comma, semicolon or tab"""
+
+    plugin: ClassVar[str] = "csv"
+
+    files: Union[Sequence[Mapping[str, Any]], None] = None
+    """The files one by one, instead of a pattern."""
+
+    marker: Union[Mapping[str, Any], None] = None
+    """The once-per-turn mark as an analogue trace in a column of its own, instead of a column `index` of 0 and 1: a turn begins
+    where it crosses a threshold, between two samples."""
+
+    pattern: Union[str, None] = None
+    """Paths of the files, relative to the TOML, with `{setup}` and `{station}` in the place of their names."""
+
+    sample_rate_hz: Union[float, None] = None
+    """Sampling rate in Hz, where the files have no column `time_s`."""
+
+    speed_rpm: Union[float, None] = None
+    """Speed of the spindle as set, in rpm."""
+
+    stations: Sequence[Mapping[str, Any]]
+    """The axial stations."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Points:
+    """Measured points from CSV or Parquet, for any separator of points"""
+
+    plugin: ClassVar[str] = "points"
+
+    columns: Union[Mapping[str, Any], None] = None
+    """The file's names of columns that differ from the separator's: `columns = { "ΔX" = "dx_mm" }`."""
+
+    path: str
+    """CSV or Parquet file with one row a point, relative to the TOML. The separator says which columns it takes; `check` lists
+    them. CSV is separated by comma, semicolon or tab; the last two allow a decimal comma."""
+
+    where: Union[Mapping[str, Any], None] = None
+    """Only rows with these values are read: `where = { a_deg = 0 }`."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RotorModel:
+    """A rotor from materials, segments, disks and bearings, or from its matrices"""
+
+    plugin: ClassVar[str] = "rotor-model"
+
+    bearings: Union[Sequence[Mapping[str, Any]], None] = None
+    """Springs and dampers between shaft and ground."""
+
+    disks: Union[Sequence[Mapping[str, Any]], None] = None
+    """Rigid disks: wheels, pulleys, chucks, parts."""
+
+    materials: Union[Sequence[Mapping[str, Any]], None] = None
+    """Materials of the segments."""
+
+    matrices: Union[Mapping[str, Any], None] = None
+    """Matrices of the equations of motion, instead of all the above."""
+
+    path: Union[str, None] = None
+    """TOML file with the keys below, relative to this one."""
+
+    segments: Union[Sequence[Mapping[str, Any]], None] = None
+    """Cylindrical segments of the shaft, one after the other from z = 0."""
+
+    supports: Union[Sequence[Mapping[str, Any]], None] = None
+    """Places that cannot move."""

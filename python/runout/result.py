@@ -1,0 +1,259 @@
+"""What a run and a diagnosis give."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _html
+from ._native import Surface, Table
+
+figures: Callable[[dict[str, Table]], str] | None = None
+"""Draws the figures of a result's tables as HTML, for notebooks; none are drawn where it is None."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Value:
+    """One of the standards' values, or a domain's own.
+
+    `std` and `interval_95` are in `unit`, and None where there is no uncertainty. `where` names what it is of: `station`, `section`,
+    `of`. `facts` is the whole entry of the summary: band, filter, reference, source, coverage, lost orders.
+    """
+
+    symbol: str
+    value: float
+    unit: str
+    std: float | None
+    interval_95: tuple[float, float] | None
+    where: dict[str, str]
+    facts: dict[str, Any]
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __str__(self) -> str:
+        std = "" if self.std is None else f" ± {self.std:.2g}"
+        at = "".join(f", {key} {name}" for key, name in self.where.items())
+        return f"{self.symbol} = {self.value:.6g}{std} {self.unit}{at}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """What a run gives. `summary` is the document of `summary.schema.json`; the rest reads it."""
+
+    document: dataclasses.InitVar[str]
+    table_list: dataclasses.InitVar[list[Table]]
+    surface: Surface | None
+    summary: dict[str, Any] = dataclasses.field(init=False, repr=False)
+    tables: dict[str, Table] = dataclasses.field(init=False, repr=False)
+
+    def __post_init__(self, document: str, table_list: list[Table]) -> None:
+        object.__setattr__(self, "summary", json.loads(document))
+        object.__setattr__(self, "tables", {table.name: table for table in table_list})
+
+    @property
+    def title(self) -> str:
+        """The pipeline's title."""
+        return str(self.summary["title"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of the run and of its stations."""
+        own = [str(text) for text in self.summary["warnings"]]
+        return own + [f"{at['station']}: {text}" for at in self.summary["stations"] for text in at["warnings"]]
+
+    @property
+    def lost_orders(self) -> dict[str, list[int]]:
+        """Orders that the rig cannot separate, by what they are of."""
+        return dict(self.summary["lost_orders"])
+
+    @property
+    def outputs(self) -> list[str]:
+        """The files that were written."""
+        return [str(path) for path in self.summary["outputs"]]
+
+    @property
+    def values(self) -> list[Value]:
+        """All values: of the stations' sections and motion, of the part, of the domain."""
+        return list(_values(self.summary))
+
+    def value(self, symbol: str, **where: str) -> Value:
+        """The one value of a symbol at a place: `result.value("RONt", section="a", station="s01", reference="LSCI")`.
+
+        Keys other than `station`, `section` and `of` are compared with `facts`. Raises LookupError where there is none or
+        more than one.
+        """
+        found = [one for one in self.values if one.symbol == symbol and _is_at(one, where)]
+        if len(found) == 1:
+            return found[0]
+        symbols = sorted({one.symbol for one in self.values})
+        known = ", ".join(symbols) if not found else "; ".join(str(one) for one in found[:5])
+        raise LookupError(f"{len(found)} values are `{symbol}` with {where}, expected one; there is {known}")
+
+    def coefficients(
+        self, quantity: str, *, section: str | None = None, station: str | None = None
+    ) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.float64]]:
+        """Fourier coefficients of `form`, `x`, `y`, `tilt_x` or `tilt_y` by order, and their standard uncertainties.
+
+        Index is the order; lost orders are NaN. Form is Re Σ c exp(+i·n·α), motion Re Σ c exp(−i·n·Φ). `section` and `station` may be left
+        out where there is only one. Raises LookupError where they are not unique or the table has no such row.
+        """
+        table = self.tables.get("harmonics")
+        if table is None:
+            raise LookupError("the result has no table `harmonics`: its separator gives no form")
+        of = np.array(table["quantity"]) == quantity
+        for column, name in (("section", section), ("station", station)):
+            names = np.array(table[column], dtype=object)
+            if name is not None:
+                of &= names == name
+            elif len(there := set(names[of])) > 1:
+                raise LookupError(f"`{quantity}` is there at several: say which {column}: {sorted(map(str, there))}")
+        if not of.any():
+            raise LookupError(f"there is no `{quantity}` of section {section} at station {station}")
+        order = table["order"][of].astype(int)
+        values = np.full(order.max() + 1, np.nan + 0j)
+        std = np.full(order.max() + 1, np.nan)
+        values[order] = table["re"][of] + 1j * table["im"][of]
+        std[order] = table["std"][of]
+        return values, std
+
+    def _repr_html_(self) -> str:
+        rows = ((one.symbol, one.value, one.std, one.unit, ", ".join(one.where.values())) for one in self.values)
+        values = _html.table(("value", "", "± (standard)", "unit", "of"), rows)
+        drawn = "" if figures is None else figures(self.tables)
+        return _html.page(self.title, self.warnings, values, drawn)
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect, in `unit`; `std` is None where the data do not determine it."""
+
+    name: str
+    value: float
+    std: float | None
+    unit: str
+
+    def __str__(self) -> str:
+        std = "" if self.std is None else f" ± {self.std:.2g}"
+        return f"{self.name} = {self.value:.6g}{std} {self.unit}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Added:
+    """An effect that was added to the model. `facts` is its whole entry in `diagnosis.json`."""
+
+    effect: str
+    targets: list[str]
+    confounded_with: list[str]
+    parameters: list[Parameter]
+    facts: dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Level:
+    """Residual and noise before or after the loop, in `unit`; None where unknown."""
+
+    residual_rms: float
+    noise_floor: float | None
+    held_out_rms: float | None
+    chi2_per_dof: float | None
+    unit: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Diagnosis:
+    """What the closed loop found. `facts` is the document of `diagnosis.schema.json`; tables are those of the final model."""
+
+    document: dataclasses.InitVar[str]
+    table_list: dataclasses.InitVar[list[Table]]
+    surface: Surface | None
+    facts: dict[str, Any] = dataclasses.field(init=False, repr=False)
+    tables: dict[str, Table] = dataclasses.field(init=False, repr=False)
+
+    def __post_init__(self, document: str, table_list: list[Table]) -> None:
+        object.__setattr__(self, "facts", json.loads(document))
+        object.__setattr__(self, "tables", {table.name: table for table in table_list})
+
+    @property
+    def verdict(self) -> str:
+        """"at-noise-floor", "explained", "unexplained", "improved" or "nothing-found"."""
+        return str(self.facts["verdict"])
+
+    @property
+    def added(self) -> list[Added]:
+        """Effects that were added, in their order."""
+        return [_added(entry) for entry in self.facts["added"]]
+
+    @property
+    def before(self) -> Level:
+        """As the rig is declared."""
+        return _level(self.facts["before"])
+
+    @property
+    def after(self) -> Level:
+        """With the effects that were added."""
+        return _level(self.facts["after"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know."""
+        return [str(text) for text in self.facts["warnings"]]
+
+    def _repr_html_(self) -> str:
+        levels = (
+            (name, level.residual_rms, level.noise_floor, level.held_out_rms, level.chi2_per_dof, level.unit)
+            for name, level in (("as declared", self.before), ("after", self.after))
+        )
+        head = ("", "residual rms", "expected from noise", "held-out rms", "χ² per dof", "unit")
+        found = (
+            (one.effect, ", ".join(one.targets), "; ".join(map(str, one.parameters)), ", ".join(one.confounded_with))
+            for one in self.added
+        )
+        effects = _html.table(("effect", "targets", "parameters", "confounded with"), found)
+        return _html.page(f"Diagnosis: {self.verdict}", self.warnings, _html.table(head, levels), effects)
+
+
+def _values(summary: dict[str, Any]) -> Iterator[Value]:
+    for station in summary["stations"]:
+        at = {"station": station["station"]}
+        for section in station["sections"]:
+            for entry in section["values"]:
+                yield _value(entry, at | {"section": section["section"]})
+        for entry in station["motion_values"]:
+            yield _value(entry, at)
+    for entry in (summary.get("part") or {}).get("values", []):
+        yield _value(entry, {})
+    for entry in summary.get("values", []):
+        yield _value(entry, {"of": entry["of"]} if entry.get("of") else {})
+
+
+def _value(entry: dict[str, Any], where: dict[str, str]) -> Value:
+    known = entry.get("uncertainty") or {}
+    number = float("nan") if entry["value"] is None else float(entry["value"])
+    interval = known.get("interval_95")
+    std = known.get("std", entry.get("std"))
+    return Value(entry["symbol"], number, entry["unit"], std, None if interval is None else tuple(interval), where, entry)
+
+
+def _is_at(value: Value, where: dict[str, str]) -> bool:
+    return all(value.where.get(key, value.facts.get(key)) == name for key, name in where.items())
+
+
+def _added(entry: dict[str, Any]) -> Added:
+    parameters = [Parameter(one["name"], one["value"], one.get("std"), one["unit"]) for one in entry["parameters"]]
+    return Added(entry["effect"], entry["targets"], entry["confounded_with"], parameters, entry)
+
+
+def _level(entry: dict[str, Any]) -> Level:
+    return Level(
+        entry["residual_rms_um"],
+        entry.get("noise_floor_um"),
+        entry.get("held_out_rms_um"),
+        entry.get("chi2_per_dof"),
+        entry.get("unit") or "um",
+    )

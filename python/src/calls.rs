@@ -1,0 +1,183 @@
+//! What the package calls.
+
+use std::{ffi::OsString, num::NonZeroUsize, path::PathBuf};
+
+use pyo3::prelude::*;
+use runout_cli::{Failure, builtin, documents};
+use runout_core::{
+    pipeline::{
+        Pipeline, Registry,
+        compare::{Comparing, ComparingPoints, Comparison},
+        config::INCLUDE_KEY,
+        diagnose::diagnose as find_effects,
+        document::{Document, Sources},
+        registry::Plugin,
+        run::{Observer, run as separate},
+    },
+    stage::Exporter,
+};
+use serde::Serialize;
+
+use crate::{
+    arrays::{ArrayLoader, Arrays, Station},
+    collect::Collector,
+    interruptible::Interruptible,
+    table::{Surface, Table},
+    work::{Stop, watched},
+};
+
+/// The pipeline of a call: a file or a text, what to change in it, and the recording where it is in memory.
+#[derive(FromPyObject)]
+pub struct Job {
+    path: Option<PathBuf>,
+    text: String,
+    folder: PathBuf,
+    set: Vec<String>,
+    stations: Option<Vec<Station>>,
+}
+
+impl Job {
+    fn build(self, registry: &Registry, stop: Stop) -> Result<(Sources, Pipeline), Failure> {
+        let sources = match &self.path {
+            Some(path) => Sources::read(path, &self.set, INCLUDE_KEY)?,
+            None => Sources::from_text("pipeline", &self.text, self.folder, &self.set, INCLUDE_KEY)?,
+        };
+        let mut pipeline = Pipeline::from_sources(&sources, registry)?;
+        if let Some(stations) = self.stations {
+            pipeline.loader = Box::new(ArrayLoader { stations });
+        }
+        pipeline.loader = Box::new(Interruptible { loader: pipeline.loader, stop });
+        Ok((sources, pipeline))
+    }
+}
+
+fn registry() -> Registry {
+    let mut registry = builtin::registry();
+    registry.loaders.add(Plugin::of::<Arrays>());
+    registry
+}
+
+fn json(result: &impl Serialize) -> Result<String, Failure> {
+    serde_json::to_string(result).map_err(|error| Failure::Output(error.into()))
+}
+
+/// What a run or a diagnosis gives: its document, its tables and its surface.
+type Answer = (String, Vec<Table>, Option<Surface>);
+
+/// Runs a pipeline.
+#[pyfunction]
+#[pyo3(signature = (job, threads = None, progress = None, surface = false))]
+pub fn run(
+    py: Python<'_>,
+    job: Job,
+    threads: Option<NonZeroUsize>,
+    progress: Option<&Bound<'_, PyAny>>,
+    surface: bool,
+) -> PyResult<Answer> {
+    let collector = Collector { with_surface: surface, ..Collector::default() };
+    let exporter: Box<dyn Exporter> = Box::new(collector.clone());
+    let stop = collector.stop.clone();
+    let document = watched(py, progress, &collector.stop, move |watch| {
+        let (_, mut pipeline) = job.build(&registry(), stop)?;
+        pipeline.exporters.push(exporter);
+        json(&separate(&pipeline, threads, watch)?)
+    })?;
+    answer(py, document, &collector)
+}
+
+/// Runs the closed loop on a pipeline.
+#[pyfunction]
+#[pyo3(signature = (job, threads = None, progress = None, surface = false))]
+pub fn diagnose(
+    py: Python<'_>,
+    job: Job,
+    threads: Option<NonZeroUsize>,
+    progress: Option<&Bound<'_, PyAny>>,
+    surface: bool,
+) -> PyResult<Answer> {
+    let collector = Collector { with_surface: surface, ..Collector::default() };
+    let exporter: Box<dyn Exporter> = Box::new(collector.clone());
+    let stop = collector.stop.clone();
+    let document = watched(py, progress, &collector.stop, move |watch| {
+        let (_, mut pipeline) = job.build(&registry(), stop)?;
+        pipeline.diagnosed.push(exporter);
+        json(&find_effects(&pipeline, threads, watch)?)
+    })?;
+    answer(py, document, &collector)
+}
+
+fn answer(py: Python<'_>, document: String, collector: &Collector) -> PyResult<Answer> {
+    let kept = collector.take();
+    let tables = kept.tables.into_iter().map(|(spec, batches)| Table::new(spec, batches)).collect();
+    Ok((document, tables, kept.surface.map(|surface| Surface::new(py, surface)).transpose()?))
+}
+
+/// Compares separators on the same data.
+#[pyfunction]
+#[pyo3(signature = (job, methods, threads = None, progress = None))]
+pub fn compare(
+    py: Python<'_>,
+    job: Job,
+    methods: Vec<String>,
+    threads: Option<NonZeroUsize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<String> {
+    let stop = Stop::default();
+    let of_job = stop.clone();
+    watched(py, progress, &stop, move |watch| {
+        documents::separators_known(&methods, &registry())?;
+        let (sources, pipeline) = job.build(&registry(), of_job)?;
+        json(&comparison(&sources, pipeline, &methods, threads, watch)?)
+    })
+}
+
+fn comparison(
+    sources: &Sources,
+    mut pipeline: Pipeline,
+    methods: &[String],
+    threads: Option<NonZeroUsize>,
+    observer: &dyn Observer,
+) -> Result<Comparison, Failure> {
+    let registry = registry();
+    let misplaced = |fault| match Document::parse(sources) {
+        Ok(document) => Failure::from(document.diagnose(fault)),
+        Err(diagnostic) => diagnostic.into(),
+    };
+    if pipeline.route.point_separator().is_some() {
+        let comparing = ComparingPoints::new(&pipeline, methods, &registry, sources).map_err(misplaced)?;
+        return Ok(comparing.run(Vec::new())?);
+    }
+    let comparing = Comparing::new(&mut pipeline, methods, &registry, sources.folder()).map_err(misplaced)?;
+    let mut stations = Vec::new();
+    let take = |station| {
+        stations.push(station);
+        Ok(())
+    };
+    let mut comparison = comparing.run(threads, observer, Vec::new(), take)?;
+    comparison.stations = stations;
+    Ok(comparison)
+}
+
+/// Says what a pipeline can do.
+#[pyfunction]
+pub fn check(py: Python<'_>, job: Job) -> PyResult<String> {
+    let stop = Stop::default();
+    let of_job = stop.clone();
+    watched(py, None, &stop, move |_| {
+        let registry = registry();
+        let (sources, pipeline) = job.build(&registry, of_job)?;
+        json(&documents::check(&sources, &pipeline, &registry)?)
+    })
+}
+
+/// The document that a command of the program prints with `--json`.
+#[pyfunction]
+pub fn document(py: Python<'_>, words: Vec<OsString>) -> PyResult<String> {
+    watched(py, None, &Stop::default(), move |_| json(&documents::of_command(words, &builtin::registry())?))
+}
+
+/// The program: prints, and gives its exit status.
+#[pyfunction]
+pub fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| runout_cli::status_of(words, &builtin::registry()))
+}

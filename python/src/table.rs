@@ -1,0 +1,150 @@
+//! Tables and surfaces, as the memory that Python's libraries share.
+
+use std::sync::Arc;
+
+use arrow_array::{
+    Array, BooleanArray, Float64Array, RecordBatch, RecordBatchIterator, StringArray, UInt32Array,
+    ffi::FFI_ArrowSchema, ffi_stream::FFI_ArrowArrayStream,
+};
+use arrow_schema::{ArrowError, Schema};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::{exceptions::PyKeyError, prelude::*, types::PyCapsule};
+use runout_core::{
+    pipeline::error::known_names,
+    surface,
+    table::{Kind, TableSpec},
+};
+
+use crate::failure::fault;
+
+/// A table with units. It gives its memory to pyarrow, polars, pandas and DuckDB by the Arrow PyCapsule interface.
+#[pyclass(frozen, module = "runout._native")]
+pub struct Table {
+    spec: TableSpec,
+    batches: Vec<RecordBatch>,
+}
+
+impl Table {
+    /// A table of these rows.
+    pub fn new(spec: TableSpec, batches: Vec<RecordBatch>) -> Self {
+        Self { spec, batches }
+    }
+
+    fn schema(&self) -> Arc<Schema> {
+        self.batches.first().map_or_else(|| self.spec.schema(), RecordBatch::schema)
+    }
+
+    /// The arrays of a column, each of one type of Arrow's.
+    fn pieces<A: Array + 'static>(&self, column: usize) -> impl Iterator<Item = &A> {
+        self.batches.iter().filter_map(move |batch| batch.column(column).as_any().downcast_ref::<A>())
+    }
+}
+
+#[pymethods]
+impl Table {
+    #[getter]
+    fn name(&self) -> &str {
+        &self.spec.name
+    }
+
+    #[getter]
+    fn about(&self) -> &str {
+        &self.spec.about
+    }
+
+    /// Name, unit and meaning of each column.
+    #[getter]
+    fn columns(&self) -> Vec<(&str, &str, &str)> {
+        let columns = self.spec.columns.iter();
+        columns.map(|column| (column.name.as_str(), column.unit.as_str(), column.about.as_str())).collect()
+    }
+
+    fn __len__(&self) -> usize {
+        self.batches.iter().map(RecordBatch::num_rows).sum()
+    }
+
+    /// A column as a NumPy array; texts as a list. Numbers that are null are NaN.
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let Some(index) = self.spec.columns.iter().position(|column| column.name == name) else {
+            let known = known_names(name, self.spec.columns.iter().map(|column| column.name.as_str()));
+            return Err(PyKeyError::new_err(format!("the table `{}` has no column `{name}`: {known}", self.spec.name)));
+        };
+        let column = &self.spec.columns[index];
+        match column.kind {
+            Kind::Number => {
+                let cells = self.pieces::<Float64Array>(index).flat_map(Float64Array::iter);
+                Ok(PyArray1::from_vec(py, cells.map(|cell| cell.unwrap_or(f64::NAN)).collect()).into_any())
+            }
+            Kind::Count if column.nullable => {
+                let cells = self.pieces::<UInt32Array>(index).flat_map(UInt32Array::iter);
+                Ok(PyArray1::from_vec(py, cells.map(|cell| cell.map_or(f64::NAN, f64::from)).collect()).into_any())
+            }
+            Kind::Count => {
+                let cells = self.pieces::<UInt32Array>(index).flat_map(|piece| piece.values().iter().copied());
+                Ok(PyArray1::from_vec(py, cells.collect()).into_any())
+            }
+            Kind::Flag => {
+                let cells = self.pieces::<BooleanArray>(index).flat_map(BooleanArray::iter);
+                Ok(PyArray1::from_vec(py, cells.map(|cell| cell.unwrap_or(false)).collect()).into_any())
+            }
+            Kind::Name | Kind::Text => {
+                let cells = self.pieces::<StringArray>(index).flat_map(StringArray::iter);
+                Ok(cells.collect::<Vec<Option<&str>>>().into_pyobject(py)?.into_any())
+            }
+        }
+    }
+
+    /// Its rows as a stream of Arrow's C data interface; no column is copied.
+    #[pyo3(signature = (requested_schema = None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // A consumer that asks for other types converts: the interface leaves the request to the best effort of the producer.
+        drop(requested_schema);
+        let batches: Vec<Result<RecordBatch, ArrowError>> = self.batches.iter().cloned().map(Ok).collect();
+        let stream = FFI_ArrowArrayStream::new(Box::new(RecordBatchIterator::new(batches, self.schema())));
+        PyCapsule::new_with_value(py, stream, c"arrow_array_stream")
+    }
+
+    /// Its schema, by the same interface.
+    fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        let schema = FFI_ArrowSchema::try_from(&*self.schema()).map_err(|error| fault(&error.to_string()))?;
+        PyCapsule::new_with_value(py, schema, c"arrow_schema")
+    }
+}
+
+/// Form over the part's angle and z.
+#[pyclass(frozen, get_all, module = "runout._native")]
+pub struct Surface {
+    /// Nominal radius, in mm.
+    radius_mm: f64,
+    /// Angles of the part, in degrees.
+    angle_deg: Py<PyArray1<f64>>,
+    /// Positions of the rings, in mm.
+    z_mm: Py<PyArray1<f64>>,
+    /// Deviation from the nominal radius in µm, `[ring, angle]`.
+    deviation_um: Py<PyArray2<f64>>,
+    /// How the rings were filled between the sections.
+    interpolation: &'static str,
+}
+
+impl Surface {
+    /// A surface, whose memory Python takes over.
+    ///
+    /// # Errors
+    /// When the grid has not as many deviations as rings and angles say.
+    pub fn new(py: Python<'_>, surface: surface::Surface) -> PyResult<Self> {
+        let (rings, angles) = (surface.z_mm.len(), surface.angles);
+        let angle_deg: Vec<f64> = (0..angles).map(|index| 360.0 * index as f64 / angles as f64).collect();
+        let deviation_um = PyArray1::from_vec(py, surface.deviation_um).reshape([rings, angles])?;
+        Ok(Self {
+            radius_mm: surface.radius_mm,
+            angle_deg: PyArray1::from_vec(py, angle_deg).unbind(),
+            z_mm: PyArray1::from_vec(py, surface.z_mm).unbind(),
+            deviation_um: deviation_um.unbind(),
+            interpolation: surface.interpolation,
+        })
+    }
+}
