@@ -5,6 +5,7 @@ use std::{collections::BTreeSet, fs, path::Path, process::Command, time::SystemT
 use crate::{
     foreign, fuzz, house, kill_test,
     process::{Outcome, answer, root, run, say, target},
+    python,
     setup::{self, cargo},
 };
 
@@ -37,6 +38,13 @@ pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
         let program = target().join("debug/runout").display().to_string();
         kill_test::test(&["--kills", "100", &program])?;
         fuzz::fuzz(&["--minutes", "2", &program])?;
+    }
+    if foreign_readers {
+        python::test()?;
+    } else {
+        say(
+            "the tests of the Python package were skipped: they need packages of Python's (`cargo xtask test --ci` installs them)",
+        );
     }
     let skips = Skips::read(&fs::read_to_string(&skips).unwrap_or_default());
     say(&skips.text());
@@ -87,9 +95,14 @@ pub fn deny() -> Outcome {
     run(&mut cargo(&["deny", "check"])?)
 }
 
-/// Writes schemas/ anew.
+/// Writes schemas/ anew, and what is made from them where there is a Python.
 pub fn schemas() -> Outcome {
-    run(&mut cargo(&["run", "--quiet", "--package", "runout", "--", "schema", "--out", "schemas"])?)
+    run(&mut cargo(&["run", "--quiet", "--package", "runout", "--", "schema", "--out", "schemas"])?)?;
+    if answer("python3", &["--version"]).is_none() {
+        say("there is no python3: the classes of python/runout were left as they are");
+        return Ok(());
+    }
+    run(Command::new("python3").arg("python/tools/generate.py"))
 }
 
 /// Makes the first example's campaign once, and runs its pipeline.

@@ -12,6 +12,7 @@ mod house;
 mod kill_test;
 mod process;
 mod random;
+mod python;
 mod results;
 mod setup;
 
@@ -28,8 +29,8 @@ cargo xtask COMMAND
                 fetch public measured files, or take them from a folder, and convert them to target/data, where examples
                 and tests find them
   test [--ci]   check-house, format, lints, tests, and the demo with the tests' build; the last line counts tests
-                skipped for want of measured data. With --ci none may be, and files are also read by Python and Node,
-                which it installs below target/
+                skipped for want of measured data. With --ci none may be, files are also read by Python and Node, which it
+                installs below target/, and the tests of the Python package run on a wheel of the dev profile
   check-house [--strict]
                 print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, and
                 on a cycle of modules; with --strict also on long files without a reason
@@ -39,7 +40,8 @@ cargo xtask COMMAND
                 kill runs at every step and at all times, and look at what is left; 1000 kills without more
   deny          advisories, licences, yanked versions and sources of dependencies (deny.toml), by cargo-deny
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
-  schemas       write schemas/ anew from the types
+  schemas       write schemas/ anew from the types, and the Python package's classes of stages from them
+  wheel [--dev] build the Python package into target/wheels; --dev in the profile of the tests, which is quick and its code slow
   bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]
                 time a campaign of 98 million samples beside the same work in NumPy and SciPy; 1.6 GB in target/bench
   bench-peers [SCRATCH] [--stations K] [--rounds N]
@@ -98,6 +100,7 @@ fn main() -> ExitCode {
         ["check-house", ref rest @ ..] => house::check(rest),
         ["data", ref rest @ ..] => measured_data(rest),
         ["schemas"] => chores::schemas(),
+        ["wheel", ref rest @ ..] => python::wheel(rest),
         ["areal-peers", ref rest @ ..] => areal::peers(rest),
         ["record-results", ref rest @ ..] => results::record(rest),
         ["compare-results", ref rest @ ..] => results::compare(rest),
