@@ -1,0 +1,128 @@
+"""Batches on Ray: local folders and object storage, failures, repeated calls, and a worker that is killed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import runout
+
+ray = pytest.importorskip("ray")
+pytest.importorskip("ray.data")
+pyarrow_dataset = pytest.importorskip("pyarrow.dataset")
+
+import runout.ray as batches  # noqa: E402
+
+from conftest import pipeline  # noqa: E402
+
+SOURCES = str(Path(runout.__file__).resolve().parent.parent)
+PIPELINE = pipeline(load={"plugin": "hdf5", "path": "?"})
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[None]:
+    paths = os.pathsep.join([SOURCES, str(Path(__file__).parent)])
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": paths}})
+    yield
+    ray.shutdown()
+
+
+@pytest.fixture
+def folder(campaign: Path, tmp_path: Path) -> Path:
+    """Four recordings, one of which is damaged."""
+    source = tmp_path / "recordings"
+    source.mkdir()
+    for name in ("one", "two", "odd name é"):
+        shutil.copy(campaign, source / f"{name}.h5")
+        with (source / f"{name}.h5").open("r+b") as file:
+            file.seek(0, os.SEEK_END)
+            file.write(name.encode())
+    (source / "bad.h5").write_bytes(b"nothing")
+    return source
+
+
+def rows(out: Path) -> int:
+    return int(pyarrow_dataset.dataset(str(out / "form"), partitioning="hive").count_rows())
+
+
+def test_one_task_a_recording_and_nothing_twice(cluster: None, folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    report = batches.run(PIPELINE, folder, out)
+    assert len(report.of("done")) == 3
+    (bad,) = report.failed
+    assert bad["recording"].endswith("bad.h5") and bad["error"]
+    table = pyarrow_dataset.dataset(str(out / "form"), partitioning="hive").to_table()
+    assert len(set(table["recording"].to_pylist())) == 3
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    again = batches.run(PIPELINE, folder, out)
+    assert len(again.of("skipped")) == 3 and len(again.failed) == 1
+    assert before == {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    changed = batches.run(PIPELINE, folder, tmp_path / "other", set={"preprocess.1.cutoff_hz": 300})
+    assert {one["key"] for one in changed.of("done")}.isdisjoint(one["key"] for one in report.of("done"))
+
+
+class Killed(batches.Task):
+    """A task whose worker is killed once for each recording, after its tables and before it is done."""
+
+    def write(self, result: runout.Result, address: str, name: str, folder: str, target: Any, root: str) -> None:
+        mark = Path(root).parent / f"killed-{name}"
+        if not mark.exists():
+            mark.touch()
+            super().write(result, address, name, folder, Halfway(target), root)
+        super().write(result, address, name, folder, target, root)
+
+
+class Halfway:
+    """A file system that kills the process at the second file."""
+
+    def __init__(self, target: Any) -> None:
+        self.target, self.protocol, self.written = target, "memory", 0
+
+    def put_file(self, file: str, path: str) -> None:
+        self.written += 1
+        if self.written == 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+        batches._put(self.target, file, path)
+
+
+def test_a_killed_worker_loses_and_doubles_nothing(cluster: None, folder: Path, tmp_path: Path) -> None:
+    (folder / "bad.h5").unlink()
+    calm, killed = tmp_path / "calm", tmp_path / "killed" / "out"
+    batches.run(PIPELINE, folder, calm)
+    killed.parent.mkdir()
+    task = Killed.of(PIPELINE, None, "load.path", str(killed), {})
+    entries = batches.recordings(folder).map(task, num_cpus=1, max_retries=5).take_all()
+    assert sorted(entry["status"] for entry in entries) == ["done"] * 3
+    assert len(list(killed.parent.glob("killed-*"))) == 3
+    assert rows(killed) == rows(calm)
+    names = [sorted(str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()) for out in (calm, killed)]
+    assert names[0] == names[1]
+    for name in names[0]:
+        if name.endswith(".parquet"):
+            assert (calm / name).read_bytes() == (killed / name).read_bytes()
+
+
+def test_object_storage_takes_the_place_of_folders(cluster: None, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    server_module = pytest.importorskip("moto.server")
+    s3fs = pytest.importorskip("s3fs")
+    server = server_module.ThreadedMotoServer(port=0)
+    server.start()
+    try:
+        host, port = server.get_host_and_port()
+        storage = {"key": "test", "secret": "test", "client_kwargs": {"endpoint_url": f"http://{host}:{port}", "region_name": "us-east-1"}}
+        files = s3fs.S3FileSystem(**storage)
+        files.mkdir("bucket")
+        files.put(str(folder), "bucket/recordings", recursive=True)
+        report = batches.run(PIPELINE, "s3://bucket/recordings", "s3://bucket/results", storage=storage)
+        assert len(report.of("done")) == 3 and len(report.failed) == 1
+        files.get("bucket/results", str(tmp_path / "fetched"), recursive=True)
+        batches.run(PIPELINE, folder, tmp_path / "local")
+        assert rows(tmp_path / "fetched") == rows(tmp_path / "local")
+    finally:
+        server.stop()
