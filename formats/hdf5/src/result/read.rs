@@ -48,7 +48,7 @@ pub struct StoredResult {
 /// # Errors
 /// When it is no result, or does not hold what one holds.
 pub fn read_result(path: &Path) -> Result<StoredResult> {
-    let (file, place) = node::open(path)?;
+    let (file, place, _) = node::open(path, false)?;
     if node::text(&file, &place, "format")?.as_deref() != Some(RESULT_FORMAT) {
         let error =
             Error::new("read", path.display().to_string(), format!("expected a file of the format {RESULT_FORMAT}"));

@@ -67,7 +67,7 @@ pub fn table() -> TableSpec {
             ColumnSpec::name(SIGNAL.0, "yes where the series has a signal in any recording, else no"),
         ],
     )
-    .figure(chart("trend-signals", "Individuals of values with signals", &individuals).only(SIGNAL.0, SIGNAL.1))
+    .figure(chart("trend-signals", "Individuals of values with signals", &individuals).only(SIGNAL.0, [SIGNAL.1]))
     .figure(chart("trend", "Individuals", &individuals))
     .figure(chart("trend-range", "Moving range", &ranges))
 }
