@@ -18,11 +18,16 @@
     return element("label", {}, text, control);
   }
 
+  // Two charts are beside each other on A4, whose width a browser tells only once it prints.
+  const PAPER = { width: 320, height: 0.75 };
+  let printing = false;
+
   // Draws into a place of the chart's own height, and as wide as there is room.
   function put(place, { traces, layout: { height, ...layout } }) {
-    // Two charts beside each other on paper.
-    place.style.height = `${matchMedia("print").matches ? 0.72 * height : height}px`;
-    return Plotly.react(place, traces, { ...layout, autosize: true }, CONFIG);
+    const high = printing ? PAPER.height * height : height;
+    place.style.height = `${high}px`;
+    const size = printing ? { autosize: false, width: PAPER.width, height: high } : { autosize: true };
+    return Plotly.react(place, traces, { ...layout, ...size }, CONFIG);
   }
 
   // Charts are drawn one after the other, so that the page can be used before the last one is there.
@@ -130,7 +135,8 @@
       space.on("plotly_hover", (event) => value(...of(event)));
       space.on("plotly_click", (event) => open(of(event)[0]));
       slider.addEventListener("input", solid);
-      redraws.push(solid);
+      // It is drawn too late for print, which takes it as it is, and smaller.
+      redraws.push(() => printing || solid());
     });
     // Later than at first, when another panel was chosen.
     if (document.documentElement.dataset.complete) beginFlat().then(beginSolid);
@@ -191,7 +197,9 @@
   table();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   // Print has its own colours and width.
-  for (const moment of ["beforeprint", "afterprint"]) addEventListener(moment, redraw);
+  for (const moment of ["beforeprint", "afterprint"]) {
+    addEventListener(moment, () => { printing = moment === "beforeprint"; redraw(); });
+  }
   document.documentElement.dataset.ready = "true";
   drawAll();
 })();
