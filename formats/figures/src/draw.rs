@@ -259,7 +259,11 @@ mod tests {
 
     #[test]
     fn an_expanded_uncertainty_has_two_digits() {
-        let curve = |std: f64| Curve { name: "a".into(), points: vec![Point { x: 0.0, y: 0.0, third: std }; 3] };
+        let curve = |std: f64| Curve {
+            name: "a".into(),
+            points: vec![Point { x: 0.0, y: 0.0, third: std }; 3],
+            ..Curve::default()
+        };
         assert_eq!(legend(&curve(0.005_23), "um"), "a ± 0.010 µm");
         assert_eq!(legend(&curve(0.61), "um"), "a ± 1.2 µm");
         assert_eq!(legend(&curve(f64::NAN), "um"), "a");
