@@ -8,9 +8,9 @@ use std::{
 };
 
 use hdf5_metno::{Dataset, File, Group, LinkType, Location, dataset::Layout, filters::Filter};
-use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
+use runout_core::input_file::InputFile;
 
-use crate::{node::Place, raw};
+use crate::raw;
 
 /// Links that lead to links.
 const DEEPEST: usize = 16;
@@ -20,6 +20,13 @@ const DENSEST: u64 = 8;
 
 /// Links of a group that lead elsewhere, by name.
 type Elsewhere = Arc<HashMap<String, LinkType>>;
+
+/// Why something is not read.
+#[derive(Debug)]
+pub(crate) struct Refusal {
+    pub(crate) problem: String,
+    pub(crate) help: Option<&'static str>,
+}
 
 /// What is known of an opened file's links.
 #[derive(Debug)]
@@ -65,21 +72,18 @@ impl Links {
         locked(&self.followed).is_empty()
     }
 
-    /// Refuses a name in a group that leads out of the file, before the library goes there.
-    pub(crate) fn check(&self, group: &Group, place: &Place, name: &str) -> Result<()> {
-        self.pass(group, place, name, 0).map_err(|problem| self.refusal(&place.child(name), problem))
+    /// Refuses a name in the group at a path that leads out of the file, before the library goes there.
+    pub(crate) fn check(&self, group: &Group, path: &str, name: &str) -> Result<(), Refusal> {
+        self.pass(group, path, name, 0).map_err(|problem| self.refusal(problem))
     }
 
-    fn refusal(&self, place: &Place, problem: String) -> Error {
-        let error = place.error(problem);
-        if self.follow {
-            return error;
-        }
-        error.help("copy what it leads to into this file, or set `follow_links = true` in [load] where the other file is known")
+    fn refusal(&self, problem: String) -> Refusal {
+        let help = "copy what it leads to into this file, or set `follow_links = true` in [load] where the other file is known";
+        Refusal { problem, help: (!self.follow).then_some(help) }
     }
 
-    fn pass(&self, group: &Group, place: &Place, name: &str, depth: usize) -> std::result::Result<(), String> {
-        let Some(kind) = self.elsewhere(group, place)?.get(name).copied() else { return Ok(()) };
+    fn pass(&self, group: &Group, path: &str, name: &str, depth: usize) -> Result<(), String> {
+        let Some(kind) = self.elsewhere(group, path)?.get(name).copied() else { return Ok(()) };
         if depth == DEEPEST {
             return Err("its links lead to links without end".into());
         }
@@ -94,9 +98,9 @@ impl Links {
         let target = text(&value);
         let (mut at, mut here) = if target.starts_with('/') {
             let root = group.file().map_err(|error| error.to_string())?;
-            (root.as_group().map_err(|error| error.to_string())?, place.top())
+            (root.as_group().map_err(|error| error.to_string())?, "/".to_owned())
         } else {
-            (group.clone(), place.clone())
+            (group.clone(), path.to_owned())
         };
         let mut steps = target.split('/').filter(|step| !step.is_empty() && *step != ".").peekable();
         while let Some(step) = steps.next() {
@@ -104,15 +108,15 @@ impl Links {
             if steps.peek().is_some() {
                 // Where it leads nowhere, the library says so.
                 let Ok(next) = at.group(step) else { return Ok(()) };
-                (at, here) = (next, here.child(step));
+                (at, here) = (next, format!("{}/{step}", here.trim_end_matches('/')));
             }
         }
         Ok(())
     }
 
     /// The links of a group that are none to an object of the file by its place.
-    fn elsewhere(&self, group: &Group, place: &Place) -> std::result::Result<Elsewhere, String> {
-        if let Some(known) = locked(&self.groups).get(place.path()) {
+    fn elsewhere(&self, group: &Group, path: &str) -> Result<Elsewhere, String> {
+        if let Some(known) = locked(&self.groups).get(path) {
             return Ok(Arc::clone(known));
         }
         let mut found = HashMap::new();
@@ -124,29 +128,29 @@ impl Links {
         });
         visited.map_err(|error| error.to_string())?;
         let found = Arc::new(found);
-        locked(&self.groups).insert(place.path().to_owned(), Arc::clone(&found));
+        locked(&self.groups).insert(path.to_owned(), Arc::clone(&found));
         Ok(found)
     }
 
     /// Takes note of the file that an opened object lies in.
-    pub(crate) fn opened(&self, object: &Location, place: &Place) -> Result<()> {
+    pub(crate) fn opened(&self, object: &Location) -> Result<(), Refusal> {
         if self.is_home_of(object) {
             return Ok(());
         }
         let name = object.filename();
         if !self.follow {
-            return Err(self.refusal(place, format!("it lies in another file (`{name}`)")));
+            return Err(self.refusal(format!("it lies in another file (`{name}`)")));
         }
-        self.take(Path::new(&name)).map_err(|problem| place.error(problem))
+        self.take(Path::new(&name)).map_err(|problem| self.refusal(problem))
     }
 
     /// Refuses a data set whose numbers lie elsewhere, whose filter is missing, or that a file of its size cannot hold.
-    pub(crate) fn check_dataset(&self, dataset: &Dataset, place: &Place) -> Result<()> {
-        self.storage(dataset, place).map_err(|problem| self.refusal(place, problem))?;
-        filters(dataset, place)
+    pub(crate) fn check_dataset(&self, dataset: &Dataset) -> Result<(), Refusal> {
+        self.storage(dataset).map_err(|problem| self.refusal(problem))?;
+        filters(dataset)
     }
 
-    fn storage(&self, dataset: &Dataset, place: &Place) -> std::result::Result<(), String> {
+    fn storage(&self, dataset: &Dataset) -> Result<(), String> {
         let words = |error: hdf5_metno::Error| error.to_string();
         let settings = dataset.dcpl().map_err(words)?;
         let bytes = dataset.dtype().map_err(words)?.size() as u64;
@@ -169,8 +173,8 @@ impl Links {
                 if source.layout() == Layout::Virtual {
                     return Err(format!("its numbers lie in `{path}`, a virtual data set itself"));
                 }
-                self.storage(&source, place)?;
-                filters(&source, place).map_err(|error| error.to_string())?;
+                self.storage(&source)?;
+                filters(&source).map_err(|refusal| refusal.problem)?;
             }
             return within(&dataset.shape(), bytes, held);
         }
@@ -204,14 +208,14 @@ impl Links {
         [folder.join(name), PathBuf::from(name)].into_iter()
     }
 
-    fn take_near(&self, name: &str) -> std::result::Result<(), String> {
+    fn take_near(&self, name: &str) -> Result<(), String> {
         match self.near(name).find(|path| path.exists()) {
             Some(path) => self.take(&path),
             None => Err(format!("the file `{name}` that it leads to is not there")),
         }
     }
 
-    fn take(&self, path: &Path) -> std::result::Result<(), String> {
+    fn take(&self, path: &Path) -> Result<(), String> {
         let same = |file: &InputFile| file.path().canonicalize().ok() == path.canonicalize().ok();
         let mut followed = locked(&self.followed);
         if same(&self.input) || followed.iter().any(same) {
@@ -229,7 +233,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 /// Refuses what no file of so many bytes holds.
-pub(crate) fn within(shape: &[usize], element: u64, held: u64) -> std::result::Result<(), String> {
+pub(crate) fn within(shape: &[usize], element: u64, held: u64) -> Result<(), String> {
     let declared = shape.iter().try_fold(element, |product, side| product.checked_mul(*side as u64));
     if declared.is_some_and(|declared| declared <= ALLOWANCE.max(held.saturating_mul(DENSEST))) {
         return Ok(());
@@ -238,7 +242,7 @@ pub(crate) fn within(shape: &[usize], element: u64, held: u64) -> std::result::R
 }
 
 /// Refuses what needs a filter that is not linked in.
-fn filters(dataset: &Dataset, place: &Place) -> Result<()> {
+fn filters(dataset: &Dataset) -> Result<(), Refusal> {
     let missing = dataset.filters().into_iter().find(|filter| !filter.is_available());
     let Some(filter) = missing else { return Ok(()) };
     // Registered numbers of the HDF Group.
@@ -255,10 +259,12 @@ fn filters(dataset: &Dataset, place: &Place) -> Result<()> {
         _ => "unknown",
     };
     let number = Filter::id(&filter);
-    Err(place
-        .error(format!("its chunks are packed by the filter {name} (number {number}), which the program does not have"))
-        .of(ErrorKind::DamagedData)
-        .help(
+    Err(Refusal {
+        problem: format!(
+            "its chunks are packed by the filter {name} (number {number}), which the program does not have"
+        ),
+        help: Some(
             "repack it with a program that has the filter: h5repack -f GZIP=4 IN OUT, or compression=\"gzip\" in h5py",
-        ))
+        ),
+    })
 }

@@ -11,7 +11,7 @@ use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
 
 use crate::{
     heaps,
-    links::{self, Links},
+    links::{self, Links, Refusal},
     raw, text,
     type_name::type_name,
 };
@@ -34,11 +34,6 @@ impl Place {
         Self { file: self.file.clone(), path: format!("{}{separator}{name}", self.path), links: self.links.clone() }
     }
 
-    /// The root of the same file.
-    pub(crate) fn top(&self) -> Self {
-        Self { path: "/".into(), ..self.clone() }
-    }
-
     /// The path in the file.
     pub(crate) fn path(&self) -> &str {
         &self.path
@@ -47,6 +42,15 @@ impl Place {
     /// What is known of the file's links; nothing of a file that is being written.
     pub(crate) fn links(&self) -> Option<&Links> {
         self.links.as_deref()
+    }
+
+    /// The error of what is not read.
+    fn refused(&self, refusal: Refusal) -> Error {
+        let error = self.error(refusal.problem);
+        match refusal.help {
+            Some(help) => error.help(help),
+            None => error,
+        }
     }
 
     #[allow(clippy::needless_pass_by_value, reason = "callers give text and errors alike")]
@@ -102,11 +106,11 @@ pub(crate) fn members(group: &Group, place: &Place) -> Result<Vec<String>> {
 pub(crate) fn group(parent: &Group, place: &Place, name: &str) -> Result<(Group, Place)> {
     let (parent_place, place) = (place, place.child(name));
     if let Some(links) = place.links() {
-        links.check(parent, parent_place, name)?;
+        links.check(parent, parent_place.path(), name).map_err(|refusal| place.refused(refusal))?;
     }
     let group = parent.group(name).map_err(|error| place.error(format!("expected a group: {error}")))?;
     if let Some(links) = place.links() {
-        links.opened(&group, &place)?;
+        links.opened(&group).map_err(|refusal| place.refused(refusal))?;
     }
     Ok((group, place))
 }
@@ -118,12 +122,14 @@ pub(crate) fn dataset(parent: &Group, place: &Place, name: &str) -> Result<(Data
         return Err(place.error("expected a dataset, found nothing of that name"));
     }
     if let Some(links) = place.links() {
-        links.check(parent, parent_place, name)?;
+        links.check(parent, parent_place.path(), name).map_err(|refusal| place.refused(refusal))?;
     }
     let dataset = parent.dataset(name).map_err(|error| place.error(format!("expected a dataset: {error}")))?;
     if let Some(links) = place.links() {
-        links.opened(&dataset, &place)?;
-        links.check_dataset(&dataset, &place)?;
+        links
+            .opened(&dataset)
+            .and_then(|()| links.check_dataset(&dataset))
+            .map_err(|refusal| place.refused(refusal))?;
     }
     Ok((dataset, place))
 }
@@ -131,7 +137,7 @@ pub(crate) fn dataset(parent: &Group, place: &Place, name: &str) -> Result<(Data
 /// What kind of object a member is.
 pub(crate) fn kind(parent: &Group, place: &Place, name: &str) -> Result<LocationType> {
     if let Some(links) = place.links() {
-        links.check(parent, place, name)?;
+        links.check(parent, place.path(), name).map_err(|refusal| place.child(name).refused(refusal))?;
     }
     parent.loc_type_by_name(name).map_err(|error| place.child(name).error(error))
 }

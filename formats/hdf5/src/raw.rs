@@ -7,7 +7,11 @@ use std::{
 };
 
 use hdf5_metno::{Group, plist::DatasetCreate, sync::sync};
-use hdf5_metno_sys::{h5l::H5Lget_val, h5p::{H5P_DEFAULT, H5Pget_virtual_count, H5Pget_virtual_dsetname, H5Pget_virtual_filename}, h5pl::H5PLset_loading_state};
+use hdf5_metno_sys::{
+    h5l::H5Lget_val,
+    h5p::{H5P_DEFAULT, H5Pget_virtual_count, H5Pget_virtual_dsetname, H5Pget_virtual_filename},
+    h5pl::H5PLset_loading_state,
+};
 
 /// Bytes of a link's value: names of files and paths are shorter.
 const LONGEST_VALUE: usize = 8192;

@@ -29,23 +29,24 @@ impl FolderLock {
     /// # Errors
     /// When another run holds one of them, or the file system refuses.
     pub fn of<'a>(files: impl IntoIterator<Item = &'a Path>) -> Result<Self> {
-        let mut folders: Vec<PathBuf> = Vec::new();
+        // Each folder once, in the spelling in which it was made.
+        let mut folders: Vec<(PathBuf, &Path)> = Vec::new();
         for file in files {
             let folder = super::folder_of(file);
             make(folder).map_err(|error| super::no_folder(folder, error))?;
-            let folder = resolved(folder);
-            if !folders.contains(&folder) {
-                folders.push(folder);
+            let place = resolved(folder);
+            if folders.iter().all(|(known, _)| *known != place) {
+                folders.push((place, folder));
             }
         }
         let mut lock = Self { held: Vec::new() };
-        for folder in folders {
+        for (_, folder) in folders {
             let path = folder.join(NAME);
             if let Some(file) = take(&path)? {
                 UnderWay::now().locks.push(path.clone());
                 lock.held.push((path, file));
             }
-            publication::recover(&folder)?;
+            publication::recover(folder)?;
         }
         Ok(lock)
     }
