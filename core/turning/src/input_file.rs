@@ -8,8 +8,29 @@ use std::{
 };
 
 use runout_error::{Error, ErrorKind, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use crate::provenance::Input;
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Input {
+    /// Its path, as it was opened.
+    pub path: String,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// BLAKE3 of its contents, in hexadecimal (`b3sum` prints the same).
+    pub blake3: String,
+}
+
+impl Input {
+    /// Reads the file once for its checksum.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn of(path: &Path) -> Result<Self> {
+        InputFile::new(path)?.checksum()
+    }
+}
 
 /// A regular file as it was when it was first opened.
 ///
