@@ -21,8 +21,8 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Samples of all channels that are read at a time.
-const BLOCK_ELEMENTS: usize = 1 << 15;
+/// Samples of all channels that are read at a time: as many as in a block of a file with 16-bit samples. Rounding depends on it.
+const BLOCK_ELEMENTS: usize = 1 << 17;
 
 /// `plugin = "arrays"`: stands for a recording that is handed over with the pipeline.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]

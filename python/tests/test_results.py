@@ -30,7 +30,7 @@ def test_every_library_takes_every_table(result: runout.Result) -> None:
         assert polars.DataFrame(table).shape == arrow.shape
         assert pandas.DataFrame.from_arrow(table).shape == arrow.shape if hasattr(pandas.DataFrame, "from_arrow") else True
         reader = pyarrow.RecordBatchReader.from_stream(table)
-        assert duckdb.sql("select count(*) from reader").fetchone() == (len(table),)
+        assert duckdb.sql("select count(*) from reader").fetchall() == [(len(table),)]
 
 
 def test_columns_are_arrays_and_the_stream_shares_them(result: runout.Result) -> None:

@@ -124,8 +124,7 @@ def test_progress_is_called_and_may_stop_the_work(campaign: Path) -> None:
 
 
 def test_what_is_stopped_leaves_no_file(campaign: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    export = [{"plugin": "parquet", "path": str(out)}]
+    export = [{"plugin": "hdf5", "path": str(tmp_path / "result.h5")}]
 
     def refuse(done: int, of: int, name: str) -> None:
         raise KeyboardInterrupt
@@ -146,15 +145,15 @@ captures = {setup: {f"s{station}": capture for station in range(200)} for setup 
 recording = runout.Recording.from_arrays(captures, sample_rate_hz=1280)
 threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
-    runout.run(small_pipeline(export=[{"plugin": "parquet", "path": sys.argv[2]}]), recording)
+    runout.run(small_pipeline(export=[{"plugin": "hdf5", "path": sys.argv[2]}]), recording)
 except KeyboardInterrupt:
     sys.exit(42)
 """
-    out = tmp_path / "out"
+    out = tmp_path / "result.h5"
     words = [sys.executable, "-c", script, str(Path(__file__).parent), str(out)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert done.returncode == 42, done.stderr
-    assert not list(tmp_path.rglob("*.parquet"))
+    assert not list(tmp_path.rglob("*.*"))
 
 
 def test_two_threads_run_at_once() -> None:
@@ -185,12 +184,10 @@ def test_check_compare_plan_and_inspect_give_documents(campaign: Path, arrays: r
 
 
 def test_diagnose_finds_what_the_rig_lacks(tmp_path: Path) -> None:
-    effect = [{"plugin": "reversal-angle", "targets": ["reversed"], "angle_deg": 0.3}]
-    few = {"recording.stations.count": 2, "recording.revolutions": 30, "effect": effect}
-    file = tmp_path / "shaft.h5"
-    runout.simulate(EXAMPLE / "scenario.toml", file, set=few)
-    settings = {"load.path": str(file), "export": []}
-    diagnosis = runout.diagnose(EXAMPLE / "pipeline.toml", set=settings)
+    example = EXAMPLE.parent / "06-closed-loop"
+    file = tmp_path / "campaign.h5"
+    runout.simulate(example / "scenario.toml", file)
+    diagnosis = runout.diagnose(example / "pipeline.toml", set={"load.path": str(file), "export": []})
     assert [added.effect for added in diagnosis.added] == ["reversal-angle"]
     (parameter,) = [one for one in diagnosis.added[0].parameters]
     assert parameter.unit and abs(parameter.value) > 0
@@ -200,5 +197,5 @@ def test_diagnose_finds_what_the_rig_lacks(tmp_path: Path) -> None:
 
 def test_the_program_is_in_the_package() -> None:
     assert "runout" in program("--version").stdout
-    assert program("run", "nothing.toml").returncode == 1
+    assert program("run", "nothing.toml").returncode == 2
     assert program("walk").returncode == 2
