@@ -11,8 +11,8 @@ mod fuzz;
 mod house;
 mod kill_test;
 mod process;
-mod random;
 mod python;
+mod random;
 mod results;
 mod setup;
 

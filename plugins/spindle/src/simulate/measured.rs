@@ -76,7 +76,7 @@ fn at(points: &[(f64, f64)], angle: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::fmt::Write;
+    use std::{fmt::Write, fs};
 
     use super::*;
 
