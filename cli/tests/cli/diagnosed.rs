@@ -89,6 +89,7 @@ fn corrected_results_are_recognisable() {
         "form.parquet",
         "harmonics.parquet",
         "motion.parquet",
+        "report.html",
         "summary.json",
         "values.parquet",
     ];

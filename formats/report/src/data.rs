@@ -7,7 +7,7 @@ use runout_core::{
 };
 use serde::Serialize;
 
-use crate::{symbol, values::Row};
+use crate::{one_line, symbol, values::Row};
 
 /// Points of a curve that are drawn: more are not visible on a screen.
 const MOST_POINTS: usize = 2880;
@@ -231,11 +231,6 @@ pub(crate) fn surface(surface: &Surface) -> MapData {
         radius_mm: Some(surface.radius_mm),
         thinned: around > 1 || along > 1,
     }
-}
-
-/// A name without what would break a line or hide.
-pub(crate) fn one_line(name: &str) -> String {
-    name.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
 }
 
 #[cfg(test)]

@@ -112,6 +112,11 @@ impl Export for Collected {
     }
 }
 
+/// A name without what would break a line or hide.
+fn one_line(name: &str) -> String {
+    name.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
+}
+
 /// A unit as people write it.
 fn symbol(unit: &str) -> String {
     match unit {

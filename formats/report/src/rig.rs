@@ -137,7 +137,7 @@ fn along(rig: &Rig) -> Markup {
 
 /// A name as long as there is room for.
 fn short(name: &str) -> String {
-    let name = crate::data::one_line(name);
+    let name = crate::one_line(name);
     if name.chars().count() <= 10 { name } else { name.chars().take(9).chain(['…']).collect() }
 }
 

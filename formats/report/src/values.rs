@@ -6,7 +6,7 @@ use runout_core::{
 };
 use serde::Serialize;
 
-use crate::{data::one_line, symbol};
+use crate::{one_line, symbol};
 
 /// A value as the page lists it.
 #[derive(Debug, Serialize)]
