@@ -128,7 +128,7 @@ impl Sources {
 
     /// Overrides one more key; `value` is a TOML value.
     pub(super) fn set(&mut self, key: &str, value: &str) {
-        self.add(&format!("--set {key}={value}"), Role::Override(key.to_owned()), &format!("value = {value}"));
+        self.add(&format!("--set {key}"), Role::Override(key.to_owned()), &format!("value = {value}"));
     }
 
     fn add(&mut self, name: &str, role: Role, text: &str) {

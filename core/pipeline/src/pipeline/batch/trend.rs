@@ -265,19 +265,17 @@ impl Trend {
     }
 }
 
-/// `RONt LSCI, Gaussian 15 UPR, section a, station s001 / um`.
+/// `RONt LSCI, Gaussian 15 UPR, a, s001 / um`.
+///
+/// A value without filter says `none` in its column.
 fn label(names: &[String; NAMES.len()], times: usize) -> String {
     let mut label = String::new();
-    for (column, name) in NAMES.iter().zip(names).filter(|(_, name)| !name.is_empty()) {
+    let said = |(column, name): &(&&str, &String)| !name.is_empty() && !(**column == "filter" && *name == "none");
+    for (column, name) in NAMES.iter().zip(names).filter(said) {
         match *column {
             "symbol" => {}
             "reference" => label.push(' '),
             UNIT => label.push_str(" / "),
-            "section" | "station" => {
-                label.push_str(", ");
-                label.push_str(column);
-                label.push(' ');
-            }
             _ => label.push_str(", "),
         }
         label.push_str(name);
@@ -341,7 +339,7 @@ mod tests {
         let (count, series) = charted(&[whole]);
         assert_eq!((count, &series), (30, &charted(&cut).1));
         let [a, b, none] = &series[..] else { panic!("{series:?}") };
-        assert_eq!((a.series.as_str(), a.mean, a.range_mean), ("RONt, section a / um", Some(4.5), Some(1.0)));
+        assert_eq!((a.series.as_str(), a.mean, a.range_mean), ("RONt, a / um", Some(4.5), Some(1.0)));
         // From the sixth of ten rising values on, and beyond 4.5 ± 2.66 at 0, 1, 8 and 9.
         let named = a.first_signals.iter().map(|one| one.recording.as_str()).collect::<Vec<_>>();
         assert_eq!((a.signals, named), (7, vec!["r0", "r1", "r5", "r6", "r7", "r8", "r9"]));
@@ -362,6 +360,6 @@ mod tests {
         trend.estimate(&values().rows(columns).unwrap());
         let series = trend.into_series();
         assert_eq!(series.iter().map(|one| one.mean).collect::<Vec<_>>(), [Some(1.5), Some(15.0)]);
-        assert_eq!(series[1].series, "RONt, section a / um (2)");
+        assert_eq!(series[1].series, "RONt, a / um (2)");
     }
 }
