@@ -115,7 +115,7 @@ def test_object_storage_takes_the_place_of_folders(cluster: None, folder: Path, 
     server.start()
     try:
         host, port = server.get_host_and_port()
-        storage = {"key": "test", "secret": "test", "client_kwargs": {"endpoint_url": f"http://{host}:{port}", "region_name": "us-east-1"}}
+        storage = {"key": "test", "secret": "test", "client_kwargs": {"endpoint_url": f"http://{host}:{port}", "region_name": "eu-central-1"}}
         files = s3fs.S3FileSystem(**storage)
         files.mkdir("bucket")
         files.put(str(folder), "bucket/recordings", recursive=True)
