@@ -56,12 +56,11 @@ impl Wanted {
 /// Simulates recordings of 2 MB once, runs the batch with each number of jobs in turns and prints a table.
 pub fn batch(words: &[&str]) -> Outcome {
     let wanted = Wanted::read(words)?;
-    let program = match &wanted.program {
-        Some(program) => program.clone(),
-        None => {
-            run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
-            target().join("release/runout")
-        }
+    let program = if let Some(program) = &wanted.program {
+        program.clone()
+    } else {
+        run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
+        target().join("release/runout")
     };
     let recordings = simulate(&wanted, &program)?;
     let mut times = vec![Vec::new(); wanted.jobs.len()];

@@ -116,6 +116,25 @@ pub fn demo() -> Outcome {
     Ok(())
 }
 
+/// Takes the picture of the first example's report that the README shows.
+pub fn report_picture() -> Outcome {
+    demo()?;
+    let browser = foreign::browser().ok_or("Chromium is not installed")?;
+    let example = root().join("examples/01-four-sensor");
+    let picture = example.join("report.png");
+    let mut page = Command::new(browser);
+    page.args([
+        "--headless",
+        "--no-sandbox",
+        "--hide-scrollbars",
+        "--enable-unsafe-swiftshader",
+        "--window-size=1440,1720",
+    ]);
+    // Charts are drawn one after the other.
+    page.arg("--virtual-time-budget=30000").arg(format!("--screenshot={}", picture.display()));
+    run(page.arg(format!("file://{}", example.join("out/report.html").display())))
+}
+
 fn run_example(program: &Path) -> Outcome {
     let example = Path::new("examples/01-four-sensor");
     let scenario = example.join("scenario.toml");

@@ -168,13 +168,13 @@ fn drive(program: &Path, inputs: u64, until: Option<Instant>, seed: u64) -> Outc
         let most_kb = ALLOWANCE_KB + 4 * input.len() as u64 / 1000;
         count.largest_kb = count.largest_kb.max(ended.memory_kb);
         let large = ended.memory_kb > most_kb;
-        let (counted, name) = match ended.status {
-            None => (&mut count.hangs, "hang"),
-            Some(Some(101)) => (&mut count.panics, "panic"),
-            Some(None) => (&mut count.aborts, "abort"),
-            Some(Some(_)) if large => (&mut count.large, "memory"),
-            Some(Some(0)) => (&mut count.done, ""),
-            Some(Some(_)) => continue,
+        let (counted, name) = match ended.how {
+            How::Killed => (&mut count.hangs, "hang"),
+            How::Status(101) => (&mut count.panics, "panic"),
+            How::Signal => (&mut count.aborts, "abort"),
+            How::Status(_) if large => (&mut count.large, "memory"),
+            How::Status(0) => (&mut count.done, ""),
+            How::Status(_) => continue,
         };
         *counted += 1;
         if !name.is_empty() {
@@ -188,10 +188,19 @@ fn drive(program: &Path, inputs: u64, until: Option<Instant>, seed: u64) -> Outc
 
 /// How a process ended.
 struct Ended {
-    /// `None` where it had to be killed; within, `None` for a signal.
-    status: Option<Option<i32>>,
+    how: How,
     /// Largest memory that was seen, on Linux.
     memory_kb: u64,
+}
+
+/// By itself or not.
+enum How {
+    /// With an exit status.
+    Status(i32),
+    /// By a signal.
+    Signal,
+    /// It had to be killed.
+    Killed,
 }
 
 fn watch(mut child: Child) -> std::io::Result<Ended> {
@@ -202,12 +211,13 @@ fn watch(mut child: Child) -> std::io::Result<Ended> {
         let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().split(' ').next()?.parse().ok());
         memory_kb = memory_kb.max(peak.unwrap_or(0));
         if let Some(status) = child.try_wait()? {
-            return Ok(Ended { status: Some(status.code()), memory_kb });
+            let how = status.code().map_or(How::Signal, How::Status);
+            return Ok(Ended { how, memory_kb });
         }
         if begun.elapsed() > LONGEST {
             child.kill()?;
             child.wait()?;
-            return Ok(Ended { status: None, memory_kb });
+            return Ok(Ended { how: How::Killed, memory_kb });
         }
         std::thread::sleep(Duration::from_millis(1));
     }

@@ -39,6 +39,8 @@ cargo xtask COMMAND
   kill-test [--kills N] [--seed S] [PROGRAM]
                 kill runs at every step and at all times, and look at what is left; 1000 kills without more
   deny          advisories, licences, yanked versions and sources of dependencies (deny.toml), by cargo-deny
+  report-picture
+                take the picture of example 1's report that the README shows, by Chromium
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types, and the Python package's classes of stages from them
   wheel [--dev] build the Python package into target/wheels; --dev in the profile of the tests, which is quick and its code slow
@@ -92,6 +94,7 @@ fn main() -> ExitCode {
         }
         ["setup"] => setup::report(),
         ["demo"] => chores::demo(),
+        ["report-picture"] => chores::report_picture(),
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1"), false),
         ["test", "--ci"] => chores::test(true, true),
         ["fuzz", ref rest @ ..] => fuzz::fuzz(rest),

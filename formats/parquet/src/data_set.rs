@@ -20,10 +20,10 @@ use runout_core::{
 
 use crate::{Parquet, table::TableFile};
 
-/// The folder of the summaries, and the end of their names.
+/// The folder of the summaries, and the file of each.
 const SUMMARIES: &str = "summaries";
-const SUMMARY_END: &str = ".json";
-/// The file of a partition.
+const SUMMARY: &str = "summary.json";
+/// The file of a table's partition.
 const FILE: &str = "0.parquet";
 
 /// A folder with the results of many recordings.
@@ -32,14 +32,9 @@ pub struct DataSet {
     folder: PathBuf,
 }
 
-/// One recording's place in a data set.
+/// One recording's place in a data set: `recording=NAME`, a folder in that of each table, in which no other recording publishes.
 #[derive(Debug, Clone)]
-pub(crate) struct Partition {
-    /// `recording=NAME`, as a name of a folder.
-    folder: String,
-    /// Name of the summary.
-    summary: String,
-}
+pub(crate) struct Partition(String);
 
 impl DataSet {
     /// In this folder, which need not exist.
@@ -63,16 +58,15 @@ impl DataSet {
 
 impl Partition {
     fn of(recording: &str) -> Self {
-        let name = encoded(recording);
-        Self { folder: format!("{RECORDING}={name}"), summary: format!("{name}{SUMMARY_END}") }
+        Self(format!("{RECORDING}={}", encoded(recording)))
     }
 
     pub(crate) fn file(&self, data_set: &Path, table: &str) -> PathBuf {
-        data_set.join(table).join(&self.folder).join(FILE)
+        data_set.join(table).join(&self.0).join(FILE)
     }
 
     pub(crate) fn summary(&self, data_set: &Path) -> PathBuf {
-        data_set.join(SUMMARIES).join(&self.summary)
+        data_set.join(SUMMARIES).join(&self.0).join(SUMMARY)
     }
 }
 
@@ -92,10 +86,10 @@ impl ResultStore for DataSet {
         let summary = partition.summary(&self.folder);
         outdated(&summary, fs::remove_file(&summary))?;
         for table in self.folders()? {
-            let file = table.join(&partition.folder).join(FILE);
+            let file = table.join(&partition.0).join(FILE);
             outdated(&file, fs::remove_file(&file))?;
             // A folder with something else in it stays.
-            let _ = fs::remove_dir(table.join(&partition.folder));
+            let _ = fs::remove_dir(table.join(&partition.0));
         }
         Ok(())
     }
@@ -104,14 +98,10 @@ impl ResultStore for DataSet {
         let prefix = format!("{RECORDING}=");
         let mut recordings = Vec::new();
         for folder in self.folders()? {
-            let is_summaries = folder.file_name().is_some_and(|name| name == SUMMARIES);
             for entry in entries(&folder)? {
                 let Some(name) = entry.file_name().and_then(|name| name.to_str()) else { continue };
-                let found = if is_summaries {
-                    name.strip_suffix(SUMMARY_END).filter(|name| !name.starts_with('.'))
-                } else {
-                    name.strip_prefix(&prefix).filter(|_| entry.join(FILE).is_file())
-                };
+                let holds = [FILE, SUMMARY].iter().any(|file| entry.join(file).is_file());
+                let found = name.strip_prefix(&prefix).filter(|_| holds);
                 recordings.extend(found.and_then(decoded));
             }
         }

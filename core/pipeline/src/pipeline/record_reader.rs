@@ -93,9 +93,9 @@ impl RecordReader<'_> {
                 }
             };
             if workers < processors && !self.alone {
-                read_ahead(captures, work_on)
+                read_ahead(captures, work_on);
             } else {
-                read_along(captures, work_on)
+                read_along(captures, work_on);
             }
         };
         let along = self.recording.checksum();

@@ -234,14 +234,14 @@ impl Trend {
                 self.number += 1;
                 self.seen.clear();
             }
-            let series = self.series_of(columns.map(text));
+            let series = self.series_of(&columns.map(text));
             let value = if values.is_valid(row) { values.value(row) } else { f64::NAN };
             take(self, Row { series, value });
         }
     }
 
     /// The series of these names; one that comes several times in a recording is as many series.
-    fn series_of(&mut self, names: [String; NAMES.len()]) -> usize {
+    fn series_of(&mut self, names: &[String; NAMES.len()]) -> usize {
         let key = names.join("\u{1f}");
         let times = self.seen.entry(key.clone()).or_default();
         *times += 1;
@@ -252,7 +252,7 @@ impl Trend {
         let times = *times;
         let unit = names[NAMES.len() - 1].clone();
         let charted = Charted {
-            label: label(&names, times),
+            label: label(names, times),
             unit,
             chart: ControlChart::default(),
             tests: Tests::default(),
@@ -270,7 +270,7 @@ impl Trend {
 /// A value without filter says `none` in its column.
 fn label(names: &[String; NAMES.len()], times: usize) -> String {
     let mut label = String::new();
-    let said = |(column, name): &(&&str, &String)| !name.is_empty() && !(**column == "filter" && *name == "none");
+    let said = |(column, name): &(&&str, &String)| !(name.is_empty() || **column == "filter" && *name == "none");
     for (column, name) in NAMES.iter().zip(names).filter(said) {
         match *column {
             "symbol" => {}
