@@ -16,6 +16,7 @@ pub mod table;
 
 use std::{
     borrow::Cow,
+    fmt::Write as _,
     io::{self, ErrorKind, IsTerminal, Write},
 };
 
@@ -71,7 +72,10 @@ pub fn document(value: &impl Serialize) -> io::Result<()> {
     for character in serde_json::to_string_pretty(value)?.chars() {
         // Only texts have them; JSON knows no other spelling.
         match character {
-            harmful if is_harmful(harmful) => text.push_str(&format!("\\u{:04x}", u32::from(harmful))),
+            // A string takes whatever is written to it.
+            harmful if is_harmful(harmful) => {
+                let _ = write!(text, "\\u{:04x}", u32::from(harmful));
+            }
             other => text.push(other),
         }
     }

@@ -6,8 +6,8 @@ use super::printable;
 const LONGEST: usize = 400;
 
 /// A cell as a terminal may show it.
-fn cut(cell: String) -> String {
-    let mut shown = printable(&cell).into_owned();
+fn cut(cell: &str) -> String {
+    let mut shown = printable(cell).into_owned();
     if let Some((end, _)) = shown.char_indices().nth(LONGEST) {
         shown.truncate(end);
         shown.push('…');
@@ -32,7 +32,7 @@ impl Table {
 
     /// Adds a row.
     pub fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
-        self.rows.push(cells.into_iter().map(|cell| cut(cell.into())).collect());
+        self.rows.push(cells.into_iter().map(|cell| cut(&cell.into())).collect());
     }
 
     /// Whether it has no rows yet.

@@ -189,7 +189,7 @@ impl Loader for CsvLoader {
         let rig = rig.ok_or_else(|| {
             Error::new("open", "the CSV files", "recorded turns need a [rig]").of(ErrorKind::Configuration)
         })?;
-        let recording = CsvRecording::open(rig, self.stations.clone(), self.paths.clone(), self.stated.clone())?;
+        let recording = CsvRecording::open(rig, self.stations.clone(), &self.paths, self.stated.clone())?;
         Ok(Source::Turns(Box::new(recording)))
     }
 }

@@ -43,7 +43,7 @@ const MARKS_AT_WHOLE_SAMPLES: &str = "marks of a column `index` are at whole sam
 
 impl CsvRecording {
     /// Looks at every file's header.
-    pub(crate) fn open(rig: &Rig, stations: Vec<StationKey>, paths: Vec<Vec<PathBuf>>, stated: Stated) -> Result<Self> {
+    pub(crate) fn open(rig: &Rig, stations: Vec<StationKey>, paths: &[Vec<PathBuf>], stated: Stated) -> Result<Self> {
         let mut remarks = Vec::new();
         let mut unknown: Vec<String> = Vec::new();
         let mut at_whole_samples = false;
@@ -237,7 +237,7 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         let station = StationKey { name: "s".into(), z_mm: 0.0 };
         let stated = Stated::default();
-        let mut recording = CsvRecording::open(&rig(), vec![station], vec![vec![path]], stated)?;
+        let mut recording = CsvRecording::open(&rig(), vec![station], &[vec![path]], stated)?;
         recording.most_kept = most_kept;
         let mut stream = recording.open_with(NonZeroUsize::new(threads).unwrap(), 0, 0)?;
         let (mut samples, mut angles, mut block) = (Vec::new(), Vec::new(), Block::default());

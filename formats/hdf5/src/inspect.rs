@@ -134,12 +134,11 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
                 turns: marks.len().saturating_sub(1),
                 channels: source.stored.sensors,
             };
-            match places.get(&station) {
-                Some(place) => report.stations[*place].captures.push(capture),
-                None => {
-                    places.insert(station.clone(), report.stations.len());
-                    report.stations.push(StationReport { station, z_mm: source.z_mm, captures: vec![capture] });
-                }
+            if let Some(place) = places.get(&station) {
+                report.stations[*place].captures.push(capture);
+            } else {
+                places.insert(station.clone(), report.stations.len());
+                report.stations.push(StationReport { station, z_mm: source.z_mm, captures: vec![capture] });
             }
         }
         report.setups.push(setup);

@@ -167,7 +167,9 @@ fn each(path: &Path, take: &mut dyn FnMut(&RecordBatch) -> Result<()>) -> Result
     let damaged = |error: parquet::errors::ParquetError| {
         Error::caused("read", shown(), error).of(ErrorKind::DamagedData).help("delete it and run the batch again")
     };
-    let rows = ParquetRecordBatchReaderBuilder::try_new(file).and_then(|reader| reader.build()).map_err(damaged)?;
+    let rows = ParquetRecordBatchReaderBuilder::try_new(file)
+        .and_then(ParquetRecordBatchReaderBuilder::build)
+        .map_err(damaged)?;
     for rows in rows {
         take(&rows.map_err(|error| Error::caused("read", shown(), error).of(ErrorKind::DamagedData))?)?;
     }
