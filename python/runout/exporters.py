@@ -85,3 +85,13 @@ class Figures:
 
     path: str
     """Folder for the figures. Made where it is missing."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Report:
+    """One page with figures, values and limits, for a browser and for print"""
+
+    plugin: ClassVar[str] = "report"
+
+    path: str
+    """The file to write, relative to the TOML: `out/report.html`."""

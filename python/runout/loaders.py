@@ -16,6 +16,10 @@ class Hdf5:
 
     plugin: ClassVar[str] = "hdf5"
 
+    follow_links: Union[bool, None] = None
+    """Follows external links, virtual data sets and data in other files, all of which are then inputs with a checksum; by default
+    they are refused. Default: false."""
+
     marker: Union[Mapping[str, Any], None] = None
     """The once-per-turn mark as an analogue trace, instead of a dataset `index`: a channel of the samples, or a dataset of the
     station. A turn begins where it crosses a threshold, between two samples."""
@@ -29,6 +33,9 @@ class HeightMap:
     """Heights of a surface on a grid, from HDF5 (runout-surface, version 1)"""
 
     plugin: ClassVar[str] = "height-map"
+
+    follow_links: Union[bool, None] = None
+    """Follows external links, virtual data sets and data in other files, all of which are then inputs. Default: false."""
 
     path: str
     """HDF5 file with the root attribute `format = "runout-surface"` and the dataset `height_nm`, relative to the TOML."""
