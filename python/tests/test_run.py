@@ -26,6 +26,14 @@ def program(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "runout", *map(str, words)], capture_output=True, text=True)
 
 
+def comparable(found: Any) -> Any:
+    """Without the truth, which only the simulated file carries, and warnings, which name their file."""
+    if isinstance(found, dict):
+        own = ("truth", "truth_form_rms_error_um", "warnings")
+        return {key: comparable(value) for key, value in found.items() if key not in own}
+    return [comparable(value) for value in found] if isinstance(found, list) else found
+
+
 def test_arrays_give_the_command_line_s_result_to_the_last_bit(campaign: Path, arrays: runout.Recording, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     pyarrow = pytest.importorskip("pyarrow")
@@ -34,8 +42,8 @@ def test_arrays_give_the_command_line_s_result_to_the_last_bit(campaign: Path, a
     assert done.returncode == 0, done.stderr
     result = runout.run(EXAMPLE / "pipeline.toml", arrays, set={"export": []})
     expected = json.loads(done.stdout)
-    for key in ("stations", "values", "lost_orders", "warnings", "part"):
-        assert result.summary.get(key) == expected.get(key), key
+    for key in ("stations", "values", "lost_orders", "part"):
+        assert comparable(result.summary.get(key)) == comparable(expected.get(key)), key
     for name, table in result.tables.items():
         written = parquet.read_table(tmp_path / f"{name}.parquet")
         here = pyarrow.table(table).cast(written.schema)
