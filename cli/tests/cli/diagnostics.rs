@@ -39,6 +39,23 @@ fn values_that_cannot_be_are_refused_at_their_key() {
 }
 
 #[test]
+fn numbers_of_a_rig_that_no_rig_has_are_refused_at_their_key() {
+    for (key, words) in [
+        ("rig.sensors.0.angle_deg=1e308", "within ±36000°, found 1000"),
+        ("rig.sensors.0.angle_deg=-inf", "within ±36000°, found -inf"),
+        ("rig.setups.0.part_deg=1e20", "within ±36000°"),
+        ("rig.setups.0.sensors_deg=nan", "within ±36000°, found NaN"),
+        ("rig.sensors.0.z_mm=1e300", "within ±1000000 mm"),
+        ("rig.part_radius_mm=1e300", "up to 1000000 mm"),
+    ] {
+        let shown = check_with(&["--set", key]);
+        let place = key.split('=').next().unwrap();
+        assert!(shown.starts_with("exit status: 2"), "{shown}");
+        assert!(shown.contains(words) && shown.contains(place), "{shown}");
+    }
+}
+
+#[test]
 fn unknown_plugin() {
     assert_snapshot!(check("\"four-sensor-reversal\"", "\"four-senser-reversal\""));
 }

@@ -242,8 +242,12 @@ impl RigConfig {
     /// # Errors
     /// The first value that cannot be, with its place.
     pub fn check(self) -> Result<Rig, Fault> {
-        if !(self.part_radius_mm.is_finite() && self.part_radius_mm > 0.0) {
-            return Err(Fault::at("part_radius_mm", "the part's radius must be above 0 mm"));
+        if !(self.part_radius_mm > 0.0 && self.part_radius_mm <= FARTHEST_MM) {
+            let message = format!(
+                "expected a part's radius above 0 and up to {FARTHEST_MM} mm, found {}",
+                self.part_radius_mm
+            );
+            return Err(Fault::at("part_radius_mm", message));
         }
         if self.sensors.is_empty() {
             return Err(Fault::at("sensors", "a rig needs at least one sensor"));
@@ -260,11 +264,10 @@ impl RigConfig {
             if sensor.id.is_empty() || !ids.insert(sensor.id.clone()) {
                 return Err(fault("id", format!("sensor ids must differ and not be empty, found `{}`", sensor.id)));
             }
-            if !sensor.angle_deg.is_finite() {
-                return Err(fault("angle_deg", "a sensor's angle must be a finite number".into()));
-            }
-            if !sensor.z_mm.is_finite() {
-                return Err(fault("z_mm", "a sensor's axial position must be a finite number".into()));
+            let angle_rad = radians(sensor.angle_deg).map_err(|message| fault("angle_deg", message))?;
+            if sensor.z_mm.is_nan() || sensor.z_mm.abs() > FARTHEST_MM {
+                let message = format!("expected an axial position within ±{FARTHEST_MM} mm, found {}", sensor.z_mm);
+                return Err(fault("z_mm", message));
             }
             if sensor.section.is_empty() {
                 return Err(fault("section", "a section's id must not be empty".into()));
@@ -291,7 +294,7 @@ impl RigConfig {
             }
             let checked = Sensor {
                 id: sensor.id,
-                angle_rad: sensor.angle_deg.to_radians(),
+                angle_rad,
                 z_mm: sensor.z_mm,
                 section,
                 axial_radius_mm,
@@ -323,22 +326,22 @@ impl RigConfig {
             if setup.id == "truth" || setup.id.contains('/') {
                 return Err(fault("id", format!("`{}` cannot name a setup: `truth` and `/` are reserved", setup.id)));
             }
-            if !setup.part_deg.is_finite() {
-                return Err(fault("part_deg", "the part's angle must be a finite number".into()));
-            }
-            if !setup.sensors_deg.is_finite() {
-                return Err(fault("sensors_deg", "the sensors' angle must be a finite number".into()));
-            }
-            setups.push(Setup {
-                id: setup.id,
-                part_rad: setup.part_deg.to_radians(),
-                sensors_rad: setup.sensors_deg.to_radians(),
-            });
+            let part_rad = radians(setup.part_deg).map_err(|message| fault("part_deg", message))?;
+            let sensors_rad = radians(setup.sensors_deg).map_err(|message| fault("sensors_deg", message))?;
+            setups.push(Setup { id: setup.id, part_rad, sensors_rad });
         }
         let gaps = gaps_of(&self.interruptions, &sections, &faces)?;
         let (part_radius_mm, rotation) = (self.part_radius_mm, self.rotation);
         Ok(Rig { part_radius_mm, rotation, sensors, setups, sections, gaps, faces, form_bounds_um })
     }
+}
+
+/// An angle in rad, or what is wrong with its degrees.
+fn radians(angle_deg: f64) -> Result<f64, String> {
+    let possible = angle_deg.abs() <= LARGEST_DEG;
+    possible
+        .then(|| angle_deg.to_radians())
+        .ok_or_else(|| format!("expected an angle within ±{LARGEST_DEG}°, found {angle_deg}"))
 }
 
 impl SensorConfig {
@@ -355,9 +358,9 @@ impl SensorConfig {
                 let message = format!("the axial sensor `{}` needs `radius_mm`, its distance from the axis", self.id);
                 Err(Fault::at("looks", message).help("radius_mm = 0 on the axis, as at the pole of a ball"))
             }
-            (Looks::Axial, Some(radius_mm)) if radius_mm.is_finite() && radius_mm >= 0.0 => Ok(Some(radius_mm)),
+            (Looks::Axial, Some(radius_mm)) if (0.0..=FARTHEST_MM).contains(&radius_mm) => Ok(Some(radius_mm)),
             (Looks::Axial, Some(radius_mm)) => {
-                let message = format!("the sensor's distance from the axis must be 0 mm or more, found {radius_mm}");
+                let message = format!("expected a distance from the axis of 0 to {FARTHEST_MM} mm, found {radius_mm}");
                 Err(Fault::at("radius_mm", message).help("the side on which it stands is its angle_deg"))
             }
         }
@@ -394,12 +397,8 @@ fn gaps_of(
     for (index, interruption) in interruptions.iter().enumerate() {
         let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("interruptions", index);
         let [from, to] =
-            [("from_deg", interruption.from_deg), ("to_deg", interruption.to_deg)].map(|(key, angle_deg)| {
-                let known = angle_deg.is_finite().then_some(angle_deg);
-                known.ok_or_else(|| {
-                    fault(key, format!("the angle must be a finite number of degrees, found {angle_deg}"))
-                })
-            });
+            [("from_deg", interruption.from_deg), ("to_deg", interruption.to_deg)]
+                .map(|(key, angle_deg)| radians(angle_deg).map(|_| angle_deg).map_err(|message| fault(key, message)));
         let length_deg = (to? - from?).rem_euclid(360.0);
         if !(length_deg > 0.0 && length_deg <= MOST_INTERRUPTED_DEG) {
             let message = format!("expected at most {MOST_INTERRUPTED_DEG}° from `from_deg` on, found {length_deg}°");
@@ -429,6 +428,10 @@ fn gaps_of(
 
 /// Longer interruptions leave too little to bridge them by, in degrees.
 const MOST_INTERRUPTED_DEG: f64 = 120.0;
+/// A hundred turns: degrees above it are a mistake, and far above it they lose the digits within a turn.
+const LARGEST_DEG: f64 = 36_000.0;
+/// A kilometre: lengths above it are a mistake.
+const FARTHEST_MM: f64 = 1e6;
 /// Share of a circle that has to be there.
 const LEAST_LEFT: f64 = 0.5;
 const ANGLES_LOOKED_AT: usize = 3600;
