@@ -3,7 +3,8 @@
 use std::{collections::BTreeSet, fs, path::Path, process::Command, time::SystemTime};
 
 use crate::{
-    foreign, fuzz, house, kill_test,
+    foreign::{self, Readers},
+    fuzz, house, kill_test,
     process::{Outcome, answer, root, run, say, target},
     python,
     setup::{self, cargo},
@@ -15,33 +16,54 @@ pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
     house::check_quietly()?;
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
-    run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;
     let nextest = answer("cargo-nextest", &["--version"]).is_some();
     let runner: &[&str] = if nextest {
         &["nextest", "run", "--workspace", "--no-fail-fast"]
     } else {
         &["test", "--workspace", "--all-targets", "--no-fail-fast"]
     };
+    // Packages are fetched while the compiler works.
+    let readers = std::thread::scope(|scope| {
+        let readers = foreign_readers.then(|| {
+            scope.spawn(|| {
+                let readers = Readers::install()?;
+                python::install_test_packages()?;
+                Outcome::Ok(readers)
+            })
+        });
+        run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;
+        run(cargo(runner)?.arg("--no-run"))?;
+        let readers = readers.map(|thread| thread.join().map_err(|_| "the packages could not be installed".to_owned()));
+        readers.transpose()?.transpose()
+    })?;
     let mut tests = cargo(runner)?;
     // Foreign readers that one test starts inherit the open files of the others, and HDF5's locks on them with it.
     tests.env("HDF5_USE_FILE_LOCKING", "FALSE");
     let skips = target().join("skipped-tests.txt");
     let _ = fs::remove_file(&skips);
     tests.env("RUNOUT_SKIPS", &skips);
-    if foreign_readers {
-        foreign::equip(&mut tests)?;
+    if let Some(readers) = &readers {
+        readers.equip(&mut tests);
     }
     run(&mut tests)?;
     run(&mut cargo(&["test", "--workspace", "--doc", "--quiet"])?)?;
-    run_example(&target().join("debug/runout"))?;
+    let program = target().join("debug/runout");
+    run_example(&program)?;
+    let package = || if foreign_readers { python::test() } else { Ok(()) };
     if complete {
-        let program = target().join("debug/runout").display().to_string();
-        kill_test::test(&["--kills", "100", &program])?;
-        fuzz::fuzz(&["--minutes", "2", &program])?;
-    }
-    if foreign_readers {
-        python::test()?;
+        // Each of them takes one processor.
+        std::thread::scope(|scope| {
+            let program = program.display().to_string();
+            let inputs = program.clone();
+            let inputs = scope.spawn(move || fuzz::fuzz(&["--minutes", "2", &inputs]));
+            kill_test::test(&["--kills", "100", &program])?;
+            package()?;
+            inputs.join().map_err(|_| "the fuzz run ended early".to_owned())?
+        })?;
     } else {
+        package()?;
+    }
+    if !foreign_readers {
         say(
             "the tests of the Python package were skipped: they need packages of Python's (`cargo xtask test --ci` installs them)",
         );

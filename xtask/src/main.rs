@@ -30,7 +30,7 @@ cargo xtask COMMAND
                 and tests find them
   test [--ci]   check-house, format, lints, tests, and the demo with the tests' build; the last line counts tests
                 skipped for want of measured data. With --ci none may be, files are also read by Python and Node, which it
-                installs below target/, and the tests of the Python package run on a wheel of the dev profile
+                installs below target/, and the tests of the Python package run with the library of the tests' build
   check-house [--strict]
                 print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, and
                 on a cycle of modules; with --strict also on long files without a reason

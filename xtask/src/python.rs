@@ -1,10 +1,15 @@
 //! The Python package: its wheel, and its tests.
 
-use std::{path::PathBuf, process::Command};
+use std::{
+    env::consts::{DLL_PREFIX, DLL_SUFFIX},
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use crate::{
     process::{Outcome, answer, root, run, say, target, tools},
-    setup,
+    setup::{self, cargo},
 };
 
 /// What builds the package, and what its tests take.
@@ -48,19 +53,42 @@ pub fn wheel(words: &[&str]) -> Outcome {
     Ok(())
 }
 
-/// Installs the wheel, built in the profile of the tests, and runs the tests on it.
-pub fn test() -> Outcome {
-    wheel(&["--dev"])?;
+/// Installs what the package's tests take.
+pub fn install_test_packages() -> Outcome {
     let environment = environment()?;
-    let python = environment.join("bin/python");
-    if answer(&python, &["-c", TEST_MODULES]).is_none() {
+    if answer(environment.join("bin/python"), &["-c", TEST_MODULES]).is_none() {
         install(&environment, &TEST_PACKAGES)?;
     }
-    let find = ["--no-index", "--no-deps", "--force-reinstall", "--find-links"];
-    let wheels = target().join("wheels");
-    run(Command::new(environment.join("bin/pip")).args(["install", "--quiet"]).args(find).arg(wheels).arg("runout"))?;
+    Ok(())
+}
+
+/// Runs the tests of the package on the library that the workspace was built with: maturin would compile all dependencies
+/// again, since it builds the one crate with fewer features.
+pub fn test() -> Outcome {
+    // With the tests' targets named, the dependencies have the tests' features.
+    run(&mut cargo(&["build", "--workspace", "--lib", "--bins", "--tests", "--quiet"])?)?;
+    let place = target().join("python");
+    assemble(&place.join("runout"))?;
+    let python = environment()?.join("bin/python");
     let tests = root().join("python/tests");
-    run(Command::new(python).args(["-m", "pytest"]).arg("--import-mode=prepend").arg(tests))
+    run(Command::new(python).env("PYTHONPATH", place).args(["-m", "pytest"]).arg("--import-mode=prepend").arg(tests))
+}
+
+/// The package as a wheel would install it.
+fn assemble(package: &Path) -> Outcome {
+    let words = |error: std::io::Error| format!("cannot make {}: {error}", package.display());
+    let _ = fs::remove_dir_all(package);
+    fs::create_dir_all(package).map_err(words)?;
+    for entry in fs::read_dir(root().join("python/runout")).map_err(words)? {
+        let path = entry.map_err(words)?.path();
+        if let Some(name) = path.file_name().filter(|_| path.is_file()) {
+            fs::copy(&path, package.join(name)).map_err(words)?;
+        }
+    }
+    let library = format!("{DLL_PREFIX}_native{DLL_SUFFIX}");
+    let module = if cfg!(windows) { "_native.pyd" } else { "_native.abi3.so" };
+    fs::copy(target().join("debug").join(library), package.join(module)).map_err(words)?;
+    Ok(())
 }
 
 fn environment() -> Outcome<PathBuf> {

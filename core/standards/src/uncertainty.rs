@@ -248,7 +248,8 @@ pub fn extreme(value: f64, at_stand_in: f64, mut drawn: Vec<f64>) -> Option<(f64
     let known = summed_up(&mut drawn, mean);
     let reach = known.interval_95.map(|end| (end - mean).abs()).into_iter().fold(0.0, f64::max);
     let reach = reach.max(student_95(NOISE_FREEDOM) * known.std).hypot(NORMAL_95 * NOISE_KNOWN_TO * share);
-    let middle = value - share;
+    // No range is below 0, also where noise adds more to it in the mean than was found.
+    let middle = (value - share).max(0.0);
     let interval_95 = [(middle - reach).max(0.0), middle + reach];
     Some((share, Uncertainty { std: known.std.hypot(NOISE_KNOWN_TO * share), interval_95, ..known }))
 }

@@ -5,10 +5,12 @@
 //! periods: a creep is certain only where captures agree on it better than captures that wander would, or where next to
 //! nothing else is in the levels.
 
-use runout_numerics::{
-    least_squares::dot,
-    statistics::{f_tail, student_95},
-};
+mod partials;
+#[cfg(test)]
+mod tests;
+
+use partials::Partials;
+use runout_numerics::{least_squares::dot, statistics::f_tail};
 
 /// Fewest turns of a capture.
 const FEWEST: usize = 8;
@@ -305,122 +307,6 @@ fn extra(course: Course) -> f64 {
     if course == Course::Straight { 0.0 } else { 1.0 }
 }
 
-/// How levels change with rate and time constant, in each capture.
-struct Partials {
-    /// `[capture][turn]`.
-    by_rate: Vec<Vec<f64>>,
-    by_tau: Vec<Vec<f64>>,
-    /// Their products over all captures: rate with rate, rate with τ, τ with τ; the latter two 0 for a straight line.
-    normal: [f64; 3],
-    /// Change of the creep over the capture with rate and τ.
-    over_capture: [f64; 2],
-}
-
-impl Partials {
-    fn new(sensor: &Sensor, fitted: &Fitted) -> Self {
-        let captures = &sensor.captures;
-        let by_rate: Vec<Vec<f64>> = captures.iter().map(|capture| shape(fitted.course, &capture.middles)).collect();
-        let mut over_capture = [fitted.course.at(sensor.turns), 0.0];
-        let mut by_tau: Vec<Vec<f64>> = by_rate.iter().map(|shape| vec![0.0; shape.len()]).collect();
-        if let Course::Settling(tau) = fitted.course {
-            let step = 1e-3 * tau;
-            let [above, below] = [tau + step, tau - step].map(Course::Settling);
-            let rate = |capture: usize| {
-                if fitted.rates.len() > 1 { fitted.shared } else { fitted.rates.get(capture).copied().unwrap_or(0.0) }
-            };
-            for (index, (capture, by_tau)) in captures.iter().zip(&mut by_tau).enumerate() {
-                let (high, low) = (shape(above, &capture.middles), shape(below, &capture.middles));
-                let each = by_tau.iter_mut().zip(high.iter().zip(&low));
-                each.for_each(|(partial, (high, low))| *partial = rate(index) * (high - low) / (2.0 * step));
-            }
-            over_capture[1] = fitted.shared * (above.at(sensor.turns) - below.at(sensor.turns)) / (2.0 * step);
-        }
-        let sum = |a: &[Vec<f64>], b: &[Vec<f64>]| a.iter().zip(b).map(|(a, b)| dot(a, b)).sum();
-        let normal = [sum(&by_rate, &by_rate), sum(&by_rate, &by_tau), sum(&by_tau, &by_tau)];
-        Self { by_rate, by_tau, normal, over_capture }
-    }
-
-    /// Inverse of the normal matrix: rate with rate, rate with τ, τ with τ.
-    fn inverse(&self) -> [f64; 3] {
-        let [aa, ab, bb] = self.normal;
-        let determinant = aa * bb - ab * ab;
-        if bb <= 0.0 || determinant <= 0.0 {
-            return [aa.max(f64::MIN_POSITIVE).recip(), 0.0, 0.0];
-        }
-        [bb / determinant, -ab / determinant, aa / determinant]
-    }
-
-    /// Of rate (0) or τ (1), from the variance of independent turns.
-    fn std(&self, noise: f64, which: usize) -> f64 {
-        (noise * self.inverse()[2 * which]).sqrt()
-    }
-
-    /// Standard uncertainties of rate, τ and the creep over the capture.
-    fn stds(&self, noise: f64, all: &[&Sensor]) -> [f64; 3] {
-        let [aa, ab, bb] = self.inverse();
-        let [by_rate, by_tau] = self.over_capture;
-        let over = by_rate * by_rate * aa + 2.0 * by_rate * by_tau * ab + by_tau * by_tau * bb;
-        let white = [aa, bb, over.max(0.0)].map(|square| (noise * square).sqrt());
-        match self.between(all) {
-            Some(between) => [0, 1, 2].map(|which| white[which].max(between[which])),
-            None => white,
-        }
-    }
-
-    /// Rate, τ and creep over the capture that explain a capture's levels beside those found.
-    fn solve(&self, capture: usize, curve: &[f64]) -> [f64; 3] {
-        let captures = self.by_rate.len() as f64;
-        let (a, b) = (dot(&self.by_rate[capture], curve), dot(&self.by_tau[capture], curve));
-        let [aa, ab, bb] = self.inverse().map(|entry| entry * captures);
-        let (rate, tau) = (aa * a + ab * b, ab * a + bb * b);
-        [rate, tau, self.over_capture[0] * rate + self.over_capture[1] * tau]
-    }
-
-    /// Chance of captures that only wander agreeing so well on a rate, with τ as it is: Student's distribution, with how far
-    /// the rates of all sensors differ from one capture to the other.
-    fn chance_of_agreement(&self, rate: f64, all: &[&Sensor]) -> f64 {
-        let captures = self.by_rate.len();
-        if captures < 2 {
-            return 1.0;
-        }
-        let squares: f64 = all
-            .iter()
-            .map(|sensor| {
-                let of = |capture: usize| {
-                    let shape = &self.by_rate[capture];
-                    dot(shape, &sensor.captures[capture].means_um) / dot(shape, shape).max(f64::MIN_POSITIVE)
-                };
-                let rates: Vec<f64> = (0..captures).map(of).collect();
-                let mean = rates.iter().sum::<f64>() / captures as f64;
-                rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>()
-            })
-            .sum();
-        let variance = squares / (captures * (captures - 1) * all.len()) as f64;
-        f_tail(rate * rate / variance.max(f64::MIN_POSITIVE), 1.0, freedom(captures, all) as f64)
-    }
-
-    /// Standard uncertainties of the means of rate, τ and the creep over the capture, from how captures differ in all sensors:
-    /// for few degrees of freedom as much larger as Student's distribution is wider, so that twice it holds 95 %.
-    fn between(&self, all: &[&Sensor]) -> Option<[f64; 3]> {
-        let captures = self.by_rate.len();
-        if captures < 2 {
-            return None;
-        }
-        let mut squares = [0.0; 3];
-        for sensor in all {
-            let each: Vec<[f64; 3]> =
-                (0..captures).map(|capture| self.solve(capture, &sensor.captures[capture].means_um)).collect();
-            for (which, sum) in squares.iter_mut().enumerate() {
-                let mean = each.iter().map(|one| one[which]).sum::<f64>() / captures as f64;
-                *sum += each.iter().map(|one| (one[which] - mean).powi(2)).sum::<f64>();
-            }
-        }
-        let wider = (0.5 * student_95(freedom(captures, all) as f64)).max(1.0);
-        let count = (captures * (captures - 1) * all.len()) as f64;
-        Some(squares.map(|sum| wider * (sum / count).sqrt()))
-    }
-}
-
 /// Independent differences between captures: sensors see two directions between them.
 fn freedom(captures: usize, all: &[&Sensor]) -> usize {
     (captures - 1) * all.len().min(2)
@@ -437,60 +323,4 @@ fn about_mean(mut values: Vec<f64>) -> Vec<f64> {
         *value -= mean;
     }
     values
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "tests")]
-
-    use super::*;
-
-    /// A course and a seeded wander of levels.
-    fn levels(capture: usize, size_um: f64, course: Course) -> Levels {
-        let mut state = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(capture as u64 + 1);
-        let mut noise = || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
-        Levels::new(
-            (0..60).map(|turn| (turn, size_um * course.at(turn as f64 + 0.5) / course.at(60.0) + 0.1 * noise())),
-        )
-    }
-
-    fn creep(sizes: &[f64], course: Course) -> Creep {
-        let steady: Vec<Levels> = (0..sizes.len()).map(|index| levels(index + 90, 0.0, Course::Straight)).collect();
-        let moved = sizes.iter().enumerate().map(|(index, size)| levels(index, *size, course)).collect();
-        creeps(&[moved, steady])[0].clone().unwrap()
-    }
-
-    #[test]
-    fn straight_and_settling_creeps_are_told_apart_by_evidence() {
-        for size in [1.0, -24.0, 100.0] {
-            let found = creep(&[size; 3], Course::Straight);
-            assert!(found.certain && found.shared && found.time_constant.is_none(), "{found:?}");
-            assert!((found.over_capture(0) - size).abs() < 3.0 * found.over_capture_std, "{found:?}");
-            let found = creep(&[size; 3], Course::Settling(12.0));
-            assert!(found.certain && found.shared, "{found:?}");
-            let [tau, std] = found.time_constant.unwrap();
-            assert!((tau - 12.0).abs() < 3.0 * std, "{found:?}");
-            assert!((found.over_capture(0) - size).abs() < 3.0 * found.over_capture_std, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn a_creep_of_one_capture_is_that_of_no_other() {
-        let found = creep(&[0.0, -20.0, 3.0], Course::Straight);
-        assert!(found.certain && !found.shared, "{found:?}");
-        for (capture, size) in [0.0, -20.0, 3.0].into_iter().enumerate() {
-            assert!((found.over_capture(capture) - size).abs() < 3.0 * found.over_capture_std, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn steady_levels_have_no_creep() {
-        assert!(!creep(&[0.0; 3], Course::Straight).certain);
-        assert!(creeps(&[vec![Levels::new((0..3).map(|turn| (turn, 0.0)))]])[0].is_none());
-    }
 }

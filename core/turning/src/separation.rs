@@ -1,9 +1,9 @@
 //! Form and motion, one harmonic at a time: estimates, covariance, and what the layout cannot tell.
 
-use crate::{
-    azimuth::{Azimuth, FacePlace},
-    smoothing::orders_beside,
-};
+mod quantity;
+
+use crate::{azimuth::Azimuth, smoothing::orders_beside};
+pub use quantity::{ALONG_COLUMN, MotionColumn, Quantity, motion_columns};
 use runout_numerics::Complex64;
 use runout_standards::{
     gaps::Gaps,
@@ -21,167 +21,6 @@ pub const NOTHING_SEPARATED: &str = "nothing is separated: this layout has no ob
 
 /// Displacement in µm at a lever of 1 mm per 1 µrad.
 pub const UM_PER_MM_URAD: f64 = 1e-3;
-
-/// Something that a separation solves for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Quantity {
-    /// Form of a section (its index), µm; Re Σ c e^{+inα} over the part's angle α.
-    Form(usize),
-    /// Error motion along x, µm; Re Σ c e^{−inΦ} over the spindle's angle Φ, as are all motions.
-    X,
-    /// Error motion along y, µm.
-    Y,
-    /// Tilt about x, right-handed, µrad.
-    TiltX,
-    /// Tilt about y, right-handed, µrad.
-    TiltY,
-    /// Error motion along one line that is neither x nor y, µm: all that sensors can observe which all look along it.
-    Along(Azimuth),
-    /// Tilt towards that line (right-handed about the direction a quarter turn further), µrad.
-    TiltAlong(Azimuth),
-    /// Form of a face (the index of its section), µm, positive along +z; Re Σ c e^{+inα} over the part's angle α.
-    FaceForm(usize),
-    /// Error motion along the axis, µm.
-    Z,
-    /// Face error motion: that along the axis at a place of the face, z − ρ·(tilt towards the place), µm.
-    FaceMotion(FacePlace),
-}
-
-impl Quantity {
-    /// Its id in files.
-    #[must_use]
-    pub fn id(self) -> &'static str {
-        match self {
-            Self::Form(_) => "form",
-            Self::X => "x",
-            Self::Y => "y",
-            Self::TiltX => "tilt_x",
-            Self::TiltY => "tilt_y",
-            Self::Along(_) => "along",
-            Self::TiltAlong(_) => "tilt_along",
-            Self::FaceForm(_) => "face",
-            Self::Z => "z",
-            Self::FaceMotion(_) => "face_motion",
-        }
-    }
-
-    /// Its unit.
-    #[must_use]
-    pub fn unit(self) -> &'static str {
-        if self.is_tilt() { "urad" } else { "um" }
-    }
-
-    /// Whether it belongs to the part.
-    #[must_use]
-    pub fn is_form(self) -> bool {
-        matches!(self, Self::Form(_) | Self::FaceForm(_))
-    }
-
-    /// Index of the section that it is the form of.
-    #[must_use]
-    pub fn section(self) -> Option<usize> {
-        match self {
-            Self::Form(section) | Self::FaceForm(section) => Some(section),
-            _ => None,
-        }
-    }
-
-    /// Whether it is a motion along the axis.
-    #[must_use]
-    pub fn is_axial(self) -> bool {
-        matches!(self, Self::Z | Self::FaceMotion(_))
-    }
-
-    /// Whether it is a tilt of the axis.
-    #[must_use]
-    pub fn is_tilt(self) -> bool {
-        matches!(self, Self::TiltX | Self::TiltY | Self::TiltAlong(_))
-    }
-
-    /// Whether it is a displacement of the axis across itself.
-    #[must_use]
-    pub fn is_shift(self) -> bool {
-        matches!(self, Self::X | Self::Y | Self::Along(_))
-    }
-
-    /// The line along which it is, where that is neither x nor y.
-    #[must_use]
-    pub fn azimuth(self) -> Option<Azimuth> {
-        match self {
-            Self::Along(azimuth) | Self::TiltAlong(azimuth) => Some(azimuth),
-            _ => None,
-        }
-    }
-
-    /// The tilt that changes this displacement along z, and its factor: x(z) = X + z·E_y, y(z) = Y − z·E_x.
-    #[must_use]
-    pub fn moved_by_tilt(self) -> Option<(Self, f64)> {
-        match self {
-            Self::X => Some((Self::TiltY, 1.0)),
-            Self::Y => Some((Self::TiltX, -1.0)),
-            Self::Along(azimuth) => Some((Self::TiltAlong(azimuth), 1.0)),
-            _ => None,
-        }
-    }
-
-    /// What a unit of it is in [x, y, tilt about x, tilt about y]; zeros of a form and of a motion along the axis.
-    #[must_use]
-    pub fn cartesian(self) -> [f64; 4] {
-        match self {
-            Self::Form(_) | Self::FaceForm(_) | Self::Z | Self::FaceMotion(_) => [0.0; 4],
-            Self::X => [1.0, 0.0, 0.0, 0.0],
-            Self::Y => [0.0, 1.0, 0.0, 0.0],
-            Self::TiltX => [0.0, 0.0, 1.0, 0.0],
-            Self::TiltY => [0.0, 0.0, 0.0, 1.0],
-            Self::Along(azimuth) => {
-                let (sine, cosine) = azimuth.radians().sin_cos();
-                [cosine, sine, 0.0, 0.0]
-            }
-            Self::TiltAlong(azimuth) => {
-                let (sine, cosine) = azimuth.radians().sin_cos();
-                [0.0, 0.0, -sine, cosine]
-            }
-        }
-    }
-}
-
-/// A motion as tables give it, one column of values and one of their standard uncertainty, `std_…`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MotionColumn {
-    /// What it holds.
-    pub quantity: Quantity,
-    /// Name of the column.
-    pub name: &'static str,
-    /// What it is, in words.
-    pub about: String,
-}
-
-/// Name of the column that holds the line of `along_um` and `tilt_along_urad`, its unit, and what it is.
-pub const ALONG_COLUMN: (&str, &str, &str) =
-    ("along_deg", "deg", "the line of along_um and tilt_along_urad: its angle from x towards y");
-
-/// Columns of motion: those of x, y and the tilts about them always, those along a line where motion is known there only, and that
-/// along the axis where the rig has an axial sensor.
-#[must_use]
-pub fn motion_columns(line: Option<Azimuth>, axial: bool) -> Vec<MotionColumn> {
-    let column = |quantity, name, about: &str| MotionColumn { quantity, name, about: about.into() };
-    let mut columns = vec![
-        column(Quantity::X, "x_um", "error motion along x"),
-        column(Quantity::Y, "y_um", "error motion along y"),
-        column(Quantity::TiltX, "tilt_x_urad", "tilt about x, right-handed"),
-        column(Quantity::TiltY, "tilt_y_urad", "tilt about y, right-handed"),
-    ];
-    if let Some(line) = line {
-        let along = format!("error motion along {line} from x towards y; across it no motion is observable");
-        let tilt = format!("tilt towards {line} from x towards y: points at z > 0 move along the line");
-        columns.push(column(Quantity::Along(line), "along_um", &along));
-        columns.push(column(Quantity::TiltAlong(line), "tilt_along_urad", &tilt));
-    }
-    if axial {
-        columns.push(column(Quantity::Z, "z_um", "error motion along the axis, without its mean level"));
-    }
-    columns
-}
 
 /// What a separator can and cannot tell with a rig, before any data.
 #[derive(Debug, Clone, PartialEq)]
@@ -399,36 +238,55 @@ impl Separation {
         (0..=self.max_order()).map(|order| student_95(self.degrees_of_freedom(order) as f64) / NORMAL_95).collect()
     }
 
-    /// Motions of one equivalent go together: the sum of their distances' products, scaled to the largest square of each.
+    /// The weighted mean of the equivalents' covariance of motions, and what they differ by.
     fn mix_motion_covariance(&mut self, weights: &[f64], equivalents: &[Self]) {
-        let width = self.unknowns.len();
-        let motions: Vec<usize> = (0..width).filter(|unknown| !self.unknowns[*unknown].is_form()).collect();
-        let Some(joint) = &mut self.motion_covariance else { return };
+        let Some(mut joint) = self.motion_covariance.take() else { return };
         for (index, entry) in joint.iter_mut().enumerate() {
             let of = |one: &Self| one.motion_covariance.as_ref().and_then(|joint| joint.get(index)).copied();
             *entry = weights.iter().zip(equivalents).map(|(weight, one)| of(one).unwrap_or_default() * *weight).sum();
         }
-        let blocks = joint.chunks_exact_mut((motions.len() * motions.len()).max(1));
-        for (block, order) in blocks.zip(0..) {
-            let distances = |motion: usize| {
-                let index = order * width + motions[motion];
-                self.equivalents.iter().map(move |distance| distance[index])
-            };
+        joint.iter_mut().zip(self.undecided_motion()).for_each(|(entry, undecided)| *entry += undecided);
+        self.motion_covariance = Some(joint);
+    }
+
+    /// What the equivalents add to the covariance of motions, `[order][motion][motion]`: motions of one equivalent go together, so it
+    /// is the sum of their distances' products, scaled to the largest square of each.
+    fn undecided_motion(&self) -> Vec<Complex64> {
+        let width = self.unknowns.len();
+        let motions: Vec<usize> = (0..width).filter(|unknown| !self.unknowns[*unknown].is_form()).collect();
+        let mut products = Vec::with_capacity((self.max_order() + 1) * motions.len() * motions.len());
+        for order in 0..=self.max_order() {
+            let distances =
+                |motion: usize| self.equivalents.iter().map(move |distance| distance[order * width + motion]);
             let scale = |motion: usize| {
                 let sum: f64 = distances(motion).map(|distance| distance.norm_sqr()).sum();
                 if sum > 0.0 { (largest(distances(motion)) / sum).sqrt() } else { 0.0 }
             };
-            for row in 0..motions.len() {
-                for column in 0..motions.len() {
-                    let products = distances(row).zip(distances(column)).map(|(a, b)| a * b.conj());
-                    let sum: Complex64 = products.sum();
-                    let factor = scale(row) * scale(column);
-                    if factor > 0.0 {
-                        block[row * motions.len() + column] += sum * factor;
-                    }
+            for row in &motions {
+                for column in &motions {
+                    let sum: Complex64 = distances(*row).zip(distances(*column)).map(|(a, b)| a * b.conj()).sum();
+                    let factor = scale(*row) * scale(*column);
+                    products.push(if factor > 0.0 { sum * factor } else { Complex64::ZERO });
                 }
             }
         }
+        products
+    }
+
+    /// The same estimates with the covariance of motions that comes from noise alone, and each of the equivalents with it: what the data
+    /// do not decide adds to no range, as noise does.
+    #[must_use]
+    pub fn decided(&self) -> (Self, Vec<Self>) {
+        let mut own = Self { equivalents: Vec::new(), ..self.clone() };
+        if let Some(joint) = &mut own.motion_covariance {
+            joint.iter_mut().zip(self.undecided_motion()).for_each(|(entry, undecided)| *entry -= undecided);
+        }
+        let moved = |distance: &Vec<Complex64>| {
+            let estimate = own.estimate.iter().zip(distance).map(|(value, distance)| value + distance).collect();
+            Self { estimate, ..own.clone() }
+        };
+        let equivalents = self.equivalents.iter().map(moved).collect();
+        (own, equivalents)
     }
 
     /// Variance of the harmonics `[order]` of one unknown that comes from noise alone, without what the data do not decide.

@@ -4,6 +4,7 @@
 //! as a part measured on a spindle. Traces that are not used test the surface: it has to predict them.
 
 mod circle;
+mod config;
 mod model;
 mod predict;
 mod robust;
@@ -13,8 +14,9 @@ mod shape;
 
 use runout_core::pipeline::registry::{Plugin, Registry};
 
+pub use config::LeastSquaresCylinderConfig;
 pub use predict::Prediction;
-pub use separate::{COLUMNS, LeastSquaresCylinder, LeastSquaresCylinderConfig};
+pub use separate::{COLUMNS, LeastSquaresCylinder};
 pub use shape::Cylinder;
 
 /// Adds the separator `least-squares-cylinder`.

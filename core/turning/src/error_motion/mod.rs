@@ -92,13 +92,35 @@ const RESIDUAL: &str = "residual-synchronous";
 /// End of the symbols of total values with 1/rev. Their centre is that of the polar chart: any other moves with 1/rev.
 pub const WITH_FUNDAMENTAL: &str = "-with-fundamental";
 
+/// The ends of a range are looked for on so many times the angles of the average: 16 to a wave of its highest order or more, so that a
+/// crest between two of them is at most 0.5 % higher, and one of a tenth of that order 5e-5.
+const FINER: usize = 8;
+
 /// Shares of noise below this, in µm or µrad, are not said: they would be written as 0.
 const SAID: f64 = 5e-4;
 
 impl ErrorMotion<'_> {
-    /// All values, about each of these centres; none without a spread over turns.
+    /// All values, about each of these centres; none without a spread over turns. Where the data do not decide between separations,
+    /// those of their mean, with an uncertainty that reaches as far as those of each.
     #[must_use]
     pub fn values(&self, centres: &[Centre]) -> Vec<Value> {
+        if self.separation.equivalents.is_empty() {
+            return self.decided_values(centres);
+        }
+        let (own, equivalents) = self.separation.decided();
+        let of = |separation| ErrorMotion { separation, ..*self }.decided_values(centres);
+        let equivalents: Vec<Vec<Value>> = equivalents.iter().map(of).collect();
+        let mut values = of(&own);
+        for value in &mut values {
+            let same = |other: &&Value| other.symbol == value.symbol && other.reference == value.reference;
+            let others = equivalents.iter().filter_map(|all| all.iter().find(same));
+            let others: Vec<f64> = others.map(|other| other.value).collect();
+            value.uncertainty = value.uncertainty.take().map(|known| known.with_equivalents(value.value, &others));
+        }
+        values
+    }
+
+    fn decided_values(&self, centres: &[Centre]) -> Vec<Value> {
         let spreads: Vec<&Spread> = self.profiles.iter().filter_map(|profile| profile.spread.as_ref()).collect();
         let Some(first) = spreads.first() else { return Vec::new() };
         let z_mm = first.projection.z_mm + self.z_mm;
@@ -141,10 +163,16 @@ impl ErrorMotion<'_> {
         spreads: &[&Spread],
     ) -> Option<Vec<Value>> {
         let points = RefCell::new(Points::default());
-        let angles = Angles::equal(self.angles);
-        let drawn = plot.over_angle(&angles);
-        let place = centre.of(&angles, &drawn, &mut points.borrow_mut())?;
-        let seen = seen_from(place, &angles, &drawn);
+        let seen_on = |count: usize| {
+            let angles = Angles::shared(count);
+            let drawn = plot.over_angle(&angles);
+            let place = centre.of(&angles, &drawn, &mut points.borrow_mut())?;
+            Some(seen_from(place, &angles, &drawn))
+        };
+        let angles = Angles::shared(self.angles);
+        let (seen, finely) = (seen_on(self.angles)?, seen_on(FINER * self.angles)?);
+        // Draws on fewer angles tell the error as well, not the range: its ends lie between those angles.
+        let between = ront_lsci_um(&finely) - ront_lsci_um(&seen);
         let seed = uncertainty::seed(&[self.station, id(direction), centre.symbol()]);
         let values = |plot: &[f64]| {
             if centre.is_linear() {
@@ -164,13 +192,12 @@ impl ErrorMotion<'_> {
                 }
                 None => found.map(|found| (found, 0.0, None)),
             };
+        let range = range + between;
+        let range_known = range_known.map(|known| known.moved(between));
         let (mut all, mut each, mut each_rms) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new(), Vec::new());
         for spread in spreads {
-            let angles = Angles::equal(spread.angles);
-            let drawn = plot.over_angle(&angles);
-            let place = centre.of(&angles, &drawn, &mut points.borrow_mut())?;
-            let seen = seen_from(place, &angles, &drawn);
-            let (inner, outer) = of_all_turns(&seen, spread.in_direction(direction)?);
+            let other = if spread.angles == self.angles { None } else { Some(seen_on(FINER * spread.angles)?) };
+            let (inner, outer) = of_all_turns(other.as_ref().unwrap_or(&finely), spread.in_direction(direction)?);
             all = (all.0.min(inner), all.1.max(outer));
             each.push(outer - inner);
             each_rms.push(rms.hypot(spread.rms(direction)?));
@@ -233,7 +260,7 @@ impl ErrorMotion<'_> {
     ) -> Option<Value> {
         let (mut all, mut each) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new());
         for spread in spreads {
-            let drawn = plot.over_angle(&Angles::equal(spread.angles));
+            let drawn = plot.over_angle(&Angles::shared(FINER * spread.angles));
             let (inner, outer) = of_all_turns(&drawn, spread.in_direction(direction)?);
             all = (all.0.min(inner), all.1.max(outer));
             each.push(outer - inner);
@@ -419,11 +446,17 @@ fn widest(spread: &Spread, direction: Direction) -> f64 {
     low.iter().zip(high).map(|(low, high)| high - low).fold(0.0, f64::max)
 }
 
-/// Lowest and highest of all turns about a plot, from the lowest and the highest turn less the mean.
+/// Lowest and highest of all turns about a plot, from the lowest and the highest turn less the mean: on as many angles as the plot or
+/// on fewer, and then straight from one angle to the next.
 fn of_all_turns(plot: &[f64], (low, high): (&[f64], &[f64])) -> (f64, f64) {
-    let turns = plot.iter().zip(low).zip(high);
-    turns.fold((f64::INFINITY, f64::NEG_INFINITY), |(inner, outer), ((value, low), high)| {
-        (inner.min(value + low), outer.max(value + high))
+    let finer = plot.len() / low.len().max(1);
+    let at = |turns: &[f64], point: usize| {
+        let (before, along) = (point / finer, (point % finer) as f64 / finer as f64);
+        turns[before] + along * (turns[(before + 1) % turns.len()] - turns[before])
+    };
+    let turns = plot.iter().take(finer * low.len()).enumerate();
+    turns.fold((f64::INFINITY, f64::NEG_INFINITY), |(inner, outer), (point, value)| {
+        (inner.min(value + at(low, point)), outer.max(value + at(high, point)))
     })
 }
 

@@ -7,6 +7,7 @@ mod drift;
 mod fit;
 mod lines;
 mod mistakes;
+mod remainder;
 mod rig_keys;
 mod said;
 mod solved;

@@ -42,7 +42,7 @@ use runout_core::{
 
 pub use config::{
     AsynchronousConfig, AxialLineConfig, EccentricityConfig, FaceConfig, FormConfig, FormHarmonic, Geometry,
-    LineConfig, MotionConfig, MotionHarmonic, NoiseConfig, Orders, Phase, RecordingConfig, SampleFormat, SpindleConfig,
+    LineConfig, MotionConfig, MotionHarmonic, NoiseConfig, Orders, Phase, RecordingConfig, SampleFormat, Scenario,
     StationsConfig, TiltHarmonic,
 };
 pub use effects::{
@@ -54,6 +54,9 @@ pub use effects::{
 pub use recording::SpindleRecording;
 
 use world::World;
+
+/// `plugin = "spindle"` of a scenario.
+pub type SpindleConfig = Scenario<Effect>;
 
 /// Computes recordings of a turned part on a spindle.
 #[derive(Debug)]
@@ -70,7 +73,11 @@ pub fn simulator(config: &SpindleConfig) -> std::result::Result<SpindleSimulator
     if i64::try_from(config.seed).is_err() {
         return Err(Fault::at("seed", format!("expected a seed up to {}, found {}", i64::MAX, config.seed)));
     }
-    let world = World::new(config)?;
+    let mut world = World::new(config)?;
+    for (index, effect) in config.effect.iter().enumerate() {
+        effect.apply(&mut world, index).map_err(|fault| fault.under_item("effect", index))?;
+    }
+    let world = world.completed()?;
     let text = toml::to_string(config).map_err(|error| Fault::here(format!("the scenario cannot be told: {error}")))?;
     Ok(SpindleSimulator { world, scenario: format!("plugin = \"{}\"\n{text}", SpindleConfig::NAME) })
 }

@@ -11,7 +11,7 @@ use super::{
     asynchronous::Asynchronous,
     chain::{Chain, Converter},
     check,
-    config::{Geometry, Phase, SpindleConfig, StationsConfig},
+    config::{Geometry, Phase, Scenario, StationsConfig},
     face,
     form::Form,
     geometry::Reach,
@@ -88,7 +88,8 @@ const MOST_STATIONS: usize = 1_000_000;
 const MOST_PARTS: usize = 4_096;
 
 impl World {
-    pub fn new(config: &SpindleConfig) -> Result<Self, Fault> {
+    /// Without effects.
+    pub fn new<E>(config: &Scenario<E>) -> Result<Self, Fault> {
         let rig = config.rig.clone().check().map_err(|fault| fault.under("rig"))?;
         if rig.sensors.len() > MOST_PARTS || rig.setups.len() > MOST_PARTS {
             return Err(Fault::at("rig", format!("more than {MOST_PARTS} sensors or setups cannot be simulated")));
@@ -147,7 +148,7 @@ impl World {
                 pole: phase(&mut stream(config.seed, Purpose::Pole, Place { setup: index, ..Place::default() })),
             }
         });
-        let mut world = Self {
+        Ok(Self {
             seed: config.seed,
             geometry: config.geometry,
             radius_um: 1e3 * rig.part_radius_mm,
@@ -166,20 +167,21 @@ impl World {
             setups: setups.collect(),
             steps: 0,
             rig,
-        };
-        for (index, effect) in config.effect.iter().enumerate() {
-            effect.apply(&mut world, index).map_err(|fault| fault.under_item("effect", index))?;
-        }
-        let reach = world.reach();
-        if world.geometry == Geometry::Exact && !reach.fits(world.radius_um) {
+        })
+    }
+
+    /// The world after the last change to it.
+    pub fn completed(mut self) -> Result<Self, Fault> {
+        let reach = self.reach();
+        if self.geometry == Geometry::Exact && !reach.fits(self.radius_um) {
             let message = format!(
                 "the axis moves by up to {:.0} µm and the form has up to {:.0} µm and {:.0} µm/rad: too much for a radius of {:.0} µm",
-                reach.displacement, reach.form, reach.slope, world.radius_um
+                reach.displacement, reach.form, reach.slope, self.radius_um
             );
             return Err(Fault::at("rig", message).help("displacement and form may reach a tenth of the radius"));
         }
-        world.steps = reach.steps(world.radius_um);
-        Ok(world)
+        self.steps = reach.steps(self.radius_um);
+        Ok(self)
     }
 
     /// The first order that the sampling cannot carry.
