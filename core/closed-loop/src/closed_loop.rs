@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    Effect, Fit, Model, Setting,
+    Effect, Fit, Model, Remainder, Setting,
     confounded::choices,
     diagnosis::{Diagnosis, Refused},
     evidence::{Evidence, agreement},
@@ -282,8 +282,7 @@ impl<M: Model> Tracing<'_, M> {
         for (effect, gain) in ranked.into_iter().take(SHORTLIST.0).filter(|(_, gain)| *gain >= promising) {
             let parameters = self.model.effects()[effect].parameters.len();
             let evidence = |after: f64| {
-                let dof = before.dof.saturating_sub(parameters);
-                Evidence::new(before.chi2(), after, parameters.max(1), dof, count, before.noise_is_known())
+                self.evidence(effect, before.chi2(), after, &before, before.dof.saturating_sub(parameters), count)
             };
             // What promises nothing to first order is not worth a refit.
             if evidence(before.chi2() - gain).p_value > 0.05 {
@@ -351,6 +350,23 @@ impl<M: Model> Tracing<'_, M> {
             alone.push(refit.settings.last().map(|setting| setting.values.clone()).unwrap_or_default());
         }
         Some(Found { members, alone, values, std, evidence, before, after })
+    }
+
+    /// Evidence for an effect, of χ² without and with it, by what is known of the noise.
+    pub(super) fn evidence(
+        &self,
+        effect: usize,
+        without: f64,
+        with: f64,
+        remainder: &Remainder,
+        dof: usize,
+        count: usize,
+    ) -> Evidence {
+        let parameters = self.model.effects()[effect].parameters.len().max(1);
+        if remainder.noise_is_known() && self.model.is_seen_besides(effect) {
+            return Evidence::seen_besides(without, with, parameters, dof, count);
+        }
+        Evidence::new(without, with, parameters, dof, count, remainder.noise_is_known())
     }
 
     /// Keeps the last reason for which an effect was refused.

@@ -29,14 +29,30 @@ impl Evidence {
     ) -> Self {
         let left = after / dof.max(1) as f64;
         let unit = if noise_is_known { left.max(1.0) } else { left };
-        let gain = (before - after).max(0.0) / unit.max(f64::MIN_POSITIVE);
+        Self::in_units_of(unit, before - after, parameters, [(dof + parameters) as f64, dof as f64], candidates)
+    }
+
+    /// The same of an effect that data show which nothing else bears on, and whose noise is known ([`Model::is_seen_besides`]): what the
+    /// larger model leaves of all other data says nothing of it.
+    ///
+    /// [`Model::is_seen_besides`]: crate::Model::is_seen_besides
+    #[must_use]
+    pub fn seen_besides(before: f64, after: f64, parameters: usize, dof: usize, candidates: usize) -> Self {
+        Self::in_units_of(1.0, before - after, parameters, [(dof + parameters) as f64, KNOWN], candidates)
+    }
+
+    fn in_units_of(unit: f64, lowered: f64, parameters: usize, [data, dof]: [f64; 2], candidates: usize) -> Self {
+        let gain = lowered.max(0.0) / unit.max(f64::MIN_POSITIVE);
         let count = parameters as f64;
         Self {
-            delta_bic: count * ((dof + parameters) as f64).ln() - gain,
-            p_value: (f_tail(gain / count, count, dof as f64) * candidates as f64).min(1.0),
+            delta_bic: count * data.ln() - gain,
+            p_value: (f_tail(gain / count, count, dof) * candidates as f64).min(1.0),
         }
     }
 }
+
+/// Degrees of freedom of a noise that is known.
+const KNOWN: f64 = 1e6;
 
 /// Chance that independent data (`stretches` of the residual) agree so well on an effect that is not there; `None` where there are
 /// too few of them to tell. `columns` are the effect's signature, orthonormal.

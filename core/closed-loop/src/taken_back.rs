@@ -3,7 +3,6 @@
 use super::{
     Fit, Model, Remainder,
     closed_loop::Tracing,
-    evidence::Evidence,
     fit::{Refit, refit},
     found::Found,
     judgement::{BIC_LIMIT, P_LIMIT, excess, may_leave, unit},
@@ -29,8 +28,8 @@ impl<M: Model> Tracing<'_, M> {
             }
             let without = current.settings.iter().filter(|other| other.effect != setting.effect).cloned().collect();
             let Ok(without) = refit(model, without, self.settings.known.len()) else { continue };
-            let (count, known) = (self.considered().len(), remainder.noise_is_known());
-            let evidence = Evidence::new(without.chi2, current.chi2, setting.values.len(), remainder.dof, count, known);
+            let count = self.considered().len();
+            let evidence = self.evidence(setting.effect, without.chi2, current.chi2, remainder, remainder.dof, count);
             if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
                 return Some((index, without));
             }
@@ -41,14 +40,16 @@ impl<M: Model> Tracing<'_, M> {
     /// Takes back the effects that took only a part of what something unknown does. Says whether there were any.
     pub(super) fn drop_the_least_bad(&mut self) -> bool {
         let effects = self.model.effects();
-        self.keep(|found| excess(&found.after) <= may_leave(effects, found))
+        let model = self.model;
+        self.keep(|found| seen_besides(model, found) || excess(&found.after) <= may_leave(effects, found))
     }
 
     /// Takes back the effects beside which what is left in the end is no small part, though it may be noise: a small stranger
     /// lets the least bad effect take a part, a small effect leaves nothing.
     pub(super) fn drop_partial(&mut self, last: &Remainder) -> bool {
         let (effects, left) = (self.model.effects(), excess(last));
-        self.keep(|found| left <= may_leave(effects, found))
+        let model = self.model;
+        self.keep(|found| seen_besides(model, found) || left <= may_leave(effects, found))
     }
 
     /// Takes back the others. Says whether there were any.
@@ -67,4 +68,9 @@ impl<M: Model> Tracing<'_, M> {
         self.found = kept;
         !dropped.is_empty()
     }
+}
+
+/// Whether other data show it: then it is no part of what stays unexplained.
+fn seen_besides<M: Model>(model: &M, found: &Found) -> bool {
+    model.is_seen_besides(found.members[0])
 }

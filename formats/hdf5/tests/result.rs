@@ -78,6 +78,7 @@ pub fn summary() -> Summary {
             residual_rms_um: None,
             expected_residual_rms_um: None,
             chi2_per_dof: None,
+            residual_dof: None,
             residual_orders: None,
             truth: None,
             warnings: vec!["left out 3 points".into()],

@@ -295,6 +295,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         residual_rms_um: None,
         expected_residual_rms_um: None,
         chi2_per_dof: None,
+        residual_dof: None,
         residual_orders: None,
         truth: None,
         warnings: Vec::new(),

@@ -27,6 +27,8 @@ pub struct Alterations {
     pub rotation_reversed: bool,
     /// Whether the part's angles count the other way than declared.
     pub part_angles_reversed: bool,
+    /// Whether the sensors' angles do.
+    pub sensor_angles_reversed: bool,
     /// Whether motion keeps the sign of even orders, where the separator assumes otherwise.
     pub even_order_motion: bool,
     /// Whether geometry is exact, where the separator leaves it linear.
@@ -38,6 +40,8 @@ pub struct Alterations {
 pub struct SensorAlteration {
     /// −1 where readings have the opposite sign to that declared, else +1.
     pub sign: f64,
+    /// Whether it stands half a turn from the declared angle.
+    pub opposite: bool,
     /// Relative gain less 1.
     pub gain: f64,
     /// True less declared angle, in rad.
@@ -111,6 +115,18 @@ impl Harmonic {
 }
 
 impl Alterations {
+    /// Whether a sign, a channel, a setup or a way of counting angles is not as declared.
+    #[must_use]
+    pub fn are_mistakes(&self) -> bool {
+        let moved = |places: &[usize]| places.iter().enumerate().any(|(place, declared)| place != *declared);
+        self.rotation_reversed
+            || self.part_angles_reversed
+            || self.sensor_angles_reversed
+            || self.sensors.iter().any(|sensor| sensor.sign < 0.0 || sensor.opposite)
+            || moved(&self.places)
+            || moved(&self.clampings)
+    }
+
     /// Whether all values are such that readings can be taken back to displacements.
     #[must_use]
     pub fn are_possible(&self) -> bool {
@@ -146,6 +162,7 @@ impl SensorAlteration {
     /// A sensor as declared.
     pub const NONE: Self = Self {
         sign: 1.0,
+        opposite: false,
         gain: 0.0,
         angle_rad: 0.0,
         z_mm: 0.0,

@@ -1,7 +1,7 @@
 //! The layout of a rig: which combination of form and motion each sensor reads in each setup, one order at a time.
 
 use std::{
-    f64::consts::{FRAC_PI_2, TAU},
+    f64::consts::{FRAC_PI_2, PI, TAU},
     sync::Arc,
 };
 
@@ -71,6 +71,8 @@ pub struct Reading {
     pub angle_rad: f64,
     /// θ' − β: where on the part it looks at spindle angle 0, in rad.
     pub part_angle_rad: f64,
+    /// σ: by how much all sensors are turned in the setup, in rad.
+    pub turned_rad: f64,
     /// Which way the sensor looks.
     pub view: View,
     /// z minus the sensors' mean z, in mm; of an axial sensor −ρ: what a tilt towards the sensor moves it by.
@@ -118,6 +120,7 @@ impl Layout {
                     section: sensor.section,
                     angle_rad,
                     part_angle_rad: angle_rad - clamping.part_rad,
+                    turned_rad: clamping.sensors_rad,
                     view: match sensor.axial_radius_mm {
                         None => View::Radial,
                         Some(radius_mm) if radius_mm > 0.0 => View::Axial,
@@ -230,11 +233,19 @@ impl Layout {
             reading.lever_mm = declared.lever_mm;
             reading.angle_rad = declared.angle_rad;
             reading.part_angle_rad = declared.part_angle_rad;
+            reading.turned_rad = declared.turned_rad;
             if alterations.part_angles_reversed {
                 // θ' + β for θ' − β.
                 reading.part_angle_rad = 2.0 * reading.angle_rad - reading.part_angle_rad;
             }
-            let turned = sensor.angle_rad + setup.sensors_rad;
+            if alterations.sensor_angles_reversed {
+                // −θ + σ for θ + σ.
+                let angle_rad = reading.angle_rad - reading.turned_rad;
+                reading.angle_rad -= 2.0 * angle_rad;
+                reading.part_angle_rad -= 2.0 * angle_rad;
+            }
+            let opposite = if sensor.opposite { PI } else { 0.0 };
+            let turned = sensor.angle_rad + setup.sensors_rad + opposite;
             reading.angle_rad += turned;
             reading.part_angle_rad += turned - setup.part_rad;
             if !reading.view.is_axial() {

@@ -93,6 +93,7 @@ fn summary(stations: usize) -> Summary {
             residual_rms_um: Some(0.0066 + 1e-4 * index as f64),
             expected_residual_rms_um: Some(0.0065),
             chi2_per_dof: Some(1.02),
+            residual_dof: None,
             residual_orders: None,
             truth: Some(MotionTruth {
                 z_rms_error_um: None,

@@ -16,6 +16,7 @@ use crate::{
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_error::{Error, Result};
+use runout_numerics::statistics::f_tail;
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
 use runout_turning::{
@@ -25,8 +26,11 @@ use runout_turning::{
     surface::{Surface, SurfaceBuilder},
 };
 
-/// χ² per degree of freedom above which a run warns: chance and coarse covariances stay well below it.
-const MISFIT_CHI2: f64 = 4.0;
+/// Chance of the residuals of all stations of a sound rig below which a run warns.
+const MISFIT_CHANCE: f64 = 1e-5;
+/// Degrees of freedom from which noise is known, at least, however few the residual has: asynchronous motion of low frequency makes the
+/// noise at one order scatter as if it came from so few.
+const LEAST_FREEDOM: f64 = 8.0;
 
 /// What a surface over all sections is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -295,9 +299,17 @@ fn begun(pipeline: &Pipeline) -> Summary {
     }
 }
 
+/// Whether a station's residual is above its noise by more than chance: an F test of χ² per degree of freedom, in which the noise is
+/// taken as known no better than the residual, from as many degrees of freedom.
+fn is_misfit(station: &StationSummary, stations: usize) -> bool {
+    let (Some(chi2), Some(dof)) = (station.chi2_per_dof, station.residual_dof) else { return false };
+    let dof = dof as f64;
+    f_tail(chi2, dof, dof.max(LEAST_FREEDOM)) * (stations as f64) < MISFIT_CHANCE
+}
+
 /// What a rig that is not as declared looks like: a residual far above what the noise lets expect.
 fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
-    let beyond = stations.iter().filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > MISFIT_CHI2));
+    let beyond = stations.iter().filter(|station| is_misfit(station, stations.len()));
     let count = beyond.clone().count();
     let worst =
         beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;

@@ -137,6 +137,9 @@ pub struct StationSummary {
     pub expected_residual_rms_um: Option<f64>,
     /// Weighted residual per degree of freedom.
     pub chi2_per_dof: Option<f64>,
+    /// Real degrees of freedom of the residual; absent where nothing is redundant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_dof: Option<usize>,
     /// Lowest and highest order at which a reading is redundant: those that the residual and chi squared are of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residual_orders: Option<[usize; 2]>,
@@ -268,6 +271,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),
         chi2_per_dof: known(separation.residual.chi2_per_dof),
+        residual_dof: Some(separation.residual.dof).filter(|dof| *dof > 0),
         residual_orders: separation.residual.orders,
         truth: has_motion.then(|| MotionTruth {
             x_rms_error_um: true_error(result, Quantity::X),

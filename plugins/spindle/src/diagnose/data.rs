@@ -121,6 +121,8 @@ pub struct StationData {
     /// Sensor, mean creep a turn where it is largest and its standard uncertainty, where the levels tell a drift for certain: one observation
     /// more, since a creep of one sensor can look like a motion in the averaged turn.
     pub creeps: Vec<(usize, f64, f64)>,
+    /// Covariance of the averages with the drifts that single turns show still in it.
+    unsteadied: Option<Vec<Vec<Complex64>>>,
 }
 
 /// Readings with what lost orders carry into others, and what follows from their uncertainty.
@@ -198,7 +200,9 @@ impl StationData {
         }
         let profiles = station.profiles.iter().map(steadied).collect();
         let steadied = Station { name: station.name.clone(), z_mm: station.z_mm, profiles };
-        Self::new(selection, layout, &steadied, None, Part::All, Arc::clone(seen))
+        let unsteadied = Self::new(selection, layout, station, None, Part::All, Arc::clone(seen))?.readings.covariance;
+        let steadied = Self::new(selection, layout, &steadied, None, Part::All, Arc::clone(seen))?;
+        Ok(Self { unsteadied, ..steadied })
     }
 
     /// The turns to fit and those held out, low orders only; all turns where none are held out.
@@ -261,7 +265,8 @@ impl StationData {
         });
         let Weighed { readings, weights, floor, carried } = Weighed::new(layout, selection, readings);
         let name = fit.name.clone();
-        Ok(Self { name, part, readings, held_out, weights, floor, carried, freed, seen, leaks, creeps })
+        let unsteadied = None;
+        Ok(Self { name, part, readings, held_out, weights, floor, carried, freed, seen, leaks, creeps, unsteadied })
     }
 
     /// Effects as they act on the turns fitted, or on those held out: a creep differs between setups and slows down.
@@ -296,6 +301,13 @@ impl StationData {
         self.freed(alterations).map_or(&self.readings, |freed| &freed.readings)
     }
 
+    /// The covariance of the averages where a drift that single turns show is not taken out of them: its saw-tooth is in the averages, and
+    /// belongs to their uncertainty.
+    pub fn with_drifts(&self, alterations: &Alterations) -> Option<&Vec<Vec<Complex64>>> {
+        let stays = self.creeps.iter().any(|(sensor, ..)| alterations.sensors[*sensor].creep_um == 0.0);
+        self.unsteadied.as_ref().filter(|_| stays)
+    }
+
     /// Share of the variance at an order from 1 that lost orders carry into it.
     pub fn carried(&self, order: usize, alterations: &Alterations) -> f64 {
         let carried = self.freed(alterations).map_or(&self.carried, |freed| &freed.carried);
@@ -316,12 +328,23 @@ impl StationData {
         weights.with_columns_scaled(response)
     }
 
-    /// Noise of the residual's degrees of freedom at an order from 1, as a standard deviation of weighted residuals.
-    pub fn floor_std(&self, order: usize, alterations: &Alterations) -> f64 {
-        self.freed(alterations)
-            .map_or(&self.floor, |freed| &freed.floor)
-            .get(order - 1)
-            .map_or(1.0, |square| square.sqrt())
+    /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals: `corrected` are the
+    /// readings as displacements, with their weights.
+    pub fn floor_std(
+        &self,
+        layout: &Layout,
+        alterations: &Alterations,
+        corrected: &Readings,
+        weights: &[Blocks],
+    ) -> Vec<f64> {
+        let squares = if alterations.are_mistakes() && self.weights.is_some() {
+            // Beside a wrong sign or place the fit cannot reach motion that it otherwise can.
+            floor(layout, corrected, weights)
+        } else {
+            self.freed(alterations).map_or(&self.floor, |freed| &freed.floor).clone()
+        };
+        let each = (0..self.readings.max_order).map(|index| squares.get(index).map_or(1.0, |square| square.sqrt()));
+        each.collect()
     }
 }
 

@@ -107,7 +107,7 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
         let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order).norm_sqr();
         squares += left.iter().enumerate().map(|(index, value)| value.norm_sqr() * response(index)).sum::<f64>();
         let weighted = data.weights_of(order, layout, alterations).times(&left, 1);
-        chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / data.floor_std(order, alterations).powi(2);
+        chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / solved.floor_std[order - 1].powi(2);
     }
     let expected = held_out_expected(solved, &held);
     Some(HeldOut { chi2, squares, expected })

@@ -31,6 +31,8 @@ pub(super) struct Solved {
     pub linear: Vec<Complex64>,
     /// W (I − A P) of each order from 1, over the noise of a real degree of freedom.
     pub whitened: Vec<Vec<Complex64>>,
+    /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals.
+    pub floor_std: Vec<f64>,
 }
 
 impl Shared {
@@ -42,6 +44,9 @@ impl Shared {
 impl Solved {
     pub fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
         let mut corrected = data.readings(alterations).clone();
+        if let Some(covariance) = data.with_drifts(alterations) {
+            corrected.covariance = Some(covariance.clone());
+        }
         for (number, (line, leak)) in data.seen.lines.iter().zip(&data.leaks).enumerate() {
             if alterations.lines.contains(&(number, line.row().0)) {
                 line.take_out(leak, layout, &mut corrected.mean);
@@ -61,13 +66,14 @@ impl Solved {
             axial(layout, alterations, &corrected, estimate, excess);
         });
         let count = corrected.count;
+        let floor_std = data.floor_std(layout, alterations, &corrected, &weights);
         let whitened = (1..=max_order)
             .map(|order| {
                 let system = &operators.systems[order - 1];
                 let left = leftover(&system.matrix, &operators.orders[order - 1].operator, count);
                 let mut left = weights[order - 1].times(&left, count);
                 // A real degree of freedom has half of a complex one's square.
-                let scale = std::f64::consts::SQRT_2 / data.floor_std(order, alterations);
+                let scale = std::f64::consts::SQRT_2 / floor_std[order - 1];
                 for entry in &mut left {
                     *entry *= scale;
                 }
@@ -82,7 +88,8 @@ impl Solved {
             Propagation::of(&uncertain, &operators)
         });
         let with_angles = with_angles.flatten();
-        Self { operators, alterations: altered, propagation, with_angles, estimate, corrected, linear, whitened }
+        let alterations = altered;
+        Self { operators, alterations, propagation, with_angles, estimate, corrected, linear, whitened, floor_std }
     }
 
     /// What is left of the readings, as a run states it.

@@ -21,6 +21,7 @@ impl Alterations {
             declared_signs: layout.declared_signs(),
             rotation_reversed: false,
             part_angles_reversed: false,
+            sensor_angles_reversed: false,
             axial_um: Vec::new(),
             lines: Vec::new(),
             even_order_motion: false,
@@ -54,6 +55,20 @@ impl Alterations {
                     curve.at_angles(&straight, |angle| setup.recorded_at(angle))
                 };
                 mean.iter_mut().skip(index).step_by(count).zip(harmonics).for_each(|(to, from)| *to = from);
+            }
+        }
+        self.correct_covariance(readings);
+    }
+
+    /// E[δ δᴴ] of displacements: that of the readings over what they respond with.
+    fn correct_covariance(&self, readings: &mut Readings) {
+        let sensors = self.sensors.len();
+        for matrices in readings.covariance.iter_mut().flatten() {
+            for (order, matrix) in matrices.chunks_exact_mut(sensors * sensors).enumerate() {
+                let responses: Vec<Complex64> = self.sensors.iter().map(|sensor| sensor.response(order)).collect();
+                for (row, one) in matrix.chunks_exact_mut(sensors).zip(&responses) {
+                    row.iter_mut().zip(&responses).for_each(|(entry, other)| *entry /= one * other.conj());
+                }
             }
         }
     }

@@ -1,7 +1,10 @@
 //! Mistakes in the rig file: the recording is sound, and channels, setups or signs are not where the file says. Each is there or
 //! not, so that it has no parameters, and all are tried before any other effect.
 
-use runout_core::{Complex64, rig::Rig};
+use runout_core::{
+    Complex64,
+    rig::{Rig, Sensor},
+};
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
 
@@ -10,6 +13,8 @@ use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
 pub enum Mistake {
     /// A reading has the opposite sign.
     SensorSign,
+    /// A sensor stands on the other side of the part, half a turn from its angle.
+    SensorOpposite,
     /// Two channels hold each other's signals.
     SensorsSwapped,
     /// The second of two channels holds the signal of the first.
@@ -22,16 +27,20 @@ pub enum Mistake {
     RotationReversed,
     /// The part's angles count the other way.
     PartAngleSign,
+    /// The sensors' angles count the other way.
+    SensorAnglesSign,
 }
 
 impl Mistake {
     /// All of them, the more frequent ones first.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::SensorSign,
+        Self::SensorOpposite,
         Self::SetupsSwapped,
         Self::SensorsSwapped,
         Self::PartAngleSign,
         Self::RotationReversed,
+        Self::SensorAnglesSign,
         Self::SetupRepeated,
         Self::SensorsIdentical,
     ];
@@ -41,12 +50,14 @@ impl Mistake {
     pub fn id(self) -> &'static str {
         match self {
             Self::SensorSign => "sensor-sign",
+            Self::SensorOpposite => "sensor-opposite",
             Self::SensorsSwapped => "sensors-swapped",
             Self::SensorsIdentical => "sensors-identical",
             Self::SetupsSwapped => "setups-swapped",
             Self::SetupRepeated => "setup-repeated",
             Self::RotationReversed => "rotation-reversed",
             Self::PartAngleSign => "part-angle-sign",
+            Self::SensorAnglesSign => "sensor-angles-sign",
         }
     }
 
@@ -54,12 +65,12 @@ impl Mistake {
     #[must_use]
     pub fn acts_on(self) -> ActsOn {
         match self {
-            Self::SensorSign => ActsOn::Sensor,
+            Self::SensorSign | Self::SensorOpposite => ActsOn::Sensor,
             Self::SensorsSwapped => ActsOn::SensorPair,
             Self::SensorsIdentical => ActsOn::SensorCopy,
             Self::SetupsSwapped => ActsOn::SetupPair,
             Self::SetupRepeated => ActsOn::SetupCopy,
-            Self::RotationReversed | Self::PartAngleSign => ActsOn::Rig,
+            Self::RotationReversed | Self::PartAngleSign | Self::SensorAnglesSign => ActsOn::Rig,
         }
     }
 
@@ -69,6 +80,7 @@ impl Mistake {
         let setups = pair_of(target, alterations.setups.len());
         match self {
             Self::SensorSign => alterations.sensors[target].sign *= -1.0,
+            Self::SensorOpposite => alterations.sensors[target].opposite ^= true,
             Self::SensorsSwapped => {
                 let [first, second] = sensors;
                 alterations.places.swap(first, second);
@@ -87,6 +99,7 @@ impl Mistake {
             Self::SetupRepeated => alterations.clampings[setups[1]] = alterations.clampings[setups[0]],
             Self::RotationReversed => alterations.rotation_reversed ^= true,
             Self::PartAngleSign => alterations.part_angles_reversed ^= true,
+            Self::SensorAnglesSign => alterations.sensor_angles_reversed ^= true,
         }
     }
 
@@ -100,6 +113,18 @@ impl Mistake {
         };
         match self {
             Self::SensorSign => vec![format!("sensors.{}.sign = {}", sensors[target], -rig.sensors[target].sign)],
+            Self::SensorOpposite => {
+                let angle_deg = degrees(rig.sensors[target].angle_rad);
+                let opposite_deg = if angle_deg > 0.0 { angle_deg - 180.0 } else { angle_deg + 180.0 };
+                vec![format!("sensors.{}.angle_deg = {opposite_deg:?}", sensors[target])]
+            }
+            Self::SensorAnglesSign => {
+                let turned = rig.sensors.iter().zip(sensors).filter(|(sensor, _)| sensor.angle_rad != 0.0);
+                let key = |(sensor, place): (&Sensor, &usize)| {
+                    format!("sensors.{place}.angle_deg = {:?}", -degrees(sensor.angle_rad))
+                };
+                turned.map(key).collect()
+            }
             Self::SensorsSwapped => {
                 let pair = pair_of(target, rig.sensors.len());
                 exchanged("sensors", pair, sensors, pair.map(|sensor| rig.sensors[sensor].id.as_str()))
@@ -114,11 +139,8 @@ impl Mistake {
             }
             Self::PartAngleSign => {
                 let turned = rig.setups.iter().zip(setups).filter(|(setup, _)| setup.part_rad != 0.0);
-                let keys = turned.map(|(setup, place)| {
-                    // Degrees were converted to radians: nine decimals give them back.
-                    let degrees = (-setup.part_rad.to_degrees() * 1e9).round() / 1e9;
-                    format!("setups.{place}.part_deg = {degrees:?}")
-                });
+                let keys =
+                    turned.map(|(setup, place)| format!("setups.{place}.part_deg = {:?}", -degrees(setup.part_rad)));
                 keys.collect()
             }
         }
@@ -141,6 +163,11 @@ impl Mistake {
     }
 }
 
+/// Degrees that were converted to radians: nine decimals give them back.
+fn degrees(angle_rad: f64) -> f64 {
+    (angle_rad.to_degrees() * 1e9).round() / 1e9
+}
+
 /// The two that the target of a pair stands for: first · count + second.
 #[must_use]
 pub fn pair_of(target: usize, count: usize) -> [usize; 2] {
@@ -161,12 +188,14 @@ impl SpindleEffect for Mistake {
     fn about(&self) -> About {
         let does = match self {
             Self::SensorSign => "a mistake in the rig: a reading has the opposite sign",
+            Self::SensorOpposite => "a mistake in the rig: a sensor stands on the other side of the part",
             Self::SensorsSwapped => "a mistake in the rig: two channels are swapped",
             Self::SensorsIdentical => "a mistake in the recording: two channels hold the same signal",
             Self::SetupsSwapped => "a mistake in the rig: two setups are swapped",
             Self::SetupRepeated => "a mistake in the recording: a setup was recorded twice",
             Self::RotationReversed => "a mistake in the rig: the part turns the other way",
             Self::PartAngleSign => "a mistake in the rig: the part's angles count the other way",
+            Self::SensorAnglesSign => "a mistake in the rig: the sensors' angles count the other way",
         };
         About { id: self.id(), does, acts_on: self.acts_on(), parameters: Vec::new() }
     }

@@ -626,6 +626,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
         residual_rms_um: None,
         expected_residual_rms_um: None,
         chi2_per_dof: None,
+        residual_dof: None,
         residual_orders: None,
         truth: None,
         warnings: Vec::new(),
