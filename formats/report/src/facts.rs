@@ -11,9 +11,6 @@ use runout_core::{
 
 use crate::limits;
 
-/// χ² per degree of freedom above which the readings contradict each other.
-const MISFIT_CHI2: f64 = 4.0;
-
 /// The verdict in one sentence, and its class in the style sheet.
 pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (String, &'static str) {
     let found = diagnosis.map(|diagnosis| {
@@ -35,15 +32,15 @@ pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (Stri
 
 /// What the residual and the warnings give, where nothing is to be decided.
 fn without_limits(summary: &Summary) -> (String, &'static str) {
-    let known: Vec<f64> = summary.stations.iter().filter_map(|station| station.chi2_per_dof).collect();
-    let misfits = known.iter().filter(|chi2| **chi2 > MISFIT_CHI2).count();
+    let known = summary.stations.iter().filter(|station| station.chi2_per_dof.is_some()).count();
+    let misfits = summary.stations.iter().filter(|station| station.is_misfit(known)).count();
     let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();
     let warned = match warnings {
         0 => String::new(),
         1 => " One warning is below.".into(),
         count => format!(" {count} warnings are below."),
     };
-    let (found, class) = match (misfits, known.len()) {
+    let (found, class) = match (misfits, known) {
         (0, 0) => (String::new(), "open"),
         (0, _) => (" The residual agrees with the measured noise.".into(), "open"),
         (count, all) => {

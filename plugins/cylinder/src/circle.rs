@@ -176,17 +176,21 @@ pub struct Cleaned {
     pub max_order: usize,
 }
 
+/// With so many points to an order, half of them are redundant: fewer, and a wild point bends the fit so far that it takes its neighbours
+/// with it.
+const POINTS_AN_ORDER: usize = 4;
 /// More rounds than any circle needs; one whose borderline points alternate stops here.
 const ROUNDS: usize = 20;
 
 impl Cleaned {
     /// Sets aside points that are further from the harmonics of the others than `deviations` median absolute
     /// deviations: where the probe swings in or lifts off, dust, ringing after a scratch. Repeated until the set stays;
-    /// points may come back.
+    /// points may come back. Few points lower the highest order.
     ///
     /// # Errors
     /// What hinders the fit, in words.
     pub fn of(scan: &Scan, max_order: usize, about_mm: Option<f64>, deviations: f64) -> Result<Self, String> {
+        let max_order = max_order.min((scan.len() / POINTS_AN_ORDER).max(LOWEST_ORDER));
         let mut kept = vec![true; scan.len()];
         for round in 1.. {
             let fit = Harmonics::fit(&scan.keep(&kept), max_order, about_mm)?;
@@ -324,6 +328,18 @@ mod tests {
         assert_eq!(stretches.iter().map(|stretch| stretch.2).collect::<Vec<_>>(), [4, 1]);
         let clean = Cleaned::of(&measured(|_| 0.0), 20, None, 5.0).unwrap();
         assert_eq!(clean.left_out(), 0, "data without noise has no outliers");
+    }
+
+    /// 120 points and orders to 50: a wild point is left out, and none of the good ones.
+    #[test]
+    fn few_points_lose_a_wild_one_only() {
+        let scan = measured(|index| 0.05 * ((index * 7919 % 101) as f64 / 50.0 - 1.0));
+        let few: Vec<bool> = (0..700).map(|index| index % 6 == 0).collect();
+        let mut scan = scan.keep(&few);
+        assert_eq!(Cleaned::of(&scan, 50, None, 5.0).unwrap().left_out(), 0);
+        scan.deviation_um[60] += 30.0;
+        let cleaned = Cleaned::of(&scan, 50, None, 5.0).unwrap();
+        assert_eq!((cleaned.left_out(), cleaned.kept[60]), (1, false));
     }
 
     #[test]

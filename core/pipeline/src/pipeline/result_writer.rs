@@ -16,7 +16,6 @@ use crate::{
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_error::{Error, Result};
-use runout_numerics::statistics::f_tail;
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
 use runout_turning::{
@@ -25,12 +24,6 @@ use runout_turning::{
     rig::Rig,
     surface::{Surface, SurfaceBuilder},
 };
-
-/// Chance of the residuals of all stations of a sound rig below which a run warns.
-const MISFIT_CHANCE: f64 = 1e-5;
-/// Degrees of freedom from which noise is known, at least, however few the residual has: asynchronous motion of low frequency makes the
-/// noise at one order scatter as if it came from so few.
-const LEAST_FREEDOM: f64 = 8.0;
 
 /// What a surface over all sections is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -299,28 +292,21 @@ fn begun(pipeline: &Pipeline) -> Summary {
     }
 }
 
-/// Whether a station's residual is above its noise by more than chance: an F test of χ² per degree of freedom, in which the noise is
-/// taken as known no better than the residual, from as many degrees of freedom.
-fn is_misfit(station: &StationSummary, stations: usize) -> bool {
-    let (Some(chi2), Some(dof)) = (station.chi2_per_dof, station.residual_dof) else { return false };
-    let dof = dof as f64;
-    f_tail(chi2, dof, dof.max(LEAST_FREEDOM)) * (stations as f64) < MISFIT_CHANCE
-}
-
 /// What a rig that is not as declared looks like: a residual far above what the noise lets expect.
 fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
-    let beyond = stations.iter().filter(|station| is_misfit(station, stations.len()));
+    let beyond = stations.iter().filter(|station| station.is_misfit(stations.len()));
     let count = beyond.clone().count();
     let worst =
         beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;
     let left = worst.residual_rms_um.unwrap_or(f64::NAN);
-    let expected = worst.expected_residual_rms_um.unwrap_or(f64::NAN);
+    let (chi2, dof) = (worst.chi2_per_dof.unwrap_or(f64::NAN), worst.residual_dof.unwrap_or(0));
+    let decimals = if chi2 < 100.0 { 2 } else { 0 };
     let bridged =
         if interrupted { " (or readings go astray where its interruptions are bridged: make them wider)" } else { "" };
     Some(format!(
-        "at {count} of {} stations the readings contradict each other: the fit leaves up to {left:.4} µm rms ({}), where \
-         the noise measured over the turns lets expect {expected:.4}; something is not as the rig declares it{bridged}, and the stated \
-         uncertainties, which come from that noise alone, do not cover it",
+        "at {count} of {} stations the readings contradict each other: χ² per degree of freedom is up to {chi2:.decimals$} ({}, {dof} degrees of \
+         freedom), where noise makes 1, and the fit leaves {left:.4} µm rms; something is not as the rig declares it{bridged}, and the \
+         stated uncertainties, which come from the noise alone, do not cover it. `runout diagnose` looks for the cause",
         stations.len(),
         worst.station,
     ))

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::stage::NamedValue;
 use runout_closed_loop::diagnosis::{self, Correction};
+use runout_numerics::statistics::f_tail;
 use runout_standards::Value;
 use runout_turning::station::StationResult;
 use runout_turning::{
@@ -148,6 +149,23 @@ pub struct StationSummary {
     /// What the user should know of this station.
     pub warnings: Vec<String>,
 }
+
+impl StationSummary {
+    /// Whether the residual is above the noise by more than chance, at one of so many stations: an F test of χ² per degree of freedom, in
+    /// which the noise is taken as known no better than the residual, from as many degrees of freedom.
+    #[must_use]
+    pub fn is_misfit(&self, stations: usize) -> bool {
+        let (Some(chi2), Some(dof)) = (self.chi2_per_dof, self.residual_dof) else { return false };
+        let dof = dof as f64;
+        f_tail(chi2, dof, dof.max(LEAST_FREEDOM)) * (stations as f64) < MISFIT_CHANCE
+    }
+}
+
+/// Chance of the residuals of all stations of a sound rig below which a run warns.
+const MISFIT_CHANCE: f64 = 1e-5;
+/// Degrees of freedom from which noise is known, at least, however few the residual has: asynchronous motion of low frequency makes the
+/// noise at one order scatter as if it came from so few.
+const LEAST_FREEDOM: f64 = 8.0;
 
 /// What became of one capture's turns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
