@@ -343,8 +343,8 @@ fn what_a_rig_file_can_get_wrong() {
     };
     for (change, message, key) in [
         ((|s| s[4].radius_mm = None) as fn(&mut Vec<SensorConfig>), "needs `radius_mm`", "looks"),
-        (|s| s[4].radius_mm = Some(-3.0), "0 mm or more, found -3", "radius_mm"),
-        (|s| s[4].radius_mm = Some(f64::NAN), "0 mm or more", "radius_mm"),
+        (|s| s[4].radius_mm = Some(-3.0), "of 0 to 1000000 mm, found -3", "radius_mm"),
+        (|s| s[4].radius_mm = Some(f64::NAN), "of 0 to 1000000 mm", "radius_mm"),
         (|s| s[0].radius_mm = Some(12.0), "only an axial sensor", "radius_mm"),
         (|s| s[4].section = "near".into(), "both radially and axially", "looks"),
         (|s| s[4].form_um = Some(-1.0), "0 µm or more", "form_um"),
