@@ -25,12 +25,14 @@ pub(super) struct Solved {
     /// The same with what is not known of the setups' angles.
     pub with_angles: Option<Propagation>,
     pub estimate: Estimate,
-    /// Readings taken back to displacements.
+    /// Readings taken back to displacements, without their covariance.
     pub corrected: Readings,
     /// The same without what exact geometry adds.
     pub linear: Vec<Complex64>,
     /// W (I − A P) of each order from 1, over the noise of a real degree of freedom.
     pub whitened: Vec<Vec<Complex64>>,
+    /// What is left of the readings, as a run states it.
+    pub residual: Residual,
 }
 
 impl Shared {
@@ -82,12 +84,11 @@ impl Solved {
             Propagation::of(&uncertain, &operators)
         });
         let with_angles = with_angles.flatten();
-        Self { operators, alterations: altered, propagation, with_angles, estimate, corrected, linear, whitened }
-    }
-
-    /// What is left of the readings, as a run states it.
-    pub fn residual(&self) -> Residual {
-        residual(&self.operators, &self.corrected, &self.linear, self.propagation.as_ref())
+        let residual = residual(&operators, &corrected, &linear, propagation.as_ref());
+        // A loop holds several fits of all stations: what is not asked for again goes.
+        operators.weights = None;
+        (corrected.covariance, corrected.scatter) = (None, None);
+        Self { operators, alterations: altered, propagation, with_angles, estimate, corrected, linear, whitened, residual }
     }
 }
 
