@@ -245,6 +245,8 @@ impl RigConfig {
         if !(self.part_radius_mm.is_finite() && self.part_radius_mm > 0.0) {
             return Err(Fault::at("part_radius_mm", "the part's radius must be above 0 mm"));
         }
+        within(self.part_radius_mm, MOST_MM)
+            .map_err(|problem| Fault::at("part_radius_mm", format!("the part's radius {problem} mm")))?;
         if self.sensors.is_empty() {
             return Err(Fault::at("sensors", "a rig needs at least one sensor"));
         }
@@ -260,12 +262,8 @@ impl RigConfig {
             if sensor.id.is_empty() || !ids.insert(sensor.id.clone()) {
                 return Err(fault("id", format!("sensor ids must differ and not be empty, found `{}`", sensor.id)));
             }
-            if !sensor.angle_deg.is_finite() {
-                return Err(fault("angle_deg", "a sensor's angle must be a finite number".into()));
-            }
-            if !sensor.z_mm.is_finite() {
-                return Err(fault("z_mm", "a sensor's axial position must be a finite number".into()));
-            }
+            within(sensor.angle_deg, MOST_DEG).map_err(|problem| fault("angle_deg", format!("a sensor's angle {problem}°")))?;
+            within(sensor.z_mm, MOST_MM).map_err(|problem| fault("z_mm", format!("a sensor's axial position {problem} mm")))?;
             if sensor.section.is_empty() {
                 return Err(fault("section", "a section's id must not be empty".into()));
             }
@@ -323,12 +321,9 @@ impl RigConfig {
             if setup.id == "truth" || setup.id.contains('/') {
                 return Err(fault("id", format!("`{}` cannot name a setup: `truth` and `/` are reserved", setup.id)));
             }
-            if !setup.part_deg.is_finite() {
-                return Err(fault("part_deg", "the part's angle must be a finite number".into()));
-            }
-            if !setup.sensors_deg.is_finite() {
-                return Err(fault("sensors_deg", "the sensors' angle must be a finite number".into()));
-            }
+            within(setup.part_deg, MOST_DEG).map_err(|problem| fault("part_deg", format!("the part's angle {problem}°")))?;
+            let of_sensors = within(setup.sensors_deg, MOST_DEG);
+            of_sensors.map_err(|problem| fault("sensors_deg", format!("the sensors' angle {problem}°")))?;
             setups.push(Setup {
                 id: setup.id,
                 part_rad: setup.part_deg.to_radians(),
@@ -339,6 +334,11 @@ impl RigConfig {
         let (part_radius_mm, rotation) = (self.part_radius_mm, self.rotation);
         Ok(Rig { part_radius_mm, rotation, sensors, setups, sections, gaps, faces, form_bounds_um })
     }
+}
+
+/// Refuses a number whose size is not at most this, or that is none.
+fn within(number: f64, most: f64) -> Result<(), String> {
+    if number.abs() <= most { Ok(()) } else { Err(format!("must be a number from −{most} to {most}, found {number:e}")) }
 }
 
 impl SensorConfig {
@@ -395,10 +395,8 @@ fn gaps_of(
         let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("interruptions", index);
         let [from, to] =
             [("from_deg", interruption.from_deg), ("to_deg", interruption.to_deg)].map(|(key, angle_deg)| {
-                let known = angle_deg.is_finite().then_some(angle_deg);
-                known.ok_or_else(|| {
-                    fault(key, format!("the angle must be a finite number of degrees, found {angle_deg}"))
-                })
+                let known = within(angle_deg, MOST_DEG).map(|()| angle_deg);
+                known.map_err(|problem| fault(key, format!("the angle {problem}°")))
             });
         let length_deg = (to? - from?).rem_euclid(360.0);
         if !(length_deg > 0.0 && length_deg <= MOST_INTERRUPTED_DEG) {
@@ -435,6 +433,9 @@ const ANGLES_LOOKED_AT: usize = 3600;
 
 /// Two sensors nearer than this along z look at the same circle: a tenth of a usual spot size.
 const SAME_SECTION_MM: f64 = 0.1;
+/// Angles and lengths are at most so large, either way: a hundred turns, and a kilometre. The digits of larger ones are no part of a rig.
+const MOST_DEG: f64 = 36_000.0;
+const MOST_MM: f64 = 1e6;
 
 impl Rig {
     /// z of a section before the station's position is added, in mm: that of its first sensor.
