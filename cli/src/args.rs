@@ -114,6 +114,9 @@ pub struct DiagnoseArgs {
     /// Stations read and averaged at a time; as many as there are processors without it.
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
+    /// Memory that the loop may take, in GB, in place of `memory_gb` in [diagnose]: it holds all stations at once.
+    #[arg(long, value_name = "GB")]
+    pub memory: Option<f64>,
     /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can stand for it.
     #[arg(long, value_name = "RIG.toml")]
     pub write: Option<PathBuf>,

@@ -114,7 +114,9 @@ pub fn deny() -> Outcome {
     if answer("cargo-deny", &["--version"]).is_none() {
         run(&mut cargo(&["install", "--locked", "cargo-deny"])?)?;
     }
-    run(&mut cargo(&["deny", "check"])?)
+    // The advisories' data base is fetched; everything else works without a network.
+    run(&mut cargo(&["deny", "--offline", "check", "licenses", "bans", "sources"])?)?;
+    run(&mut cargo(&["deny", "check", "advisories"])?)
 }
 
 /// Writes schemas/ anew, and what is made from them where there is a Python.

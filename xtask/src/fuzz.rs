@@ -19,6 +19,8 @@ const LONGEST: Duration = Duration::from_secs(5);
 const ALLOWANCE_KB: u64 = 100_000;
 /// Longest text that is put in.
 const LONGEST_TEXT: u64 = 40_000;
+/// Bytes that are printed of what a program said before it panicked.
+const LONGEST_SAID: usize = 1000;
 /// Texts that configurations and tables do not expect.
 const DICTIONARY: [&str; 22] = [
     "1e308",
@@ -97,29 +99,34 @@ pub fn fuzz(words: &[&str]) -> Outcome {
         largest_kb / 1000
     ));
     if panics + aborts + hangs + large > 0 {
-        return Err(format!("the inputs are in {}", failures().display()));
+        return Err(format!("the inputs are in {}", folder(seed).join(FAILURES).display()));
     }
     Ok(())
 }
 
-fn failures() -> PathBuf {
-    target().join("fuzz/failures")
+const FAILURES: &str = "failures";
+
+/// Each seed has a folder of its own: several may run at a time.
+fn folder(seed: u64) -> PathBuf {
+    target().join(format!("fuzz/seed-{seed}"))
 }
 
 fn drive(program: &Path, inputs: u64, until: Option<Instant>, seed: u64) -> Outcome<Count> {
-    let place = target().join("fuzz/work");
+    let (place, failures) = (folder(seed).join("work"), folder(seed).join(FAILURES));
     let words = |error: std::io::Error| format!("{}: {error}", place.display());
-    let _ = fs::remove_dir_all(target().join("fuzz"));
+    let _ = fs::remove_dir_all(folder(seed));
     fs::create_dir_all(&place).map_err(words)?;
-    fs::create_dir_all(failures()).map_err(words)?;
+    fs::create_dir_all(&failures).map_err(words)?;
     let example = root().join("examples/08-text-recording");
     let text = fs::read_to_string(example.join("pipeline.toml")).map_err(words)?;
     let hdf5 = text.replace("plugin = \"csv\"", "plugin = \"hdf5\"\npath = \"shaft.h5\"");
     let dropped = ["pattern", "stations", "sample_rate_hz", "speed_rpm"];
     let hdf5 = hdf5.lines().filter(|line| dropped.iter().all(|key| !line.starts_with(key)));
     let hdf5 = hdf5.collect::<Vec<_>>().join("\n");
+    // Its names go into the recording, by which the inputs of a seed are to be the same everywhere.
+    fs::copy(example.join("scenario.toml"), place.join("scenario.toml")).map_err(words)?;
     let mut simulate = Command::new(program);
-    simulate.arg("simulate").arg(example.join("scenario.toml")).arg("--out").arg(place.join("seed.h5"));
+    simulate.args(["simulate", "scenario.toml", "--out", "seed.h5"]).current_dir(&place);
     let made = simulate.stdout(Stdio::null()).stderr(Stdio::null()).status().map_err(words)?;
     if !made.success() {
         return Err("the recording that is to be damaged cannot be made".into());
@@ -163,7 +170,9 @@ fn drive(program: &Path, inputs: u64, until: Option<Instant>, seed: u64) -> Outc
         };
         count.inputs += 1;
         let mut started = Command::new(program);
-        started.args(&arguments).current_dir(&place).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        let said = place.join("said");
+        let errors = fs::File::create(&said).map_err(words)?;
+        started.args(&arguments).current_dir(&place).stdin(Stdio::null()).stdout(Stdio::null()).stderr(errors);
         let ended = watch(started.spawn().map_err(words)?).map_err(words)?;
         let most_kb = ALLOWANCE_KB + 4 * input.len() as u64 / 1000;
         count.largest_kb = count.largest_kb.max(ended.memory_kb);
@@ -178,9 +187,11 @@ fn drive(program: &Path, inputs: u64, until: Option<Instant>, seed: u64) -> Outc
         };
         *counted += 1;
         if !name.is_empty() {
-            let kept = failures().join(format!("{name}-{}", count.inputs));
+            let kept = failures.join(format!("{name}-{}", count.inputs));
             fs::write(&kept, &input).map_err(words)?;
-            say(&format!("{name}: runout {} ({})", command.join(" "), kept.display()));
+            let said = fs::read(&said).map_err(words)?;
+            let said = String::from_utf8_lossy(&said[..said.len().min(LONGEST_SAID)]).escape_debug().to_string();
+            say(&format!("{name}: input {}, runout {} ({})\n  {said}", count.inputs, command.join(" "), kept.display()));
         }
     }
     Ok(count)

@@ -14,6 +14,8 @@ use crate::{
     setup::cargo,
 };
 
+/// The state of a folder with a journal.
+const JOURNAL: usize = 2;
 /// Steps of a publication of few files, at most.
 const MOST_STEPS: u64 = 1000;
 
@@ -104,17 +106,33 @@ impl Test {
             } else {
                 killed += 1;
             }
-            found[self.state(&old, &new)?] += 1;
+            let state = self.state(&old, &new)?;
+            found[state] += 1;
+            if state == JOURNAL {
+                self.read_completes(&new)?;
+            }
             if self.whole("old")? != old {
                 return Err(format!("the run after kill {killed} left other files in {}", self.folder.display()));
             }
         }
         let [whole_old, whole_new, journal] = found;
         say(&format!(
-            "{killed} kills in {runs} runs (seed {seed}): {whole_old} left the old results, {whole_new} the new ones, {journal} a journal that the next run \
-             completed; every next run succeeded"
+            "{killed} kills in {runs} runs (seed {seed}): {whole_old} left the old results, {whole_new} the new ones, {journal} a journal that \
+             `inspect` completed; every next run succeeded"
         ));
         Ok(())
+    }
+
+    /// A command that reads a result completes the publication first.
+    fn read_completes(&self, new: &Files) -> Outcome {
+        let mut command = Command::new(&self.program);
+        command.args(["inspect", "elsewhere/result.h5"]).current_dir(&self.folder);
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        let status = command.status().map_err(|error| error.to_string())?;
+        if status.success() && self.files() == *new {
+            return Ok(());
+        }
+        Err(format!("`inspect` did not complete the publication in {}", self.folder.display()))
     }
 
     fn at_step(&self, step: u64) -> Outcome<ExitStatus> {
@@ -136,7 +154,7 @@ impl Test {
         match shown {
             shown if shown == *old => Ok(0),
             shown if shown == *new => Ok(1),
-            _ if left.keys().any(|path| path.extension().is_some_and(|extension| extension == "journal")) => Ok(2),
+            _ if left.keys().any(|path| path.extension().is_some_and(|extension| extension == "journal")) => Ok(JOURNAL),
             _ => Err(format!("old and new files stand side by side in {}", self.folder.display())),
         }
     }

@@ -16,6 +16,13 @@ use crate::{args::DiagnoseArgs, failure::Failure, progress::Progress, render};
 /// When the configuration is wrong, or the data or a file fails. Whatever the verdict, a diagnosis is no failure.
 pub fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
+    if let Some(memory_gb) = args.memory {
+        if !(memory_gb > 0.0 && memory_gb.is_finite()) {
+            let message = format!("--memory {memory_gb}: expected a number of GB above 0");
+            return Err(Failure::Name { message, help: "give as many as the machine has free".into() });
+        }
+        pipeline.diagnose.memory_gb = memory_gb;
+    }
     if let Some(path) = &args.write {
         is_free(path, &sources, &pipeline)?;
         pipeline.diagnose.write_rig = Some(path.clone());

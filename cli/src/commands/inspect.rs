@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fs::File, io::Read, path::Path};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use runout_core::{Error, ErrorKind, Result, input_file::open_regular};
+use runout_core::{Error, ErrorKind, Result, atomic_file::complete_publication, input_file::open_regular};
 use runout_hdf5::FileReport;
 use serde::Serialize;
 
@@ -60,6 +60,7 @@ pub fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failur
 /// # Errors
 /// When it cannot be read, or is of no known kind.
 pub fn report(path: &Path) -> Result<Report> {
+    complete_publication(path)?;
     let mut signature = Vec::new();
     let start = open_regular(path).and_then(|file| file.take(8).read_to_end(&mut signature));
     start.map_err(|error| Error::caused("inspect", path.display().to_string(), error))?;

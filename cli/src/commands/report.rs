@@ -35,6 +35,7 @@ pub fn execute(args: &ReportArgs, json: bool) -> std::result::Result<(), Failure
 }
 
 fn write(result: &Path, report: &Path) -> Result<()> {
+    atomic_file::complete_publication(result)?;
     let stored = read_result(result)?;
     let tables = stored.tables.iter().map(|(spec, _)| spec.clone()).collect();
     let info = ResultInfo { title: stored.title.clone(), tables, longest_name: None };

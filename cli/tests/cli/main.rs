@@ -10,6 +10,7 @@ mod figures;
 mod folder;
 mod lost_orders;
 mod measured;
+mod odd_files;
 mod one_line;
 mod other_rigs;
 mod points;

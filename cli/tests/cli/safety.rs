@@ -209,6 +209,15 @@ fn a_kill_at_any_step_leaves_old_or_new_results() {
                     state.keys()
                 );
             }
+            if journal && kind == "kill" {
+                // A command that reads results completes them first.
+                let inspected = folder.run(&["inspect", "elsewhere/result.h5"]);
+                assert!(inspected.status == 0, "{kind}:{step}: {}", inspected.stderr);
+                let read = results();
+                // Before the last journal is there, all are old.
+                let whole = read == new || (state == old && read == old);
+                assert!(whole, "{kind}:{step}: a reader saw {:?}", read.keys());
+            }
             assert!(whole("old") == old, "{kind}:{step}: the next run leaves other files");
         }
         assert!(interrupted <= new.len(), "{kind}: {interrupted}");

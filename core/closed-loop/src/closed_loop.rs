@@ -66,8 +66,8 @@ pub struct Closed<F> {
 /// # Errors
 /// When the declared model cannot be fitted.
 pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fit>> {
-    let declared = model.fit(&settings.known)?;
-    let before = model.whole().fit(&settings.known)?;
+    // Of a fit that is not needed any more, only the remainder is kept: a fit of many stations is large.
+    let declared = model.fit(&settings.known)?.remainder().clone();
     let mut tracing = Tracing { model, settings, found: Vec::new(), refused: Vec::new() };
     let mut current = tracing.refit_found(model, &[])?;
     if let Some(corrected) = tracing.find_mistakes(&current)? {
@@ -100,8 +100,11 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     if above_chance(current.fit.remainder()) && tracing.drop_partial(current.fit.remainder()) {
         current = tracing.refit_found(model, &current.settings)?;
     }
-    let held_out = [declared.remainder().clone(), current.fit.remainder().clone()];
-    let current = tracing.refit_found(model.whole(), &current.settings)?;
+    let held_out = [declared, current.fit.remainder().clone()];
+    let found = current.settings.clone();
+    drop(current);
+    let before = model.whole().fit(&settings.known)?;
+    let current = tracing.refit_found(model.whole(), &found)?;
     let (current, others) = tracing.combinations(model.whole(), current, SAME_BIC);
     let left = at_the_floor(current.fit.remainder());
     let verdict = verdict(current.fit.remainder(), tracing.found.is_empty());
@@ -270,7 +273,7 @@ impl<M: Model> Tracing<'_, M> {
             .collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
-        let mut trials: Vec<(usize, Refit<M::Fit>, Evidence)> = Vec::new();
+        let mut trials: Vec<(usize, Refit<Remainder>, Evidence)> = Vec::new();
         // Effects of single parts are many and alike: they do not crowd out the others.
         let parts: Vec<usize> = (0..self.model.effects().len()).flat_map(|whole| self.model.parts(whole)).collect();
         let mut part_places = PARTS_LISTED;
@@ -295,7 +298,7 @@ impl<M: Model> Tracing<'_, M> {
                 continue;
             }
             let evidence = evidence(trial.chi2);
-            trials.push((effect, trial, evidence));
+            trials.push((effect, trial.remainder_only(), evidence));
         }
         let best = trials.iter().map(|(_, _, evidence)| evidence.delta_bic).fold(f64::INFINITY, f64::min);
         // Of those that are equal up to rounding, the one that the model names first.
@@ -303,7 +306,7 @@ impl<M: Model> Tracing<'_, M> {
         trials.sort_by(|a, b| place(a.2.delta_bic).total_cmp(&place(b.2.delta_bic)).then(a.0.cmp(&b.0)));
         let mut trials = trials.into_iter();
         let (effect, trial, evidence) = trials.next()?;
-        let after = trial.fit.remainder().clone();
+        let after = trial.fit.clone();
         let columns = independent(current.fit.signature(effect), &basis);
         let (stretches, lowered) = (before.stretches.len(), before.chi2() - trial.chi2);
         let each = -lowered / stretches.max(1) as f64;
@@ -341,7 +344,7 @@ impl<M: Model> Tracing<'_, M> {
             let difference = (other.chi2 - trial.chi2) / unit.max(f64::MIN_POSITIVE);
             difference < SAME_BIC
                 && evidence.delta_bic - best < SAME_BIC.max(0.02 * best.abs())
-                && overlap(&before.residual, [&after.residual, &other.fit.remainder().residual]) > OVERLAP
+                && overlap(&before.residual, [&after.residual, &other.fit.residual]) > OVERLAP
         });
         let mut members = vec![effect];
         let mut alone = vec![values.clone()];

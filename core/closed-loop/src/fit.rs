@@ -1,6 +1,6 @@
 //! Joint refit of all effects that are applied: Gauss-Newton with halved steps, relinearised with the effects applied.
 
-use super::{Fit, Model, OpenWithinBound, Setting};
+use super::{Fit, Model, OpenWithinBound, Remainder, Setting};
 use runout_error::Result;
 use runout_numerics::least_squares::Basis;
 
@@ -25,6 +25,14 @@ pub struct Refit<F> {
     /// Covariance of the free parameters, `[parameter][parameter]`, for noise of size 1 in the residual, with what is
     /// [open within bounds](Fit::open_within_bounds).
     pub covariance: Vec<Vec<f64>>,
+}
+
+impl<F: Fit> Refit<F> {
+    /// The same with what the fit leaves in place of the fit.
+    pub(super) fn remainder_only(self) -> Refit<Remainder> {
+        let Self { settings, fit, chi2, covariance } = self;
+        Refit { settings, fit: fit.remainder().clone(), chi2, covariance }
+    }
 }
 
 /// Fits the parameters of all settings but the first `fixed` ones.

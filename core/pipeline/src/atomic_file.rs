@@ -238,10 +238,10 @@ fn folder_of(file: &Path) -> &Path {
 
 /// Why a folder cannot be made.
 fn no_folder(folder: &Path, error: std::io::Error) -> Error {
-    let file = folder.ancestors().find(|above| above.is_file());
+    let file = folder.ancestors().find(|above| above.exists() && !above.is_dir());
     let failure = Error::caused("create the folder", folder.display().to_string(), error);
     match file {
-        Some(file) => failure.help(format!("{} is a file; name another folder", file.display())),
+        Some(file) => failure.help(format!("{} is no folder; name another one", file.display())),
         None => failure,
     }
 }
@@ -282,6 +282,22 @@ pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
     // Files that are left need it for their removal.
     drop(under_way);
     finished
+}
+
+/// Completes a publication whose run was killed, before a file that it may have replaced is read as a result.
+///
+/// # Errors
+/// When a run publishes there now, or the publication cannot be completed: files beside each other may then be of two runs.
+pub fn complete_publication(file: &Path) -> Result<()> {
+    if !publication::is_under_way(folder_of(file)) {
+        return Ok(());
+    }
+    FolderLock::of([file]).map(drop).map_err(|error| {
+        let problem = format!("results beside it were not published as a whole: {error}");
+        Error::new("read", file.display().to_string(), problem)
+            .of(ErrorKind::Io)
+            .help("wait for the run that publishes them, or make the folder writable, or run the pipeline again")
+    })
 }
 
 /// One spelling of a path, by which two paths to the same file can be told to be so, whether or not it exists yet.
@@ -331,7 +347,7 @@ mod tests {
         assert!(error.to_string().contains("MB are free there") && error.advice().is_some(), "{error}");
         fs::write(folder.path().join("file"), "").unwrap();
         let error = PendingFile::new(folder.path().join("file/deeper/x.csv")).unwrap_err();
-        assert!(error.advice().is_some_and(|advice| advice.contains("file is a file")), "{error:?}");
+        assert!(error.advice().is_some_and(|advice| advice.contains("file is no folder")), "{error:?}");
     }
 
     #[test]

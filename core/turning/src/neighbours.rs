@@ -19,6 +19,12 @@ pub struct Neighbours {
 }
 
 impl Neighbours {
+    /// Number of its coefficients.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.coefficients.iter().map(Vec::len).sum()
+    }
+
     /// Covariance of the mean across channels, `[order][channel][channel]`.
     #[must_use]
     pub fn covariance(&self) -> Vec<Complex64> {

@@ -164,6 +164,22 @@ impl Split {
 }
 
 impl Profile {
+    /// Memory that its coefficients take, in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let matrices = [&self.covariance, &self.scatter, &self.scatter_beside];
+        let own = self.mean.len() + matrices.into_iter().flatten().map(Vec::len).sum::<usize>();
+        let beside = self.split.as_ref().map_or(0, |split| {
+            let part = |part: &Part| {
+                let matrices = [&part.covariance, &part.scatter].into_iter().flatten().map(Vec::len).sum::<usize>();
+                part.mean.len() + matrices + part.neighbours.as_ref().map_or(0, Neighbours::count)
+            };
+            let all = split.neighbours.as_ref().map_or(0, Neighbours::count);
+            part(&split.fit) + part(&split.held_out) + all + split.turns.harmonics.len()
+        });
+        ((own + beside) * size_of::<Complex64>()) as u64
+    }
+
     /// Number of channels.
     #[must_use]
     pub fn channels(&self) -> usize {

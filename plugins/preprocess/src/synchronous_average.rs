@@ -52,7 +52,8 @@ use crate::{interruptions, low_pass::significant};
 #[serde(deny_unknown_fields)]
 pub struct SynchronousAverageConfig {
     /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them, as far as the recording
-    /// has them.
+    /// has them. Above 4096, and far above the recording's own samples a turn (8 times, rounded up to a power of two), fewer are
+    /// used, with a warning.
     pub samples_per_rev: usize,
     /// Fewest turns that make an average, at least 1; the covariance needs 2.
     #[serde(default = "default_min_turns")]
@@ -161,11 +162,18 @@ impl SynchronousAverage {
             }
         }
         let Some(turn) = capture.median_turn_samples() else { return warnings };
+        let angles = self.config.samples_per_rev.min(most_angles(turn));
+        if angles < self.config.samples_per_rev {
+            warnings.push(format!(
+                "`samples_per_rev` = {} is far above the {turn:.0} samples of a turn: results are given on {angles} angles",
+                self.config.samples_per_rev
+            ));
+        }
         if self.max_order() > orders_held(turn) {
             warnings.push(format!(
                 "{turn:.0} samples a turn hold no orders above {}: the average ends there, on {} angles",
                 orders_held(turn),
-                self.config.samples_per_rev
+                angles
             ));
         }
         let held = (PASS_BAND * 0.5 * turn) as usize;
@@ -202,6 +210,17 @@ fn near_synchronous(tones: &[NearTone], turns: usize, object: &str) -> Option<St
 /// Highest order that turns of this many samples hold, below Nyquist as for whole numbers of samples.
 fn orders_held(turn_samples: f64) -> usize {
     (0.5 * (turn_samples - 1.0)) as usize
+}
+
+/// Equal angles on which results are given, at most: this many times the samples of a turn, rounded up to a power of two, or the
+/// second number where that is larger. More show nothing else.
+const MOST_ANGLES: (usize, usize) = (8, 4096);
+
+/// That number for turns of this many samples.
+fn most_angles(turn_samples: f64) -> usize {
+    let (times, fewest) = MOST_ANGLES;
+    let turn = (turn_samples.ceil() as usize).checked_next_power_of_two().unwrap_or(usize::MAX);
+    turn.saturating_mul(times).max(fewest)
 }
 
 /// Fewest samples that a turn may have: fewer come from marks in another unit.
@@ -270,6 +289,7 @@ impl Averager for SynchronousAverage {
                 split::truncate(split, orders, channels);
             }
         }
+        let most_angles = capture.median_turn_samples().map_or(usize::MAX, most_angles);
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
@@ -282,7 +302,7 @@ impl Averager for SynchronousAverage {
             object: capture.object,
             setup: capture.setup,
             sensors: capture.sensors,
-            samples_per_rev: self.config.samples_per_rev,
+            samples_per_rev: self.config.samples_per_rev.min(most_angles),
             turn_angles: outcome.turn_angles,
             mean: outcome.mean,
             covariance: outcome.covariance,

@@ -42,11 +42,13 @@ impl FolderLock {
         let mut lock = Self { held: Vec::new() };
         for (_, folder) in folders {
             let path = folder.join(NAME);
-            if let Some(file) = take(&path)? {
+            let taken = take(&path)?;
+            let locked = taken.is_some();
+            if let Some(file) = taken {
                 UnderWay::now().locks.push(path.clone());
                 lock.held.push((path, file));
             }
-            publication::recover(folder)?;
+            publication::recover(folder, locked)?;
         }
         Ok(lock)
     }
@@ -90,7 +92,8 @@ fn take(path: &Path) -> Result<Option<File>> {
         if !is_at(&file, path) {
             continue;
         }
-        let words: Vec<String> = std::env::args().take(4).collect();
+        // Names of files need not be UTF-8.
+        let words: Vec<_> = std::env::args_os().take(4).map(|word| word.to_string_lossy().into_owned()).collect();
         let holder = format!("process {} ({})", std::process::id(), words.join(" "));
         file.set_len(0).and_then(|()| file.write_all(holder.as_bytes())).map_err(failure)?;
         return Ok(Some(file));

@@ -5,6 +5,7 @@
 //! the file system refuses takes back those before it.
 
 use std::{
+    ffi::{OsStr, OsString},
     fs::{self, File},
     io::{self, Write},
     path::{Path, PathBuf},
@@ -25,10 +26,10 @@ const LONGEST: u64 = 1 << 20;
 /// A file on its way to its name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Entry {
-    /// `None` for the folder of the journal.
-    folder: Option<PathBuf>,
-    temporary: String,
-    name: String,
+    /// `None` for the folder of the journal. Names are those of the system: they need not be UTF-8.
+    folder: Option<OsString>,
+    temporary: OsString,
+    name: OsString,
 }
 
 /// What a journal says.
@@ -38,18 +39,19 @@ enum Journal {
     /// The files of a publication.
     Files(Vec<Entry>),
     /// Where the journal of a publication lies that has files here too.
-    SeeAlso(PathBuf),
+    SeeAlso(OsString),
 }
 
 impl Entry {
     fn folder<'a>(&'a self, home: &'a Path) -> &'a Path {
-        self.folder.as_deref().unwrap_or(home)
+        self.folder.as_ref().map_or(home, Path::new)
     }
 
     /// Gives it its name, where this is still to be done. A journal that somebody made up can name nothing but temporary files.
     fn finish(&self, home: &Path) -> io::Result<()> {
-        let plain = |name: &str| !name.is_empty() && !name.contains(['/', '\\']) && name != "." && name != "..";
-        if !plain(&self.name) || !plain(&self.temporary) || !self.temporary.ends_with(PARTIAL) {
+        let plain = |name: &OsStr| Path::new(name).file_name() == Some(name);
+        let is_temporary = self.temporary.to_str().is_some_and(|name| name.ends_with(PARTIAL));
+        if !plain(&self.name) || !plain(&self.temporary) || !is_temporary {
             return Ok(());
         }
         let folder = self.folder(home);
@@ -157,12 +159,12 @@ fn write_journals(files: &[(&Path, &Path)], home: &Path) -> Result<Vec<PathBuf>>
     };
     let mut all = || -> io::Result<()> {
         for folder in folders(files).into_iter().filter(|folder| *folder != home) {
-            write(journal(folder), &Journal::SeeAlso(absolute(&at_home)?))?;
+            write(journal(folder), &Journal::SeeAlso(absolute(&at_home)?.into()))?;
         }
-        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = |path: &Path| path.file_name().unwrap_or_default().to_owned();
         let entries = files.iter().map(|(temporary, destination)| {
             let folder = folder_of(destination);
-            let folder = if folder == home { None } else { Some(absolute(folder)?) };
+            let folder = if folder == home { None } else { Some(absolute(folder)?.into()) };
             Ok(Entry { folder, temporary: name(temporary), name: name(destination) })
         });
         let entries = entries.collect::<io::Result<Vec<Entry>>>()?;
@@ -191,24 +193,32 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Completes publications in a folder whose run was killed, and removes what such runs left otherwise. The caller holds the folder.
-pub(super) fn recover(folder: &Path) -> Result<()> {
+/// Whether a publication into a folder is under way, or was when its run was killed.
+pub(super) fn is_under_way(folder: &Path) -> bool {
+    let Ok(mut entries) = fs::read_dir(folder) else { return false };
+    entries.any(|entry| entry.is_ok_and(|entry| entry.file_name().to_str().is_some_and(is_named_as_journal)))
+}
+
+/// Completes publications in a folder whose run was killed, and removes what such runs left otherwise. Where the caller holds the
+/// folder's lock, no journal is that of a run that lives, whichever process has its number by now.
+pub(super) fn recover(folder: &Path, locked: bool) -> Result<()> {
     let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
     let (mut journals, mut debris) = (Vec::new(), Vec::new());
     for entry in entries.flatten() {
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
-        if !name.starts_with('.') || !is_left(name) {
+        if is_named_as_journal(name) {
+            if locked || is_left(name) {
+                journals.push(entry.path());
+            }
+        } else if !name.starts_with('.') || !is_left(name) {
             continue;
-        }
-        if name.starts_with(PREFIX) && name.ends_with(SUFFIX) {
-            journals.push(entry.path());
         } else if name.ends_with(PARTIAL) || name.ends_with(PREVIOUS) {
             debris.push(entry.path());
         }
     }
     for journal in &journals {
-        complete(journal).map_err(|error| {
+        complete(journal, locked).map_err(|error| {
             let problem =
                 format!("an earlier run was killed while it published its results, which cannot be completed: {error}");
             Error::new("write to", folder.display().to_string(), problem)
@@ -230,7 +240,7 @@ fn is_left(name: &str) -> bool {
     process.is_some_and(|process| !is_alive(process))
 }
 
-fn complete(journal: &Path) -> io::Result<()> {
+fn complete(journal: &Path, locked: bool) -> io::Result<()> {
     let home = folder_of(journal);
     match read(journal) {
         Some(Journal::Files(files)) => {
@@ -239,11 +249,12 @@ fn complete(journal: &Path) -> io::Result<()> {
                 sync_folder(entry.folder(home))?;
             }
         }
-        Some(Journal::SeeAlso(other)) if is_journal(&other) && other.exists() => {
-            if let Some(Journal::Files(files)) = read(&other) {
-                files.iter().try_for_each(|entry| entry.finish(folder_of(&other)))?;
+        Some(Journal::SeeAlso(other)) if is_journal(Path::new(&other), locked) && Path::new(&other).exists() => {
+            let other = Path::new(&other);
+            if let Some(Journal::Files(files)) = read(other) {
+                files.iter().try_for_each(|entry| entry.finish(folder_of(other)))?;
             }
-            fs::remove_file(&other)?;
+            fs::remove_file(other)?;
         }
         // Cut short: what it names has not begun.
         _ => {}
@@ -251,9 +262,13 @@ fn complete(journal: &Path) -> io::Result<()> {
     fs::remove_file(journal)
 }
 
-fn is_journal(path: &Path) -> bool {
+fn is_named_as_journal(name: &str) -> bool {
+    name.starts_with(PREFIX) && name.ends_with(SUFFIX)
+}
+
+fn is_journal(path: &Path, locked: bool) -> bool {
     let name = path.file_name().and_then(|name| name.to_str());
-    name.is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX) && is_left(name))
+    name.is_some_and(|name| is_named_as_journal(name) && (locked || is_left(name)))
 }
 
 fn read(journal: &Path) -> Option<Journal> {

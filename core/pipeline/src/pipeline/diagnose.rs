@@ -27,7 +27,7 @@ use runout_closed_loop::{
     diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
 };
 use runout_error::{Error, ErrorKind, Result};
-use runout_turning::separation::Quantity;
+use runout_turning::{profile::Profile, separation::Quantity};
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form. These do not
 /// replace those of a run: they go below `diagnosed/`, or where `[diagnose] out` says.
@@ -85,12 +85,15 @@ fn diagnose_turns(
         observer,
         |_, station| Ok(station),
         |station| {
+            if stations.is_empty() {
+                check_memory(pipeline, model, &station, recording.stations().len())?;
+            }
             stations.push(station);
             Ok(())
         },
     )?;
     let settings = &pipeline.diagnose.settings;
-    let found = model.diagnose(&stations, settings)?;
+    let found = model.diagnose(&mut stations, settings)?;
     let mut diagnosis = found.diagnosis;
     diagnosis.moved.clear();
     let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
@@ -142,6 +145,25 @@ fn diagnose_turns(
         finished.add(corrected_rig::pending(path, pipeline, &changes)?);
     }
     commit(finished, pipeline.diagnosis_path(), diagnosis)
+}
+
+/// Refuses to begin what needs more memory than the pipeline allows: as many stations like the first one.
+fn check_memory(pipeline: &Pipeline, model: &dyn StationModel, first: &Station, stations: usize) -> Result<()> {
+    let each = first.profiles.iter().map(Profile::bytes).sum::<u64>() + model.bytes(first);
+    let (needed_gb, allowed_gb) = (1e-9 * each as f64 * stations as f64, pipeline.diagnose.memory_gb);
+    if needed_gb <= allowed_gb {
+        return Ok(());
+    }
+    let problem = format!(
+        "the closed loop holds all {stations} stations at once, some {:.2} MB each and {needed_gb:.2} GB together; {allowed_gb} GB are \
+         allowed",
+        1e-6 * each as f64
+    );
+    let help = format!(
+        "allow more (`--memory {:.0}`, or `memory_gb` in [diagnose]), or give fewer stations, or a smaller `samples_per_rev`",
+        needed_gb.ceil()
+    );
+    Err(Error::new("diagnose", &pipeline.title, problem).of(ErrorKind::Configuration).help(help))
 }
 
 /// More than any model of points has effects that earn their place.

@@ -159,7 +159,11 @@ impl RecordReader<'_> {
                 Ok(profiles)
             });
         }
-        Ok(Station { name: key.name.clone(), z_mm: key.z_mm, profiles: profiles? })
+        let mut profiles = profiles?;
+        // Where the averager has fewer angles than configured, captures of slightly different turns may differ in their number.
+        let angles = profiles.iter().map(|profile| profile.samples_per_rev).max().unwrap_or(0);
+        profiles.iter_mut().for_each(|profile| profile.samples_per_rev = angles);
+        Ok(Station { name: key.name.clone(), z_mm: key.z_mm, profiles })
     }
 }
 

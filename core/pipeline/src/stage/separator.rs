@@ -69,11 +69,17 @@ pub trait StationModel: Send + Sync {
         Vec::new()
     }
 
-    /// Runs the loop on all stations at once; `settings` count effects as [`effects`](Self::effects) does.
+    /// Memory that the loop takes for a station like this one beside its profiles, about, in bytes.
+    fn bytes(&self, _station: &Station) -> u64 {
+        0
+    }
+
+    /// Runs the loop on all stations at once; `settings` count effects as [`effects`](Self::effects) does. The profiles may lose
+    /// their [`split`](Profile::split), which is large and which nothing else needs.
     ///
     /// # Errors
     /// When the profiles do not fit the rig.
-    fn diagnose(&self, stations: &[Station], settings: &Settings) -> Result<StationDiagnosis>;
+    fn diagnose(&self, stations: &mut [Station], settings: &Settings) -> Result<StationDiagnosis>;
 }
 
 /// What the closed loop found, with form and motion before and after.

@@ -89,8 +89,9 @@ impl<'a> Resampling<'a> {
         wanted: AverageRequest,
     ) -> Self {
         let config = &average.config;
-        let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev) + 1);
         let (angles, on_samples) = angles(&turns, config.samples_per_rev, capture.encoder);
+        // Angles that the recording does not have hold no further orders.
+        let (channels, orders) = (capture.channels().max(1), max_order(config.samples_per_rev.min(angles)) + 1);
         // The samples that are bridged with the interruption, and what is interpolated between one of them and the next.
         let beyond = GUARD + usize::from(!on_samples);
         let beyond_rad = capture.median_turn_samples().map_or(0.0, |turn| TAU * beyond as f64 / turn);

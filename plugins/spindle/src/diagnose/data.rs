@@ -195,14 +195,19 @@ impl StationData {
             drift::steady(&mut steadied, neighbours, selection, &seen.creeping, Part::All);
             steadied
         };
-        if seen.creeping.iter().flatten().all(|creeping| !creeping.certain()) {
-            return Self::new(selection, layout, station, None, Part::All, Arc::clone(seen));
-        }
-        let profiles = station.profiles.iter().map(steadied).collect();
-        let steadied = Station { name: station.name.clone(), z_mm: station.z_mm, profiles };
-        let unsteadied = Self::new(selection, layout, station, None, Part::All, Arc::clone(seen))?.readings.covariance;
-        let steadied = Self::new(selection, layout, &steadied, None, Part::All, Arc::clone(seen))?;
-        Ok(Self { unsteadied, ..steadied })
+        let mut data = if seen.creeping.iter().flatten().all(|creeping| !creeping.certain()) {
+            Self::new(selection, layout, station, None, Part::All, Arc::clone(seen))?
+        } else {
+            let profiles = station.profiles.iter().map(steadied).collect();
+            let steadied = Station { name: station.name.clone(), z_mm: station.z_mm, profiles };
+            let plain = Self::new(selection, layout, station, None, Part::All, Arc::clone(seen))?;
+            let steadied = Self::new(selection, layout, &steadied, None, Part::All, Arc::clone(seen))?;
+            Self { unsteadied: plain.readings.covariance, ..steadied }
+        };
+        // The weights are made of it, and nothing else is.
+        data.readings.scatter = None;
+        data.freed.iter_mut().for_each(|freed| freed.readings.scatter = None);
+        Ok(data)
     }
 
     /// The turns to fit and those held out, low orders only; all turns where none are held out.
@@ -259,6 +264,7 @@ impl StationData {
         seen.changes.iter().for_each(|change| change.widen(&mut readings));
         let held_out =
             held_out.map(|station| Readings::gather(selection, layout, station, Scatter::OfAll)).transpose()?;
+        let held_out = held_out.map(|readings| Readings { scatter: None, ..readings });
         let freed = layout.assumes_odd_motion().then(|| {
             let freed = Alterations { even_order_motion: true, ..Alterations::none(layout) };
             Box::new(Weighed::new(&layout.altered(&freed), selection, readings.clone()))

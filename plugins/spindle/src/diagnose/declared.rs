@@ -6,10 +6,11 @@ use runout_core::{
     Result,
     model::{Effect, Setting, closed_loop::Settings},
     pipeline::effects::EffectCatalogue,
+    profile::Profile,
     stage::{Station, StationDiagnosis, StationModel},
 };
 
-use super::{data::Place, declared_by, diagnose, places};
+use super::{SpindleModel, data::Place, declared_by, places, run};
 use crate::{effects::SpindleEffect, layout::Layout, selection::Selection};
 
 /// A rig, how its readings are taken, and the effects that it may lack.
@@ -42,8 +43,16 @@ impl StationModel for DeclaredSpindle {
         declared_by(&self.selection, &self.layout, &self.kinds, &self.places, effect, applied)
     }
 
-    fn diagnose(&self, stations: &[Station], settings: &Settings) -> Result<StationDiagnosis> {
-        let (selection, layout) = (self.selection.clone(), self.layout.clone());
-        diagnose(selection, layout, self.second_order, self.kinds.clone(), stations, settings)
+    fn bytes(&self, station: &Station) -> u64 {
+        let orders = station.profiles.iter().map(Profile::max_order).min().unwrap_or(0);
+        let (readings, setups) = (self.layout.readings.len(), self.selection.rig.setups.len().max(1));
+        SpindleModel::bytes(orders, [readings, readings / setups, self.layout.unknowns.len()])
+    }
+
+    fn diagnose(&self, stations: &mut [Station], settings: &Settings) -> Result<StationDiagnosis> {
+        let (selection, layout, kinds) = (self.selection.clone(), self.layout.clone(), self.kinds.clone());
+        let model = SpindleModel::new(selection, layout, self.second_order, kinds, stations)?;
+        stations.iter_mut().flat_map(|station| &mut station.profiles).for_each(|profile| profile.split = None);
+        run(&model, stations, settings)
     }
 }

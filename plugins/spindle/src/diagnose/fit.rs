@@ -57,7 +57,7 @@ impl SpindleFit {
 
     /// Lowest and highest order at which a reading is redundant.
     pub(super) fn redundant(&self) -> Option<[usize; 2]> {
-        let of_stations = self.stations.iter().filter_map(|station| station.residual().orders);
+        let of_stations = self.stations.iter().filter_map(|station| station.residual.orders);
         of_stations.reduce(|[low, high], [lowest, highest]| [low.min(lowest), high.max(highest)])
     }
 
@@ -68,7 +68,7 @@ impl SpindleFit {
     pub(super) fn stated_chi2_per_dof(&self) -> Option<f64> {
         let (mut chi2, mut dof) = (0.0, 0);
         for (solved, data) in self.stations.iter().zip(&self.shared.data) {
-            let level = solved.residual();
+            let level = &solved.residual;
             if level.dof > 0 {
                 chi2 += level.chi2_per_dof * level.dof as f64;
                 dof += level.dof;
@@ -175,7 +175,7 @@ impl SpindleFit {
         let solver = self.shared.solver(&self.layout, &self.alterations);
         let each = self.stations.iter().zip(stations).map(|(solved, station)| {
             let propagation = solved.with_angles.as_ref().or(solved.propagation.as_ref());
-            let residual = solved.residual();
+            let residual = solved.residual.clone();
             solver.report(station, &solved.operators, &solved.estimate, propagation, residual)
         });
         each.collect()

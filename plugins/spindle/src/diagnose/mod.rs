@@ -16,7 +16,7 @@ mod strangers;
 use std::sync::Arc;
 
 use runout_core::{
-    Result,
+    Complex64, Result,
     model::{
         Effect, Fit, Model, Setting,
         closed_loop::{self, Settings},
@@ -93,6 +93,23 @@ impl SpindleModel {
         };
         let whole = Self { traced: Arc::new(whole), whole: None };
         Ok(Self { traced: Arc::new(traced), whole: Some(Box::new(whole)) })
+    }
+}
+
+/// Fits that a loop holds at a time, and one more: that of a trial beside the best so far, and what a final one is mixed with.
+const FITS: usize = 4;
+
+impl SpindleModel {
+    /// Memory that a loop takes a station, about, in bytes: `[readings, sensors, unknowns]` of a layout.
+    fn bytes(orders: usize, [readings, sensors, unknowns]: [usize; 3]) -> u64 {
+        // Matrices of a setup: covariance, scatter and weights of the turns fitted, covariance of those held out; covariance and
+        // weights of all turns.
+        let data = 6 * readings * sensors + 3 * readings;
+        // Operator, its covariance, whitened residual; readings and estimate.
+        let fit = unknowns * readings + unknowns * unknowns + readings * readings + 3 * readings + unknowns;
+        // Form and motion before and after, with their covariance.
+        let results = 2 * (unknowns * unknowns + 2 * unknowns);
+        (orders * (data + FITS * fit + results) * size_of::<Complex64>()) as u64
     }
 }
 
@@ -231,7 +248,11 @@ pub fn diagnose(
     stations: &[Station],
     settings: &Settings,
 ) -> Result<StationDiagnosis> {
-    let model = SpindleModel::new(selection, layout, second_order, effects, stations)?;
+    run(&SpindleModel::new(selection, layout, second_order, effects, stations)?, stations, settings)
+}
+
+/// The same on a model; of the stations, their splits are not needed any more.
+fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Result<StationDiagnosis> {
     let changes: Vec<&Change> = model.traced.data.iter().flat_map(|station| &station.seen.changes).collect();
     // What a sensor or its neighbour lacks in all setups cannot be told from what happened to it in one.
     let sensors = &model.traced.selection.rig.sensors;
@@ -260,13 +281,13 @@ pub fn diagnose(
         })
     };
     let left_out =
-        |place: &data::Place| no_line(place) || steady(place) || (slipped(place) && !of_turns(&model, place));
+        |place: &data::Place| no_line(place) || steady(place) || (slipped(place) && !of_turns(model, place));
     let places = model.traced.places.iter().enumerate().filter(|(_, place)| left_out(place));
     let left_out = places.map(|(index, _)| index).chain(settings.left_out.iter().copied()).collect();
     // What single turns show for certain leaves room for what only averages show.
-    let shown = model.traced.places.iter().filter(|place| of_turns(&model, place) && !no_line(place) && !steady(place));
+    let shown = model.traced.places.iter().filter(|place| of_turns(model, place) && !no_line(place) && !steady(place));
     let max_added = settings.max_added + shown.count();
-    let closed = closed_loop::diagnose(&model, &Settings { left_out, max_added, ..settings.clone() })?;
+    let closed = closed_loop::diagnose(model, &Settings { left_out, max_added, ..settings.clone() })?;
     let mut diagnosis = closed.diagnosis;
     said::say_drifts(&mut diagnosis, &model.traced);
     said::say_lines(&mut diagnosis, &model.traced, stations);

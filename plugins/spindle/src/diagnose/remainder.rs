@@ -32,7 +32,7 @@ pub(super) fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, a
             let freedom = 2 * count.saturating_sub(operator.rank);
             disturbed += freedom as f64 * data.carried(index + 1, alterations);
         }
-        let level = solved.residual();
+        let level = &solved.residual;
         if level.dof > 0 {
             dof += level.dof;
             squares += level.rms_um.powi(2) * count as f64;

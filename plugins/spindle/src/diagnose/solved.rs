@@ -25,7 +25,7 @@ pub(super) struct Solved {
     /// The same with what is not known of the setups' angles.
     pub with_angles: Option<Propagation>,
     pub estimate: Estimate,
-    /// Readings taken back to displacements.
+    /// Readings taken back to displacements, without their covariance.
     pub corrected: Readings,
     /// The same without what exact geometry adds.
     pub linear: Vec<Complex64>,
@@ -33,6 +33,8 @@ pub(super) struct Solved {
     pub whitened: Vec<Vec<Complex64>>,
     /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals.
     pub floor_std: Vec<f64>,
+    /// What is left of the readings, as a run states it.
+    pub residual: Residual,
 }
 
 impl Shared {
@@ -88,13 +90,23 @@ impl Solved {
             Propagation::of(&uncertain, &operators)
         });
         let with_angles = with_angles.flatten();
+        let residual = residual(&operators, &corrected, &linear, propagation.as_ref());
+        // A loop holds several fits of all stations: what is not asked for again goes.
+        operators.weights = None;
+        (corrected.covariance, corrected.scatter) = (None, None);
         let alterations = altered;
-        Self { operators, alterations, propagation, with_angles, estimate, corrected, linear, whitened, floor_std }
-    }
-
-    /// What is left of the readings, as a run states it.
-    pub fn residual(&self) -> Residual {
-        residual(&self.operators, &self.corrected, &self.linear, self.propagation.as_ref())
+        Self {
+            operators,
+            alterations,
+            propagation,
+            with_angles,
+            estimate,
+            corrected,
+            linear,
+            whitened,
+            floor_std,
+            residual,
+        }
     }
 }
 

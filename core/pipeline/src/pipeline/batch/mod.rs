@@ -31,7 +31,7 @@ use super::{
     tables,
 };
 use crate::{
-    atomic_file::{self, PendingFile, commit_all},
+    atomic_file::{self, FolderLock, PendingFile, commit_all},
     stage::{About, Completed, Exporter, ResultInfo, Source},
 };
 use recording::{of_recording, without_recording};
@@ -267,6 +267,7 @@ impl<'a> Batch<'a> {
             files.extend(export.finish(&completed)?);
         }
         report.outputs = files.iter().map(|file| file.destination().to_owned()).collect();
+        let _lock = FolderLock::of(files.iter().map(PendingFile::destination))?;
         commit_all(files)?;
         let path = self.store.folder().join("batch.json");
         report.outputs.push(path.clone());

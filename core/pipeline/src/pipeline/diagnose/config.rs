@@ -13,7 +13,7 @@ use runout_closed_loop::{Effect, Setting, closed_loop::Settings};
 use runout_error::fault::{Fault, known_names};
 
 /// `[diagnose]`: what the closed loop may consider. `run` leaves it alone.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct DiagnoseConfig {
@@ -31,7 +31,17 @@ pub struct DiagnoseConfig {
     pub out: Option<PathBuf>,
     /// Where `diagnosis.json` goes; beside the first export of the final model without it.
     pub path: Option<PathBuf>,
+    /// Memory that the loop may take, in GB: it holds all stations of recorded turns at once, and refuses those that need more.
+    #[serde(default = "default_memory_gb")]
+    pub memory_gb: f64,
 }
+
+fn default_memory_gb() -> f64 {
+    MEMORY_GB
+}
+
+/// Memory that the loop may take where the pipeline says nothing, in GB.
+const MEMORY_GB: f64 = 4.0;
 
 /// A choice of effects.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -73,7 +83,7 @@ pub struct KnownEffect {
 }
 
 /// What the closed loop is to do, for the model of a pipeline.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Diagnose {
     /// How the loop runs.
@@ -86,8 +96,24 @@ pub struct Diagnose {
     pub out: Option<PathBuf>,
     /// Where the diagnosis goes, where it is configured.
     pub path: Option<PathBuf>,
+    /// Memory that the loop may take, in GB.
+    pub memory_gb: f64,
     /// Where the corrected rig goes, where it is asked for: a file of TOML that can stand for `[rig]`.
     pub write_rig: Option<PathBuf>,
+}
+
+impl Default for Diagnose {
+    fn default() -> Self {
+        Self {
+            settings: Settings::default(),
+            named: Vec::new(),
+            hold_out: None,
+            out: None,
+            path: None,
+            memory_gb: MEMORY_GB,
+            write_rig: None,
+        }
+    }
 }
 
 impl DiagnoseConfig {
@@ -110,6 +136,10 @@ impl DiagnoseConfig {
                 let fault = Fault::at("hold_out", "measured points are left out group by group, not by a share");
                 return Err(fault.help("leave `hold_out` out"));
             }
+        }
+        let memory_gb = self.memory_gb;
+        if !(memory_gb > 0.0 && memory_gb.is_finite()) {
+            return Err(Fault::at("memory_gb", format!("expected a number of GB above 0, found {memory_gb}")));
         }
         if self.out.as_ref().is_some_and(|out| out.as_os_str().is_empty()) {
             return Err(Fault::at("out", "expected the name of a folder"));
@@ -134,7 +164,7 @@ impl DiagnoseConfig {
         let (known, named) = if data_name_targets { (Vec::new(), self.known) } else { (known, Vec::new()) };
         let settings = Settings { effects: chosen, known, ..Settings::default() };
         let path = self.path.map(|path| folder.join(path));
-        Ok(Diagnose { settings, named, hold_out: self.hold_out, out: self.out, path, write_rig: None })
+        Ok(Diagnose { settings, named, hold_out: self.hold_out, out: self.out, path, memory_gb, write_rig: None })
     }
 }
 
@@ -245,6 +275,14 @@ mod tests {
             let said = format!("{fault}; {}", fault.help.clone().unwrap_or_default());
             assert!(said.contains(words), "{said}");
             assert_eq!(fault.place, Place::Path(place), "{text}");
+        }
+    }
+
+    #[test]
+    fn memory_is_a_number_above_0() {
+        assert_eq!(checked("").unwrap().memory_gb, 4.0);
+        for (memory_gb, fits) in [("0.0", false), ("-1", false), ("0.5", true), ("inf", false), ("nan", false)] {
+            assert_eq!(checked(&format!("memory_gb = {memory_gb}")).is_ok(), fits, "{memory_gb}");
         }
     }
 

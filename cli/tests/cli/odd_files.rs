@@ -1,0 +1,120 @@
+//! Names, files and numbers that nobody means: an error in words, at once, or work as usual.
+
+use std::fs;
+
+use crate::folder::{Folder, pipeline};
+
+const PIPELINE: &str = include_str!("../../../examples/08-text-recording/pipeline.toml");
+const RECORDING: &str = include_str!("../../../examples/08-text-recording/shaft.csv");
+
+fn text_recording() -> Folder {
+    Folder::with(&[("pipeline.toml", PIPELINE), ("shaft.csv", RECORDING)])
+}
+
+/// Outputs in two folders: their publication has a journal that names both.
+#[test]
+#[cfg(target_os = "linux")]
+fn folders_whose_names_are_not_utf_8_are_folders_like_others() {
+    use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
+
+    let folder = text_recording();
+    let odd = folder.path().join(OsStr::from_bytes(b"f\xff\xfeolder"));
+    fs::create_dir(&odd).unwrap();
+    let second = "\n[[export]]\nplugin = \"hdf5\"\npath = \"elsewhere/result.h5\"\n";
+    fs::write(odd.join("pipeline.toml"), format!("{PIPELINE}{second}")).unwrap();
+    fs::copy(folder.path().join("shaft.csv"), odd.join("shaft.csv")).unwrap();
+    let run = |fault: Option<&str>| {
+        let mut command = assert_cmd::cargo::cargo_bin_cmd!("runout");
+        command.arg("run").arg(odd.join("pipeline.toml")).envs(fault.map(|fault| ("RUNOUT_TEST_FAULT", fault)));
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let files = || {
+        let entries = ["out", "elsewhere"].map(|name| fs::read_dir(odd.join(name)).unwrap());
+        let names = entries.into_iter().flatten().map(|entry| entry.unwrap().file_name());
+        names.collect::<std::collections::BTreeSet<_>>()
+    };
+    let (status, said) = run(None);
+    assert_eq!(status, Some(0), "{said}");
+    let whole = files();
+    assert!(whole.len() > 4 && whole.iter().all(|name| !name.to_string_lossy().starts_with('.')), "{whole:?}");
+    // A journal that is left there is completed like any other.
+    for step in 10..40 {
+        run(Some(&format!("kill:{step}")));
+        let (status, said) = run(None);
+        assert!(status == Some(0) && files() == whole, "kill:{step}: {said}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn what_never_ends_is_refused_at_once_wherever_a_file_is_named() {
+    let folder = text_recording();
+    assert!(std::process::Command::new("mkfifo").arg(folder.path().join("pipe")).status().unwrap().success());
+    for name in ["pipe", "/dev/zero"] {
+        let (pattern, rig) = (format!("load.pattern=\"{name}\""), format!("rig=\"{name}\""));
+        for arguments in [
+            &["check", name][..],
+            &["run", name],
+            &["simulate", name],
+            &["plan", name],
+            &["report", name],
+            &["inspect", name],
+            &["run", "pipeline.toml", "--set", &pattern],
+            &["check", "pipeline.toml", "--set", &rig],
+        ] {
+            let ran = folder.run(arguments);
+            assert!([1, 2].contains(&ran.status), "{arguments:?}: {}", ran.stderr);
+            let flat = ran.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(flat.contains("found a pipe, a device or a socket"), "{arguments:?}: {flat}");
+        }
+    }
+    let ran = folder.run(&["run", "pipeline.toml", "--set", "export.0.path=\"pipe\""]);
+    assert!(ran.status == 1 && ran.stderr.contains("pipe is no folder"), "{}", ran.stderr);
+    let ran = folder.run(&["run", "pipeline.toml", "--set", "export=[{plugin=\"hdf5\",path=\"pipe\"}]"]);
+    assert!(ran.status == 1 && ran.stderr.contains("is no file"), "{}", ran.stderr);
+}
+
+#[test]
+fn numbers_that_no_rig_has_are_refused_at_their_keys() {
+    let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
+    for (key, word) in [
+        ("rig.sensors.0.angle_deg", "a sensor's angle must be a number from −36000 to 36000"),
+        ("rig.sensors.0.z_mm", "a sensor's axial position must be a number"),
+        ("rig.setups.1.part_deg", "the part's angle must be a number"),
+        ("rig.setups.1.sensors_deg", "the sensors' angle must be a number"),
+        ("rig.part_radius_mm", "the part's radius must be a number"),
+    ] {
+        for number in ["1e308", "-1e308", "inf", "nan"] {
+            let ran = folder.run(&["check", "pipeline.toml", "--set", &format!("{key}={number}")]);
+            assert_eq!(ran.status, 2, "{key}={number}: {}{}", ran.stdout, ran.stderr);
+            let flat = ran.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+            let radius = key == "rig.part_radius_mm" && flat.contains("must be above 0 mm");
+            assert!((flat.contains(word) || radius) && flat.contains(&format!("--set {key}=")), "{key}: {}", ran.stderr);
+        }
+    }
+    let ran = folder.run(&["check", "pipeline.toml", "--set", "title=\"a\\u0000b\""]);
+    assert!(ran.status == 2 && ran.stderr.contains("must not hold NUL"), "{}", ran.stderr);
+}
+
+/// A million angles for turns of 256 samples took 2 GB and half a minute.
+#[test]
+fn far_more_angles_than_samples_are_a_warning_and_fewer() {
+    let folder = text_recording();
+    let ran = folder.run(&["run", "pipeline.toml", "--set", "preprocess.0.samples_per_rev=1000000", "--json"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let said = "`samples_per_rev` = 1000000 is far above the 256 samples of a turn: results are given on 4096 angles";
+    assert!(ran.stdout.contains(said), "{}", ran.stdout);
+    let rows = folder.run(&["inspect", "out/form.parquet", "--json"]).stdout;
+    assert!(rows.contains("\"rows\": 4096"), "{rows}");
+}
+
+#[test]
+fn diagnose_asks_for_the_memory_that_it_needs() {
+    let folder = text_recording();
+    let ran = folder.run(&["diagnose", "pipeline.toml", "--memory", "0.0001"]);
+    let flat = ran.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ran.status != 0 && flat.contains("0.0001 GB are allowed") && flat.contains("--memory 1"), "{flat}");
+    assert_eq!(folder.run(&["diagnose", "pipeline.toml", "--memory", "0"]).status, 2);
+    assert_eq!(folder.run(&["diagnose", "pipeline.toml", "--memory", "1"]).status, 0);
+}
