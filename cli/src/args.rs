@@ -134,6 +134,9 @@ pub struct CompareArgs {
     /// Write what came out order by order: a table (FILE.parquet) or the document (FILE.json).
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Write a page to look at: the tables of the comparison, and E_n by order.
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Stations worked on at a time; as many as there are processors without it.
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
@@ -156,7 +159,7 @@ pub struct SimulateArgs {
 #[derive(Debug, Args)]
 pub struct PlanArgs {
     /// The rig: what stands under [rig] in a pipeline, in a file of its own. Or a pipeline of measured points, of which the layout
-    /// is planned; the options but --set and --json are of rigs.
+    /// is planned; the options but --set, --report and --json are of rigs.
     #[arg(value_name = "RIG.toml|PIPELINE.toml")]
     pub rig: PathBuf,
     /// Orders (undulations per revolution) to plan for, both ends included.
@@ -180,6 +183,9 @@ pub struct PlanArgs {
     /// Write noise gain by order and layout, to be plotted as a map: the rig's, those suggested and those found.
     #[arg(long, value_name = "FILE.csv")]
     pub map: Option<PathBuf>,
+    /// Write a page to look at: the tables of the plan, the rig as a drawing, and noise gain by order.
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     #[command(flatten)]
     pub overrides: Overrides,
 }

@@ -13,6 +13,7 @@ mod kill_test;
 mod process;
 mod python;
 mod random;
+mod report_check;
 mod results;
 mod setup;
 
@@ -41,6 +42,8 @@ cargo xtask COMMAND
   deny          advisories, licences, yanked versions and sources of dependencies (deny.toml), by cargo-deny
   report-picture
                 take the picture of example 1's report that the README shows, by Chromium
+  report-check [PROGRAM]
+                run all examples with a report, look at each page in Chromium, and print size and time of each
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types, and the Python package's classes of stages from them
   wheel [--dev] build the Python package into target/wheels; --dev in the profile of the tests, which is quick and its code slow
@@ -95,6 +98,7 @@ fn main() -> ExitCode {
         ["setup"] => setup::report(),
         ["demo"] => chores::demo(),
         ["report-picture"] => chores::report_picture(),
+        ["report-check", ref rest @ ..] => report_check::check(rest),
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1"), false),
         ["test", "--ci"] => chores::test(true, true),
         ["fuzz", ref rest @ ..] => fuzz::fuzz(rest),

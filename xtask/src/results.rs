@@ -26,6 +26,11 @@ pub fn record(words: &[&str]) -> Outcome {
         [folder, program] => (Path::new(folder), PathBuf::from(program)),
         _ => return Err("usage: cargo xtask record-results FOLDER [PROGRAM]".into()),
     };
+    run_examples(folder, &program, &|_| Ok(()))
+}
+
+/// Runs the commands of all examples' READMEs in a copy of the examples; each copy is prepared before.
+pub fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path) -> std::io::Result<()>) -> Outcome {
     let program = program.canonicalize().map_err(|error| format!("cannot find {}: {error}", program.display()))?;
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
@@ -45,6 +50,7 @@ pub fn record(words: &[&str]) -> Outcome {
         let name = example.file_name().unwrap_or_default();
         let copied = folder.join("examples").join(name);
         copy(&example, &copied).map_err(failed)?;
+        prepare(&copied).map_err(failed)?;
         let text = fs::read_to_string(example.join("README.md"))
             .map_err(|error| format!("cannot read {}: {error}", example.display()))?;
         for (number, line) in commands(&text).into_iter().enumerate() {

@@ -12,9 +12,9 @@ use runout_core::{
         error::known_names,
     },
 };
-use runout_parquet::ComparisonTable;
+use runout_parquet::{ComparisonTable, comparison_figures, comparison_rows};
 
-use super::{pipeline, print};
+use super::{pipeline, print, report::OverviewReport};
 use crate::{args::CompareArgs, failure::Failure, progress::Progress, render};
 
 /// Compares separators and says how they differ.
@@ -34,16 +34,24 @@ pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::resu
     };
     let progress = Progress::new("stations");
     let whole = json || matches!(output, Output::Document(_));
+    let others: Vec<String> = comparing.methods.iter().map(|method| method.name.clone()).collect();
+    let table = comparison_figures(&others);
+    let begin = |path| OverviewReport::begin(path, comparing.title().to_owned(), &sources, vec![table.clone()]);
+    let mut report = args.report.as_deref().map(begin).transpose()?;
     let mut stations = Vec::new();
     let take = |station: StationComparison| {
         output.take(&station)?;
+        if let Some(report) = &mut report {
+            report.rows(&table, &comparison_rows(&table, &station)?)?;
+        }
         stations.push(if whole { station } else { station.without_orders() });
         Ok(())
     };
-    let mut comparison = comparing.run(args.threads, &progress, args.out.iter().cloned().collect(), take)?;
+    let mut comparison = comparing.run(args.threads, &progress, outputs(args), take)?;
     drop(progress);
     comparison.stations = stations;
     output.finish(&comparison)?;
+    conclude(report, &comparison)?;
     print(&comparison, json, render::compare::text)
 }
 
@@ -64,9 +72,24 @@ fn points(
         Ok(comparing) => comparing,
         Err(fault) => return Err(Document::parse(sources)?.diagnose(fault).into()),
     };
-    let comparison = comparing.run(args.out.iter().cloned().collect())?;
+    let begin = |path| OverviewReport::begin(path, pipeline.title.clone(), sources, Vec::new());
+    let report = args.report.as_deref().map(begin).transpose()?;
+    let comparison = comparing.run(outputs(args))?;
     output.finish(&comparison)?;
+    conclude(report, &comparison)?;
     print(&comparison, json, render::compare::text)
+}
+
+/// The files that are to be written.
+fn outputs(args: &CompareArgs) -> Vec<PathBuf> {
+    args.out.iter().chain(&args.report).cloned().collect()
+}
+
+/// Writes the report, where there is to be one.
+fn conclude(report: Option<OverviewReport>, comparison: &Comparison) -> Result<()> {
+    let Some(report) = report else { return Ok(()) };
+    let (_, overview) = render::compare::page(comparison).into_overview(None);
+    report.finish(comparison.provenance.clone(), &overview)
 }
 
 /// Refuses names that no separator has.

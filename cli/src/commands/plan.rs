@@ -1,6 +1,7 @@
 //! `runout plan`: what a rig can separate and how well, which effects it would show, what to add to it, and better angles
 //! for its sensors.
 
+mod drawn;
 mod map;
 pub mod points;
 mod report;
@@ -40,7 +41,7 @@ pub use report::{Arrangement, Gain, Optimised, Report, Score, Suggested, Unresol
 pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     match planned(args, registry, &Progress::new("steps"))? {
         Planned::Rig(report) => print(&*report, json, render::plan::text),
-        Planned::Points(report) => print(&*report, json, render::plan_points::text),
+        Planned::Points(report) => print(&*report, json, |report| render::plan_points::page(report).into_text()),
     }
 }
 
@@ -65,7 +66,11 @@ fn planned(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<
     // A rig file includes no other.
     let sources = Sources::read(&args.rig, &args.overrides.set, "")?;
     if points::is_pipeline(&sources)? {
-        return Ok(Planned::Points(Box::new(points::report(args, &sources, registry)?)));
+        let report = points::report(args, &sources, registry)?;
+        if let Some(path) = &args.report {
+            drawn::of_points(path, &sources, &report)?;
+        }
+        return Ok(Planned::Points(Box::new(report)));
     }
     let rig = rig(&sources)?;
     map::refuse(args.map.as_deref(), &sources)?;
@@ -81,6 +86,9 @@ fn planned(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<
     report.optimised = optimum.as_ref().map(|optimum| Optimised::new(optimum, &across, args));
     if let Some(path) = &args.map {
         report.map = Some(map::write(path, &rig, &args.orders, &suggestions, optimum.as_ref())?);
+    }
+    if let Some(path) = &args.report {
+        drawn::of_rig(path, &sources, &rig, &report, &map::layouts(&rig, &suggestions, optimum.as_ref()))?;
     }
     Ok(Planned::Rig(Box::new(report)))
 }

@@ -1,11 +1,14 @@
-//! `runout report`.
+//! `runout report`, and the reports of what is no single result.
 
 use std::path::{Path, PathBuf};
 
 use runout_core::{
     Result,
     atomic_file::{self, resolved},
-    stage::{Completed, Exporter, ResultInfo},
+    pipeline::{document::Sources, summary::Summary},
+    provenance::Provenance,
+    stage::{About, Completed, Export, Exporter, Overview, ResultInfo},
+    table::{RecordBatch, TableSpec},
 };
 use runout_hdf5::read_result;
 use runout_report::Report;
@@ -48,6 +51,54 @@ fn write(result: &Path, report: &Path) -> Result<()> {
         about: &stored.about,
         surface: stored.surface.as_ref(),
         diagnosis: stored.diagnosis.as_ref(),
+        overview: None,
     };
     atomic_file::commit_all(export.finish(&completed)?).map(|_written| ())
+}
+
+/// The report of a comparison or a plan, whose tables are coming.
+pub(super) struct OverviewReport {
+    title: String,
+    export: Box<dyn Export>,
+}
+
+impl OverviewReport {
+    /// Begins the report that `--report` names, with tables whose figures it draws.
+    ///
+    /// # Errors
+    /// When the file is one that is read, or its folder cannot be written to.
+    pub(super) fn begin(
+        path: &Path,
+        title: String,
+        sources: &Sources,
+        tables: Vec<TableSpec>,
+    ) -> std::result::Result<Self, Failure> {
+        if sources.files().any(|file| resolved(file) == resolved(path)) {
+            let message = format!("{} is read as configuration", path.display());
+            return Err(Failure::Name { message, help: "name another file with --report".into() });
+        }
+        let info = ResultInfo { title: title.clone(), tables, longest_name: None };
+        let export = Report::new(path.to_owned()).begin(&info)?;
+        Ok(Self { title, export })
+    }
+
+    /// Takes rows of one of the tables.
+    ///
+    /// # Errors
+    /// When they cannot be taken.
+    pub(super) fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
+        self.export.rows(table, rows)
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn finish(self, provenance: Provenance, overview: &Overview) -> Result<()> {
+        let summary = Summary { title: self.title, provenance, ..Summary::default() };
+        let about = About::default();
+        let completed =
+            Completed { summary: &summary, about: &about, surface: None, diagnosis: None, overview: Some(overview) };
+        atomic_file::commit_all(self.export.finish(&completed)?).map(|_written| ())
+    }
 }

@@ -14,10 +14,19 @@ use super::{
 /// The text of a comparison.
 #[must_use]
 pub fn text(comparison: &Comparison) -> String {
+    let mut page = page(comparison);
+    let outputs: Vec<String> = comparison.outputs.iter().map(|path| path.display().to_string()).collect();
+    page.bullets("Written", &outputs);
+    page.into_text()
+}
+
+/// A comparison as lines and tables.
+#[must_use]
+pub fn page(comparison: &Comparison) -> Page {
     let mut page = Page::default();
     page.line(&comparison.title);
     if comparison.stations.is_empty() && !comparison.values.is_empty() {
-        return points::text(page, comparison);
+        return points::page(page, comparison);
     }
     page.line(format_args!("{}, compared with {}", count(comparison.stations.len(), "station"), comparison.reference));
     methods(&mut page, comparison);
@@ -40,9 +49,7 @@ pub fn text(comparison: &Comparison) -> String {
         comparison.refused.iter().map(|refusal| format!("{}: {}", refusal.method, refusal.reason)).collect();
     page.bullets("Refused", &refused);
     page.bullets("Warnings and notes", &notes(comparison));
-    let outputs: Vec<String> = comparison.outputs.iter().map(|path| path.display().to_string()).collect();
-    page.bullets("Written", &outputs);
-    page.into_text()
+    page
 }
 
 fn methods(page: &mut Page, comparison: &Comparison) {

@@ -1,31 +1,42 @@
-//! Text that grows line by line.
+//! Text that grows line by line, for a terminal and for a page of a report.
 
 use std::fmt::{Display, Write};
+
+use runout_core::{
+    rig::Rig,
+    stage::{Overview, Part, Section},
+};
 
 use super::table::Table;
 
 /// Lines, sections and tables in the order added.
 #[derive(Debug, Default)]
 pub struct Page {
-    text: String,
+    blocks: Vec<Block>,
+}
+
+#[derive(Debug)]
+enum Block {
+    Line(String),
+    Heading(String),
+    Bullet(String),
+    Table(Table),
 }
 
 impl Page {
     /// Adds a line.
     pub fn line(&mut self, line: impl Display) {
-        // A string takes whatever is written to it.
-        let _ = writeln!(self.text, "{line}");
+        self.blocks.push(Block::Line(line.to_string()));
     }
 
     /// Adds a heading behind an empty line.
     pub fn heading(&mut self, heading: impl Display) {
-        self.line("");
-        self.line(heading);
+        self.blocks.push(Block::Heading(heading.to_string()));
     }
 
     /// Adds a table's rows.
     pub fn table(&mut self, table: &Table) {
-        self.text.push_str(&table.text());
+        self.blocks.push(Block::Table(table.clone()));
     }
 
     /// Adds a table under a heading; nothing where it has no rows.
@@ -51,24 +62,61 @@ impl Page {
         }
         self.heading(heading);
         for (line, times) in seen {
-            if times == 1 {
-                self.line(format_args!("  - {line}"));
-            } else {
-                self.line(format_args!("  - {line} ({times} times)"));
-            }
+            let times = if times == 1 { String::new() } else { format!(" ({times} times)") };
+            self.blocks.push(Block::Bullet(format!("{line}{times}")));
         }
     }
 
-    /// The text so far.
+    /// The text for a terminal.
     #[must_use]
     pub fn into_text(self) -> String {
-        self.text
+        let mut text = String::new();
+        for block in self.blocks {
+            // A string takes whatever is written to it.
+            let _ = match block {
+                Block::Line(line) => writeln!(text, "{line}"),
+                Block::Heading(heading) => writeln!(text, "\n{heading}"),
+                Block::Bullet(line) => writeln!(text, "  - {line}"),
+                Block::Table(table) => write!(text, "{}", table.text()),
+            };
+        }
+        text
+    }
+
+    /// The same for a report. The first line is its title, those before the first heading are its headline.
+    #[must_use]
+    pub fn into_overview(self, rig: Option<Rig>) -> (String, Overview) {
+        let mut lead = Vec::new();
+        let mut sections: Vec<Section> = Vec::new();
+        for block in self.blocks {
+            let Some(section) = sections.last_mut() else {
+                match block {
+                    Block::Line(line) => lead.push(line),
+                    Block::Heading(heading) => sections.push(Section { heading, parts: Vec::new() }),
+                    Block::Bullet(_) | Block::Table(_) => {}
+                }
+                continue;
+            };
+            match (block, section.parts.last_mut()) {
+                (Block::Heading(heading), _) => sections.push(Section { heading, parts: Vec::new() }),
+                (Block::Line(line), Some(Part::Lines(lines))) => lines.push(line.trim().to_owned()),
+                (Block::Line(line), _) => section.parts.push(Part::Lines(vec![line.trim().to_owned()])),
+                (Block::Bullet(line), Some(Part::List(lines))) => lines.push(line),
+                (Block::Bullet(line), _) => section.parts.push(Part::List(vec![line])),
+                (Block::Table(table), _) => section.parts.push(table.into_part()),
+            }
+        }
+        let mut lead = lead.into_iter();
+        let title = lead.next().unwrap_or_default();
+        (title, Overview { headline: lead.collect::<Vec<_>>().join(" "), rig, sections })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Page;
+    use runout_core::stage::Part;
+
+    use super::{super::table::Table, Page};
 
     #[test]
     fn equal_bullets_are_counted() {
@@ -76,5 +124,24 @@ mod tests {
         page.bullets("Warnings", &["a".into(), "b".into(), "a".into()]);
         page.bullets("Nothing", &[]);
         assert_eq!(page.into_text(), "\nWarnings\n  - a (2 times)\n  - b\n");
+    }
+
+    #[test]
+    fn an_overview_has_the_text_in_sections() {
+        let mut page = Page::default();
+        page.line("Shaft");
+        page.line("2 stations");
+        let mut table = Table::new(1, ["a", "empty", "b"]);
+        table.row(["x", "", "1"]);
+        page.headed_table("Values", &table);
+        page.line("  ± is the standard uncertainty");
+        page.bullets("Notes", &["one".into()]);
+        let (title, overview) = page.into_overview(None);
+        assert_eq!((title.as_str(), overview.headline.as_str(), overview.sections.len()), ("Shaft", "2 stations", 2));
+        let columns = vec!["a".to_owned(), "b".to_owned()];
+        let rows = vec![vec!["x".to_owned(), "1".to_owned()]];
+        let lines = Part::Lines(vec!["± is the standard uncertainty".into()]);
+        assert_eq!(overview.sections[0].parts, [Part::Table { words: 1, header: columns, rows }, lines]);
+        assert_eq!(overview.sections[1].parts, [Part::List(vec!["one".into()])]);
     }
 }

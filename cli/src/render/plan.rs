@@ -14,6 +14,16 @@ const LINES: usize = 20;
 /// The text of a report.
 #[must_use]
 pub fn text(report: &Report) -> String {
+    let mut page = page(report);
+    if let Some(map) = &report.map {
+        page.heading(format_args!("written: {}", map.display()));
+    }
+    page.into_text().trim_start().to_owned()
+}
+
+/// A report as lines and tables.
+#[must_use]
+pub fn page(report: &Report) -> Page {
     let mut page = Page::default();
     check::rig(&mut page, &report.rig);
     check::orders(&mut page, &report.separability);
@@ -28,10 +38,7 @@ pub fn text(report: &Report) -> String {
         angles(&mut page, optimised);
     }
     page.bullets("Notes", &report.notes);
-    if let Some(map) = &report.map {
-        page.heading(format_args!("written: {}", map.display()));
-    }
-    page.into_text().trim_start().to_owned()
+    page
 }
 
 fn gains(page: &mut Page, gains: &[Gain]) {

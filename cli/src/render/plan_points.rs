@@ -13,9 +13,9 @@ use super::{
 };
 use crate::commands::plan::points::PointReport;
 
-/// The text of a plan.
+/// A plan as lines and tables.
 #[must_use]
-pub fn text(report: &PointReport) -> String {
+pub fn page(report: &PointReport) -> Page {
     let plan = &report.plan;
     let mut page = Page::default();
     page.line(&report.title);
@@ -40,7 +40,7 @@ pub fn text(report: &PointReport) -> String {
     let sets: Vec<String> = foresight.confounded.iter().map(|set| foresight::names(set)).collect();
     page.bullets("Effects that cannot be told apart", &sets);
     page.bullets("Notes", &plan.notes);
-    page.into_text()
+    page
 }
 
 /// Without what is taken for granted, which stands above, and with orders that would show alike as one: "lobing-order-16…27".

@@ -1,5 +1,7 @@
 //! Tables of text.
 
+use runout_core::stage::Part;
+
 use super::printable;
 
 /// Characters of a cell, at most: a name from a file may have any length.
@@ -45,12 +47,12 @@ impl Table {
     /// row are left out.
     #[must_use]
     pub fn text(&self) -> String {
-        let (Some(header), true) = (self.rows.first(), self.rows.len() > 1) else { return String::new() };
-        let cell = |row: &Vec<String>, column: usize| row.get(column).cloned().unwrap_or_default();
-        let used = |column: &usize| self.rows[1..].iter().any(|row| !cell(row, *column).is_empty());
-        let columns: Vec<usize> = (0..header.len()).filter(used).collect();
+        if self.is_empty() {
+            return String::new();
+        }
+        let columns = self.used();
         let width = |column: usize| self.rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..header.len()).map(width).collect();
+        let widths: Vec<usize> = (0..=columns.last().copied().unwrap_or(0)).map(width).collect();
         let mut text = String::new();
         for row in &self.rows {
             let mut line = String::new();
@@ -65,6 +67,26 @@ impl Table {
         }
         text
     }
+
+    /// Columns that are not empty in every row.
+    fn used(&self) -> Vec<usize> {
+        let used = |column: &usize| self.rows.iter().skip(1).any(|row| !cell(row, *column).is_empty());
+        (0..self.rows.first().map_or(0, Vec::len)).filter(used).collect()
+    }
+
+    /// The same for a report.
+    #[must_use]
+    pub fn into_part(self) -> Part {
+        let columns = self.used();
+        let words = columns.iter().filter(|column| **column < self.words).count();
+        let mut rows =
+            self.rows.iter().map(|row| columns.iter().map(|column| cell(row, *column).to_owned()).collect::<Vec<_>>());
+        Part::Table { words, header: rows.next().unwrap_or_default(), rows: rows.collect() }
+    }
+}
+
+fn cell(row: &[String], column: usize) -> &str {
+    row.get(column).map_or("", String::as_str)
 }
 
 #[cfg(test)]

@@ -119,6 +119,83 @@ fn a_diagnosis_has_its_report() {
     assert_eq!(elements(&page(&folder.path().join("again.html"))), elements(&written));
 }
 
+/// A simulated spindle whose pipeline has the same limit and exports, and a page of each command that has one.
+fn pages_of_commands(hostile: bool) -> (Folder, [PathBuf; 3]) {
+    let folder = spindle(hostile);
+    let compared = folder.run(&["compare", "pipeline.toml", "--report", "compare.html", "--out", "compare.json"]);
+    assert_eq!(compared.status, 0, "{}", compared.stderr);
+    let planned = folder.run(&["plan", "rig.toml", "--orders", "2..60", "--report", "plan.html"]);
+    assert_eq!(planned.status, 0, "{}", planned.stderr);
+    let recordings = ["one.h5", "two.h5", "three.h5"];
+    for (seed, name) in (1..).zip(recordings) {
+        let ran = folder.run(&["simulate", "scenario.toml", "--out", name, "--set", &format!("seed={seed}")]);
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+    }
+    let batch = folder.run(&[&["batch", "pipeline.toml"], &recordings[..], &["--out", "many"]].concat());
+    assert_eq!(batch.status, 0, "{}", batch.stderr);
+    let pages = ["compare.html", "plan.html", "many/report.html"].map(|name| folder.path().join(name));
+    (folder, pages)
+}
+
+#[test]
+fn comparison_plan_and_batch_have_their_pages() {
+    let (folder, [compared, planned, batch]) = pages_of_commands(false);
+    let expected: [(&Path, &[&str]); 3] = [
+        (&compared, &["Turned shaft", "compared with four-sensor-reversal", "E_n by order", "Methods", "BLAKE3"]),
+        (&planned, &["Plan of rig.toml", "Lost orders of form: none", "Noise gain of form, other layouts", "Setup <bdi>reversed"]),
+        (&batch, &["3 recordings. ", "Limits, recordings that are proven", "Individuals", "Moving range"]),
+    ];
+    for (path, parts) in expected {
+        let written = page(path);
+        for part in parts {
+            assert!(written.contains(part), "{}: {part}", path.display());
+        }
+        assert!(written.contains("default-src 'none'") && !elements(&written).contains("://"), "{}", path.display());
+    }
+    // The limit of the pipeline is in the control charts.
+    assert!(page(&batch).contains("\"upper limit\""));
+    for (arguments, said) in [
+        (&["compare", "pipeline.toml", "--report", "pipeline.toml"][..], "is read as configuration"),
+        (&["plan", "rig.toml", "--report", "./rig.toml"], "is read as configuration"),
+        (&["compare", "pipeline.toml", "--report", "shaft.h5"], "it is what the run reads"),
+    ] {
+        let ran = folder.run(arguments);
+        assert!(ran.status != 0 && ran.stderr.contains(said), "{arguments:?}: {}", ran.shown());
+    }
+    assert_eq!(folder.run(&["run", "pipeline.toml"]).status, 0, "the inputs are as they were");
+}
+
+#[test]
+fn names_of_comparison_and_plan_stay_names() {
+    let (_folder, pages) = pages_of_commands(true);
+    for path in pages {
+        let written = page(&path);
+        let shown = elements(&written);
+        assert!(!shown.contains("<b>") && !shown.contains("<!-- %"), "{}", path.display());
+        assert_eq!(written.matches("</script>").count(), 5, "{}", path.display());
+    }
+}
+
+#[test]
+fn error_motion_has_all_turns_and_spectra() {
+    let folder = spindle(false);
+    assert_eq!(folder.run(&["run", "pipeline.toml"]).status, 0);
+    let written = page(&folder.path().join("out/report.html"));
+    for part in ["\"turns\"", "\"spectrum\"", "\"spectrum-hz\"", "\"tilt-turns\"", "outermost turn"] {
+        assert!(written.contains(part), "{part}");
+    }
+    let result = hdf5_metno::File::open(folder.path().join("out/result.h5")).unwrap();
+    let column = |name: &str| result.dataset(name).unwrap().read_raw::<f64>().unwrap();
+    let [low, middle, high] = ["lowest", "synchronous", "highest"].map(|name| column(&format!("turns/{name}_um")));
+    assert!(!middle.is_empty() && low.iter().zip(&middle).all(|(low, middle)| low <= middle));
+    assert!(high.iter().zip(&middle).all(|(high, middle)| high >= middle));
+    // Sensor noise of 0.02 µm: turns lie a few times that apart.
+    let widest = low.iter().zip(&high).map(|(low, high)| high - low).fold(0.0, f64::max);
+    assert!((0.02..0.5).contains(&widest), "{widest}");
+    let orders = result.dataset("spectrum/order").unwrap().read_raw::<u32>().unwrap();
+    assert_eq!(orders.iter().max(), Some(&63));
+}
+
 #[test]
 fn what_is_no_result_is_refused() {
     let folder = spindle(false);
@@ -202,7 +279,22 @@ fn chromium_draws_what_the_tables_hold_and_the_controls_work() {
     }
     assert_eq!(drawn.len(), 2);
     let of = |plot: &str| found["plots"][plot][0].clone();
-    assert!(of("map-surface")["count"].as_u64() > Some(1000) && of("solid-surface")["count"].as_u64() > Some(1000));
+    // The map has every height of the surface, the body in space those of the rings and angles that it draws, with the seam closed.
+    let surface = result.dataset("surface_map/deviation_um").unwrap();
+    let [rings, angles] = surface.shape()[..] else { panic!("a surface has two dimensions") };
+    let heights = surface.read_raw::<f64>().unwrap();
+    assert_eq!(of("map-surface")["count"].as_u64(), Some((rings * angles) as u64));
+    let whole: f64 = heights.iter().sum();
+    assert!((of("map-surface")["sum"].as_f64().unwrap() - whole).abs() < 1e-6 * heights.len() as f64, "{whole}");
+    let [ring_step, angle_step] = [rings.div_ceil(160), angles.div_ceil(180)];
+    let drawn = (0..rings).step_by(ring_step).flat_map(|ring| {
+        let around = (0..angles).step_by(angle_step).chain([0]);
+        around.map(|angle| heights[ring * angles + angle]).collect::<Vec<_>>()
+    });
+    let drawn: Vec<f64> = drawn.collect();
+    assert_eq!(of("solid-surface")["count"].as_u64(), Some(drawn.len() as u64));
+    let sum: f64 = drawn.iter().sum();
+    assert!((of("solid-surface")["sum"].as_f64().unwrap() - sum).abs() < 1e-6 * drawn.len() as f64, "{sum}");
     let controls = &found["controls"];
     for (plot, control) in
         [("plot-form", "panel"), ("plot-form", "filter"), ("plot-motion", "filter"), ("plot-form-harmonics", "panel")]
@@ -211,4 +303,25 @@ fn chromium_draws_what_the_tables_hold_and_the_controls_work() {
     }
     assert_eq!(controls["slider"], true);
     assert!(found["pointed"].as_str().unwrap().contains("deviation") && found["ring"].is_array(), "{found:#}");
+}
+
+#[test]
+fn chromium_draws_comparison_plan_and_batch() {
+    let (folder, [compared, planned, batch]) = pages_of_commands(true);
+    let Some(found) = look(&compared) else { return };
+    assert_quiet("compare", &found);
+    // The first panel has the first station's first quantity: E_n of every method but the reference.
+    let document: serde_json::Value = serde_json::from_str(&page(&folder.path().join("compare.json"))).unwrap();
+    let first = &document["stations"][0]["quantities"][0]["differences"];
+    let expected: f64 = first.as_array().unwrap().iter().flat_map(|one| {
+        one["by_order"]["e_n"].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect::<Vec<_>>()
+    }).sum();
+    let traces = found["plots"]["plot-e-n"].as_array().unwrap();
+    let drawn: f64 = traces.iter().filter(|trace| trace["meta"] == "values").filter_map(|trace| trace["sum"].as_f64()).sum();
+    assert!((expected - drawn).abs() < 1e-5 * expected.max(1.0), "{expected} {drawn}");
+    for (name, path, plot) in [("plan", &planned, "plot-noise-gain"), ("batch", &batch, "plot-trend")] {
+        let found = look(path).unwrap();
+        assert_quiet(name, &found);
+        assert_eq!(found["controls"][plot]["panel"], true, "{name}");
+    }
 }

@@ -113,6 +113,18 @@ impl Signal {
             Self::RangeBeyondLimit => "range-beyond-limit",
         }
     }
+
+    /// The rule that is broken, in words.
+    #[must_use]
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::BeyondLimit => "a value beyond a control limit (Nelson 1)",
+            Self::NineOnOneSide => "nine values in a row on one side of the mean (Nelson 2)",
+            Self::SixRisingOrFalling => "six values in a row that rise or fall (Nelson 3)",
+            Self::FourteenAlternating => "fourteen values in a row that alternate (Nelson 4)",
+            Self::RangeBeyondLimit => "a moving range above its control limit",
+        }
+    }
 }
 
 /// The tests, with what they remember of the values before.

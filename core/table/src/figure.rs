@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A figure of a table: panels side by side, each with curves.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
     /// Its id, which names its files: `form-polar`.
     pub id: String,
@@ -15,8 +15,21 @@ pub struct Figure {
     pub curves: Vec<String>,
     /// A column of names, and the names of the rows that are drawn; without it all rows are.
     pub only: Option<(String, Vec<String>)>,
+    /// A column of names of the places along the horizontal axis.
+    pub places: Option<String>,
+    /// A limit that all panels show.
+    pub level: Option<Level>,
     /// How its rows are drawn.
     pub drawing: Drawing,
+}
+
+/// A horizontal line across every panel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// Its name: `limit`.
+    pub name: String,
+    /// Its height, in the unit of the values.
+    pub value: f64,
 }
 
 /// How rows are drawn. All fields name columns of the figure's table; rows with NaN or null are left out.
@@ -45,6 +58,20 @@ pub enum Drawing {
         /// Standard uncertainty of the complex number, both parts together.
         std: Option<String>,
     },
+    /// Points that are not joined, over a common axis.
+    Points {
+        /// Along the axis.
+        x: String,
+        /// The values, all of one unit.
+        values: Vec<Measure>,
+    },
+    /// Bars over the order; orders without a value are lost.
+    Bars {
+        /// The order.
+        order: String,
+        /// The values, all of one unit.
+        values: Vec<Measure>,
+    },
     /// A height over a rectangle, as colours.
     Map {
         /// Along the horizontal axis.
@@ -65,13 +92,18 @@ pub struct Measure {
     pub std: Option<String>,
     /// Their symbol, where the column's name without its unit is not the usual one.
     pub symbol: Option<String>,
+    /// A column of texts: a value with a text is marked with it.
+    pub marks: Option<String>,
+    /// Whether all curves of a panel have the same values, so that they are drawn once, as a line.
+    #[serde(default)]
+    pub common: bool,
 }
 
 impl Measure {
     /// Values without uncertainty.
     #[must_use]
     pub fn new(column: impl Into<String>) -> Self {
-        Self { column: column.into(), std: None, symbol: None }
+        Self { column: column.into(), std: None, symbol: None, marks: None, common: false }
     }
 
     /// The same with a column of standard uncertainties.
@@ -85,12 +117,30 @@ impl Measure {
     pub fn with_symbol(self, symbol: impl Into<String>) -> Self {
         Self { symbol: Some(symbol.into()), ..self }
     }
+
+    /// The same with a column of texts that mark values.
+    #[must_use]
+    pub fn with_marks(self, column: impl Into<String>) -> Self {
+        Self { marks: Some(column.into()), ..self }
+    }
+
+    /// The same for values that all curves of a panel share.
+    #[must_use]
+    pub fn common(self) -> Self {
+        Self { common: true, ..self }
+    }
+
+    /// The columns that it needs.
+    fn columns(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(&self.column).chain(&self.std).chain(&self.marks).map(String::as_str)
+    }
 }
 
 impl Figure {
     fn new(id: impl Into<String>, title: impl Into<String>, drawing: Drawing) -> Self {
         let (panels, curves) = (Vec::new(), Vec::new());
-        Self { id: id.into(), title: title.into(), panels, curves, only: None, drawing }
+        let (id, title) = (id.into(), title.into());
+        Self { id, title, panels, curves, only: None, places: None, level: None, drawing }
     }
 
     /// Deviations about a reference circle.
@@ -129,6 +179,28 @@ impl Figure {
         Self::new(id, title, Drawing::Amplitudes { order: order.into(), parts, std })
     }
 
+    /// Points that are not joined, over a common axis.
+    #[must_use]
+    pub fn points(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        x: impl Into<String>,
+        values: impl IntoIterator<Item = Measure>,
+    ) -> Self {
+        Self::new(id, title, Drawing::Points { x: x.into(), values: values.into_iter().collect() })
+    }
+
+    /// Bars over the order; orders without a value are lost.
+    #[must_use]
+    pub fn bars(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        order: impl Into<String>,
+        values: impl IntoIterator<Item = Measure>,
+    ) -> Self {
+        Self::new(id, title, Drawing::Bars { order: order.into(), values: values.into_iter().collect() })
+    }
+
     /// A height over a rectangle.
     #[must_use]
     pub fn map(id: impl Into<String>, title: impl Into<String>, [x, y, value]: [&str; 3]) -> Self {
@@ -153,20 +225,31 @@ impl Figure {
         Self { only: Some((column.into(), names.into_iter().map(Into::into).collect())), ..self }
     }
 
+    /// The same with the names of the places along the horizontal axis in a column.
+    #[must_use]
+    pub fn places(self, column: impl Into<String>) -> Self {
+        Self { places: Some(column.into()), ..self }
+    }
+
+    /// The same with a limit.
+    #[must_use]
+    pub fn level(self, name: impl Into<String>, value: f64) -> Self {
+        Self { level: Some(Level { name: name.into(), value }), ..self }
+    }
+
     /// The columns of its table that it needs.
     #[must_use]
     pub fn columns(&self) -> Vec<&str> {
         let mut columns: Vec<&str> = self.panels.iter().chain(&self.curves).map(String::as_str).collect();
         columns.extend(self.only.iter().map(|(column, _)| column.as_str()));
+        columns.extend(self.places.as_deref());
         match &self.drawing {
-            Drawing::Polar { angle_deg: x, values } | Drawing::Lines { x, values } => {
+            Drawing::Polar { angle_deg: x, values }
+            | Drawing::Lines { x, values }
+            | Drawing::Points { x, values }
+            | Drawing::Bars { order: x, values } => {
                 columns.push(x);
-                columns.extend(
-                    values
-                        .iter()
-                        .flat_map(|value| std::iter::once(&value.column).chain(&value.std))
-                        .map(String::as_str),
-                );
+                columns.extend(values.iter().flat_map(Measure::columns));
             }
             Drawing::Amplitudes { order, parts, std } => {
                 columns.extend([order.as_str(), parts[0].as_str(), parts[1].as_str()]);

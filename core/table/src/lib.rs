@@ -125,7 +125,7 @@ impl ColumnSpec {
 }
 
 /// A table as it is declared before a run.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct TableSpec {
     /// Its name, of a file or a group: `form`.

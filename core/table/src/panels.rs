@@ -1,16 +1,20 @@
 //! Rows of a table as the panels and curves of a figure, for whatever draws them.
 
+mod columns;
 mod grid;
+#[cfg(test)]
+mod tests;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use arrow_array::{Array, Float64Array, RecordBatch, StringArray, UInt32Array, cast::AsArray, types::Float64Type};
+use arrow_array::RecordBatch;
 use runout_error::{Error, Result};
 
 use crate::{
     TableSpec,
-    figure::{Drawing, Figure, Measure},
+    figure::{Drawing, Figure, Level, Measure},
 };
+use columns::{Names, Numbers, joined};
 pub use grid::{Cells, Grid};
 
 /// The rows of one figure, collected while they come.
@@ -27,6 +31,12 @@ pub struct Panels {
     pub axes: [Axis; 2],
     /// The panels that are kept, in the order in which they came.
     pub drawn: Vec<Panel>,
+    /// Names of places along the horizontal axis, where they have names.
+    pub places: Vec<(f64, String)>,
+    /// A horizontal line across every panel, in the unit of the vertical axis before it is [scaled](Self::scaled).
+    pub level: Option<Level>,
+    place_column: Option<String>,
+    known_places: HashSet<u64>,
     /// Panels that there were.
     numbers: HashMap<String, usize>,
     /// Each so many of them are kept.
@@ -48,6 +58,10 @@ pub enum Kind {
     Lines,
     /// Absolute values over the order.
     Amplitudes,
+    /// Points over a common axis; curves that are [joined](Curve::joined) are lines.
+    Points,
+    /// Bars over the order.
+    Bars,
     /// Heights over a rectangle.
     Map,
 }
@@ -79,6 +93,21 @@ pub struct Curve {
     pub points: Vec<Point>,
     /// Places along the horizontal axis without a value: of amplitudes the lost orders.
     pub missing: Vec<f64>,
+    /// Points that are marked.
+    pub marks: Vec<Mark>,
+    /// Whether it is a line where others are points.
+    pub joined: bool,
+}
+
+/// A point of a curve with what there is to say of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    /// Along the horizontal axis.
+    pub x: f64,
+    /// Along the vertical axis.
+    pub y: f64,
+    /// What there is to say.
+    pub text: String,
 }
 
 /// A point of a curve, or a cell of a map.
@@ -99,6 +128,8 @@ struct Source {
     x: String,
     y: [Option<String>; 2],
     third: Option<String>,
+    marks: Option<String>,
+    common: bool,
 }
 
 impl Panels {
@@ -118,7 +149,8 @@ impl Panels {
             return Err(missing(column));
         }
         let axis = |column: &str| {
-            let unit = table.column(column).map_or("", |column| &column.unit);
+            // Rows of several quantities share a column; its unit begins with that of the figure's.
+            let unit = table.column(column).and_then(|column| column.unit.split(';').next()).unwrap_or_default();
             Axis { name: without_unit(column, unit), unit: unit.to_owned() }
         };
         let values_axis = |values: &[Measure]| match values {
@@ -132,12 +164,14 @@ impl Panels {
                 (Kind::Polar, [axis(x), values_axis(values)], curves(x, values, &axis))
             }
             Drawing::Lines { x, values } => (Kind::Lines, [axis(x), values_axis(values)], curves(x, values, &axis)),
+            Drawing::Points { x, values } => (Kind::Points, [axis(x), values_axis(values)], curves(x, values, &axis)),
+            Drawing::Bars { order: x, values } => {
+                (Kind::Bars, [axis(x), values_axis(values)], curves(x, values, &axis))
+            }
             Drawing::Amplitudes { order, parts: [real, imaginary], std } => {
                 let y = [Some(real.clone()), Some(imaginary.clone())];
-                let source = Source { name: String::new(), x: order.clone(), y, third: std.clone() };
-                // Coefficients of several quantities share a column; its unit begins with that of form.
-                let unit = axis(real).unit.split(';').next().unwrap_or_default().to_owned();
-                let amplitude = Axis { name: "amplitude".into(), unit };
+                let source = Source { name: String::new(), x: order.clone(), y, third: std.clone(), marks: None, common: false };
+                let amplitude = Axis { name: "amplitude".into(), ..axis(real) };
                 (Kind::Amplitudes, [axis(order), amplitude], vec![source])
             }
             Drawing::Map { x, y, value } => {
@@ -146,6 +180,8 @@ impl Panels {
                     x: x.clone(),
                     y: [Some(y.clone()), None],
                     third: Some(value.clone()),
+                    marks: None,
+                    common: false,
                 };
                 (Kind::Map, [axis(x), axis(y)], vec![source])
             }
@@ -162,6 +198,10 @@ impl Panels {
             kind,
             axes,
             drawn: Vec::new(),
+            places: Vec::new(),
+            level: figure.level.clone(),
+            place_column: figure.places.clone(),
+            known_places: HashSet::new(),
             numbers: HashMap::new(),
             stride: 1,
             most,
@@ -204,8 +244,11 @@ impl Panels {
         let (panel_names, curve_names) = (names(&self.panel_columns), names(&self.curve_columns));
         let only = self.only.as_ref().map(|(column, names)| (Names::of(rows, column), names.clone()));
         let columns: Vec<[Option<Numbers>; 4]> = self.values.iter().map(|value| value.columns(rows)).collect();
+        let marks: Vec<Option<Names>> =
+            self.values.iter().map(|value| value.marks.as_ref().map(|column| Names::of(rows, column))).collect();
+        let places = self.place_column.as_ref().map(|column| Names::of(rows, column));
         let mut last: Option<(String, String)> = None;
-        let mut at: Option<(usize, usize)> = None;
+        let mut at: Option<(usize, Vec<usize>)> = None;
         for row in 0..rows.num_rows() {
             if only.as_ref().is_some_and(|(column, names)| names.iter().all(|name| column.get(row) != name)) {
                 continue;
@@ -215,15 +258,28 @@ impl Panels {
                 at = self.place(&key.0, &key.1);
                 last = Some(key);
             }
-            let Some((panel, first)) = at else { continue };
+            let Some((panel, places_of)) = &at else { continue };
             for (offset, columns) in columns.iter().enumerate() {
                 let number = |column: &Option<Numbers>| column.as_ref().map_or(f64::NAN, |column| column.get(row));
                 let [x, y, second, third] =
                     [number(&columns[0]), number(&columns[1]), number(&columns[2]), number(&columns[3])];
                 let y = if columns[2].is_some() { y.hypot(second) } else { y };
-                let curve = &mut self.drawn[panel].curves[first + offset];
+                let curve = &mut self.drawn[*panel].curves[places_of[offset]];
+                if self.values[offset].common && curve.points.last().is_some_and(|last| last.x.to_bits() == x.to_bits()) {
+                    continue;
+                }
+                if let Some(places) = &places
+                    && x.is_finite()
+                    && self.known_places.insert(x.to_bits())
+                {
+                    self.places.push((x, places.get(row).to_owned()));
+                }
                 if x.is_finite() && y.is_finite() {
                     curve.points.push(Point { x, y, third });
+                    let text = marks[offset].as_ref().map_or("", |texts| texts.get(row));
+                    if !text.is_empty() {
+                        curve.marks.push(Mark { x, y, text: text.to_owned() });
+                    }
                 } else if x.is_finite() {
                     curve.missing.push(x);
                 }
@@ -231,8 +287,8 @@ impl Panels {
         }
     }
 
-    /// The panel of these names and its first curve; none where the panel is not kept.
-    fn place(&mut self, panel: &str, curve: &str) -> Option<(usize, usize)> {
+    /// The panel of these names and its curves, value by value; none where the panel is not kept.
+    fn place(&mut self, panel: &str, curve: &str) -> Option<(usize, Vec<usize>)> {
         let next = self.numbers.len();
         let number = *self.numbers.entry(panel.to_owned()).or_insert(next);
         if !number.is_multiple_of(self.stride) {
@@ -254,18 +310,19 @@ impl Panels {
             self.drawn.len() - 1
         };
         let curves = &mut self.drawn[index].curves;
-        let full = |value: &Source| match (curve, value.name.as_str()) {
-            ("", name) => name.to_owned(),
-            (curve, "") => curve.to_owned(),
-            (curve, name) => format!("{curve} {name}"),
+        let place = |value: &Source| {
+            let name = match (curve, value.name.as_str()) {
+                ("", name) => name.to_owned(),
+                (_, name) if value.common => name.to_owned(),
+                (curve, "") => curve.to_owned(),
+                (curve, name) => format!("{curve} {name}"),
+            };
+            curves.iter().position(|known| known.name == name).unwrap_or_else(|| {
+                curves.push(Curve { name, joined: value.common, ..Curve::default() });
+                curves.len() - 1
+            })
         };
-        let first = self.values.first().map(&full).unwrap_or_default();
-        if let Some(first) = curves.iter().position(|known| known.name == first) {
-            return Some((index, first));
-        }
-        let first = curves.len();
-        curves.extend(self.values.iter().map(|value| Curve { name: full(value), ..Curve::default() }));
-        Some((index, first))
+        Some((index, self.values.iter().map(place).collect()))
     }
 }
 
@@ -288,7 +345,9 @@ impl Curve {
                 points.extend(ends);
             }
         }
-        Self { points: points.into_iter().map(scaled).collect(), ..self.clone() }
+        let marks = self.marks.iter().map(|mark| Mark { y: scale * mark.y, ..mark.clone() }).collect();
+        let (name, missing) = (self.name.clone(), self.missing.clone());
+        Self { name, points: points.into_iter().map(scaled).collect(), missing, marks, joined: self.joined }
     }
 }
 
@@ -303,12 +362,14 @@ fn curves(x: &str, values: &[Measure], axis: &dyn Fn(&str) -> Axis) -> Vec<Sourc
     let source = |value: &Measure| Source {
         name: match &value.symbol {
             Some(symbol) => symbol.clone(),
-            None if values.len() > 1 => axis(&value.column).name,
+            None if values.iter().filter(|value| !value.common).count() > 1 || value.common => axis(&value.column).name,
             None => String::new(),
         },
         x: x.to_owned(),
         y: [Some(value.column.clone()), None],
         third: value.std.clone(),
+        marks: value.marks.clone(),
+        common: value.common,
     };
     values.iter().map(source).collect()
 }
@@ -317,117 +378,4 @@ fn curves(x: &str, values: &[Measure], axis: &dyn Fn(&str) -> Axis) -> Vec<Sourc
 fn without_unit(column: &str, unit: &str) -> String {
     let name = if unit.is_empty() { column } else { column.strip_suffix(&format!("_{unit}")).unwrap_or(column) };
     name.replace('_', " ")
-}
-
-/// Names of a row, those that are there.
-fn joined(columns: &[Names], row: usize) -> String {
-    let names = columns.iter().map(|column| column.get(row)).filter(|name| !name.is_empty());
-    names.collect::<Vec<_>>().join(" ")
-}
-
-/// A column of names.
-struct Names<'a>(Option<&'a StringArray>);
-
-impl<'a> Names<'a> {
-    fn of(rows: &'a RecordBatch, column: &str) -> Self {
-        Self(rows.column_by_name(column).and_then(|column| column.as_string_opt::<i32>()))
-    }
-
-    fn get(&self, row: usize) -> &'a str {
-        self.0.filter(|names| names.is_valid(row)).map_or("", |names| names.value(row))
-    }
-}
-
-/// A column of numbers.
-enum Numbers<'a> {
-    Measured(&'a Float64Array),
-    Counted(&'a UInt32Array),
-}
-
-impl<'a> Numbers<'a> {
-    fn of(rows: &'a RecordBatch, column: &str) -> Option<Self> {
-        let column = rows.column_by_name(column)?;
-        let counted = || column.as_any().downcast_ref::<UInt32Array>().map(Self::Counted);
-        column.as_primitive_opt::<Float64Type>().map(Self::Measured).or_else(counted)
-    }
-
-    fn get(&self, row: usize) -> f64 {
-        match self {
-            Self::Measured(numbers) if numbers.is_valid(row) => numbers.value(row),
-            Self::Counted(numbers) if numbers.is_valid(row) => f64::from(numbers.value(row)),
-            _ => f64::NAN,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "tests")]
-
-    use super::*;
-    use crate::{ColumnSpec, counts, numbers, texts};
-
-    fn table() -> TableSpec {
-        TableSpec::new(
-            "form",
-            "form",
-            vec![
-                ColumnSpec::name("station", "station"),
-                ColumnSpec::number("angle_deg", "deg", "angle"),
-                ColumnSpec::number("form_um", "um", "form"),
-                ColumnSpec::count("order", "", "order"),
-            ],
-        )
-    }
-
-    fn rows(station: &str, form_um: [f64; 3]) -> RecordBatch {
-        let columns = vec![texts([station; 3]), numbers([0.0, 120.0, 240.0]), numbers(form_um), counts(0..3)];
-        table().rows(columns).unwrap()
-    }
-
-    #[test]
-    fn panels_are_spread_over_all_stations() {
-        let figure = Figure::polar("form", "Form", "angle_deg", [Measure::new("form_um")]).panels(["station"]);
-        let mut panels = Panels::new(&table(), &figure, 4).unwrap();
-        for station in 0..31 {
-            panels.add(&rows(&format!("s{station}"), [f64::from(station), 1.0, f64::NAN]));
-        }
-        let names: Vec<&str> = panels.drawn.iter().map(|panel| panel.name.as_str()).collect();
-        assert_eq!((panels.count(), names), (31, vec!["s0", "s8", "s16", "s24"]));
-        // Rows that come again belong to the panel that is there; NaN is left out.
-        panels.add(&rows("s8", [0.5, 0.5, 0.5]));
-        assert_eq!(panels.drawn[1].curves.len(), 1);
-        let heights: Vec<f64> = panels.drawn[1].curves[0].points.iter().map(|point| point.y).collect();
-        assert_eq!(heights, [8.0, 1.0, 0.5, 0.5, 0.5]);
-        assert_eq!(panels.drawn[1].curves[0].missing, [240.0]);
-    }
-
-    #[test]
-    fn a_column_that_the_table_lacks_is_an_error() {
-        let figure = Figure::lines("residual", "Residual", "order", [Measure::new("after")]);
-        let error = Panels::new(&table(), &figure, 4).err().unwrap().to_string();
-        assert!(error.contains("residual") && error.contains("has no column after"), "{error}");
-    }
-
-    #[test]
-    fn a_thinned_curve_keeps_its_peak() {
-        let mut points: Vec<Point> =
-            (0..100_000).map(|index| Point { x: f64::from(index), y: 0.0, third: f64::NAN }).collect();
-        points[43_211].y = 7.0;
-        points[43_214].y = -3.0;
-        let thin = Curve { points, ..Curve::default() }.thinned(1440, 1000.0);
-        assert!(thin.points.len() <= 1440, "{} points", thin.points.len());
-        for (x, y) in [(43_211.0, 7000.0), (43_214.0, -3000.0)] {
-            assert!(thin.points.iter().any(|point| (point.x, point.y) == (x, y)));
-        }
-        assert!(thin.points.windows(2).all(|pair| pair[0].x <= pair[1].x));
-    }
-
-    #[test]
-    fn axes_are_named_by_their_columns() {
-        let figure = Figure::lines("form", "Form", "order", [Measure::new("form_um")]);
-        let [x, y] = Panels::new(&table(), &figure, 4).unwrap().axes;
-        assert_eq!((x.name.as_str(), y.name.as_str(), y.unit.as_str()), ("order", "form", "um"));
-        assert_eq!(without_unit("tilt_x_urad", "urad"), "tilt x");
-    }
 }

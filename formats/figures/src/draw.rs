@@ -3,7 +3,7 @@
 use kuva::{
     backend::{png::PngBackend, svg::SvgBackend},
     plot::{
-        ColorMap, Heatmap, LegendPosition, LinePlot, LollipopPlot,
+        ColorMap, Heatmap, LegendPosition, LinePlot, LollipopPlot, ScatterPlot,
         polar::{PolarMode, PolarPlot},
     },
     render::{figure::Figure, layout::Layout, plots::Plot, render::render_multiple},
@@ -86,7 +86,7 @@ pub(crate) fn surface(surface: &Surface) -> Scene {
 fn size(kind: Kind) -> [f64; 2] {
     match kind {
         Kind::Polar => [560.0, 660.0],
-        Kind::Lines | Kind::Amplitudes => [720.0, 420.0],
+        Kind::Lines | Kind::Points | Kind::Amplitudes | Kind::Bars => [720.0, 420.0],
         Kind::Map => [860.0, 460.0],
     }
 }
@@ -100,10 +100,14 @@ fn cell(figure: &Panels, panel: &Panel, scale: f64, unit: &str) -> (Vec<Plot>, L
         .filter(|curve| !curve.points.is_empty())
         .map(|curve| curve.thinned(MOST_POINTS, scale))
         .collect();
+    let level = figure.level.as_ref().map(|level| (level.name.as_str(), scale * level.value));
     let (plots, layout) = match figure.kind {
         Kind::Polar => polar(&curves, &axes[1]),
-        Kind::Lines => lines(&curves, &axes),
-        Kind::Amplitudes => amplitudes(&curves, &axes),
+        Kind::Lines => lines(&curves, &axes, level),
+        Kind::Points => points(&curves, &axes),
+        // Eccentricity is no form, and high orders are noise.
+        Kind::Amplitudes => bars(&curves, &axes, 2.0, level),
+        Kind::Bars => bars(&curves, &axes, 0.0, level),
         Kind::Map => {
             let points = panel.curves.iter().flat_map(|curve| curve.points.iter().copied()).collect::<Vec<_>>();
             map(&points, &axes, figure.height())
@@ -159,7 +163,7 @@ fn polar(curves: &[Curve], values: &Axis) -> (Vec<Plot>, Layout) {
     (plots, layout)
 }
 
-fn lines(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
+fn lines(curves: &[Curve], axes: &[Axis; 2], level: Option<(&str, f64)>) -> (Vec<Plot>, Layout) {
     let mut plots = Vec::new();
     for (index, curve) in curves.iter().enumerate() {
         let line = curve.points.iter().map(|point| (point.x, point.y)).collect::<Vec<_>>();
@@ -171,26 +175,69 @@ fn lines(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
             plot = plot.with_band(side(-1.0), side(1.0));
         }
         plots.push(Plot::Line(if curve.name.is_empty() { plot } else { plot.with_legend(curve.name.clone()) }));
+        if !curve.marks.is_empty() {
+            let marks = curve.marks.iter().map(|mark| (mark.x, mark.y)).collect::<Vec<_>>();
+            plots.push(Plot::Scatter(ScatterPlot::new().with_data(marks).with_color(MARK).with_size(3.5)));
+        }
+    }
+    plots.extend(level.map(|level| limit(level, curves, f64::INFINITY)));
+    let layout = Layout::auto_from_plots(&plots).with_x_label(label(&axes[0])).with_y_label(label(&axes[1]));
+    (plots, layout)
+}
+
+fn points(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
+    let mut plots = Vec::new();
+    for (index, curve) in curves.iter().enumerate() {
+        let points = curve.points.iter().map(|point| (point.x, point.y)).collect::<Vec<_>>();
+        let named = !curve.name.is_empty();
+        if curve.joined {
+            let plot = LinePlot::new().with_data(points).with_color(LIMIT).with_stroke_width(1.2);
+            plots.push(Plot::Line(if named { plot.with_legend(curve.name.clone()) } else { plot }));
+            continue;
+        }
+        let plot = ScatterPlot::new().with_data(points).with_color(colour(index)).with_size(2.5);
+        plots.push(Plot::Scatter(if named { plot.with_legend(curve.name.clone()) } else { plot }));
+        for point in curve.points.iter().filter(|point| point.third.is_finite()) {
+            let ends = [-COVERAGE, COVERAGE].map(|side| (point.x, point.y + side * point.third));
+            plots.push(Plot::Line(LinePlot::new().with_data(ends.to_vec()).with_color(colour(index)).with_stroke_width(0.8)));
+        }
     }
     let layout = Layout::auto_from_plots(&plots).with_x_label(label(&axes[0])).with_y_label(label(&axes[1]));
     (plots, layout)
 }
 
-fn amplitudes(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
+/// The first orders, side by side.
+fn bars(
+    curves: &[Curve],
+    axes: &[Axis; 2],
+    lowest_order: f64,
+    level: Option<(&str, f64)>,
+) -> (Vec<Plot>, Layout) {
     let mut plots = Vec::new();
     let width = 0.6 / curves.len().max(1) as f64;
     for (index, curve) in curves.iter().enumerate() {
-        // The first orders, side by side: eccentricity is no form, and high orders are noise.
-        let shown = curve.points.iter().filter(|point| (2.0..=HIGHEST_ORDER).contains(&point.x));
+        let shown = curve.points.iter().filter(|point| (lowest_order..=HIGHEST_ORDER).contains(&point.x));
         let stems = shown.map(|point| (point.x + width * index as f64, point.y)).collect::<Vec<_>>();
         let plot = LollipopPlot::new().with_points(stems).with_color(colour(index)).with_dot_radius(2.5);
         plots.push(Plot::Lollipop(if curve.name.is_empty() { plot } else { plot.with_legend(curve.name.clone()) }));
     }
+    plots.extend(level.map(|level| limit(level, curves, HIGHEST_ORDER)));
     let layout = Layout::auto_from_plots(&plots).with_x_label("order / UPR").with_y_label(label(&axes[1]));
     (plots, layout)
 }
 
-/// The highest order of which the amplitude is drawn.
+/// A line across all places of the curves, as far as they are shown.
+fn limit((name, value): (&str, f64), curves: &[Curve], highest: f64) -> Plot {
+    let places = curves.iter().flat_map(|curve| &curve.points).map(|point| point.x);
+    let (from, to) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let line = vec![(from, value), (to.min(highest), value)];
+    Plot::Line(LinePlot::new().with_data(line).with_color(LIMIT).with_stroke_width(1.2).with_legend(name))
+}
+
+/// Colours of marked points and of limits.
+const MARK: &str = "#b3261e";
+const LIMIT: &str = "#666666";
+/// The highest order that is drawn.
 const HIGHEST_ORDER: f64 = 50.0;
 
 fn map(points: &[Point], axes: &[Axis; 2], height: &Axis) -> (Vec<Plot>, Layout) {

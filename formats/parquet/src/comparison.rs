@@ -7,7 +7,7 @@ use runout_core::{
     atomic_file::PendingFile,
     pipeline::compare::{Comparison, Difference, MethodValue, QuantityComparison, StationComparison},
     separation::CONVENTION,
-    table::{ArrayRef, ColumnSpec, TableSpec, counts, flags, numbers, numbers_or_null, texts, texts_or_null},
+    table::{ArrayRef, ColumnSpec, Figure, Measure, RecordBatch, TableSpec, counts, flags, numbers, numbers_or_null, texts, texts_or_null},
 };
 
 use crate::{about, table::TableFile};
@@ -24,7 +24,7 @@ impl ComparisonTable {
     /// # Errors
     /// When it cannot be created.
     pub fn create(path: PathBuf) -> Result<Self> {
-        let spec = spec();
+        let spec = comparison_table();
         Ok(Self { file: TableFile::create(path, &spec)?, spec })
     }
 
@@ -33,7 +33,7 @@ impl ComparisonTable {
     /// # Errors
     /// When the file system refuses them.
     pub fn append(&mut self, station: &StationComparison) -> Result<()> {
-        self.file.append(&self.spec.rows(rows(station))?)
+        self.file.append(&comparison_rows(&self.spec, station)?)
     }
 
     /// Completes the file; it appears when the result is committed.
@@ -50,7 +50,25 @@ impl ComparisonTable {
 
 const UNIT: &str = "um; urad for tilt";
 
-fn spec() -> TableSpec {
+/// A station's rows of the table of a comparison.
+///
+/// # Errors
+/// Never in practice: the columns are of one length.
+pub fn comparison_rows(spec: &TableSpec, station: &StationComparison) -> Result<RecordBatch> {
+    spec.rows(rows(station))
+}
+
+/// The table of a comparison with the figure of E_n by order, of all methods but the reference.
+#[must_use]
+pub fn comparison_figures(methods: &[String]) -> TableSpec {
+    let figure = Figure::bars("e-n", "E_n by order", "order", [Measure::new("e_n").with_symbol("E_n")]);
+    let figure = figure.panels(["station", "quantity", "section"]).curves(["method"]).only("method", methods);
+    comparison_table().figure(figure.level("E_n = 1", 1.0))
+}
+
+/// The table of a comparison: one row a station, quantity, section, order and method.
+#[must_use]
+pub fn comparison_table() -> TableSpec {
     let optional = |name: &str, unit: &str, about: &str| ColumnSpec::number(name, unit, about).or_null();
     TableSpec::new(
         "comparison",
@@ -171,7 +189,7 @@ mod tests {
         };
         let station =
             StationComparison { station: "s001".into(), z_mm: 0.0, quantities: vec![quantity], warnings: Vec::new() };
-        let batch = spec().rows(rows(&station)).unwrap();
+        let batch = comparison_table().rows(rows(&station)).unwrap();
         let numbers = |name: &str| batch.column_by_name(name).unwrap().as_primitive::<Float64Type>().clone();
         let observable = batch.column_by_name("observable").unwrap().as_boolean().clone();
         assert_eq!(observable.iter().flatten().collect::<Vec<_>>(), [true, true, true, false]);

@@ -24,7 +24,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-pub use comparison::ComparisonTable;
+pub use comparison::{ComparisonTable, comparison_figures, comparison_rows, comparison_table};
 pub use data_set::DataSet;
 use data_set::Partition;
 use table::TableFile;

@@ -30,7 +30,7 @@ const Draw = (() => {
   function colours() {
     const style = getComputedStyle(document.documentElement);
     const of = (name) => style.getPropertyValue(`--${name}`).trim();
-    return { ink: of("ink"), faint: of("faint"), line: of("line"), curves: [0, 1, 2, 3, 4, 5, 6].map((index) => of(`c${index}`)) };
+    return { ink: of("ink"), faint: of("faint"), line: of("line"), bad: of("bad"), curves: [0, 1, 2, 3, 4, 5, 6].map((index) => of(`c${index}`)) };
   }
 
   const clear = (colour, share) => colour + Math.round(255 * share).toString(16).padStart(2, "0");
@@ -154,12 +154,38 @@ const Draw = (() => {
     return { traces, layout: place, magnification, said: said.length && said.length <= 4 ? `${said.join(", ")} (k = 2)` : "" };
   }
 
+  // A horizontal line across the chart, with its name at the right.
+  function level(figure) {
+    if (!figure.level) return {};
+    const { ink } = colours();
+    const at = figure.level.value;
+    const line = { color: ink, width: 1.2, dash: "dash" };
+    return {
+      shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: at, y1: at, line }],
+      annotations: [{ xref: "paper", x: 1, yref: "y", y: at, text: plain(figure.level.name), showarrow: false, xanchor: "right", yanchor: "bottom", font: { size: 11 } }],
+    };
+  }
+
+  const MOST_PLACES = 30; // Names beside each other below a chart.
+
+  // The horizontal axis, with the names of its places where there are some.
+  function across(figure, x) {
+    const places = figure.places ?? [];
+    if (!places.length) return axis(figure.x);
+    const range = x.length ? { range: [Math.min(...x) - 0.5, Math.max(...x) + 0.5] } : {};
+    if (places.length > MOST_PLACES || places.some(([, name]) => name.length > 24)) return axis(figure.x, range);
+    return axis({ name: "", unit: "" }, { ...range, tickvals: places.map(([at]) => at), ticktext: places.map(([, name]) => plain(name)) });
+  }
+
   function lines(figure, panel) {
-    const { curves: palette } = colours();
+    const { curves: palette, bad } = colours();
+    const places = new Map(figure.places ?? []);
     const traces = [];
+    let everyX = [];
     panel.curves.forEach((curve, index) => {
       const colour = palette[index % palette.length];
       const [x, y, std] = [numbers(curve.x), numbers(curve.y), numbers(curve.std)];
+      if (places.size) everyX = everyX.concat(x);
       if (std) {
         const side = (sign) => y.map((value, place) => value + sign * COVERAGE * (std[place] || 0));
         traces.push({
@@ -168,47 +194,89 @@ const Draw = (() => {
         });
       }
       traces.push({
-        type: "scatter", mode: "lines", x, y, text: y.map((value, place) => shown(value, std?.[place])), name: plain(curve.name) || plain(figure.title),
-        line: { color: colour, width: 1.5 }, meta: "values", showlegend: panel.curves.length > 1,
-        hovertemplate: `%{x} ${figure.x.unit}: %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
+        type: "scatter", mode: places.size && index === 0 ? "lines+markers" : "lines", x, y,
+        text: y.map((value, place) => shown(value, std?.[place])), name: plain(curve.name) || plain(figure.title),
+        customdata: x.map((at) => plain(places.get(at) ?? `${Number(at.toPrecision(6))} ${figure.x.unit}`)),
+        line: { color: colour, width: 1.5, dash: curve.y.same === undefined ? "solid" : "dash" }, meta: "values", showlegend: panel.curves.length > 1,
+        hovertemplate: `%{customdata}: %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
       });
+      const marks = curve.marks ?? [];
+      if (marks.length) {
+        traces.push({
+          type: "scatter", mode: "markers", x: marks.map(([at]) => at), y: marks.map(([, at]) => at), text: marks.map(([at, , said]) => plain(`${places.get(at) ?? at}: ${said}`)),
+          name: "rule broken", marker: { color: bad, size: 9, symbol: "diamond" }, meta: "marks", hovertemplate: "%{text}<extra></extra>", showlegend: true,
+        });
+      }
     });
-    return { traces, layout: layout({ xaxis: axis(figure.x), yaxis: axis(figure.y), height: 400 }) };
+    return { traces, layout: layout({ xaxis: across(figure, everyX), yaxis: axis(figure.y), height: 400, ...level(figure) }) };
+  }
+
+  // Points with their expanded uncertainty; what all of them share is a line.
+  function points(figure, panel) {
+    const { curves: palette, faint } = colours();
+    const traces = panel.curves.map((curve, index) => {
+      const [x, y, std] = [numbers(curve.x), numbers(curve.y), numbers(curve.std)];
+      const colour = curve.joined ? faint : palette[index % palette.length];
+      return {
+        type: "scatter", mode: curve.joined ? "lines" : "markers", x, y, name: plain(curve.name) || plain(figure.title), meta: "values",
+        text: y.map((value, place) => shown(value, std?.[place])), marker: { color: colour, size: 6 }, line: { color: colour, width: 1.2, dash: "dash" },
+        error_y: std ? { type: "data", array: std.map((one) => COVERAGE * one), thickness: 1, width: 0, color: colour } : undefined,
+        showlegend: panel.curves.length > 1, hovertemplate: `%{x} ${figure.x.unit}: %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
+      };
+    });
+    return { traces, layout: layout({ xaxis: axis(figure.x), yaxis: axis(figure.y), height: 400, ...level(figure) }) };
   }
 
   const FIRST_ORDERS = 50; // Shown at first; the axis can be moved to higher ones.
 
-  function amplitudes(figure, panel) {
+  // Of coefficients, whose uncertainty is that of both parts together, and without eccentricity, which is no form and would hide it.
+  const amplitudes = (figure, panel) => overOrder(figure, panel, { lowest: 2, share: Math.SQRT1_2 });
+  const bars = (figure, panel) => overOrder(figure, panel, { lowest: 0, share: 1 });
+
+  const WIDE_RANGE = 30; // Times a limit, or times the median, beyond which small bars are not visible on a linear axis.
+
+  function overOrder(figure, panel, { lowest, share }) {
     const { curves: palette, faint } = colours();
     const lost = new Set();
     let highest = 0;
     const traces = panel.curves.map((curve, index) => {
       const [x, y, std] = [numbers(curve.x), numbers(curve.y), numbers(curve.std)];
-      curve.missing.forEach((order) => lost.add(order));
-      // Eccentricity is no form, and would hide it.
-      const kept = x.map((_, place) => place).filter((place) => x[place] >= 2);
-      highest = Math.max(highest, ...kept.map((place) => x[place]));
+      (curve.missing ?? []).forEach((order) => lost.add(order));
+      const kept = x.map((_, place) => place).filter((place) => x[place] >= lowest);
+      highest = kept.reduce((most, place) => Math.max(most, x[place]), highest);
       const of = (list) => kept.map((place) => list[place]);
       return {
         type: "bar", x: of(x), y: of(y), name: plain(curve.name) || "amplitude", marker: { color: palette[index % palette.length] }, meta: "values",
-        error_y: std ? { type: "data", array: of(std).map((one) => COVERAGE * one * Math.SQRT1_2), thickness: 1, width: 0, color: faint } : undefined,
-        text: kept.map((place) => shown(y[place], std ? std[place] * Math.SQRT1_2 : undefined)), textposition: "none",
+        error_y: std ? { type: "data", array: of(std).map((one) => COVERAGE * one * share), thickness: 1, width: 0, color: faint } : undefined,
+        text: kept.map((place) => shown(y[place], std ? std[place] * share : undefined)), textposition: "none",
         showlegend: panel.curves.length > 1, hovertemplate: `order %{x}: %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
       };
     });
-    const orders = [...lost].filter((order) => order >= 2);
+    const heights = traces.flatMap((trace) => trace.y).filter((one) => one > 0).sort((a, b) => a - b);
+    const [least, median, most] = [0, heights.length >> 1, heights.length - 1].map((place) => heights[place] ?? 1);
+    const usual = figure.level?.value ?? (share === 1 ? 3 * median : most);
+    const wide = most > WIDE_RANGE * usual;
+    const uncertain = traces.reduce((all, { y, error_y: error }) => y.reduce((high, one, place) => Math.max(high, one + (error?.array[place] || 0)), all), 0);
+    const tallest = Math.max(uncertain || 1, figure.level?.value ?? 0);
+    const lowestShown = Math.max(least, 1e-3 * usual) / 2;
+    // Of several curves, one without a value is a bar less; an order that none of them has is lost.
+    const known = new Set(share === 1 ? traces.flatMap((trace) => trace.x) : []);
+    const orders = [...lost].filter((order) => order >= lowest && !known.has(order));
     if (orders.length) {
       highest = Math.max(highest, ...orders);
-      const top = Math.max(...traces.flatMap((trace) => trace.y), 0) || 1;
       traces.push({
-        type: "bar", x: orders, y: orders.map(() => top), name: "lost order", width: 0.9, hovertemplate: "order %{x} is lost<extra></extra>",
+        type: "bar", x: orders, y: orders.map(() => tallest), name: "lost order", width: 0.9, hovertemplate: "order %{x} is lost<extra></extra>",
         marker: { color: "rgba(0,0,0,0)", line: { width: 0 }, pattern: { shape: "/", fgcolor: faint, size: 6 } }, showlegend: true,
       });
     }
-    const tallest = traces.reduce((most, { y, error_y: error }) => y.reduce((high, one, place) => Math.max(high, one + (error?.array[place] || 0)), most), 0) || 1;
-    const range = [1.4, Math.min(highest, FIRST_ORDERS) + 0.6];
-    const across = axis({ name: "order", unit: "UPR" }, { range, tickformat: "d" });
-    return { traces, layout: layout({ xaxis: across, yaxis: axis(figure.y, { range: [0, 1.06 * tallest] }), height: 380, barmode: "group", bargap: 0.25 }) };
+    const first = lowest || 1;
+    const xaxis = axis({ name: "order", unit: "UPR" }, { range: [first - 0.6, Math.min(highest, FIRST_ORDERS) + 0.6], tickformat: "d" });
+    const yaxis = wide ? { type: "log", range: [Math.log10(lowestShown), Math.log10(1.5 * tallest)], dtick: 1 } : { range: [0, 1.06 * tallest] };
+    const said = [
+      wide ? "logarithmic axis" : "",
+      highest > FIRST_ORDERS ? `orders up to ${highest}: drag the axis, or double-click for all` : "",
+    ].filter(Boolean).join("; ");
+    return { traces, layout: layout({ xaxis, yaxis: axis(figure.y, yaxis), height: 380, barmode: "group", bargap: 0.25, ...level(figure) }), said };
   }
 
   // A map's numbers: columns, rows, and heights row by row.
@@ -274,5 +342,5 @@ const Draw = (() => {
     return { title, ...(of.radius_mm ? polar(figure, panel, 0) : lines(figure, panel)) };
   }
 
-  return { amplitudes, grid, lines, map, polar, ring, shown, solid, roundedUp };
+  return { amplitudes, bars, grid, lines, map, points, polar, ring, shown, solid, roundedUp };
 })();

@@ -30,12 +30,17 @@
     return Plotly.react(place, traces, { ...layout, ...size }, CONFIG);
   }
 
-  // Charts are drawn one after the other, so that the page can be used before the last one is there.
+  // Charts are drawn one after the other, those in view first, so that the page can be used before the last one is there.
   const waiting = [];
+  const inView = (place) => {
+    const { top, bottom } = place.getBoundingClientRect();
+    return bottom > 0 && top < innerHeight;
+  };
   async function drawAll() {
-    for (const job of waiting) {
+    while (waiting.length) {
       await new Promise((go) => (window.requestIdleCallback ?? setTimeout)(go, { timeout: 100 }));
-      await job();
+      const next = Math.max(0, waiting.findIndex(({ place }) => inView(place)));
+      await waiting.splice(next, 1)[0].draw();
     }
     document.documentElement.dataset.complete = "true";
   }
@@ -84,7 +89,7 @@
     }
     if (controls.childNodes.length) box.append(controls);
     box.append(plot, readout);
-    waiting.push(draw);
+    waiting.push({ place: plot, draw });
     redraws.push(draw);
   }
 
@@ -140,7 +145,7 @@
     });
     // Later than at first, when another panel was chosen.
     if (document.documentElement.dataset.complete) beginFlat().then(beginSolid);
-    else waiting.push(beginFlat, beginSolid);
+    else waiting.push({ place: flat, draw: beginFlat }, { place: space, draw: beginSolid });
     redraws.push(map, () => chosen.row !== null && open(chosen.row));
   }
 
@@ -148,12 +153,14 @@
     const body = document.querySelector("#rows tbody");
     if (!body) return;
     let most = 50;
+    const columns = Object.fromEntries(Object.entries(data.values).map(([key, column]) => [key, column.texts ? column.rows.map((row) => column.texts[row]) : column]));
+    const values = columns.shown.map((_, row) => Object.fromEntries(Object.entries(columns).map(([key, column]) => [key, column[row]])));
     const [filter, count, all] = ["filter", "shown", "all"].map((id) => document.getElementById(id));
     const keys = ["place", "symbol", "shown", "unit", "interval", "refers", "about"];
-    let [rows, sorted, down] = [data.values, null, false];
+    let [rows, sorted, down] = [values, null, false];
     const show = () => {
       const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-      rows = data.values.filter((row) => { const text = keys.map((key) => row[key]).join(" ").toLowerCase(); return words.every((word) => text.includes(word)); });
+      rows = values.filter((row) => { const text = keys.map((key) => row[key]).join(" ").toLowerCase(); return words.every((word) => text.includes(word)); });
       if (sorted) {
         const [key, sign] = [sorted, down ? -1 : 1];
         rows.sort((a, b) => sign * (key === "value" ? (a.value ?? Infinity) - (b.value ?? Infinity) : a[key].localeCompare(b[key], "en", { numeric: true })));
@@ -178,8 +185,8 @@
     }));
     document.getElementById("copy").addEventListener("click", async () => {
       const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-      const columns = ["place", "symbol", "value", "std", "unit", "refers", "about"];
-      const csv = [columns, ...rows.map((row) => columns.map((key) => row[key] ?? ""))].map((row) => row.map((one) => quoted(String(one))).join(",")).join("\n");
+      const copied = ["place", "symbol", "value", "std", "unit", "refers", "about"];
+      const csv = [copied, ...rows.map((row) => copied.map((key) => row[key] ?? ""))].map((row) => row.map((one) => quoted(String(one))).join(",")).join("\n");
       const area = element("textarea", { value: csv });
       document.body.append(area);
       area.select();

@@ -7,7 +7,7 @@ use runout_core::{
 };
 use serde::Serialize;
 
-use crate::{one_line, symbol, values::Row};
+use crate::{one_line, symbol, values::Columns};
 
 /// Points of a curve that are drawn: more are not visible on a screen.
 const MOST_POINTS: usize = 2880;
@@ -23,7 +23,7 @@ const MOST_CELLS: [usize; 2] = [400, 720];
 pub(crate) struct Data<'a> {
     pub(crate) figures: Vec<FigureData>,
     pub(crate) surface: Option<MapData>,
-    pub(crate) values: &'a [Row],
+    pub(crate) values: &'a Columns,
 }
 
 /// A figure with its panels.
@@ -36,6 +36,18 @@ pub(crate) struct FigureData {
     y: AxisData,
     pub(crate) panels: Vec<PanelData>,
     thinned: bool,
+    /// Names of places along x.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    places: Vec<(f64, String)>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    level: Option<LevelData>,
+}
+
+/// A horizontal line across every panel.
+#[derive(Serialize)]
+struct LevelData {
+    name: String,
+    value: f64,
 }
 
 #[derive(Serialize)]
@@ -61,7 +73,14 @@ struct CurveData {
     #[serde(skip_serializing_if = "Option::is_none")]
     std: Option<Numbers>,
     /// Places without a value.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     missing: Vec<f64>,
+    /// Points that are marked, and what there is to say of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    marks: Vec<(f64, f64, String)>,
+    /// Whether it is a line where others are points.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    joined: bool,
 }
 
 /// Heights on a grid, row by row along y.
@@ -172,10 +191,15 @@ fn figure(figure: &Panels, most: usize) -> FigureData {
         Kind::Polar => "polar",
         Kind::Lines => "lines",
         Kind::Amplitudes => "amplitudes",
+        Kind::Points => "points",
+        Kind::Bars => "bars",
         Kind::Map => "map",
     };
     let (x, y) = (AxisData::of(x, &x.unit), AxisData::of(y, unit));
-    FigureData { id: figure.id.clone(), title: figure.title.clone(), kind, x, y, panels, thinned }
+    let places = figure.places.iter().map(|(x, name)| (*x, one_line(name))).collect();
+    let level = figure.level.as_ref();
+    let level = level.map(|level| LevelData { name: one_line(&level.name), value: scale * level.value });
+    FigureData { id: figure.id.clone(), title: figure.title.clone(), kind, x, y, panels, thinned, places, level }
 }
 
 fn curve(curve: &Curve) -> CurveData {
@@ -187,6 +211,8 @@ fn curve(curve: &Curve) -> CurveData {
         y: Numbers::of(&numbers(|point| point.y)),
         std: std.iter().any(|std| std.is_finite()).then(|| Numbers::of(&std)),
         missing: curve.missing.clone(),
+        marks: curve.marks.iter().map(|mark| (mark.x, mark.y, one_line(&mark.text))).collect(),
+        joined: curve.joined,
     }
 }
 

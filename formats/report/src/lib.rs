@@ -14,6 +14,7 @@ mod data;
 mod facts;
 mod limits;
 mod origin;
+mod overview;
 mod page;
 mod rig;
 mod values;

@@ -8,7 +8,8 @@ use sha2::{Digest, Sha256};
 use crate::{
     closed_loop,
     data::{self, Data, FigureData},
-    facts, limits, origin, rig, values,
+    facts, limits, origin, overview, rig,
+    values::Columns,
 };
 
 /// Charts: see `assets/plotly/README.md`.
@@ -23,18 +24,22 @@ const STYLE: &str = include_str!("../assets/report.css");
 /// # Errors
 /// Never in practice: its data can be written as JSON.
 pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Result<Markup> {
-    let Completed { summary, about, surface, diagnosis } = *result;
+    let Completed { summary, about, surface, diagnosis, overview } = *result;
     let title = if title.is_empty() { "Result" } else { title };
-    let rows = values::rows(summary);
+    let values = Columns::of(summary);
     let drawn = data::figures(figures);
     let surface_data = surface.map(data::surface);
-    let rig = rig::declared(&summary.provenance.configuration);
-    let (verdict, class) = facts::verdict(summary, diagnosis);
+    let declared = || rig::declared(&summary.provenance.configuration);
+    let rig = overview.and_then(|overview| overview.rig.clone()).or_else(declared);
+    let (verdict, class) = match overview {
+        Some(overview) => (overview.headline.clone(), "plain"),
+        None => facts::verdict(summary, diagnosis),
+    };
     let body = html! {
         header {
             h1 { bdi { (title) } }
-            p.verdict.(class) role="status" { (verdict) }
-            (facts::list(summary, rig.as_ref(), surface))
+            @if !verdict.is_empty() { p.verdict.(class) role="status" { bdi { (verdict) } } }
+            @if overview.is_none() { (facts::list(summary, rig.as_ref(), surface)) }
         }
         @if let Some(rig) = &rig { section #rig { h2 { "Rig" } (rig::drawing(rig)) } }
         @if !summary.limits.is_empty() { (limits::section(&summary.limits)) }
@@ -52,12 +57,13 @@ pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Resul
             }
         }
         @if let Some(diagnosis) = diagnosis { (closed_loop::section(diagnosis)) }
-        @if !rows.is_empty() { (table(rows.len())) }
+        @if let Some(overview) = overview { (overview::sections(overview)) }
+        @if values.count() > 0 { (table(values.count())) }
         (origin::turns(summary))
         (origin::warnings(summary))
         (origin::provenance(summary, about))
     };
-    let data = Data { figures: drawn, surface: surface_data, values: &rows };
+    let data = Data { figures: drawn, surface: surface_data, values: &values };
     let json = serde_json::to_string(&data).map_err(|error| Error::caused("write", "the report's data", error))?;
     Ok(document(title, &body, &json))
 }

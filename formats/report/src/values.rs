@@ -1,4 +1,6 @@
-//! The values of a result, row by row.
+//! The values of a result, column by column: texts that repeat are written once.
+
+use std::collections::HashMap;
 
 use runout_core::{
     pipeline::summary::Summary,
@@ -9,8 +11,8 @@ use serde::Serialize;
 use crate::{one_line, symbol};
 
 /// A value as the page lists it.
-#[derive(Debug, Serialize)]
-pub(crate) struct Row {
+#[derive(Debug)]
+struct Row {
     /// Station and section, or what it is of.
     place: String,
     symbol: String,
@@ -28,8 +30,65 @@ pub(crate) struct Row {
     about: String,
 }
 
-/// Every value of a result.
-pub(crate) fn rows(summary: &Summary) -> Vec<Row> {
+/// All rows of the table of values.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct Columns {
+    place: Texts,
+    symbol: Texts,
+    shown: Vec<String>,
+    value: Vec<Option<f64>>,
+    std: Vec<Option<f64>>,
+    unit: Texts,
+    interval: Vec<String>,
+    refers: Texts,
+    about: Texts,
+}
+
+/// A column of texts: each text once, and its place among them row by row.
+#[derive(Debug, Default, Serialize)]
+struct Texts {
+    texts: Vec<String>,
+    rows: Vec<usize>,
+    #[serde(skip)]
+    known: HashMap<String, usize>,
+}
+
+impl Texts {
+    fn add(&mut self, text: String) {
+        let next = self.texts.len();
+        let place = *self.known.entry(text).or_insert_with_key(|text| {
+            self.texts.push(text.clone());
+            next
+        });
+        self.rows.push(place);
+    }
+}
+
+impl Columns {
+    /// Every value of a result.
+    pub(crate) fn of(summary: &Summary) -> Self {
+        let mut all = Self::default();
+        for row in rows(summary) {
+            all.place.add(row.place);
+            all.symbol.add(row.symbol);
+            all.shown.push(row.shown);
+            all.value.push(row.value);
+            all.std.push(row.std);
+            all.unit.add(row.unit);
+            all.interval.push(row.interval);
+            all.refers.add(row.refers);
+            all.about.add(row.about);
+        }
+        all
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.shown.len()
+    }
+}
+
+fn rows(summary: &Summary) -> Vec<Row> {
     let placed = summary.placed_values();
     let of_form = placed.iter().map(|placed| {
         let value = placed.value;
@@ -84,5 +143,17 @@ fn as_precise(number: f64, std: f64) -> String {
     match with_std(number, Some(std)).split_once(" ± ") {
         Some((number, _)) => number.to_owned(),
         None => significant(number, 5),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_that_repeats_is_written_once() {
+        let mut column = Texts::default();
+        ["a", "b", "a", "", "b"].into_iter().for_each(|text| column.add(text.to_owned()));
+        assert_eq!((column.texts, column.rows), (vec!["a".into(), "b".into(), String::new()], vec![0, 1, 0, 2, 1]));
     }
 }

@@ -8,7 +8,7 @@ use runout_core::{
     },
     points::{PointColumn, Points},
     stage::{NamedValue, Outcome, PointSeparator, Separator, points::value},
-    table::{ColumnSpec, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
+    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -225,6 +225,7 @@ impl Solution {
                     numbers(campbell.iter().map(|(.., mode)| hertz(mode.frequency()))),
                     numbers(campbell.iter().map(|(.., mode)| mode.damping_ratio())),
                     texts(campbell.iter().map(|(.., mode)| self.whirl(mode).name())),
+                    numbers(campbell.iter().map(|(speed, ..)| speed / 60.0)),
                 ],
             ),
             (
@@ -323,8 +324,11 @@ fn campbell_table() -> TableSpec {
         frequency_column(),
         damping_column(),
         whirl_column(),
+        ColumnSpec::number("rotation_hz", "Hz", "frequency of the rotation at this speed").repeating(),
     ];
-    TableSpec::new("campbell", "modes over the speed of rotation", columns)
+    let values = [Measure::new("frequency_hz"), Measure::new("rotation_hz").with_symbol("1/rev").common()];
+    let figure = Figure::points("campbell", "Campbell diagram", "speed_rpm", values).curves(["whirl"]);
+    TableSpec::new("campbell", "modes over the speed of rotation", columns).figure(figure)
 }
 
 fn critical_table() -> TableSpec {

@@ -3,7 +3,7 @@
 use runout_core::{
     Result,
     stage::{NamedValue, Outcome, points::value},
-    table::{ArrayRef, ColumnSpec, TableRows, TableSpec, counts, flags, numbers},
+    table::{ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers},
 };
 
 use crate::{
@@ -52,12 +52,36 @@ pub fn tables(chain: &Chain) -> Vec<TableSpec> {
     compensation.extend(each("remains_", "what is predicted to remain of the error, without the placement"));
     compensation.push(ColumnSpec::flag("limited", "whether an axis is at its limit"));
     compensation.push(extrapolated());
+    let prediction = TableSpec::new("prediction", "predicted readings; NaN where nothing is predicted", prediction);
+    let residual = TableSpec::new("residual", "residual of each reading", residual);
     vec![
-        TableSpec::new("prediction", "predicted readings; NaN where nothing is predicted", prediction),
-        TableSpec::new("residual", "residual of each reading", residual),
+        ["x", "y", "z"].into_iter().fold(prediction, |table, axis| table.figure(predicted_along(axis))),
+        COMPONENTS.into_iter().fold(residual, |table, one| table.figure(before_and_after(one))).figure(left_out()),
         variogram::table(),
         TableSpec::new("compensation", "corrections, without the placement of the tracker", compensation),
     ]
+}
+
+/// The predicted error with its uncertainty over the command of one axis.
+fn predicted_along(axis: &str) -> Figure {
+    let value = |one: &str| Measure::new(format!("{one}_um")).with_std(format!("std_{one}_um")).with_symbol(one);
+    let title = format!("Predicted error over {axis}");
+    Figure::points(format!("prediction-{axis}"), title, format!("{axis}_mm"), COMPONENTS.map(value))
+}
+
+/// A component of each reading, and what the fit leaves of it.
+fn before_and_after(one: &str) -> Figure {
+    let before = Measure::new(format!("{one}_um")).with_symbol("reading");
+    let after = Measure::new(format!("residual_{one}_um")).with_symbol("residual");
+    Figure::points(format!("residual-{one}"), format!("Error {one} before and after"), "reading", [before, after])
+}
+
+/// What all other places do not predict of a place, with its expected standard deviation.
+fn left_out() -> Figure {
+    let value = |one: &str| {
+        Measure::new(format!("left_out_{one}_um")).with_std(format!("std_left_out_{one}_um")).with_symbol(one)
+    };
+    Figure::points("left-out", "Mean reading less prediction from all other places", "reading", COMPONENTS.map(value))
 }
 
 impl Conclusion<'_> {

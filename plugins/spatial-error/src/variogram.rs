@@ -1,6 +1,6 @@
 //! The table `variogram`: half the mean squared difference of places by their distance, beside the fitted covariance.
 
-use runout_core::table::{ArrayRef, ColumnSpec, TableSpec, counts, numbers, texts};
+use runout_core::table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, texts};
 
 use crate::{
     campaign::{COMPONENTS, Campaign},
@@ -29,6 +29,13 @@ pub fn table() -> TableSpec {
             um2("semivariance_um2", "half the mean squared difference"),
             um2("model_um2", "that of the fitted covariance along the axis, nugget and noise of the means included"),
         ],
+    )
+    .figure(
+        Figure::lines("variogram", "Variogram", "lag_mm", [
+            Measure::new("semivariance_um2").with_symbol("readings"),
+            Measure::new("model_um2").with_symbol("model"),
+        ])
+        .panels(["component", "axis"]),
     )
 }
 

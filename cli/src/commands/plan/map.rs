@@ -34,6 +34,25 @@ pub(super) fn refuse(path: Option<&Path>, sources: &Sources) -> Result<(), Failu
     Ok(())
 }
 
+/// A rig and what it is: declared, found, or with an addition.
+pub(super) type Layout = (String, Rig);
+
+/// The declared rig, those found and those with one addition.
+pub(super) fn layouts(rig: &Rig, suggestions: &[Suggestion], optimum: Option<&Optimum>) -> Vec<Layout> {
+    let mut layouts = vec![("declared".to_owned(), rig.clone())];
+    for (place, found) in (1..).zip(optimum.into_iter().flat_map(|optimum| &optimum.found)) {
+        let mut placed = rig.clone();
+        let radial = placed.sensors.iter_mut().filter(|sensor| sensor.axial_radius_mm.is_none());
+        for (sensor, angle_deg) in radial.zip(&found.angles_deg) {
+            sensor.angle_rad = angle_deg.to_radians();
+        }
+        layouts.push((format!("found {place}"), placed));
+    }
+    let with = |one: &Suggestion| (format!("with {}", words(&one.addition, rig)), one.rig.clone());
+    layouts.extend(suggestions.iter().map(with));
+    layouts
+}
+
 /// Writes one row a layout and order.
 pub(super) fn write(
     path: &Path,
@@ -43,17 +62,8 @@ pub(super) fn write(
     optimum: Option<&Optimum>,
 ) -> Result<PathBuf, Error> {
     let mut text = String::from("layout,angles_deg,order,gain,lost\n");
-    add(&mut text, "declared", rig, orders);
-    for (place, found) in (1..).zip(optimum.into_iter().flat_map(|optimum| &optimum.found)) {
-        let mut placed = rig.clone();
-        let radial = placed.sensors.iter_mut().filter(|sensor| sensor.axial_radius_mm.is_none());
-        for (sensor, angle_deg) in radial.zip(&found.angles_deg) {
-            sensor.angle_rad = angle_deg.to_radians();
-        }
-        add(&mut text, &format!("found {place}"), &placed, orders);
-    }
-    for suggestion in suggestions {
-        add(&mut text, &format!("with {}", words(&suggestion.addition, rig)), &suggestion.rig, orders);
+    for (name, rig) in layouts(rig, suggestions, optimum) {
+        add(&mut text, &name, &rig, orders);
     }
     atomic_file::write(path, text.as_bytes())
 }

@@ -5,7 +5,7 @@ use runout_core::pipeline::compare::{Comparison, ValueComparison};
 use super::{super::number::with_std, Page, Table, normalised, significant};
 
 /// Adds what was compared.
-pub fn text(mut page: Page, comparison: &Comparison) -> String {
+pub fn page(mut page: Page, comparison: &Comparison) -> Page {
     let names: Vec<&str> = comparison.methods.iter().map(|method| method.method.as_str()).collect();
     page.line(format_args!("{}, compared with {}", names[1..].join(", "), comparison.reference));
     page.headed_table("Values (± is the standard uncertainty)", &values(comparison, &names));
@@ -28,9 +28,7 @@ pub fn text(mut page: Page, comparison: &Comparison) -> String {
         method.notes.iter().map(|note| format!("{}: {note}", method.method)).collect::<Vec<String>>()
     });
     page.bullets("Warnings and notes", &notes.collect::<Vec<String>>());
-    let outputs: Vec<String> = comparison.outputs.iter().map(|path| path.display().to_string()).collect();
-    page.bullets("Written", &outputs);
-    page.into_text()
+    page
 }
 
 fn name(value: &ValueComparison) -> String {

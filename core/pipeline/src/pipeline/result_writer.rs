@@ -218,7 +218,7 @@ impl ResultWriter {
             About { convention: std::mem::take(&mut self.convention), ..About::default() }
         };
         let completed =
-            Completed { summary: &self.summary, about: &about, surface, diagnosis: self.diagnosis.as_ref() };
+            Completed { summary: &self.summary, about: &about, surface, diagnosis: self.diagnosis.as_ref(), overview: None };
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&completed)?);

@@ -4,7 +4,10 @@ use std::{collections::BTreeSet, iter::repeat_n};
 
 use serde_json::json;
 
-use super::summary::{Summary, sensor_id, setup_id};
+use super::{
+    summary::{Summary, sensor_id, setup_id},
+    turn_tables,
+};
 use crate::{
     atomic_file::PendingFile,
     stage::{About, Completed, Export, NamedValue, ResultInfo},
@@ -51,6 +54,8 @@ pub struct StationTables {
     harmonics: TableSpec,
     reading: TableSpec,
     values: TableSpec,
+    /// Those of error motion turn by turn.
+    turns: Vec<TableSpec>,
     /// The line of the motion, where that is neither x nor y.
     line: Option<Azimuth>,
     /// Whether there is motion along the axis.
@@ -72,6 +77,7 @@ impl StationTables {
             harmonics: harmonics(),
             reading: reading(),
             values: values(),
+            turns: turn_tables::specs(),
             line,
             axial,
             rig: rig.cloned(),
@@ -82,7 +88,11 @@ impl StationTables {
     /// All tables, also those that a result may lack.
     #[must_use]
     pub fn specs(&self) -> Vec<TableSpec> {
-        [&self.form, &self.motion, &self.harmonics, &self.reading, &self.values].map(Clone::clone).into()
+        let mut all: Vec<TableSpec> =
+            [&self.form, &self.motion, &self.harmonics, &self.reading].map(Clone::clone).into();
+        all.extend(self.turns.iter().cloned());
+        all.push(self.values.clone());
+        all
     }
 
     /// Rows of one station, by table; none where they are not `wanted`. A layout that separates nothing gives rows of the
@@ -106,7 +116,11 @@ impl StationTables {
         let rows = |(table, columns): (&TableSpec, Vec<ArrayRef>)| {
             Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? })
         };
-        tables.into_iter().map(rows).collect()
+        let of_turns = turn_tables::rows(result);
+        let of_turns = of_turns.into_iter().map(|(table, columns)| {
+            Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? })
+        });
+        tables.into_iter().map(rows).chain(of_turns).collect()
     }
 
     /// The values of all stations and of the part.
@@ -145,7 +159,7 @@ impl StationTables {
         surface: Option<&Surface>,
     ) -> Result<Vec<PendingFile>> {
         export.rows(&self.values, &self.value_rows(summary)?.rows)?;
-        export.finish(&Completed { summary, about: &self.about(summary), surface, diagnosis: None })
+        export.finish(&Completed { summary, about: &self.about(summary), surface, diagnosis: None, overview: None })
     }
 
     /// What the numbers are.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::Overview;
 use crate::{atomic_file::PendingFile, pipeline::summary::Summary};
 use runout_closed_loop::diagnosis::Diagnosis;
 use runout_error::Result;
@@ -77,6 +78,8 @@ pub struct Completed<'a> {
     pub surface: Option<&'a Surface>,
     /// What the closed loop found, where the result is that of its final model.
     pub diagnosis: Option<&'a Diagnosis>,
+    /// What is to be read where this is no single result.
+    pub overview: Option<&'a Overview>,
 }
 
 /// What a result's numbers are, for files that explain themselves.

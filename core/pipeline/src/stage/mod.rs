@@ -3,6 +3,7 @@
 pub mod check;
 pub mod exporter;
 pub mod loader;
+pub mod overview;
 pub mod plan;
 pub mod points;
 pub mod preprocessor;
@@ -12,6 +13,7 @@ pub mod simulator;
 pub use check::{Check, Planned};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
+pub use overview::{Overview, Part, Section};
 pub use plan::{LayoutScore, NoiseGain, PointAddition, PointPlan};
 pub use points::{Form, LinearModel, NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator};
 pub use preprocessor::{AverageRequest, Averager, Conditioner, Preprocessor};

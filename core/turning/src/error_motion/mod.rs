@@ -14,10 +14,12 @@
 //! x and y are those in the plane midway between the sensors, where noise is least.
 
 mod axial;
+mod plots;
 mod polar;
 #[cfg(test)]
 mod tests;
 
+pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;
 
 use std::cell::RefCell;

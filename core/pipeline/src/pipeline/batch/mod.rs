@@ -2,6 +2,7 @@
 //! to date is skipped, one that fails does not stop the others.
 
 mod exports;
+mod overview;
 mod recording;
 mod report;
 mod trend;
@@ -229,7 +230,7 @@ impl<'a> Batch<'a> {
         for table in self.pipeline.tables.iter().filter(|table| tables::holds_values(&table.name)) {
             gathered.push(self.store.gather(table, complete)?);
         }
-        let mut trend = Trend::default();
+        let mut trend = Trend::new(self.pipeline.evaluate.limits());
         for pass in [Trend::estimate, Trend::judge] {
             trend.rewind();
             for table in &gathered {
@@ -261,7 +262,14 @@ impl<'a> Batch<'a> {
             },
             ..Summary::default()
         };
-        let completed = Completed { summary: &summary, about: &About::default(), surface: None, diagnosis: None };
+        let overview = overview::of(&report);
+        let completed = Completed {
+            summary: &summary,
+            about: &About::default(),
+            surface: None,
+            diagnosis: None,
+            overview: Some(&overview),
+        };
         let mut files: Vec<PendingFile> = gathered.into_iter().map(Gathered::finish).collect();
         for export in exports {
             files.extend(export.finish(&completed)?);

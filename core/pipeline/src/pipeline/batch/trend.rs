@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::pipeline::evaluate::Limit;
 use runout_error::Result;
 use runout_standards::control_chart::{ControlChart, Signal, Tests};
 use runout_table::{
@@ -38,15 +39,18 @@ pub fn table() -> TableSpec {
     let measures = |columns: &[(&str, &str)]| {
         columns.iter().map(|(column, symbol)| Measure::new(*column).with_symbol(*symbol)).collect::<Vec<_>>()
     };
-    let individuals = measures(&[
+    let mut individuals = measures(&[
         ("value", "value"),
         ("mean", "mean"),
-        ("lower_limit", "lower limit"),
-        ("upper_limit", "upper limit"),
+        ("lower_limit", "lower control limit"),
+        ("upper_limit", "upper control limit"),
+        ("lower_tolerance", "lower limit"),
+        ("upper_tolerance", "upper limit"),
     ]);
+    individuals[0] = individuals[0].clone().with_marks("signals");
     let ranges = measures(&[("moving_range", "moving range"), ("range_mean", "mean"), ("range_limit", "upper limit")]);
     let chart = |id: &str, title: &str, measures: &[Measure]| {
-        Figure::lines(id, title, "number", measures.iter().cloned()).panels(["series"])
+        Figure::lines(id, title, "number", measures.iter().cloned()).panels(["series"]).places(RECORDING)
     };
     TableSpec::new(
         "trend",
@@ -61,6 +65,8 @@ pub fn table() -> TableSpec {
             limit("mean", "X̄, mean of the series"),
             limit("lower_limit", "lower control limit; null of one value"),
             limit("upper_limit", "upper control limit; null of one value"),
+            limit("lower_tolerance", "the narrowest lower end of the [[limit]] tables that name the value; null without one"),
+            limit("upper_tolerance", "the narrowest upper end; null without one"),
             limit("range_mean", "R̄, mean moving range; null of one value"),
             limit("range_limit", "upper control limit of the moving range; null of one value"),
             ColumnSpec::text("signals", "tests for special causes that this value completes, by name; empty for none"),
@@ -108,6 +114,8 @@ pub struct Signals {
 struct Charted {
     label: String,
     unit: String,
+    /// Lower and upper end of what is allowed.
+    tolerance: [Option<f64>; 2],
     chart: ControlChart,
     tests: Tests,
     signals: usize,
@@ -118,6 +126,7 @@ struct Charted {
 /// [estimates](Self::estimate), the second [judges](Self::judge), the third gives [rows](Self::rows).
 #[derive(Default)]
 pub(super) struct Trend {
+    limits: Vec<Limit>,
     series: Vec<Charted>,
     known: HashMap<String, usize>,
     /// The recording whose rows are coming, its place, and how often each series has come.
@@ -133,6 +142,11 @@ struct Row {
 }
 
 impl Trend {
+    /// Without rows yet.
+    pub(super) fn new(limits: &[Limit]) -> Self {
+        Self { limits: limits.to_vec(), ..Self::default() }
+    }
+
     /// Begins another pass.
     pub(super) fn rewind(&mut self) {
         self.series.iter_mut().for_each(|series| series.tests = Tests::default());
@@ -172,7 +186,7 @@ impl Trend {
     pub(super) fn rows(&mut self, rows: &RecordBatch) -> Result<RecordBatch> {
         let mut names: [Vec<String>; 4] = Default::default();
         let mut places = Vec::with_capacity(rows.num_rows());
-        let mut columns: [Vec<Option<f64>>; 7] = Default::default();
+        let mut columns: [Vec<Option<f64>>; 9] = Default::default();
         self.each(rows, |trend, row| {
             let series = &mut trend.series[row.series];
             let chart = &series.chart;
@@ -184,6 +198,8 @@ impl Trend {
                 chart.mean(),
                 limits.map(|limits| limits[0]),
                 limits.map(|limits| limits[1]),
+                series.tolerance[0],
+                series.tolerance[1],
                 chart.range_mean(),
                 chart.range_limit(),
             ];
@@ -240,6 +256,14 @@ impl Trend {
         }
     }
 
+    /// What the limits allow for a value of these names.
+    fn tolerance(&self, names: &[String; NAMES.len()]) -> [Option<f64>; 2] {
+        let [symbol, reference, filter, _, section, ..] = names;
+        let section = Some(section.as_str()).filter(|id| !id.is_empty());
+        let named = || self.limits.iter().filter(|limit| limit.names(symbol, section, reference, filter));
+        [named().filter_map(|limit| limit.lower).reduce(f64::max), named().filter_map(|limit| limit.upper).reduce(f64::min)]
+    }
+
     /// The series of these names; one that comes several times in a recording is as many series.
     fn series_of(&mut self, names: &[String; NAMES.len()]) -> usize {
         let key = names.join("\u{1f}");
@@ -253,6 +277,7 @@ impl Trend {
         let unit = names[NAMES.len() - 1].clone();
         let charted = Charted {
             label: label(names, times),
+            tolerance: self.tolerance(names),
             unit,
             chart: ControlChart::default(),
             tests: Tests::default(),

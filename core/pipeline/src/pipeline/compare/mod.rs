@@ -98,6 +98,12 @@ impl<'a> Comparing<'a> {
         Ok(Self { pipeline, rig, conditioners, averager: &**averager, reference, methods, refused, names })
     }
 
+    /// The pipeline's title.
+    #[must_use]
+    pub fn title(&self) -> &str {
+        &self.pipeline.title
+    }
+
     /// Separates every station with every method; `take` gets the stations in their order. The answer has none.
     ///
     /// # Errors

@@ -95,15 +95,16 @@ impl Limit {
         format!("{}{reference}{filter}{section} {} {}", self.symbol, ends.join(" and "), self.unit)
     }
 
-    fn names(&self, placed: &PlacedValue) -> bool {
-        let value = placed.value;
-        let asked = |asked: &Option<String>, found: &str| asked.as_ref().is_none_or(|asked| asked == found);
+    /// Whether it is one of the value of this symbol, section, reference and filter.
+    #[must_use]
+    pub fn names(&self, symbol: &str, section: Option<&str>, reference: &str, filter: &str) -> bool {
         // "LSCY" is also "LSCY of centred sections".
-        let reference = self.reference.as_ref().is_none_or(|asked| {
-            value.reference.strip_prefix(asked.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(" of "))
+        let referred = self.reference.as_ref().is_none_or(|asked| {
+            reference.strip_prefix(asked.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(" of "))
         });
-        let here = self.section.as_ref().is_none_or(|asked| placed.section == Some(asked.as_str()));
-        value.symbol == self.symbol && here && reference && asked(&self.filter, &value.filter)
+        let here = self.section.as_ref().is_none_or(|asked| section == Some(asked.as_str()));
+        let filtered = self.filter.as_ref().is_none_or(|asked| asked == filter);
+        symbol == self.symbol && here && referred && filtered
     }
 
     fn decide(&self, placed: &PlacedValue) -> LimitValue {
@@ -151,7 +152,9 @@ fn missing(value: &Value) -> Option<String> {
 pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> (Vec<LimitSummary>, Vec<String>) {
     let mut remarks = Vec::new();
     let decide = |limit: &Limit| {
-        let named = all.iter().filter(|placed| limit.names(placed));
+        let named = all.iter().filter(|PlacedValue { section, value, .. }| {
+            limit.names(&value.symbol, *section, &value.reference, &value.filter)
+        });
         let values: Vec<LimitValue> = named.map(|placed| limit.decide(placed)).collect();
         if values.is_empty() {
             let mut symbols: Vec<&str> = all.iter().map(|placed| &*placed.value.symbol).collect();
