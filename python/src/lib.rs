@@ -8,6 +8,7 @@ mod calls;
 mod collect;
 mod failure;
 mod interruptible;
+mod own;
 mod table;
 mod work;
 
@@ -20,6 +21,8 @@ mod _native {
     use super::arrays::Capture;
     #[pymodule_export]
     use super::calls::{check, compare, diagnose, document, main, run};
+    #[pymodule_export]
+    use super::own::Layout;
     #[pymodule_export]
     use super::table::{Surface, Table};
 
