@@ -2,8 +2,12 @@
 //!
 //! Its path is a folder that receives one file a figure and format, named by the figure's id (`form.svg`, `form.png`), and
 //! `surface.svg`, `surface.png` where the result has a surface. A figure has one panel a station, of at most `panels` stations.
+//! [`fragment`] draws the same figures for a page of HTML.
 
 mod draw;
+mod fragment;
+
+pub use fragment::fragment;
 
 use std::path::{Path, PathBuf};
 
