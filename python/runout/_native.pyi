@@ -118,6 +118,9 @@ class Table:
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __arrow_c_schema__(self) -> object: ...
 
+def figures(tables: Sequence[Table], panels: int) -> str:
+    """The figures that tables declare, as HTML with pictures in it; each figure has so many panels at most."""
+
 class Surface:
     """Form over the part's angle and z."""
 

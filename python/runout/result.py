@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _html
-from ._native import Surface, Table
+from ._native import Surface, Table, figures
 
-figures: Callable[[dict[str, Table]], str] | None = None
-"""Draws the figures of a result's tables as HTML, for notebooks; none are drawn where it is None."""
+PANELS = 4
+"""Panels of a figure in a notebook, evenly spread over all stations; the exporter `report` shows all."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,6 +84,11 @@ class _Outcome:
         return values, std
 
 
+    def figures(self, panels: int = PANELS) -> str:
+        """The figures of its tables as HTML: polar plots of form and error motion, harmonics, and those of its domain."""
+        return figures(list(self.tables.values()), panels)
+
+
 class Result(_Outcome):
     """What a run gives. `summary` is the document of `summary.schema.json`; the rest reads it."""
 
@@ -134,8 +139,7 @@ class Result(_Outcome):
     def _repr_html_(self) -> str:
         rows = ((one.symbol, one.value, one.std, one.unit, ", ".join(one.where.values())) for one in self.values)
         values = _html.table(("value", "", "± (standard)", "unit", "of"), rows)
-        drawn = "" if figures is None else figures(self.tables)
-        return _html.page(self.title, self.warnings, values, drawn)
+        return _html.page(self.title, self.warnings, values, self.figures())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -213,7 +217,7 @@ class Diagnosis(_Outcome):
             for one in self.added
         )
         effects = _html.table(("effect", "targets", "parameters", "confounded with"), found)
-        return _html.page(f"Diagnosis: {self.verdict}", self.warnings, _html.table(head, levels), effects)
+        return _html.page(f"Diagnosis: {self.verdict}", self.warnings, _html.table(head, levels), effects, self.figures())
 
 
 def _values(summary: dict[str, Any]) -> Iterator[Value]:

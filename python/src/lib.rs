@@ -24,7 +24,7 @@ mod _native {
     #[pymodule_export]
     use super::own::Layout;
     #[pymodule_export]
-    use super::table::{Surface, Table};
+    use super::table::{Surface, Table, figures};
 
     use pyo3::{
         Bound, PyResult,

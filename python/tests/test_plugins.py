@@ -138,11 +138,11 @@ def test_an_exception_of_the_code_comes_back_with_its_traceback() -> None:
     ("returned", "kind", "words"),
     [
         (np.zeros((3, 3)), ValueError, "shape"),
-        ("text", ValueError, ""),
-        (None, (ValueError, TypeError), ""),
-        ([[1, 2], [3]], ValueError, ""),
-        (np.full((31, 6, 8), np.inf), ValueError, "infinity"),
-        (object(), (TypeError, ValueError), ""),
+        ("text", ValueError, "malformed|convert"),
+        (None, (ValueError, TypeError), "."),
+        ([[1, 2], [3]], ValueError, "."),
+        (np.full((30, 6, 8), np.inf), ValueError, "infinity"),
+        (object(), (TypeError, ValueError), "."),
     ],
 )
 def test_what_is_no_operator_is_refused(returned: Any, kind: Any, words: str) -> None:

@@ -92,7 +92,7 @@ impl Described {
         let mut partials = Vec::with_capacity(values.len());
         for (index, parameter) in self.parameters.iter().enumerate() {
             let step = STEP * parameter.tolerance;
-            let mut at = |sign: f64| {
+            let at = |sign: f64| {
                 let mut values = values.to_vec();
                 values[index] += sign * step;
                 self.transfer_of(plugin, orders, &values)

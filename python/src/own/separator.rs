@@ -51,18 +51,18 @@ pub struct Layout {
 impl Layout {
     fn new(py: Python<'_>, layout: &layout::Layout, rig: &Rig, max_order: usize) -> PyResult<Self> {
         let readings = &layout.readings;
+        let section = |index: usize| rig.sections[index].clone();
         let of = |value: fn(&layout::Reading) -> f64| PyArray1::from_iter(py, readings.iter().map(value)).unbind();
-        let names = |name: &dyn Fn(&layout::Reading) -> &String| readings.iter().map(|one| name(one).clone()).collect();
+        let names = |name: &dyn Fn(&layout::Reading) -> String| readings.iter().map(name).collect();
         let orders = FIRST_ORDER..=max_order;
         let entries: Vec<Complex64> = orders.clone().flat_map(|order| layout.matrix(order)).collect();
         let shape = [orders.clone().count(), readings.len(), layout.unknowns.len()];
-        let section = |index: usize| rig.sections[index].clone();
         Ok(Self {
             orders: PyArray1::from_iter(py, orders.map(|order| order as i64)).unbind(),
             unknowns: layout.unknowns.iter().map(|one| (one.id(), one.section().map(section))).collect(),
-            sensors: names(&|one| &rig.sensors[one.sensor].id),
-            setups: names(&|one| &rig.setups[one.setup].id),
-            sections: names(&|one| &rig.sections[one.section]),
+            sensors: names(&|one| rig.sensors[one.sensor].id.clone()),
+            setups: names(&|one| rig.setups[one.setup].id.clone()),
+            sections: names(&|one| section(one.section)),
             angle_rad: of(|one| one.angle_rad),
             part_angle_rad: of(|one| one.part_angle_rad),
             lever_mm: of(|one| one.lever_mm),
