@@ -15,13 +15,8 @@ pub use lock::FolderLock;
 use runout_error::{Error, ErrorKind, Result};
 
 /// What this process has begun and not finished.
-static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay {
-    files: Vec::new(),
-    folders: Vec::new(),
-    locks: Vec::new(),
-    abandoning: 0,
-    publishing: 0,
-});
+static UNDER_WAY: Mutex<UnderWay> =
+    Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new(), locks: Vec::new(), abandoning: 0, publishing: 0 });
 
 /// That a publication has ended.
 static PUBLISHED: Condvar = Condvar::new();

@@ -44,7 +44,7 @@ impl Described {
         values: &[f64],
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = plugin.py();
-        let orders = PyArray1::from_iter(py, 0..orders as i64).into_any();
+        let orders = PyArray1::from_iter(py, 0..orders.cast_signed() as i64).into_any();
         let words: Vec<Bound<PyAny>> = std::iter::once(Ok(orders))
             .chain(values.iter().map(|value| Ok(value.into_pyobject(py)?.into_any())))
             .collect::<PyResult<_>>()?;
@@ -58,7 +58,8 @@ impl Described {
         match found.iter().position(|entry| !entry.is_finite() || *entry == Complex64::ZERO) {
             None => Ok(found),
             Some(order) => {
-                let problem = format!("{method}: expected finite numbers but 0, found {} at order {order}", found[order]);
+                let problem =
+                    format!("{method}: expected finite numbers but 0, found {} at order {order}", found[order]);
                 Err(PyValueError::new_err(problem))
             }
         }
@@ -78,7 +79,8 @@ impl Described {
         values: &[f64],
     ) -> PyResult<Vec<Vec<Complex64>>> {
         let transfer = self.transfer_of(plugin, orders, values)?;
-        let relative = |partial: &[Complex64]| partial.iter().zip(&transfer).map(|(partial, of)| partial / of).collect();
+        let relative =
+            |partial: &[Complex64]| partial.iter().zip(&transfer).map(|(partial, of)| partial / of).collect();
         if plugin.hasattr("partials")? {
             let method = format!("{}.partials", self.object.name);
             let returned = Self::call(plugin, "partials", orders, values)?;

@@ -23,8 +23,8 @@ use runout_spindle::{effects, separators::closed_form::MethodConfig};
 
 use crate::work::Stop;
 use effect::OwnEffect;
-use separator::OwnSeparator;
 pub use separator::Layout;
+use separator::OwnSeparator;
 
 /// A Python object that is a plugin of one call.
 #[derive(FromPyObject)]

@@ -58,7 +58,7 @@ impl Layout {
         let entries: Vec<Complex64> = orders.clone().flat_map(|order| layout.matrix(order)).collect();
         let shape = [orders.clone().count(), readings.len(), layout.unknowns.len()];
         Ok(Self {
-            orders: PyArray1::from_iter(py, orders.map(|order| order as i64)).unbind(),
+            orders: PyArray1::from_iter(py, orders.map(|order| order.cast_signed() as i64)).unbind(),
             unknowns: layout.unknowns.iter().map(|one| (one.id(), one.section().map(section))).collect(),
             sensors: names(&|one| rig.sensors[one.sensor].id.clone()),
             setups: names(&|one| rig.setups[one.setup].id.clone()),
@@ -118,7 +118,9 @@ impl Formula {
         let mut found = Found { operators: Vec::with_capacity(shape[0]), given: Vec::with_capacity(shape[0]) };
         for (order, own) in (FIRST_ORDER..).zip(array.as_slice()?.chunks(unknowns * readings)) {
             if own.iter().any(|entry| entry.re.is_infinite() || entry.im.is_infinite()) {
-                let problem = format!("{method}: expected finite numbers, or NaN for what is not given; order {order} has infinity");
+                let problem = format!(
+                    "{method}: expected finite numbers, or NaN for what is not given; order {order} has infinity"
+                );
                 return Err(PyValueError::new_err(problem));
             }
             let mut operator = own.to_vec();

@@ -111,9 +111,8 @@ impl<S> Plugin<S> {
         about: &'static str,
         check: impl Fn(C, &Context) -> Result<S, Fault> + Send + Sync + 'static,
     ) -> Self {
-        let build = move |table: &Table, context: &Context| {
-            check(document::read_besides::<C>(table, &["plugin"])?, context)
-        };
+        let build =
+            move |table: &Table, context: &Context| check(document::read_besides::<C>(table, &["plugin"])?, context);
         Self { name, about, former: false, schema: inline::<C>, build: Box::new(build) }
     }
 
