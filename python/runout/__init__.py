@@ -7,7 +7,7 @@ Samples are in µm, geometry is in mm, angles in a configuration are in degrees.
 """
 
 from ._commands import check, compare, diagnose, inspect, plan, run, simulate
-from ._native import Surface, Table, __version__
+from ._native import Layout, Surface, Table, __version__
 from .errors import CommandError, ConfigurationError, DataError, Error
 from .pipeline import Pipeline
 from .recording import Capture, Recording
@@ -21,6 +21,7 @@ __all__ = [
     "DataError",
     "Diagnosis",
     "Error",
+    "Layout",
     "Level",
     "Parameter",
     "Pipeline",

@@ -10,6 +10,7 @@ from typing import Any, Union
 
 from . import _native, _toml
 from .pipeline import Source, job
+from .plugins import Effect, Method, Separator
 from .recording import Recording
 from .result import Diagnosis, Result
 
@@ -17,6 +18,7 @@ Progress = Callable[[int, int, str], object]
 """Called with the number of stations that are done, of all, and the name of the last one. What it raises stops the work."""
 Path = Union[str, os.PathLike[str]]
 Overrides = Mapping[str, Any]
+Plugin = Union[Separator, Effect]
 
 
 def run(
@@ -27,17 +29,19 @@ def run(
     threads: int | None = None,
     progress: Progress | None = None,
     surface: bool = False,
+    plugins: Sequence[Plugin] = (),
 ) -> Result:
     """Loads, preprocesses, separates, evaluates and exports.
 
     `pipeline` is a TOML file, a dictionary with its keys, or a `Pipeline`. `recording` takes the place of its `[load]`. `set`
     overrides keys: `{"preprocess.0.cutoff_hz": 300}`. With `surface` the form over angle and z is kept as well; it is kept
-    in any case where an exporter or a value needs it.
+    in any case where an exporter or a value needs it. `plugins` are separators and effects of one's own (`runout.plugins`), which the pipeline
+    may name; what their code raises, the call raises.
 
     Raises `ConfigurationError` for a mistake in the pipeline, `DataError` for data and files. Ctrl-C stops it; nothing
     half-written remains.
     """
-    return Result(*_native.run(job(pipeline, recording, set), threads, progress, surface))
+    return Result(*_native.run(job(pipeline, recording, set, plugins), threads, progress, surface))
 
 
 def diagnose(
@@ -48,32 +52,43 @@ def diagnose(
     threads: int | None = None,
     progress: Progress | None = None,
     surface: bool = False,
+    plugins: Sequence[Plugin] = (),
 ) -> Diagnosis:
     """Runs the closed loop: finds what the declared model lacks, and adds it. Arguments and exceptions as of `run`."""
-    return Diagnosis(*_native.diagnose(job(pipeline, recording, set), threads, progress, surface))
+    return Diagnosis(*_native.diagnose(job(pipeline, recording, set, plugins), threads, progress, surface))
 
 
 def compare(
     pipeline: Source,
-    methods: Sequence[str] = (),
+    methods: Sequence[Method] = (),
     recording: Recording | None = None,
     *,
     set: Overrides | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
+    plugins: Sequence[Plugin] = (),
 ) -> dict[str, Any]:
     """Compares separators on the same data, as the document of `compare.schema.json`.
 
-    Without `methods`, all of `[[compare]]`, or else every other separator. Arguments and exceptions as of `run`.
+    `methods` are names, or separators of one's own. Without them, all of `[[compare]]`, or else every other separator. Arguments and
+    exceptions as of `run`.
     """
     if isinstance(methods, str):
         raise TypeError("expected a list of separators, found a string")
-    return _document(_native.compare(job(pipeline, recording, set), list(methods), threads, progress))
+    own = [method for method in methods if not isinstance(method, str)]
+    names = [method if isinstance(method, str) else method.name for method in methods]
+    return _document(_native.compare(job(pipeline, recording, set, [*plugins, *own]), names, threads, progress))
 
 
-def check(pipeline: Source, recording: Recording | None = None, *, set: Overrides | None = None) -> dict[str, Any]:
+def check(
+    pipeline: Source,
+    recording: Recording | None = None,
+    *,
+    set: Overrides | None = None,
+    plugins: Sequence[Plugin] = (),
+) -> dict[str, Any]:
     """Says what is known without the data, as the document of `check.schema.json`."""
-    return _document(_native.check(job(pipeline, recording, set)))
+    return _document(_native.check(job(pipeline, recording, set, plugins)))
 
 
 def plan(

@@ -16,6 +16,16 @@ class _Station(Protocol):
     @property
     def captures(self) -> dict[str, Capture]: ...
 
+class _Own(Protocol):
+    @property
+    def name(self) -> str: ...
+    @property
+    def about(self) -> str: ...
+    @property
+    def parameters(self) -> list[tuple[str, str, float]] | None: ...
+    @property
+    def plugin(self) -> Any: ...
+
 class _Job(Protocol):
     @property
     def path(self) -> str | None: ...
@@ -27,6 +37,8 @@ class _Job(Protocol):
     def set(self) -> list[str]: ...
     @property
     def stations(self) -> Sequence[_Station] | None: ...
+    @property
+    def plugins(self) -> Sequence[_Own]: ...
 
 class Capture:
     """Samples in µm, `[sample, channel]`, and how turns are known."""
@@ -45,6 +57,49 @@ class Capture:
     @property
     def samples(self) -> npt.NDArray[np.float64]: ...
 
+class Layout:
+    """The rig as a formula gets it: which reading (a sensor in a setup) contains which unknown, order by order."""
+
+    @property
+    def orders(self) -> npt.NDArray[np.int64]:
+        """Orders that are asked for, ascending from 2. Order 1 follows the rule of 1/rev."""
+
+    @property
+    def unknowns(self) -> list[tuple[str, str | None]]:
+        """What is solved for: `form` with its section, then `x`, `y`, `tilt_x`, `tilt_y` in µm and µrad, as far as a sensor sees them."""
+
+    @property
+    def sensors(self) -> list[str]:
+        """Of each reading, the id of its sensor."""
+
+    @property
+    def setups(self) -> list[str]:
+        """Of each reading, the id of its setup."""
+
+    @property
+    def sections(self) -> list[str]:
+        """Of each reading, the id of its section."""
+
+    @property
+    def angle_rad(self) -> npt.NDArray[np.float64]:
+        """Of each reading, the direction in which it looks."""
+
+    @property
+    def part_angle_rad(self) -> npt.NDArray[np.float64]:
+        """Of each reading, the angle of the part that it sees at spindle angle 0."""
+
+    @property
+    def lever_mm(self) -> npt.NDArray[np.float64]:
+        """Of each reading, z less the mean over the sensors."""
+
+    @property
+    def direction(self) -> float:
+        """+1 where the part turns counter-clockwise, else −1."""
+
+    @property
+    def matrix(self) -> npt.NDArray[np.complex128]:
+        """readings = matrix · unknowns, `[order, reading, unknown]`."""
+
 class Table:
     """A table with units, for any library that takes the Arrow PyCapsule interface."""
 
@@ -62,6 +117,9 @@ class Table:
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __arrow_c_schema__(self) -> object: ...
+
+def figures(tables: Sequence[Table], panels: int) -> str:
+    """The figures that tables declare, as HTML with pictures in it; each figure has so many panels at most."""
 
 class Surface:
     """Form over the part's angle and z."""

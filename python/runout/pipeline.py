@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Union
 
 from . import _toml
+from .plugins import Own, checked, named
 from .recording import Recording, Station
 from .tables import Diagnose, Evaluate, Limit, Rig, Surface
 
 Stage = Union[Mapping[str, Any], Any]
-"""An object of `runout.loaders`, `.preprocessors`, `.separators`, `.exporters` or `.checks`, or a dictionary with `plugin`."""
+"""An object of `runout.loaders`, `.preprocessors`, `.separators`, `.exporters` or `.checks`, or a dictionary with `plugin`. `separate` and `compare`
+take separators of one's own as well (`runout.plugins.Separator`)."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -35,11 +37,14 @@ class Pipeline:
 
     def to_toml(self) -> str:
         """The pipeline as a file would hold it. A recording in memory is `plugin = "arrays"`, which only Python knows."""
-        keys = {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "folder"}
+        keys, _ = self._named()
         if isinstance(self.load, Recording) or self.load is None:
             keys["load"] = {"plugin": "arrays"}
         empty = {name for name, of in keys.items() if isinstance(of, (list, tuple)) and not of}
         return _toml.document({name: of for name, of in keys.items() if name not in empty})
+
+    def _named(self) -> tuple[dict[str, Any], list[Any]]:
+        return named({field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "folder"})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,27 +56,37 @@ class Job:
     folder: str
     set: list[str]
     stations: list[Station] | None
+    plugins: list[Own]
 
 
 Source = Union[str, os.PathLike[str], Mapping[str, Any], Pipeline]
 
 
-def job(pipeline: Source, recording: Recording | None, overrides: Mapping[str, Any] | None) -> Job:
+def job(
+    pipeline: Source, recording: Recording | None, overrides: Mapping[str, Any] | None, plugins: Iterable[Any] = ()
+) -> Job:
     """The job of a pipeline: a file, a dictionary with the keys of TOML, or a `Pipeline`."""
     if recording is not None and not isinstance(recording, Recording):
         raise TypeError(f"expected a runout.Recording, found {type(recording).__name__}")
-    lines = [f"{name}={_toml.value(of, name)}" for name, of in (overrides or {}).items()]
+    changes, found = named(overrides or {})
+    lines = [f"{name}={_toml.value(of, name)}" for name, of in changes.items()]
     path, text, folder = None, "", "."
     if isinstance(pipeline, Pipeline):
         text, folder = pipeline.to_toml(), os.fspath(pipeline.folder)
+        found += pipeline._named()[1]
         if isinstance(pipeline.load, Recording) and recording is None:
             recording = pipeline.load
     elif isinstance(pipeline, Mapping):
-        text = _toml.document(pipeline)
+        keys, own = named(pipeline)
+        text = _toml.document(keys)
+        found += own
     elif isinstance(pipeline, (str, os.PathLike)):
         path = os.fspath(pipeline)
     else:
         raise TypeError(f"expected a path, a dictionary or a runout.Pipeline, found {type(pipeline).__name__}")
     if recording is not None:
         lines.append('load={ plugin = "arrays" }')
-    return Job(path, text, folder, lines, None if recording is None else recording.stations)
+    if isinstance(plugins, (str, Mapping)) or not isinstance(plugins, Iterable):
+        raise TypeError(f"expected a list of plugins, found {type(plugins).__name__}")
+    stations = None if recording is None else recording.stations
+    return Job(path, text, folder, lines, stations, checked([*plugins, *found]))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _html
-from ._native import Surface, Table
+from ._native import Surface, Table, figures
 
-figures: Callable[[dict[str, Table]], str] | None = None
-"""Draws the figures of a result's tables as HTML, for notebooks; none are drawn where it is None."""
+PANELS = 4
+"""Panels of a figure in a notebook, evenly spread over all stations; the exporter `report` shows all."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,18 +43,59 @@ class Value:
 
 
 @dataclasses.dataclass(frozen=True)
-class Result:
-    """What a run gives. `summary` is the document of `summary.schema.json`; the rest reads it."""
+class _Outcome:
+    """What a run and a diagnosis have in common: their document, and the tables and the surface of the final model."""
 
     document: dataclasses.InitVar[str]
     table_list: dataclasses.InitVar[list[Table]]
     surface: Surface | None
-    summary: dict[str, Any] = dataclasses.field(init=False, repr=False)
+    facts: dict[str, Any] = dataclasses.field(init=False, repr=False)
     tables: dict[str, Table] = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self, document: str, table_list: list[Table]) -> None:
-        object.__setattr__(self, "summary", json.loads(document))
+        object.__setattr__(self, "facts", json.loads(document))
         object.__setattr__(self, "tables", {table.name: table for table in table_list})
+
+    def coefficients(
+        self, quantity: str, *, section: str | None = None, station: str | None = None
+    ) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.float64]]:
+        """Fourier coefficients of `form`, `x`, `y`, `tilt_x` or `tilt_y` by order, and their standard uncertainties.
+
+        Index is the order; lost orders are NaN. Form is Re Σ c exp(+i·n·α), motion Re Σ c exp(−i·n·Φ). `section` and `station` may be left
+        out where there is only one. Raises LookupError where they are not unique or the table has no such row.
+        """
+        table = self.tables.get("harmonics")
+        if table is None:
+            raise LookupError("the result has no table `harmonics`: its separator gives no form")
+        of = np.array(table["quantity"]) == quantity
+        for column, name in (("section", section), ("station", station)):
+            names = np.array(table[column], dtype=object)
+            if name is not None:
+                of &= names == name
+            elif len(there := set(names[of])) > 1:
+                raise LookupError(f"`{quantity}` is there at several: say which {column}: {sorted(map(str, there))}")
+        if not of.any():
+            raise LookupError(f"there is no `{quantity}` of section {section} at station {station}")
+        order = table["order"][of].astype(int)
+        values = np.full(order.max() + 1, np.nan + 0j)
+        std = np.full(order.max() + 1, np.nan)
+        values[order] = table["re"][of] + 1j * table["im"][of]
+        std[order] = table["std"][of]
+        return values, std
+
+
+    def figures(self, panels: int = PANELS) -> str:
+        """The figures of its tables as HTML: polar plots of form and error motion, harmonics, and those of its domain."""
+        return figures(list(self.tables.values()), panels)
+
+
+class Result(_Outcome):
+    """What a run gives. `summary` is the document of `summary.schema.json`; the rest reads it."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The whole document."""
+        return self.facts
 
     @property
     def title(self) -> str:
@@ -95,38 +136,10 @@ class Result:
         known = ", ".join(symbols) if not found else "; ".join(str(one) for one in found[:5])
         raise LookupError(f"{len(found)} values are `{symbol}` with {where}, expected one; there is {known}")
 
-    def coefficients(
-        self, quantity: str, *, section: str | None = None, station: str | None = None
-    ) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.float64]]:
-        """Fourier coefficients of `form`, `x`, `y`, `tilt_x` or `tilt_y` by order, and their standard uncertainties.
-
-        Index is the order; lost orders are NaN. Form is Re Σ c exp(+i·n·α), motion Re Σ c exp(−i·n·Φ). `section` and `station` may be left
-        out where there is only one. Raises LookupError where they are not unique or the table has no such row.
-        """
-        table = self.tables.get("harmonics")
-        if table is None:
-            raise LookupError("the result has no table `harmonics`: its separator gives no form")
-        of = np.array(table["quantity"]) == quantity
-        for column, name in (("section", section), ("station", station)):
-            names = np.array(table[column], dtype=object)
-            if name is not None:
-                of &= names == name
-            elif len(there := set(names[of])) > 1:
-                raise LookupError(f"`{quantity}` is there at several: say which {column}: {sorted(map(str, there))}")
-        if not of.any():
-            raise LookupError(f"there is no `{quantity}` of section {section} at station {station}")
-        order = table["order"][of].astype(int)
-        values = np.full(order.max() + 1, np.nan + 0j)
-        std = np.full(order.max() + 1, np.nan)
-        values[order] = table["re"][of] + 1j * table["im"][of]
-        std[order] = table["std"][of]
-        return values, std
-
     def _repr_html_(self) -> str:
         rows = ((one.symbol, one.value, one.std, one.unit, ", ".join(one.where.values())) for one in self.values)
         values = _html.table(("value", "", "± (standard)", "unit", "of"), rows)
-        drawn = "" if figures is None else figures(self.tables)
-        return _html.page(self.title, self.warnings, values, drawn)
+        return _html.page(self.title, self.warnings, values, self.figures())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,19 +178,8 @@ class Level:
     unit: str
 
 
-@dataclasses.dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(_Outcome):
     """What the closed loop found. `facts` is the document of `diagnosis.schema.json`; tables are those of the final model."""
-
-    document: dataclasses.InitVar[str]
-    table_list: dataclasses.InitVar[list[Table]]
-    surface: Surface | None
-    facts: dict[str, Any] = dataclasses.field(init=False, repr=False)
-    tables: dict[str, Table] = dataclasses.field(init=False, repr=False)
-
-    def __post_init__(self, document: str, table_list: list[Table]) -> None:
-        object.__setattr__(self, "facts", json.loads(document))
-        object.__setattr__(self, "tables", {table.name: table for table in table_list})
 
     @property
     def verdict(self) -> str:
@@ -215,7 +217,7 @@ class Diagnosis:
             for one in self.added
         )
         effects = _html.table(("effect", "targets", "parameters", "confounded with"), found)
-        return _html.page(f"Diagnosis: {self.verdict}", self.warnings, _html.table(head, levels), effects)
+        return _html.page(f"Diagnosis: {self.verdict}", self.warnings, _html.table(head, levels), effects, self.figures())
 
 
 def _values(summary: dict[str, Any]) -> Iterator[Value]:

@@ -22,11 +22,12 @@ use crate::{
     arrays::{ArrayLoader, Arrays, Station},
     collect::Collector,
     interruptible::Interruptible,
+    own::{self, Own},
     table::{Surface, Table},
     work::{Stop, watched},
 };
 
-/// The pipeline of a call: a file or a text, what to change in it, and the recording where it is in memory.
+/// The pipeline of a call: a file or a text, what to change in it, the recording where it is in memory, and plugins in Python.
 #[derive(FromPyObject)]
 pub struct Job {
     path: Option<PathBuf>,
@@ -34,9 +35,18 @@ pub struct Job {
     folder: PathBuf,
     set: Vec<String>,
     stations: Option<Vec<Station>>,
+    plugins: Vec<Own>,
 }
 
 impl Job {
+    /// What is registered for the call.
+    fn registry(&mut self, stop: &Stop) -> Result<Registry, Failure> {
+        let mut registry = builtin::registry();
+        registry.loaders.add(Plugin::of::<Arrays>());
+        own::register(&mut registry, std::mem::take(&mut self.plugins), stop)?;
+        Ok(registry)
+    }
+
     fn build(self, registry: &Registry, stop: Stop) -> Result<(Sources, Pipeline), Failure> {
         let sources = match &self.path {
             Some(path) => Sources::read(path, &self.set, INCLUDE_KEY)?,
@@ -49,12 +59,6 @@ impl Job {
         pipeline.loader = Box::new(Interruptible { loader: pipeline.loader, stop });
         Ok((sources, pipeline))
     }
-}
-
-fn registry() -> Registry {
-    let mut registry = builtin::registry();
-    registry.loaders.add(Plugin::of::<Arrays>());
-    registry
 }
 
 fn json(result: &impl Serialize) -> Result<String, Failure> {
@@ -74,15 +78,10 @@ pub fn run(
     progress: Option<&Bound<'_, PyAny>>,
     surface: bool,
 ) -> PyResult<Answer> {
-    let collector = Collector { with_surface: surface, ..Collector::default() };
-    let exporter: Box<dyn Exporter> = Box::new(collector.clone());
-    let stop = collector.stop.clone();
-    let document = watched(py, progress, &collector.stop, move |watch| {
-        let (_, mut pipeline) = job.build(&registry(), stop)?;
-        pipeline.exporters.push(exporter);
+    answer(py, job, progress, surface, move |mut pipeline, collector, watch| {
+        pipeline.exporters.push(collector);
         json(&separate(&pipeline, threads, watch)?)
-    })?;
-    answer(py, document, &collector)
+    })
 }
 
 /// Runs the closed loop on a pipeline.
@@ -95,18 +94,28 @@ pub fn diagnose(
     progress: Option<&Bound<'_, PyAny>>,
     surface: bool,
 ) -> PyResult<Answer> {
+    answer(py, job, progress, surface, move |mut pipeline, collector, watch| {
+        pipeline.diagnosed.push(collector);
+        json(&find_effects(&pipeline, threads, watch)?)
+    })
+}
+
+/// Does work on a pipeline with an exporter that keeps its result, and gives that with the work's document.
+fn answer(
+    py: Python<'_>,
+    mut job: Job,
+    progress: Option<&Bound<'_, PyAny>>,
+    surface: bool,
+    work: impl FnOnce(Pipeline, Box<dyn Exporter>, &dyn Observer) -> Result<String, Failure> + Send + 'static,
+) -> PyResult<Answer> {
     let collector = Collector { with_surface: surface, ..Collector::default() };
     let exporter: Box<dyn Exporter> = Box::new(collector.clone());
     let stop = collector.stop.clone();
     let document = watched(py, progress, &collector.stop, move |watch| {
-        let (_, mut pipeline) = job.build(&registry(), stop)?;
-        pipeline.diagnosed.push(exporter);
-        json(&find_effects(&pipeline, threads, watch)?)
+        let registry = job.registry(&stop)?;
+        let (_, pipeline) = job.build(&registry, stop)?;
+        work(pipeline, exporter, watch)
     })?;
-    answer(py, document, &collector)
-}
-
-fn answer(py: Python<'_>, document: String, collector: &Collector) -> PyResult<Answer> {
     let kept = collector.take();
     let tables = kept.tables.into_iter().map(|(spec, batches)| Table::new(spec, batches)).collect();
     Ok((document, tables, kept.surface.map(|surface| Surface::new(py, surface)).transpose()?))
@@ -117,7 +126,7 @@ fn answer(py: Python<'_>, document: String, collector: &Collector) -> PyResult<A
 #[pyo3(signature = (job, methods, threads = None, progress = None))]
 pub fn compare(
     py: Python<'_>,
-    job: Job,
+    mut job: Job,
     methods: Vec<String>,
     threads: Option<NonZeroUsize>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -125,9 +134,10 @@ pub fn compare(
     let stop = Stop::default();
     let of_job = stop.clone();
     watched(py, progress, &stop, move |watch| {
-        documents::separators_known(&methods, &registry())?;
-        let (sources, pipeline) = job.build(&registry(), of_job)?;
-        json(&comparison(&sources, pipeline, &methods, threads, watch)?)
+        let registry = job.registry(&of_job)?;
+        documents::separators_known(&methods, &registry)?;
+        let (sources, pipeline) = job.build(&registry, of_job)?;
+        json(&comparison(&sources, pipeline, &methods, &registry, threads, watch)?)
     })
 }
 
@@ -135,19 +145,19 @@ fn comparison(
     sources: &Sources,
     mut pipeline: Pipeline,
     methods: &[String],
+    registry: &Registry,
     threads: Option<NonZeroUsize>,
     observer: &dyn Observer,
 ) -> Result<Comparison, Failure> {
-    let registry = registry();
     let misplaced = |fault| match Document::parse(sources) {
         Ok(document) => Failure::from(document.diagnose(fault)),
         Err(diagnostic) => diagnostic.into(),
     };
     if pipeline.route.point_separator().is_some() {
-        let comparing = ComparingPoints::new(&pipeline, methods, &registry, sources).map_err(misplaced)?;
+        let comparing = ComparingPoints::new(&pipeline, methods, registry, sources).map_err(misplaced)?;
         return Ok(comparing.run(Vec::new())?);
     }
-    let comparing = Comparing::new(&mut pipeline, methods, &registry, sources.folder()).map_err(misplaced)?;
+    let comparing = Comparing::new(&mut pipeline, methods, registry, sources.folder()).map_err(misplaced)?;
     let mut stations = Vec::new();
     let take = |station| {
         stations.push(station);
@@ -160,11 +170,11 @@ fn comparison(
 
 /// Says what a pipeline can do.
 #[pyfunction]
-pub fn check(py: Python<'_>, job: Job) -> PyResult<String> {
+pub fn check(py: Python<'_>, mut job: Job) -> PyResult<String> {
     let stop = Stop::default();
     let of_job = stop.clone();
     watched(py, None, &stop, move |_| {
-        let registry = registry();
+        let registry = job.registry(&of_job)?;
         let (sources, pipeline) = job.build(&registry, of_job)?;
         json(&documents::check(&sources, &pipeline, &registry)?)
     })

@@ -8,6 +8,7 @@ mod calls;
 mod collect;
 mod failure;
 mod interruptible;
+mod own;
 mod table;
 mod work;
 
@@ -21,7 +22,9 @@ mod _native {
     #[pymodule_export]
     use super::calls::{check, compare, diagnose, document, main, run};
     #[pymodule_export]
-    use super::table::{Surface, Table};
+    use super::own::Layout;
+    #[pymodule_export]
+    use super::table::{Surface, Table, figures};
 
     use pyo3::{
         Bound, PyResult,

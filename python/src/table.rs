@@ -9,13 +9,14 @@ use arrow_array::{
 use arrow_schema::{ArrowError, Schema};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::{exceptions::PyKeyError, prelude::*, types::PyCapsule};
+use runout_cli::Failure;
 use runout_core::{
     pipeline::error::known_names,
     surface,
     table::{Kind, TableSpec},
 };
 
-use crate::failure::fault;
+use crate::failure::{exception, fault};
 
 /// A table with units. It gives its memory to pyarrow, polars, pandas and DuckDB by the Arrow PyCapsule interface.
 #[pyclass(frozen, module = "runout._native")]
@@ -113,6 +114,14 @@ impl Table {
         let schema = FFI_ArrowSchema::try_from(&*self.schema()).map_err(|error| fault(&error.to_string()))?;
         PyCapsule::new_with_value(py, schema, c"arrow_schema")
     }
+}
+
+/// The figures that tables declare, as HTML with pictures in it; each figure has so many panels at most.
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value, reason = "what Python gives is owned")]
+pub fn figures(py: Python<'_>, tables: Vec<Py<Table>>, panels: usize) -> PyResult<String> {
+    let drawn = tables.iter().map(|table| (&table.get().spec, &table.get().batches[..]));
+    py.detach(|| runout_figures::fragment(drawn, panels)).map_err(|error| exception(py, &Failure::Work(error)))
 }
 
 /// Form over the part's angle and z.

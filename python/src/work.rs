@@ -23,18 +23,34 @@ const GRACE: Duration = Duration::from_secs(2);
 /// The stack of a program's first thread.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Whether work is to stop.
+/// Whether work is to stop, and what Python code in it raised.
 #[derive(Debug, Clone, Default)]
-pub struct Stop(Arc<AtomicBool>);
+pub struct Stop(Arc<State>);
+
+#[derive(Debug, Default)]
+struct State {
+    is_set: AtomicBool,
+    raised: Mutex<Option<PyErr>>,
+}
 
 impl Stop {
     /// Whether it is.
     pub fn is_set(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.is_set.load(Ordering::Relaxed)
     }
 
     fn set(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0.is_set.store(true, Ordering::Relaxed);
+    }
+
+    /// Stops because of an exception; the first of several is the one that the call raises.
+    pub fn raise(&self, error: PyErr) {
+        self.0.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        self.set();
+    }
+
+    fn take_raised(&self) -> Option<PyErr> {
+        self.0.raised.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
@@ -63,7 +79,7 @@ impl<T: Send> Observer for Watch<T> {
 /// Does work on a thread of its own, and calls `progress(done, of, name)` on this one.
 ///
 /// # Errors
-/// When the work fails, the callback raises, or Python was interrupted.
+/// When the work fails, the callback or a plugin raises, or Python was interrupted.
 pub fn watched<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -82,17 +98,24 @@ pub fn watched<T: Send + 'static>(
     std::thread::Builder::new().name("runout".into()).stack_size(STACK_BYTES).spawn(worker)?;
     let (mut done, mut of) = (0, 0);
     loop {
-        let outcome = match next(py, &receiver, SIGNALS)? {
-            Some(Event::End(outcome)) => return outcome.map_err(|failure| exception(py, &failure)),
-            Some(Event::Begin(count)) => {
-                of = count;
-                Ok(())
-            }
-            Some(Event::Done(name)) => {
-                done += 1;
-                progress.map_or(Ok(()), |progress| progress.call1((done, of, name)).map(drop))
-            }
-            None => Ok(()),
+        let event = next(py, &receiver, SIGNALS);
+        // What a plugin raised explains any failure of the work.
+        let ended = matches!(event, Ok(Some(Event::End(_))) | Err(_));
+        let outcome = match (stop.take_raised(), event) {
+            (Some(error), _) if ended => return Err(error),
+            (Some(error), _) => Err(error),
+            (None, event) => match event? {
+                Some(Event::End(outcome)) => return outcome.map_err(|failure| exception(py, &failure)),
+                Some(Event::Begin(count)) => {
+                    of = count;
+                    Ok(())
+                }
+                Some(Event::Done(name)) => {
+                    done += 1;
+                    progress.map_or(Ok(()), |progress| progress.call1((done, of, name)).map(drop))
+                }
+                None => Ok(()),
+            },
         };
         if let Err(error) = outcome.and_then(|()| py.check_signals()) {
             stop.set();

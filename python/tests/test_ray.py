@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -19,7 +20,7 @@ pyarrow_dataset = pytest.importorskip("pyarrow.dataset")
 
 import runout.ray as batches  # noqa: E402
 
-from conftest import pipeline  # noqa: E402
+from conftest import EXAMPLE, pipeline  # noqa: E402
 
 SOURCES = str(Path(runout.__file__).resolve().parent.parent)
 PIPELINE = pipeline(load={"plugin": "hdf5", "path": "?"})
@@ -70,12 +71,12 @@ def test_one_task_a_recording_and_nothing_twice(cluster: None, folder: Path, tmp
 class Killed(batches.Task):
     """A task whose worker is killed once for each recording, after its tables and before it is done."""
 
-    def write(self, result: runout.Result, address: str, name: str, folder: str, target: Any, root: str) -> None:
+    def write(self, result: Any, row: dict[str, Any], name: str, folder: str, target: Any, root: str) -> None:
         mark = Path(root).parent / f"killed-{name}"
         if not mark.exists():
             mark.touch()
-            super().write(result, address, name, folder, Halfway(target), root)
-        super().write(result, address, name, folder, target, root)
+            super().write(result, row, name, folder, Halfway(target), root)
+        super().write(result, row, name, folder, target, root)
 
 
 class Halfway:
@@ -97,7 +98,7 @@ def test_a_killed_worker_loses_and_doubles_nothing(cluster: None, folder: Path, 
     batches.run(PIPELINE, folder, calm)
     killed.parent.mkdir()
     task = Killed.of(PIPELINE, None, "load.path", str(killed), {})
-    entries = batches.recordings(folder).map(task, num_cpus=1, max_retries=5).take_all()
+    entries = batches.recordings(folder).map(task, num_cpus=1).take_all()
     assert sorted(entry["status"] for entry in entries) == ["done"] * 3
     assert len(list(killed.parent.glob("killed-*"))) == 3
     assert rows(killed) == rows(calm)
@@ -126,3 +127,28 @@ def test_object_storage_takes_the_place_of_folders(cluster: None, folder: Path, 
         assert rows(tmp_path / "fetched") == rows(tmp_path / "local")
     finally:
         server.stop()
+
+
+def test_simulated_campaigns_are_a_blind_benchmark(cluster: None, tmp_path: Path) -> None:
+    few = {"recording.stations.count": 1, "recording.revolutions": 8, "recording.format": "f32"}
+    scenario = EXAMPLE / "scenario.toml"
+
+    def vary(seed: int) -> dict[str, Any]:
+        return few | {"form.rms_um": 2.0 + seed}
+
+    report = batches.campaigns(scenario, PIPELINE, range(3), tmp_path / "out", vary=vary)
+    assert [entry["recording"] for entry in report.of("done")] == ["seed-0", "seed-1", "seed-2"], report.failed
+    summaries = [json.loads(path.read_text()) for path in (tmp_path / "out" / "summary").iterdir()]
+    assert len(summaries) == 3 and all(one["stations"][0]["truth_form_rms_error_um"] is not None for one in summaries)
+    again = batches.campaigns(scenario, PIPELINE, range(4), tmp_path / "out", vary=vary)
+    assert len(again.of("skipped")) == 3 and len(again.of("done")) == 1
+    # The same campaign by hand.
+    file = tmp_path / "by-hand.h5"
+    runout.simulate(scenario, file, set=vary(2) | {"seed": 2})
+    by_hand = runout.run(PIPELINE, set={"load.path": str(file)})
+    (written,) = (tmp_path / "out" / "form" / "recording=seed-2").iterdir()
+    assert pyarrow_dataset.dataset(str(written)).to_table()["form_um"].to_pylist() == by_hand.tables["form"]["form_um"].tolist()
+    (bad,) = batches.campaigns(scenario, PIPELINE, [1], tmp_path / "out", vary=lambda seed: {"form.rms_um": -1}).failed
+    assert bad["error"]
+    with pytest.raises(ValueError, match="seed"):
+        batches.campaigns(scenario, PIPELINE, [], tmp_path / "out")

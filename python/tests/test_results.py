@@ -85,5 +85,6 @@ def test_values_have_units_and_places(result: runout.Result) -> None:
 
 def test_a_notebook_shows_it(result: runout.Result) -> None:
     page = result._repr_html_()
+    assert page.count("<img") >= 2 and "data:image/svg+xml;base64," in page
     assert "<table>" in page and "RONt" in page and "Turned shaft" in page
     assert "<b>" not in runout.Result('{"title": "<b>", "warnings": [], "stations": [], "values": []}', [], None)._repr_html_()

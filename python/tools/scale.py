@@ -1,12 +1,20 @@
-"""Times a batch on Ray: `python python/tools/scale.py [RECORDINGS]`. Prints recordings a second for 1 and 2 tasks at a time."""
+"""Times batches on Ray beside `runout batch`: `python python/tools/scale.py [--recordings N] [--campaigns N] [--rounds N]`.
+
+Prints recordings a second of `runout batch` with one and two jobs and of `runout.ray.run` with one and two tasks at a time, in turns, on recordings of 2 MB; and
+campaigns a second of `runout.ray.campaigns`, where asked for. Workers are started before the clock.
+"""
 
 from __future__ import annotations
 
-import json
+import argparse
+import os
 import shutil
+import statistics
+import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import ray
@@ -14,39 +22,77 @@ import ray
 import runout
 import runout.ray
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "01-four-sensor"
+BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "batch"
+PIPELINE = BENCHMARK / "pipeline.toml"
+JOBS = (1, 2)
 
 
-def main(count: int) -> None:
+def recordings(folder: Path, count: int) -> list[str]:
+    """Recordings that differ in their checksum only."""
+    first = folder / "first.h5"
+    runout.simulate(BENCHMARK / "scenario.toml", first)
+    source = folder / "recordings"
+    source.mkdir()
+    for number in range(count):
+        copy = source / f"part-{number:05}.h5"
+        shutil.copy(first, copy)
+        # Bytes behind the end of an HDF5 file are not read, and make its checksum its own.
+        with copy.open("ab") as file:
+            file.write(number.to_bytes(8, "little"))
+    return [str(path) for path in sorted(source.iterdir())]
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Seconds of some work."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def batch(paths: list[str], out: Path, jobs: int) -> None:
+    """The batch of the command line."""
+    words = [sys.executable, "-m", "runout", "batch", str(PIPELINE), *paths, "--out", str(out), "--jobs", str(jobs)]
+    subprocess.run(words, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def on_ray(paths: list[str], out: Path, tasks: int) -> None:
+    """The same on Ray."""
+    report = runout.ray.run(PIPELINE, paths, out, concurrency=tasks)
+    assert len(report.of("done")) == len(paths), report.failed
+
+
+def main() -> None:
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--recordings", type=int, default=100)
+    words.add_argument("--campaigns", type=int, default=0)
+    words.add_argument("--rounds", type=int, default=1)
+    asked = words.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="runout-scale-"))
+    ray.init(num_cpus=max(JOBS), include_dashboard=False, log_to_driver=False)
     try:
-        first = folder / "first.h5"
-        few = {"recording.stations.count": 2, "recording.revolutions": 120, "recording.format": "i16"}
-        runout.simulate(EXAMPLE / "scenario.toml", first, set=few)
-        source = folder / "recordings"
-        source.mkdir()
-        for number in range(count):
-            copy = source / f"part-{number:05}.h5"
-            shutil.copy(first, copy)
-            # Bytes behind the end of an HDF5 file are not read, and make its checksum its own.
-            with copy.open("ab") as file:
-                file.write(number.to_bytes(8, "little"))
-        set_of = {"load.path": str(first), "export": []}
-        start = time.perf_counter()
-        for _ in range(10):
-            runout.run(EXAMPLE / "pipeline.toml", set=set_of, threads=1)
-        alone = (time.perf_counter() - start) / 10
-        print(json.dumps({"recording_mb": first.stat().st_size / 1e6, "seconds_a_run_in_one_process": alone}))
-        ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-        for tasks in (1, 2):
-            start = time.perf_counter()
-            report = runout.ray.run(EXAMPLE / "pipeline.toml", source, folder / f"out-{tasks}", concurrency=tasks)
-            seconds = time.perf_counter() - start
-            done = len(report.of("done"))
-            print(json.dumps({"tasks": tasks, "done": done, "seconds": seconds, "recordings_a_second": done / seconds}))
+        paths = recordings(folder, asked.recordings)
+        on_ray(paths[: 2 * max(JOBS)], folder / "warm", max(JOBS))
+        ways = [(f"{name}, {jobs}", way, jobs) for name, way in (("batch", batch), ("Ray", on_ray)) for jobs in JOBS]
+        found: dict[str, list[float]] = {name: [] for name, _, _ in ways}
+        for round in range(asked.rounds):
+            for name, way, jobs in ways:
+                out = folder / f"out-{round}"
+                found[name].append(timed(lambda: way(paths, out, jobs)))  # noqa: B023
+                shutil.rmtree(out)
+        print(f"{len(paths)} recordings of {Path(paths[0]).stat().st_size / 1e6:.1f} MB, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}\n")
+        print("| jobs or tasks | time, s | recordings a second |\n| --- | --- | --- |")
+        for name, times in found.items():
+            seconds = statistics.median(times)
+            print(f"| {name} | {seconds:.1f} | {len(paths) / seconds:.2f} |")
+        if asked.campaigns:
+            few = {"recording.revolutions": 24}
+            seconds = timed(lambda: runout.ray.campaigns(
+                BENCHMARK / "scenario.toml", PIPELINE, range(asked.campaigns), folder / "campaigns", vary=lambda seed: few))
+            print(f"\n{asked.campaigns} campaigns in {seconds:.1f} s: {asked.campaigns / seconds:.2f} a second")
     finally:
+        ray.shutdown()
         shutil.rmtree(folder)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    main()

@@ -248,3 +248,16 @@ fn foreign_readers_take_the_data_set_as_one() {
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
     println!("{said}");
 }
+
+#[test]
+fn a_second_batch_into_the_same_folder_hears_who_holds_it() {
+    let folder = recorded(&["a.h5"]);
+    let held = folder.path().join("out/batch.json");
+    let lock = runout_core::atomic_file::FolderLock::of([held.as_path()]).unwrap();
+    let (status, _, said) = batch(&folder, "out", &["a.h5"], &[]);
+    assert_eq!(status, 1, "{said}");
+    assert!(said.contains(&format!("process {} (", std::process::id())), "{said}");
+    drop(lock);
+    assert_eq!(batch(&folder, "out", &["a.h5"], &[]).0, 0);
+    assert!(!folder.path().join("out/.runout.lock").exists());
+}

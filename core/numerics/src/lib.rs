@@ -10,6 +10,7 @@ pub mod lanes;
 pub mod least_squares;
 pub mod side_by_side;
 pub mod statistics;
+pub mod threads;
 
 pub use num_complex::Complex64;
 

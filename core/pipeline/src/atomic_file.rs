@@ -8,7 +8,7 @@ use std::{
     fs,
     io::Write,
     path::{Component, Path, PathBuf},
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Condvar, Mutex, MutexGuard, PoisonError},
 };
 
 pub use lock::FolderLock;
@@ -16,7 +16,10 @@ use runout_error::{Error, ErrorKind, Result};
 
 /// What this process has begun and not finished.
 static UNDER_WAY: Mutex<UnderWay> =
-    Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new(), locks: Vec::new(), abandoning: 0 });
+    Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new(), locks: Vec::new(), abandoning: 0, publishing: 0 });
+
+/// That a publication has ended.
+static PUBLISHED: Condvar = Condvar::new();
 
 struct UnderWay {
     /// Temporary files.
@@ -27,6 +30,8 @@ struct UnderWay {
     locks: Vec<PathBuf>,
     /// How many [`Abandoned`] there are.
     abandoning: usize,
+    /// How many threads give files their names now: they do so side by side, because syncing takes time.
+    publishing: usize,
 }
 
 impl UnderWay {
@@ -49,19 +54,25 @@ impl UnderWay {
         let _ = made.map(fs::remove_dir).take_while(std::result::Result::is_ok).count();
     }
 
-    /// Gives files their final names.
-    fn finish(&mut self, files: &mut [PendingFile]) -> Result<Vec<PathBuf>> {
-        if let Some(gone) = files.iter().find(|file| !self.files.contains(&file.temporary)) {
+    /// Begins to give files their final names, which nothing can abandon from here on.
+    fn publish(&mut self, files: &[PendingFile]) -> Result<Publishing> {
+        let abandoned = files.first().filter(|_| self.abandoning > 0);
+        let gone = files.iter().find(|file| !self.files.contains(&file.temporary));
+        if let Some(gone) = gone.or(abandoned) {
             return Err(gone.failure(ABANDONED).of(ErrorKind::Interrupted));
         }
-        files.iter().try_for_each(PendingFile::sync)?;
-        let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();
-        publication::publish(&names)?;
-        for file in &mut *files {
-            self.files.retain(|pending| *pending != file.temporary);
-            file.committed = true;
-        }
-        Ok(files.iter().map(|file| file.destination.clone()).collect())
+        self.publishing += 1;
+        Ok(Publishing)
+    }
+}
+
+/// A publication of this process, until it is dropped.
+struct Publishing;
+
+impl Drop for Publishing {
+    fn drop(&mut self) {
+        UnderWay::now().publishing -= 1;
+        PUBLISHED.notify_all();
     }
 }
 
@@ -69,11 +80,13 @@ impl UnderWay {
 const ABANDONED: &str = "the work was abandoned";
 
 /// Removes all that this process has begun and not finished, as a program does that is interrupted. What was abandoned cannot be
-/// finished any more, and nothing can be begun while the returned value lives: both fail with [`ErrorKind::Interrupted`].
+/// finished any more, and nothing can be begun while the returned value lives: both fail with [`ErrorKind::Interrupted`]. Files that
+/// are getting their names have them first.
 #[must_use = "new files can be begun as soon as it is dropped"]
 pub fn abandon_all() -> Abandoned {
     let mut under_way = UnderWay::now();
     under_way.abandoning += 1;
+    under_way = PUBLISHED.wait_while(under_way, |now| now.publishing > 0).unwrap_or_else(PoisonError::into_inner);
     while let Some(file) = under_way.files.pop() {
         under_way.remove(&file);
     }
@@ -277,11 +290,18 @@ fn remove_stale(folder: &Path, name: &str) {
 /// # Errors
 /// When the file system refuses a rename; those before it are taken back.
 pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
+    let publishing = UnderWay::now().publish(&files)?;
+    files.iter().try_for_each(PendingFile::sync)?;
+    let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();
+    publication::publish(&names)?;
     let mut under_way = UnderWay::now();
-    let finished = under_way.finish(&mut files);
-    // Files that are left need it for their removal.
+    for file in &mut files {
+        under_way.files.retain(|pending| *pending != file.temporary);
+        file.committed = true;
+    }
     drop(under_way);
-    finished
+    drop(publishing);
+    Ok(files.iter().map(|file| file.destination.clone()).collect())
 }
 
 /// Completes a publication whose run was killed, before a file that it may have replaced is read as a result.

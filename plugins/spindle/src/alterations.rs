@@ -66,18 +66,28 @@ pub struct SensorAlteration {
 
 /// Reading over displacement at an order, never 0: any linear change of a channel.
 #[derive(Clone)]
-pub struct Transfer(Arc<dyn Fn(usize) -> Complex64 + Send + Sync>);
+pub struct Transfer {
+    at: Arc<dyn Fn(usize) -> Complex64 + Send + Sync>,
+    /// The effect that it is of, and the values of its parameters.
+    effect: Option<(&'static str, Vec<f64>)>,
+}
 
 impl Transfer {
     /// By a function of the order.
     pub fn new(of: impl Fn(usize) -> Complex64 + Send + Sync + 'static) -> Self {
-        Self(Arc::new(of))
+        Self { at: Arc::new(of), effect: None }
+    }
+
+    /// Which effect it is of, for partials that depend on the values of its parameters ([`SensorAlteration::applied`]).
+    #[must_use]
+    pub fn of(self, effect: &'static str, values: &[f64]) -> Self {
+        Self { effect: Some((effect, values.to_vec())), ..self }
     }
 }
 
 impl fmt::Debug for Transfer {
     fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        write!(formatter, "Transfer(… {} at order 1 …)", (self.0)(1))
+        write!(formatter, "Transfer(… {} at order 1 …)", (self.at)(1))
     }
 }
 
@@ -179,7 +189,14 @@ impl SensorAlteration {
     #[must_use]
     pub fn response(&self, order: usize) -> Complex64 {
         let known = self.sign * (1.0 + self.gain) / Complex64::new(1.0, -(order as f64) * self.inverse_cutoff);
-        self.transfers.iter().fold(known, |response, transfer| response * (transfer.0)(order))
+        self.transfers.iter().fold(known, |response, transfer| response * (transfer.at)(order))
+    }
+
+    /// The values with which an effect [stated](Transfer::of) its transfer; `None` where it is not applied.
+    #[must_use]
+    pub fn applied(&self, effect: &str) -> Option<&[f64]> {
+        let stated = self.transfers.iter().filter_map(|transfer| transfer.effect.as_ref());
+        stated.rev().find(|(known, _)| *known == effect).map(|(_, values)| &values[..])
     }
 
     /// Creep in a setup, over that which `creep_um` is meant for.

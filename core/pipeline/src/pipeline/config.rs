@@ -68,6 +68,8 @@ pub struct Pipeline {
     pub tables: Vec<TableSpec>,
     /// What the separator can tell with the rig.
     pub assessment: Option<Assessment>,
+    /// Files that stages besides `[load]` name and read: inputs of the result too.
+    pub named_files: Vec<PathBuf>,
     /// The configuration with includes and overrides in their places, for provenance: it runs again as it is.
     pub configuration: String,
 }
@@ -284,6 +286,7 @@ impl Pipeline {
             checks,
             tables: of_result,
             assessment,
+            named_files: named_files(root, sources.folder()),
             configuration: document::resolved_text(root, sources)?,
         })
     }
@@ -333,6 +336,31 @@ impl Pipeline {
         let configured = self.diagnose.path.clone().filter(beside);
         beside_the_first(&self.exporters, &self.tables, DIAGNOSIS).into_iter().chain(configured)
     }
+}
+
+/// Tables whose texts may name files that a run reads besides those of `[load]`.
+const READERS: [&str; 3] = ["preprocess", "separate", "evaluate"];
+
+/// The files that texts of a configuration name, each once.
+fn named_files(root: &Table, folder: &Path) -> Vec<PathBuf> {
+    fn add(value: &DeValue, folder: &Path, found: &mut Vec<PathBuf>) {
+        match value {
+            DeValue::String(text) if !text.is_empty() && !text.contains('\0') => {
+                let path = folder.join(text.as_ref());
+                if path.is_file() && !found.contains(&path) {
+                    found.push(path);
+                }
+            }
+            DeValue::Array(items) => items.iter().for_each(|item| add(item.get_ref(), folder, found)),
+            DeValue::Table(table) => table.values().for_each(|value| add(value.get_ref(), folder, found)),
+            _ => {}
+        }
+    }
+    let mut found = Vec::new();
+    for table in READERS.iter().filter_map(|key| root.get_ref().get(*key)) {
+        add(table.get_ref(), folder, &mut found);
+    }
+    found
 }
 
 /// The route of measured points.

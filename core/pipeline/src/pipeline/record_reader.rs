@@ -15,6 +15,7 @@ use super::{
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
 use runout_error::{Error, ErrorKind, Result};
+use runout_numerics::threads;
 use runout_turning::{
     calibrated::calibrated,
     input_file::InputFile,
@@ -103,14 +104,17 @@ impl RecordReader<'_> {
             checksum.begin();
         }
         let files = self.recording.opened()?;
-        let inputs = std::thread::scope(|scope| {
-            let apart = || files.iter().map(InputFile::checksum).collect::<Result<Vec<_>>>();
-            let checksums = scope.spawn(move || if along.is_some() { Ok(Vec::new()) } else { apart() });
-            for _ in 1..workers {
-                scope.spawn(worker);
-            }
-            worker();
-            checksums.join()
+        let checksums = || match along {
+            Some(_) => Ok(Vec::new()),
+            None => files.iter().map(InputFile::checksum).collect::<Result<Vec<_>>>(),
+        };
+        let (inputs, ()) = threads::both(checksums, || {
+            std::thread::scope(|scope| {
+                for _ in 1..workers {
+                    scope.spawn(worker);
+                }
+                worker();
+            });
         });
         ordered_collector.outcome()?;
         // The checksums may have been taken before the last sample was read.
@@ -118,9 +122,7 @@ impl RecordReader<'_> {
         if let Some(checksum) = along {
             return Ok(vec![checksum.finish()?]);
         }
-        inputs.unwrap_or_else(|_| {
-            Err(Error::new("checksum", "the inputs", "the thread that read them stopped").of(ErrorKind::Interrupted))
-        })
+        inputs
     }
 
     /// A capture as it is read and conditioned; every sample is looked at before anything else touches it.

@@ -54,8 +54,11 @@ pub struct Plugin<S> {
     pub about: &'static str,
     former: bool,
     schema: fn() -> Schema,
-    build: fn(&Table, &Context) -> Result<S, Fault>,
+    build: Build<S>,
 }
+
+/// From a stage's table to the stage.
+type Build<S> = Box<dyn Fn(&Table, &Context) -> Result<S, Fault> + Send + Sync>;
 
 /// What a stage's check may look at besides its own keys.
 #[derive(Debug, Clone, Copy)]
@@ -78,7 +81,7 @@ impl Context<'_> {
 ///
 /// Implement it on a struct with `#[derive(Deserialize, JsonSchema)]` and `#[serde(deny_unknown_fields)]`; its doc
 /// comments become the schema's and the help's descriptions.
-pub trait StageConfig: DeserializeOwned + JsonSchema {
+pub trait StageConfig: DeserializeOwned + JsonSchema + 'static {
     /// What the check makes: a boxed stage trait, or [`Preprocessor`] or [`Separator`].
     type Stage;
 
@@ -98,13 +101,19 @@ impl<S> Plugin<S> {
     /// The plugin with this configuration.
     #[must_use]
     pub fn of<C: StageConfig<Stage = S>>() -> Self {
-        Self {
-            name: C::NAME,
-            about: C::ABOUT,
-            former: false,
-            schema: inline::<C>,
-            build: |table, context| document::read_besides::<C>(table, &["plugin"])?.check(context),
-        }
+        Self::made(C::NAME, C::ABOUT, C::check)
+    }
+
+    /// A plugin that a program makes while it runs: with keys of type `C`, which `check` makes the stage of.
+    #[must_use]
+    pub fn made<C: DeserializeOwned + JsonSchema + 'static>(
+        name: &'static str,
+        about: &'static str,
+        check: impl Fn(C, &Context) -> Result<S, Fault> + Send + Sync + 'static,
+    ) -> Self {
+        let build =
+            move |table: &Table, context: &Context| check(document::read_besides::<C>(table, &["plugin"])?, context);
+        Self { name, about, former: false, schema: inline::<C>, build: Box::new(build) }
     }
 
     /// The same plugin under a name that it had before: found by it, and in no list.

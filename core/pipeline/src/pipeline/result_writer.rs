@@ -61,6 +61,8 @@ pub(super) struct ResultWriter {
     /// What the closed loop found.
     diagnosis: Option<Diagnosis>,
     summary_path: Option<PathBuf>,
+    /// Inputs besides what is loaded.
+    named_files: Vec<PathBuf>,
     /// Given back last.
     lock: FolderLock,
 }
@@ -102,6 +104,7 @@ impl ResultWriter {
             summary: begun(pipeline),
             diagnosis: None,
             summary_path: summary_path(exporters, &pipeline.tables),
+            named_files: pipeline.named_files.clone(),
             lock,
         })
     }
@@ -196,6 +199,9 @@ impl ResultWriter {
         surface: Option<&Surface>,
     ) -> Result<Finished> {
         self.summary.provenance.inputs = inputs;
+        for file in &self.named_files {
+            self.summary.provenance.inputs.push(Input::of(file)?);
+        }
         self.summary.warnings.extend(remarks);
         self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
         self.summary.warnings.extend(inflated(&self.summary.stations));

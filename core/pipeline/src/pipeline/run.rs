@@ -27,6 +27,7 @@ use crate::{
     stage::{Averager, Conditioner, Source, Station, StationSeparator},
 };
 use runout_error::{Error, ErrorKind, Result};
+use runout_numerics::threads;
 use runout_standards::Value;
 use runout_turning::{
     error_motion::{Centre, ErrorMotion},
@@ -69,7 +70,7 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
 
 /// Runs a pipeline on one thread, which also reads and writes: other threads have recordings of their own.
 pub(super) fn run_alone(pipeline: &Pipeline) -> Result<Summary> {
-    run_with(pipeline, Some(NonZeroUsize::MIN), true, &Silent)
+    threads::alone(|| run_with(pipeline, Some(NonZeroUsize::MIN), true, &Silent))
 }
 
 fn run_with(

@@ -1,6 +1,7 @@
 //! Feature parameters (ISO 25178-2:2021, clause 5): hills and dales by watersheds, pruned after Wolf.
 
-use super::{HeightMap, beside};
+use super::HeightMap;
+use runout_numerics::threads::both;
 
 /// Peaks or pits of which the mean is S5p or S5v.
 const FIVE: usize = 5;
@@ -42,7 +43,7 @@ impl Features {
     /// Of a map with mean 0; hills and dales lower than `pruning_um` are merged with a neighbour.
     pub(super) fn of(centred: &HeightMap, pruning_um: f64) -> Self {
         let of = |sign: f64| Relief::new(centred, sign).extremes(pruning_um);
-        let (dales, hills) = beside(|| of(1.0), || of(-1.0));
+        let (dales, hills) = both(|| of(1.0), || of(-1.0));
         let area = centred.area_mm2();
         let [s5v, s5p] = [&dales, &hills].map(|found| {
             let mut depths: Vec<f64> = found.iter().map(|extreme| -extreme.depth).collect();

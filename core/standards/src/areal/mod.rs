@@ -23,6 +23,7 @@ pub use spatial_draws::SpatialDraws;
 
 pub use super::parameter::Parameter;
 pub use runout_numerics::height_map::HeightMap;
+use runout_numerics::threads::both;
 
 /// What the standard leaves to the one who evaluates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,21 +119,11 @@ pub fn areal(map: &HeightMap, settings: &Settings) -> Areal {
     let centred = map.with(height::centred(map.heights_um()));
     let Height { sz, .. } = Height::of(&centred);
     let functional = || MaterialRatio::of(&centred).functional(settings.difference_percent, settings.volume_percent);
-    let (functional, (features, found)) = beside(functional, || {
+    let (functional, (features, found)) = both(functional, || {
         let features = Features::of(&centred, settings.pruning_percent / 100.0 * sz);
         (features, of_centred(&centred, settings))
     });
     Areal { functional, features, ..found }
-}
-
-/// Does work on another thread, and some here meanwhile.
-fn beside<A: Send, B>(other: impl FnOnce() -> A + Send, here: impl FnOnce() -> B) -> (A, B) {
-    std::thread::scope(|scope| {
-        let other = scope.spawn(other);
-        let here = here();
-        let other = other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        (other, here)
-    })
 }
 
 /// Heights, lengths and slopes alone, in a part of the time: what the material ratio curve, hills and dales give is NaN.

@@ -12,6 +12,7 @@ use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
+    threads::both,
 };
 use runout_standards::{drawn::remove_noise, gaps::Gaps, uncertainty::Errors};
 
@@ -246,10 +247,7 @@ impl Uncertain {
             let half = errors.len() / 2;
             let (first, rest) = errors.split_at_mut(half);
             let (first_um, rest_um) = rings_um.split_at_mut((half * angles).min(rings_um.len()));
-            std::thread::scope(|scope| {
-                scope.spawn(|| fill(first, first_um));
-                fill(rest, rest_um);
-            });
+            both(|| fill(first, first_um), || fill(rest, rest_um));
         })
     }
 

@@ -93,11 +93,42 @@ impl<M: Method> StageConfig for MethodConfig<M> {
     const ABOUT: &'static str = M::ABOUT;
 
     fn check(self, context: &Context) -> std::result::Result<Separator, Fault> {
-        let rig = require_rig(context.rig)?;
-        let selection = Selection::named(rig, self.sensors.as_deref(), self.setups.as_deref(), M::choose)?;
-        let max_noise_gain = checked_gain(self.max_noise_gain)?.unwrap_or(M::MAX_NOISE_GAIN);
+        let selection = self.selection(context, M::choose)?;
+        let max_noise_gain = self.noise_limit(M::MAX_NOISE_GAIN)?;
         let separator = ClosedFormSeparator::of::<M>(selection, self.second_order, max_noise_gain)?;
         Ok(Separator::Stations(Box::new(separator)))
+    }
+}
+
+impl<M> MethodConfig<M> {
+    /// A formula that takes any sensors and setups, for those that are configured; `make` gets them and their layout.
+    ///
+    /// # Errors
+    /// A key with a value that cannot be, a rig with sensors that no formula takes, and what `make` refuses.
+    pub fn build(
+        &self,
+        context: &Context,
+        name: &str,
+        make: impl FnOnce(&Rig, &Layout) -> std::result::Result<Box<dyn ClosedForm>, Fault>,
+    ) -> std::result::Result<ClosedFormSeparator, Fault> {
+        let all = |rig: &Rig| ((0..rig.sensors.len()).collect(), (0..rig.setups.len()).collect());
+        let selection = self.selection(context, all)?;
+        takes_sensors(&selection.rig).map_err(|problem| refusal(name, &problem))?;
+        let layout = Layout::new(&selection.rig, false).limited_to(self.noise_limit(f64::INFINITY)?);
+        let method = make(&selection.rig, &layout)?;
+        Ok(ClosedFormSeparator::new(selection, layout, self.second_order, method))
+    }
+
+    fn selection(
+        &self,
+        context: &Context,
+        choose: impl FnOnce(&Rig) -> (Vec<usize>, Vec<usize>),
+    ) -> std::result::Result<Selection, Fault> {
+        Selection::named(require_rig(context.rig)?, self.sensors.as_deref(), self.setups.as_deref(), choose)
+    }
+
+    fn noise_limit(&self, usual: f64) -> std::result::Result<f64, Fault> {
+        Ok(checked_gain(self.max_noise_gain)?.unwrap_or(usual))
     }
 }
 

@@ -41,6 +41,9 @@ use runout_table::{RecordBatch, TableSpec};
 use runout_turning::provenance::{Input, Provenance, VERSION};
 use trend::Trend;
 
+/// The report's file in the folder of the data set.
+const REPORT: &str = "batch.json";
+
 /// Keeps the results of recordings side by side, as a data set.
 pub trait ResultStore: Sync {
     /// Writes the result of a recording; its summary, which comes last, says that the result is complete.
@@ -127,8 +130,10 @@ impl<'a> Batch<'a> {
     /// Runs the pipeline on each recording that is not up to date, so many at a time, and writes what all of them say together.
     ///
     /// # Errors
-    /// When the tables of the batch cannot be written. A recording that fails is none: the report names it.
+    /// When another batch writes to the folder, or the tables of the batch cannot be written. A recording that fails is none: the report
+    /// names it.
     pub fn run(&self, recordings: &[Recording], jobs: NonZeroUsize, observer: &dyn Observer) -> Result<BatchReport> {
+        let _lock = FolderLock::of([self.store.folder().join(REPORT).as_path()])?;
         let outcomes = self.work(recordings, jobs, observer);
         let mut report = BatchReport::begun(&self.pipeline, self.store.folder());
         let (mut complete, mut given) = (Vec::new(), HashSet::new());
@@ -277,7 +282,7 @@ impl<'a> Batch<'a> {
         report.outputs = files.iter().map(|file| file.destination().to_owned()).collect();
         let _lock = FolderLock::of(files.iter().map(PendingFile::destination))?;
         commit_all(files)?;
-        let path = self.store.folder().join("batch.json");
+        let path = self.store.folder().join(REPORT);
         report.outputs.push(path.clone());
         let text = serde_json::to_vec_pretty(&report)
             .map_err(|error| Error::caused("write", path.display().to_string(), error))?;
@@ -294,17 +299,17 @@ fn decisions(summary: &Summary) -> Vec<Decision> {
     summary.limits.iter().map(|limit| limit.decision).collect()
 }
 
-/// Whether a result is of the files that the pipeline loads now, by their checksums.
+/// Whether a result is of the files that the pipeline reads now, by their checksums.
 fn is_of_inputs(summary: &Summary, pipeline: &Pipeline) -> Result<bool> {
     let inputs = match pipeline.loader.open(&pipeline.request())? {
         Source::Turns(recording) => recording.inputs(),
         Source::Points(points) => points.inputs(),
     };
     let known = &summary.provenance.inputs;
-    if inputs.len() != known.len() {
+    if inputs.len() + pipeline.named_files.len() != known.len() {
         return Ok(false);
     }
-    for (path, known) in inputs.iter().zip(known) {
+    for (path, known) in inputs.iter().chain(&pipeline.named_files).zip(known) {
         let now = Input::of(path)?;
         if (now.bytes, &now.blake3) != (known.bytes, &known.blake3) {
             return Ok(false);

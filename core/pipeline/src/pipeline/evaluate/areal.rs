@@ -11,6 +11,7 @@ use runout_numerics::{
     filter::{areal_gaussian, robust_areal_gaussian},
     fourier::max_order,
     height_map::HeightMap,
+    threads,
 };
 use runout_standards::{
     Value,
@@ -268,19 +269,16 @@ impl<'a> Prepared<'a> {
             map.with(heights.collect())
         };
         let settings = areal::Settings::default();
-        Ok(std::thread::scope(|scope| {
-            let Some(spatial) = spatial else {
-                let below = scope.spawn(|| numbers(&areal::of_centred(&with(-1.0), &settings)));
-                let above = numbers(&areal::of_centred(&with(1.0), &settings));
-                // A thread that stopped gave nothing.
-                return [above, below.join().unwrap_or_default()];
-            };
-            let spatial = scope.spawn(|| spatial.both(errors.heights_um()));
-            let found = [1.0, -1.0].map(|sign| areal::heights_and_slopes(&with(sign), Spatial::NONE));
-            let [added, taken] = spatial.join().unwrap_or([Spatial::NONE; 2]);
-            let [above, below] = found;
-            [(above, added), (below, taken)].map(|(found, spatial)| numbers(&Areal { spatial, ..found }))
-        }))
+        let Some(spatial) = spatial else {
+            let of = |sign| numbers(&areal::of_centred(&with(sign), &settings));
+            let (below, above) = threads::both(|| of(-1.0), || of(1.0));
+            return Ok([above, below]);
+        };
+        let ([added, taken], [above, below]) = threads::both(
+            || spatial.both(errors.heights_um()),
+            || [1.0, -1.0].map(|sign| areal::heights_and_slopes(&with(sign), Spatial::NONE)),
+        );
+        Ok([(above, added), (below, taken)].map(|(found, spatial)| numbers(&Areal { spatial, ..found })))
     }
 
     /// Values of two surfaces.
@@ -288,12 +286,8 @@ impl<'a> Prepared<'a> {
         let [above, below] = both.map(|rings_um| self.map(uncertain.laid(rings_um)));
         let [above, below] = [above?, below?];
         let of = |map: &HeightMap| numbers(&areal::without_curve_and_features(map, &areal::Settings::default()));
-        Ok(std::thread::scope(|scope| {
-            let below = scope.spawn(|| of(&below));
-            let above = of(&above);
-            // A thread that stopped gave nothing.
-            [above, below.join().unwrap_or_default()]
-        }))
+        let (below, above) = threads::both(|| of(&below), || of(&above));
+        Ok([above, below])
     }
 
     fn areal(&self, map: &HeightMap, draws: &Draws) -> (Vec<Label>, Vec<Found>) {

@@ -9,6 +9,7 @@ use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
+    threads,
 };
 use runout_standards::{
     Value,
@@ -66,21 +67,14 @@ pub fn part_summary(
     if evaluate.has(Group::Cylindricity) {
         part.remarks.extend(wall.missing_cylinders(&evaluate.references));
         let known = there.iter().map(|section| section.orders.len().saturating_sub(1)).min().unwrap_or(0);
-        let behind = &|cutoff: Option<f64>| {
+        let behind = |cutoff: Option<f64>| {
             let filter = evaluate.low_pass(cutoff);
             // What a filter passes and the sections know, needs its angles.
             let wanted = filter.reach_upr().map_or(0, |reach| reach.min(known));
             let finer = (wanted > wall.held.highest).then(|| Wall::of(&there, 2 * wanted + 2, radius_mm, placed));
             finer.as_ref().unwrap_or(&wall).cylindricity(&filter, &evaluate.references)
         };
-        std::thread::scope(|scope| {
-            let cutoffs = evaluate.cutoffs_upr(wall.held.highest);
-            let each: Vec<_> = cutoffs.into_iter().map(|cutoff| scope.spawn(move || behind(cutoff))).collect();
-            // In the order of the filters, whichever is done first.
-            for values in each {
-                part.values.extend(values.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            }
-        });
+        part.values.extend(threads::each(evaluate.cutoffs_upr(wall.held.highest), behind).into_iter().flatten());
         if placed {
             part.values.extend(wall.lines());
         } else {
