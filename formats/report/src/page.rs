@@ -24,7 +24,7 @@ const STYLE: &str = include_str!("../assets/report.css");
 /// # Errors
 /// Never in practice: its data can be written as JSON.
 pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Result<Markup> {
-    let Completed { summary, about, surface, diagnosis, overview } = *result;
+    let Completed { summary, about, surface, diagnosis, overview, .. } = *result;
     let title = if title.is_empty() { "Result" } else { title };
     let values = Columns::of(summary);
     let drawn = data::figures(figures);

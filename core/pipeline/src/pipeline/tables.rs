@@ -159,7 +159,8 @@ impl StationTables {
         surface: Option<&Surface>,
     ) -> Result<Vec<PendingFile>> {
         export.rows(&self.values, &self.value_rows(summary)?.rows)?;
-        export.finish(&Completed { summary, about: &self.about(summary), surface, diagnosis: None, overview: None })
+        let about = self.about(summary);
+        export.finish(&Completed { summary, about: &about, surface, heights: None, diagnosis: None, overview: None })
     }
 
     /// What the numbers are.

@@ -272,6 +272,7 @@ impl<'a> Batch<'a> {
             summary: &summary,
             about: &About::default(),
             surface: None,
+            heights: None,
             diagnosis: None,
             overview: Some(&overview),
         };
