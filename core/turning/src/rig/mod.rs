@@ -1,6 +1,7 @@
 //! The rig: where the sensors look, and how part and sensors stand in each setup.
 
 mod calibration;
+mod remarks;
 
 use std::collections::HashSet;
 
@@ -243,10 +244,8 @@ impl RigConfig {
     /// The first value that cannot be, with its place.
     pub fn check(self) -> Result<Rig, Fault> {
         if !(self.part_radius_mm > 0.0 && self.part_radius_mm <= FARTHEST_MM) {
-            let message = format!(
-                "expected a part's radius above 0 and up to {FARTHEST_MM} mm, found {}",
-                self.part_radius_mm
-            );
+            let message =
+                format!("expected a part's radius above 0 and up to {FARTHEST_MM} mm, found {}", self.part_radius_mm);
             return Err(Fault::at("part_radius_mm", message));
         }
         if self.sensors.is_empty() {
@@ -396,9 +395,8 @@ fn gaps_of(
     let mut gaps = vec![Gaps::default(); sections.len()];
     for (index, interruption) in interruptions.iter().enumerate() {
         let fault = |key: &'static str, message: String| Fault::at(key, message).under_item("interruptions", index);
-        let [from, to] =
-            [("from_deg", interruption.from_deg), ("to_deg", interruption.to_deg)]
-                .map(|(key, angle_deg)| radians(angle_deg).map(|_| angle_deg).map_err(|message| fault(key, message)));
+        let [from, to] = [("from_deg", interruption.from_deg), ("to_deg", interruption.to_deg)]
+            .map(|(key, angle_deg)| radians(angle_deg).map(|_| angle_deg).map_err(|message| fault(key, message)));
         let length_deg = (to? - from?).rem_euclid(360.0);
         if !(length_deg > 0.0 && length_deg <= MOST_INTERRUPTED_DEG) {
             let message = format!("expected at most {MOST_INTERRUPTED_DEG}° from `from_deg` on, found {length_deg}°");
