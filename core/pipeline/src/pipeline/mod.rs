@@ -22,6 +22,7 @@ mod schema;
 mod steadiness;
 pub mod summary;
 pub mod tables;
+mod undeclared;
 
 pub use config::Pipeline;
 pub use registry::Registry;
