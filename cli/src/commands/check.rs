@@ -2,6 +2,7 @@
 
 use runout_core::{
     azimuth::Azimuth,
+    mains,
     model::{diagnosis, foresight::Foresight},
     pipeline::{
         Pipeline, Registry,
@@ -164,10 +165,14 @@ pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(
 /// When a check of it fails.
 pub fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
+    notes.extend(pipeline.rig.as_ref().map(Rig::remarks).unwrap_or_default());
     let source = pipeline.loader.open(&pipeline.request());
     match &source {
         Ok(Source::Points(points)) => notes.extend(points.remarks.iter().cloned()),
-        Ok(Source::Turns(_)) => {}
+        Ok(Source::Turns(recording)) => {
+            let setups = pipeline.rig.as_ref().map_or(0, |rig| rig.setups.len());
+            notes.extend(mains::whole_orders(&check::speeds_and_turns(&**recording, setups)));
+        }
         Err(error) => notes.push(format!("the data are not there yet, or cannot be used: {error}")),
     }
     if !pipeline.checks.is_empty() {

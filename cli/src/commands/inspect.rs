@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, fs::File, io::Read, path::Path};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use runout_core::{Error, ErrorKind, Result, atomic_file::complete_publication, input_file::open_regular};
+use runout_csv::TextReport;
 use runout_hdf5::FileReport;
 use serde::Serialize;
 
@@ -18,6 +19,8 @@ pub enum Report {
     Hdf5(FileReport),
     /// A table.
     Parquet(TableReport),
+    /// Samples as text.
+    Text(TextReport),
 }
 
 /// A Parquet table in short.
@@ -70,10 +73,13 @@ pub fn report(path: &Path) -> Result<Report> {
     if signature.starts_with(b"PAR1") {
         return table(path).map(Report::Parquet);
     }
-    let problem = "it is neither HDF5 nor Parquet";
+    if let Some(text) = runout_csv::inspect(path)? {
+        return Ok(Report::Text(text));
+    }
+    let problem = "it is neither HDF5 nor Parquet, nor a table as text";
     Err(Error::new("inspect", path.display().to_string(), problem)
         .of(ErrorKind::DamagedData)
-        .help("inspect reads measurement files, results and Parquet tables"))
+        .help("inspect reads measurement files, results, Parquet tables and CSV files with a header"))
 }
 
 /// Arrow's own schema, in Base64: the columns say the same.

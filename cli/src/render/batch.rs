@@ -1,6 +1,6 @@
 //! A batch, for people.
 
-use runout_core::pipeline::batch::{BatchReport, Failed, Series, Signals};
+use runout_core::pipeline::batch::{BatchReport, Failed, Series, Signals, Warned};
 
 use super::{count, number::significant, page::Page, table::Table};
 
@@ -43,6 +43,7 @@ pub fn text(report: &BatchReport) -> String {
             )],
         );
     }
+    warned(&mut page, report);
     let failed = |one: &Failed| {
         let Failed { recording, message, help, .. } = one;
         let help = help.as_ref().map(|help| format!(" ({help})")).unwrap_or_default();
@@ -52,6 +53,19 @@ pub fn text(report: &BatchReport) -> String {
     let outputs: Vec<String> = report.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
     page.into_text()
+}
+
+fn warned(page: &mut Page, report: &BatchReport) {
+    let of_one = |one: &Warned| {
+        let more = one.count - one.first.len().min(one.count);
+        let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+        format!("{}: {}{more}", one.recording, one.first.join("; "))
+    };
+    let mut shown: Vec<String> = report.warnings.iter().take(SHOWN).map(of_one).collect();
+    if report.warned > shown.len() {
+        shown.push(format!("and {} more", count(report.warned - shown.len(), "recording")));
+    }
+    page.bullets("Recordings with warnings", &shown);
 }
 
 fn limits(report: &BatchReport) -> Table {

@@ -15,8 +15,8 @@ use super::{
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut page = Page::default();
     page.line(diagnosis.headline());
-    for set in undecided(&diagnosis.added) {
-        page.line(format_args!("Not decided: {set}. The stated ± include each of them"));
+    if diagnosis.added.iter().any(|one| !one.confounded_with.is_empty()) {
+        page.line("The stated ± include each of them");
     }
     // A residual without degrees of freedom is 0 whatever the data are.
     if diagnosis.after.degrees_of_freedom > 0 && !diagnosis.nothing_separated {
@@ -112,10 +112,6 @@ fn named(one: &Added) -> [String; 2] {
         Some(others) => [one.effect.clone(), [&[targets.as_str()], &others[..]].concat().join(" or ")],
         None => [one.members(), String::new()],
     }
-}
-
-fn undecided(added: &[Added]) -> impl Iterator<Item = String> + '_ {
-    added.iter().filter(|one| !one.confounded_with.is_empty()).map(Added::members)
 }
 
 fn confounded(added: &[Added]) -> Vec<String> {

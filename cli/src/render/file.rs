@@ -1,5 +1,6 @@
 //! What a file holds, for people.
 
+use runout_csv::TextReport;
 use runout_hdf5::{FileReport, StationReport};
 
 use super::{number::significant, page::Page, table::Table};
@@ -12,6 +13,7 @@ pub fn text(report: &Report) -> String {
     match report {
         Report::Hdf5(file) => hdf5(&mut page, file),
         Report::Parquet(table) => parquet(&mut page, table),
+        Report::Text(table) => csv(&mut page, table),
     }
     page.into_text()
 }
@@ -60,6 +62,22 @@ fn captures(stations: &[StationReport]) -> Table {
         }
     }
     table
+}
+
+fn csv(page: &mut Page, table: &TextReport) {
+    let TextReport { delimiter, header_line, columns, rows, .. } = table;
+    page.line(format_args!(
+        "CSV, {rows} rows of {} columns, split at each {delimiter}, header in line {header_line}",
+        columns.len()
+    ));
+    page.line(format_args!("  columns: {}", columns.join(", ")));
+    page.line(format_args!(
+        "  angle by: {}",
+        table
+            .angle_by
+            .unwrap_or("no column `index` or `angle_deg`; the trace of a mark is named by `marker` in [load]")
+    ));
+    page.line(format_args!("  sampling rate: {}", if table.time { "by time_s" } else { "sample_rate_hz in [load]" }));
 }
 
 fn parquet(page: &mut Page, table: &TableReport) {

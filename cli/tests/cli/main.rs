@@ -15,6 +15,7 @@ mod one_line;
 mod other_rigs;
 mod points;
 mod reading;
+mod remarks;
 mod report;
 mod rotor;
 mod safety;

@@ -41,9 +41,16 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// The verdict in one sentence.
+    /// The verdict in one sentence, and the confounded sets that the data do not decide.
     #[must_use]
-    pub fn headline(&self) -> &'static str {
+    pub fn headline(&self) -> String {
+        let undecided = self.added.iter().filter(|one| !one.confounded_with.is_empty());
+        let sets: Vec<String> = undecided.map(Added::members).collect();
+        let verdict = self.in_words();
+        if sets.is_empty() { verdict.into() } else { format!("{verdict}. Not decided: {}", sets.join("; ")) }
+    }
+
+    fn in_words(&self) -> &'static str {
         match self.verdict {
             _ if self.nothing_separated => {
                 "Nothing is separated: each reading is form, eccentricity and error motion together"

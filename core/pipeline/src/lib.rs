@@ -29,8 +29,8 @@ pub use runout_error::{Error, ErrorKind, Result};
 pub use runout_numerics::{self as numerics, Complex64};
 pub use runout_table as table;
 pub use runout_turning::{
-    azimuth, checksum, creep, encoder, input_file, inspection, marker, measurement, near_tone, neighbours, profile,
-    provenance, rig, separation, spread, surface,
+    azimuth, checksum, creep, encoder, input_file, inspection, level_step, mains, marker, measurement, near_tone,
+    neighbours, profile, provenance, rig, separation, spread, surface,
 };
 
 /// The standards' values, and those of recorded turns.

@@ -23,8 +23,16 @@ pub struct EncoderFault {
     pub sample: u64,
     /// What was expected and what was found.
     pub problem: String,
+    /// What to do, where that is known.
+    pub help: Option<&'static str>,
 }
 
+/// What to do with a recording in which the angle jumps.
+const CUT: &str = "cut the recording there and use the longer part: a jump of whole turns is a gap in the recording, any other jump is a \
+                   zero that moved";
+
+/// An angle that begins at 0 again goes back by less than this.
+const WRAPPED_DEG: f64 = 360.0;
 /// A longer step between two samples leaves open which way the spindle went.
 const LONGEST_STEP_DEG: f64 = 180.0;
 /// A step longer than twice the longest before it by more than this is a jump: twice, as an encoder coarser than the
@@ -37,7 +45,7 @@ impl EncoderScan {
     /// # Errors
     /// When it is not finite, jumps by half a turn or by 0.05 turn beyond twice the longest step before, or goes back.
     pub fn push(&mut self, angle_deg: f64) -> Result<(), EncoderFault> {
-        let fault = |problem| Err(EncoderFault { sample: self.samples, problem });
+        let fault = |problem| Err(EncoderFault { sample: self.samples, problem, help: None });
         if !angle_deg.is_finite() {
             return fault(format!("expected a finite angle in degrees, found {angle_deg}"));
         }
@@ -48,10 +56,11 @@ impl EncoderScan {
         } else {
             let step_deg = angle_deg - self.last_deg;
             if step_deg.abs() >= LONGEST_STEP_DEG {
-                return fault(format!(
-                    "expected an unwrapped angle, found a step from {}° to {angle_deg}°",
-                    self.last_deg
-                ));
+                let problem =
+                    format!("expected an unwrapped angle, found a step from {}° to {angle_deg}°", self.last_deg);
+                // One beyond a turn is none of an angle that begins at 0 again.
+                let help = (self.samples > 1 && step_deg.abs() > WRAPPED_DEG).then_some(CUT);
+                return Err(EncoderFault { sample: self.samples, problem, help });
             }
             if self.direction == 0.0 && step_deg != 0.0 {
                 self.direction = step_deg.signum();
@@ -65,13 +74,14 @@ impl EncoderScan {
             }
             // Before the first movement nothing is known of its steps.
             if self.longest_step_deg > 0.0 && step_deg.abs() > 2.0 * self.longest_step_deg + JUMP_DEG {
-                return fault(format!(
+                let problem = format!(
                     "expected steps like those before (up to {:.3}°), found a jump of {:.3} turns from {}° to \
                      {angle_deg}°; a recording whose zero moved cannot be averaged as one",
                     self.longest_step_deg,
                     step_deg / 360.0,
                     self.last_deg
-                ));
+                );
+                return Err(EncoderFault { sample: self.samples, problem, help: Some(CUT) });
             }
             self.longest_step_deg = self.longest_step_deg.max(step_deg.abs());
             let (before, now) = (self.turns(self.last_deg), self.turns(angle_deg));
@@ -144,6 +154,9 @@ mod tests {
             // 0.3 turn, and the 0.7° of the step itself.
             let expected = format!("jump of {:.3} turns", way * 108.7 / 360.0);
             assert!(fault.problem.contains(&expected), "{fault}");
+            assert!(fault.help.is_some_and(|help| help.contains("cut the recording there")), "{fault}");
+            // A turn that is missing.
+            assert_eq!(jumping(360.0).unwrap_err().help, fault.help);
             assert!(jumping(20.0).is_err());
             assert!(jumping(1.0).is_ok(), "a line passed over is no jump");
         }
@@ -154,7 +167,8 @@ mod tests {
 
     #[test]
     fn wrapped_missing_and_backward_angles_are_faults() {
-        assert_eq!(scan([0.0, 120.0, 240.0, 0.0]).unwrap_err().sample, 3);
+        let wrapped = scan([0.0, 120.0, 240.0, 0.0]).unwrap_err();
+        assert_eq!((wrapped.sample, wrapped.help), (3, None));
         assert_eq!(scan([0.0, 1.0, f64::NAN]).unwrap_err().sample, 2);
         assert_eq!(scan([5.0, 5.0, 4.0, 4.5]).unwrap_err().sample, 3);
     }

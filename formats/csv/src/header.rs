@@ -7,11 +7,11 @@ use runout_core::{
 use crate::lines::{Stretch, Stretches, cells};
 
 /// Column of the once-per-turn mark.
-const INDEX: &str = "index";
+pub(crate) const INDEX: &str = "index";
 /// Column of the unwrapped spindle angle.
-const ANGLE: &str = "angle_deg";
+pub(crate) const ANGLE: &str = "angle_deg";
 /// Column of the time.
-const TIME: &str = "time_s";
+pub(crate) const TIME: &str = "time_s";
 
 /// What the header tells.
 #[derive(Debug, Clone)]
@@ -36,6 +36,11 @@ pub(crate) enum Phase {
     Angle(usize),
     /// The mark as an analogue trace.
     Trace(usize),
+}
+
+/// What a header is split at: a decimal comma is no delimiter, so that semicolons and tabs come first.
+pub(crate) fn delimiter_of(line: &[u8]) -> u8 {
+    [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',')
 }
 
 impl Phase {
@@ -79,8 +84,7 @@ impl Header {
     }
 
     fn parse(line: &[u8], number: u64, shown: String, rig: &Rig, marker: Option<&Marker>) -> Result<Self> {
-        // A decimal comma is no delimiter: a header with semicolons or tabs is split there.
-        let delimiter = [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
+        let delimiter = delimiter_of(line);
         let names: Vec<String> = cells(line, delimiter).map(decode).collect();
         let object = format!("{shown}, line {number}");
         let error = |problem: String| Error::new("read", &object, problem);

@@ -19,6 +19,7 @@
 
 mod config;
 mod header;
+mod inspect;
 mod lines;
 mod number;
 mod recording;
@@ -28,6 +29,7 @@ mod scan;
 mod stated;
 
 pub use config::{CsvConfig, FileConfig, StationConfig};
+pub use inspect::{TextReport, inspect};
 use runout_core::pipeline::registry::{Plugin, Registry};
 
 /// Adds the loader `csv`.

@@ -43,7 +43,7 @@ impl Scan {
             for (row, instant) in piece.instants.iter().enumerate() {
                 let taken = turns.push(instant.phase);
                 let error = |column, problem| header.error(piece.line(row), column, problem);
-                taken.map_err(|problem| error(phase.column(), problem).help(phase.help()))?;
+                taken.map_err(|(problem, help)| error(phase.column(), problem).help(help.unwrap_or(phase.help())))?;
                 if let Some(column) = time_column {
                     time.push(instant.time_s).map_err(|problem| error(column, problem).help(TIME_HELP))?;
                 }
@@ -93,11 +93,12 @@ impl Turns {
         matches!(self, Self::Encoder(_))
     }
 
-    fn push(&mut self, value: f64) -> std::result::Result<(), String> {
+    /// A fault says what is wrong and, where it is not what the column is, what to do.
+    fn push(&mut self, value: f64) -> std::result::Result<(), (String, Option<&'static str>)> {
         match self {
-            Self::Index(index) => index.push(value),
-            Self::Encoder(encoder) => encoder.push(value).map_err(|fault| fault.problem),
-            Self::Trace(trace) => trace.push(value),
+            Self::Index(index) => index.push(value).map_err(|problem| (problem, None)),
+            Self::Encoder(encoder) => encoder.push(value).map_err(|fault| (fault.problem, fault.help)),
+            Self::Trace(trace) => trace.push(value).map_err(|problem| (problem, None)),
         }
     }
 

@@ -73,6 +73,7 @@ pub fn summary() -> Summary {
             captures: Vec::new(),
             sections: Vec::new(),
             motion_along_deg: None,
+            motion_z_mm: None,
             readings: vec![],
             motion_values: Vec::new(),
             residual_rms_um: None,

@@ -290,6 +290,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         captures: Vec::new(),
         sections: vec![section],
         motion_along_deg: None,
+        motion_z_mm: None,
         readings: vec![],
         motion_values: vec![value("total", 1.5, None)],
         residual_rms_um: None,

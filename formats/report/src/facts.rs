@@ -19,7 +19,7 @@ pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (Stri
             Verdict::Unexplained => "bad",
             Verdict::Improved | Verdict::NothingFound => "open",
         };
-        (diagnosis.headline().to_owned(), class)
+        (diagnosis.headline(), class)
     });
     let limits = limits_kept(summary);
     match (limits, found) {

@@ -252,6 +252,60 @@ fn a_stranger_stays_unexplained() {
     assert!(after <= 1.001 * before);
 }
 
+/// Three sensors in one setup are redundant at order 1 only: what is left there is said, and no sensor is named.
+#[test]
+fn a_residual_that_every_sensor_explains_names_none() {
+    let mut config = campaign(9, r#"[{"plugin":"sensor-gain","targets":["S2"],"relative_gain":0.05}]"#);
+    for (sensor, angle_deg) in config.rig.sensors.iter_mut().zip([0.0, 99.844, 202.5]) {
+        (sensor.angle_deg, sensor.z_mm, sensor.section) = (angle_deg, 100.0, "a".into());
+    }
+    config.rig.sensors.truncate(3);
+    config.rig.setups.truncate(1);
+    let rig = config.rig.clone().check().unwrap();
+    let (station, _) = averaged_behind(None, &config, &rig);
+    let settings = Settings { effects: Some(Vec::new()), ..Settings::default() };
+    let found = diagnose(Selection::whole(&rig), Layout::new(&rig, false), true, effects::all(), &[station], &settings);
+    let diagnosis = found.unwrap().diagnosis;
+    println!("simulated, three sensors: {:?}", diagnosis.unexplained);
+    assert_eq!(diagnosis.verdict, Verdict::Unexplained);
+    let [left] = &diagnosis.unexplained[..] else { panic!("{:?}", diagnosis.unexplained) };
+    assert_eq!((left.sensor.as_deref(), left.orders), (None, [1, 1]));
+    assert!((left.rms_um / diagnosis.after.residual_rms_um - 1.0).abs() < 1e-6, "{left:?}");
+    assert!(left.place.contains("at order 1 only") && left.place.contains("which of S1, S2, S3"), "{left:?}");
+}
+
+/// A level that steps is unexplained with sensor, setup, turn and size, and is no drift.
+#[test]
+fn a_step_of_a_level_is_said_and_is_no_drift() {
+    let config = campaign(6, "[]");
+    let rig = config.rig.clone().check().unwrap();
+    let (mut station, _) = averaged_behind(None, &config, &rig);
+    let profile = &mut station.profiles[1];
+    let channels = profile.channels();
+    let turns = profile.levels.numbers.len();
+    profile
+        .levels
+        .levels_um
+        .iter_mut()
+        .skip(2 + turns / 2 * channels)
+        .step_by(channels)
+        .for_each(|level| *level += 20.0);
+    let found = diagnose(
+        Selection::whole(&rig),
+        Layout::new(&rig, false),
+        true,
+        effects::all(),
+        &[station],
+        &Settings::default(),
+    );
+    let diagnosis = found.unwrap().diagnosis;
+    assert_eq!(diagnosis.verdict, Verdict::Unexplained);
+    let left = &diagnosis.unexplained[0];
+    assert_eq!((left.sensor.as_deref(), left.setup.as_deref()), (Some("S3"), Some("b")));
+    assert!(left.place.contains("the level steps by +") && left.place.contains("at turn "), "{left:?}");
+    assert!(diagnosis.added.is_empty(), "{:?}", diagnosis.added);
+}
+
 /// A stranger many times larger than form and motion can be fitted in part by an absurd value of an effect: motion 700 times as
 /// large in one setup, a sensor 300 mm off, 3 mm of axial motion. None of them is blamed.
 #[test]

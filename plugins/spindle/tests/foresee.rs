@@ -86,6 +86,20 @@ fn a_full_reversal_is_blind_to_the_angle_of_the_part() {
     assert!((form.value / turned - 1.0).abs() < 0.15, "{} and {turned}", form.value);
 }
 
+/// Mistakes that leave no trace are named before a measurement too, and no addition is asked for them.
+#[test]
+fn mistakes_without_a_trace_are_foreseen() {
+    let reversed = rig(&FOUR_SENSORS, &[(0.0, 0.0), (180.0, 180.0)]);
+    let foresight = foresee_rig(&reversed).unwrap();
+    let blind: Vec<String> = foresight.blind_names().collect();
+    for mistake in ["sensor-sign S1 S2", "sensor-sign S3 S4", "setups-swapped k0 k1"] {
+        assert!(blind.iter().any(|name| name == mistake), "{mistake}: {blind:?}");
+    }
+    let changes = changes(&reversed, &foresight, &[], 15.0).unwrap();
+    let asked = changes.still_blind.iter().chain(changes.found.iter().flat_map(|change| &change.reveals));
+    assert!(asked.clone().all(|name| !name.starts_with("sensor-sign")), "{:?}", asked.collect::<Vec<_>>());
+}
+
 #[test]
 fn a_third_sensor_tells_the_gains_of_its_section_apart() {
     let (rig, clearance_deg) = (four_sensors(), 15.0);

@@ -40,7 +40,15 @@ pub fn section(page: &mut Page, stations: &[StationSummary]) {
         table.row(std::iter::once(format!("{} {unit}", named(direction))).chain(KINDS.map(cell)));
     }
     let of = if stations.len() > 1 { ", lowest to highest of the stations" } else { "" };
-    page.headed_table(format_args!("Error motion of the axis about {about}, peak to valley and rms{of}"), &table);
+    let places: Vec<f64> = stations.iter().filter_map(|station| station.motion_z_mm).collect();
+    let at = match spread(places) {
+        Some([low, _, high]) if low < high => {
+            format!(", radial at z {} to {} mm", significant(low, 5), significant(high, 5))
+        }
+        Some([low, ..]) => format!(", radial at z = {} mm", significant(low, 5)),
+        None => String::new(),
+    };
+    page.headed_table(format_args!("Error motion of the axis about {about}{at}, peak to valley and rms{of}"), &table);
 }
 
 /// Whether it is drawn about a centre.

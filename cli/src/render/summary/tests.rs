@@ -88,6 +88,7 @@ fn summary(stations: usize) -> Summary {
             captures: vec![capture("initial", 0), capture("reversed", index % 2)],
             sections: vec![section("a", 200.0 + z_mm), section("b", 230.0 + z_mm)],
             motion_along_deg: None,
+            motion_z_mm: None,
             readings: vec![],
             motion_values: motion_values(1.0 + 0.1 * index as f64),
             residual_rms_um: Some(0.0066 + 1e-4 * index as f64),

@@ -15,7 +15,8 @@ use super::{
     record_reader::RecordReader,
     result::{Evaluation, complete, true_error},
     result_writer::{Finished, ResultWriter},
-    run::{Observer, projections, spare_inputs, with_motion_values},
+    run::{Observer, projections, spare_inputs, speeds_and_turns, with_motion_values},
+    undeclared::Undeclared,
 };
 use crate::{
     atomic_file::PendingFile,
@@ -27,7 +28,7 @@ use runout_closed_loop::{
     diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
 };
 use runout_error::{Error, ErrorKind, Result};
-use runout_turning::{profile::Profile, separation::Quantity};
+use runout_turning::{mains, profile::Profile, separation::Quantity};
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form. These do not
 /// replace those of a run: they go below `diagnosed/`, or where `[diagnose] out` says.
@@ -102,7 +103,9 @@ fn diagnose_turns(
     writer.corrected_for(corrections(&changes));
     let rig = pipeline.diagnose.write_rig.clone();
     diagnosis.warnings.extend(rig.as_ref().and_then(|path| corrected_rig::left_out(&changes, path)));
-    let mut errors = [Vec::new(), Vec::new()];
+    let profiles = stations.iter().flat_map(|station| speeds_and_turns(&station.profiles));
+    let notes = mains::whole_orders(&profiles.collect::<Vec<_>>());
+    let (mut errors, mut undeclared) = ([Vec::new(), Vec::new()], Undeclared::default());
     let (radius_mm, several) = (line.rig.part_radius_mm, stations.len() > 1);
     let looked_at = pipeline.evaluate.first_ront();
     for (index, (station, (before, after))) in
@@ -124,8 +127,10 @@ fn diagnose_turns(
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);
             errors.extend(forms.filter_map(|form| true_error(result, form)));
         }
+        undeclared.take(&result);
         writer.take(&result, pipeline.rig.as_ref())?;
     }
+    diagnosis.warnings.extend(undeclared.warning());
     let rms = |errors: &Vec<f64>| {
         let squares: f64 = errors.iter().map(|error| error * error).sum();
         (!errors.is_empty()).then(|| (squares / errors.len() as f64).sqrt())
@@ -135,10 +140,13 @@ fn diagnose_turns(
     }
     let surface = writer.build_surface(radius_mm)?;
     let mut remarks = recording.remarks();
+    remarks.extend(line.rig.remarks());
     remarks.extend(diagnosis.warnings.iter().cloned());
     if pipeline.evaluate.has(Group::ErrorMotion) && !diagnosis.added.is_empty() {
         remarks.push(UNCORRECTED_SPREAD.into());
     }
+    writer.note(notes.clone());
+    diagnosis.warnings.extend(notes);
     writer.diagnosed(&diagnosis);
     let mut finished = writer.finish(inputs, remarks, surface.as_ref())?;
     if let Some(path) = rig {

@@ -23,6 +23,7 @@ mod steadiness;
 pub mod summary;
 pub mod tables;
 mod turn_tables;
+mod undeclared;
 
 pub use config::Pipeline;
 pub use registry::Registry;

@@ -11,6 +11,7 @@ use super::{
     result::{Evaluation, complete},
     result_writer::ResultWriter,
     steadiness::Steadiness,
+    undeclared::Undeclared,
 };
 pub use runout_turning::station::StationResult;
 
@@ -31,7 +32,9 @@ use runout_numerics::threads;
 use runout_standards::Value;
 use runout_turning::{
     error_motion::{Centre, ErrorMotion},
+    mains,
     measurement::Recording,
+    profile::Profile,
     rig::Rig,
     separation::Quantity,
     spread::Projection,
@@ -124,8 +127,11 @@ fn run_turns(
         Ok(with_motion_values(result, &pipeline.evaluate.centres, rig.part_radius_mm))
     };
     let mut steadiness = Steadiness::default();
+    let (mut speeds, mut undeclared) = (Vec::new(), Undeclared::default());
     let mut take = |result: StationResult| {
         steadiness.take(&result.station, &result.profiles, rig);
+        speeds.extend(speeds_and_turns(&result.profiles));
+        undeclared.take(&result);
         writer.take(&result, Some(rig))
     };
     let inputs = if alone {
@@ -133,9 +139,21 @@ fn run_turns(
     } else {
         write_behind(take, |take| line.run(threads, observer, work, take))?
     };
-    let remarks = recording.remarks().into_iter().chain(steadiness.warning(rig)).collect();
+    let remarks = recording
+        .remarks()
+        .into_iter()
+        .chain(rig.remarks())
+        .chain(steadiness.warnings(rig))
+        .chain(undeclared.warning())
+        .collect();
+    writer.note(mains::whole_orders(&speeds));
     let surface = writer.build_surface(rig.part_radius_mm)?;
     writer.finish(inputs, remarks, surface.as_ref())?.commit(None)
+}
+
+/// Speed, in rpm, and turns used of captures whose speed is known.
+pub(super) fn speeds_and_turns(profiles: &[Profile]) -> impl Iterator<Item = (f64, usize)> {
+    profiles.iter().filter_map(|profile| Some((profile.speed_rpm?, profile.turns.used)))
 }
 
 /// How motion follows from the readings of each setup, where error motion values are wanted.

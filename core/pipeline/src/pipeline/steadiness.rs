@@ -1,8 +1,9 @@
-//! Whether the turns of a run are steady: levels that creep, and noise that is estimated too high.
+//! Whether the turns of a run are steady: levels that creep or step, and noise that is estimated too high.
 
 use super::summary::StationSummary;
 use runout_turning::{
     creep::{Creep, Levels, creeps},
+    level_step::{LevelStep, level_step},
     profile::Profile,
     rig::Rig,
 };
@@ -11,6 +12,8 @@ use runout_turning::{
 const INFLATED_CHI2: f64 = 0.2;
 /// Orders that the residual has at least for that: χ² of ten orders is as low once in 10⁵ times by chance, of one order in 18 %.
 const ORDERS_ENOUGH: usize = 10;
+/// Steps that are said one by one, the largest first.
+const MOST_STEPS: usize = 4;
 /// Of many stations, this share must show a creep: chance has more opportunities there.
 const SHARE: f64 = 0.1;
 
@@ -20,6 +23,8 @@ pub(super) struct Steadiness {
     stations: usize,
     /// Of each sensor of the rig.
     sensors: Vec<SensorCreep>,
+    /// Captures and sensors whose level steps, in words, with its size without sign in µm.
+    steps: Vec<(f64, String)>,
 }
 
 /// Creep of one sensor.
@@ -45,8 +50,20 @@ impl Steadiness {
             profiles.iter().filter_map(of).collect()
         };
         let all: Vec<Vec<Levels>> = (0..rig.sensors.len()).map(levels).collect();
-        for (seen, creep) in self.sensors.iter_mut().zip(creeps(&all)) {
-            let Some(creep) = creep.filter(|creep| creep.certain) else { continue };
+        for (sensor, creep) in creeps(&all).into_iter().enumerate() {
+            let steps = self.steps.len();
+            for profile in profiles {
+                let channel = profile.sensors.iter().position(|known| *known == sensor);
+                let step = channel.and_then(|channel| level_step(&profile.levels, channel, profile.channels()));
+                let Some(LevelStep { turn, by_um, .. }) = step else { continue };
+                let (id, setup) =
+                    (&rig.sensors[sensor].id, rig.setups.get(profile.setup).map_or("", |setup| &setup.id));
+                let text = format!("{id} steps by {by_um:+.2} µm at turn {turn} of the capture {setup}/{station}");
+                self.steps.push((by_um.abs(), text));
+            }
+            // A straight line through a step is no creep.
+            let Some(creep) = creep.filter(|creep| creep.certain && self.steps.len() == steps) else { continue };
+            let seen = &mut self.sensors[sensor];
             seen.stations += 1;
             let largest = creep.largest();
             let size_um = creep.over_capture(largest);
@@ -58,7 +75,23 @@ impl Steadiness {
     }
 
     /// What is to be said of it.
-    pub fn warning(&self, rig: &Rig) -> Option<String> {
+    pub fn warnings(mut self, rig: &Rig) -> impl Iterator<Item = String> {
+        let creeping = self.creeping(rig);
+        self.steps.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let shown: Vec<&str> = self.steps.iter().take(MOST_STEPS).map(|(_, text)| text.as_str()).collect();
+        let more = self.steps.len() - shown.len();
+        let more = if more > 0 { format!(", and {more} smaller steps") } else { String::new() };
+        let steps = (!shown.is_empty()).then(|| {
+            format!(
+                "the level changes for good within a capture: {}{more}. The average is of two states, and the turn of the step distorts \
+                 it in all orders; the stated uncertainties are not valid. Leave the turns on one side out (`trim`), or measure again",
+                shown.join(", ")
+            )
+        });
+        creeping.into_iter().chain(steps)
+    }
+
+    fn creeping(&self, rig: &Rig) -> Option<String> {
         let enough = (SHARE * self.stations as f64).max(1.0);
         let creeping = rig.sensors.iter().zip(&self.sensors).filter(|(_, seen)| seen.stations as f64 >= enough);
         let each: Vec<String> = creeping
@@ -104,7 +137,7 @@ pub(super) fn inflated(stations: &[StationSummary]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "tests")]
+    #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
     use super::*;
     use runout_turning::{
@@ -149,7 +182,7 @@ mod tests {
         let warning = |creep_um| {
             let mut steadiness = Steadiness::default();
             steadiness.take("s1", &profiles(creep_um), &rig);
-            steadiness.warning(&rig)
+            steadiness.warnings(&rig).next()
         };
         assert_eq!(warning([0.0, 0.0]), None);
         let shared = warning([24.0, 24.0]).unwrap();
@@ -157,5 +190,18 @@ mod tests {
         assert!(!shared.contains("S1"), "{shared}");
         let single = warning([0.0, -24.0]).unwrap();
         assert!(single.contains("S2 by -24.0") && single.contains("over the capture turned/s1"), "{single}");
+    }
+    #[test]
+    fn a_step_is_named_with_its_turn_and_is_no_creep() {
+        let rig = rig();
+        let mut profiles = profiles([0.0, 0.0]);
+        let stepped = profiles[1].levels.levels_um.iter_mut().skip(1).step_by(2).skip(30);
+        stepped.for_each(|level| *level += 20.0);
+        let mut steadiness = Steadiness::default();
+        steadiness.take("s1", &profiles, &rig);
+        let warnings: Vec<String> = steadiness.warnings(&rig).collect();
+        let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+        assert!(warning.contains("S2 steps by +20.0") && warning.contains("of the capture turned/s1"), "{warning}");
+        assert!(warning.contains("at turn 29") || warning.contains("at turn 30"), "{warning}");
     }
 }

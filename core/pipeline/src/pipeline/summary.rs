@@ -130,6 +130,9 @@ pub struct StationSummary {
     /// known. Empty where form is separated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub readings: Vec<ReadingValues>,
+    /// Where along the axis radial motion of this station is stated, in mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion_z_mm: Option<f64>,
     /// Error motion values of the axis; empty where no spread over the turns is known.
     pub motion_values: Vec<Value>,
     /// Root mean square that the fit leaves of the readings, in µm; absent where nothing is redundant.
@@ -285,6 +288,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
         sections,
         motion_along_deg: azimuth.map(Azimuth::degrees),
         readings: if nothing { readings(&result.profiles, rig) } else { Vec::new() },
+        motion_z_mm: (!result.motion_values.is_empty()).then_some(result.separation.motion_z_mm),
         motion_values: result.motion_values.clone(),
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),

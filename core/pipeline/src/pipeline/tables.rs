@@ -401,7 +401,11 @@ fn values() -> TableSpec {
             ColumnSpec::text("standard", "standard and clause, or paper and equation"),
             order("band_low_upr", "lowest order that it was computed over"),
             order("band_high_upr", "highest order that it was computed over; of a filter, where half passes"),
-            ColumnSpec::text("lost_orders", "orders of it that are lost and that are not in the value, as JSON"),
+            ColumnSpec::text(
+                "lost_orders",
+                "orders of it that are lost and that are not in the value, as JSON; null where none is",
+            )
+            .or_null(),
             ColumnSpec::number(
                 "weakened_above_upr",
                 "1/rev",
@@ -446,7 +450,10 @@ fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
         of_value(|value| &value.source),
         counts(rows.iter().map(|row| row.value.band_upr[0])),
         counts(rows.iter().map(|row| row.value.band_upr[1])),
-        texts(rows.iter().map(|row| json!(row.value.lost_orders).to_string())),
+        texts_or_null(rows.iter().map(|row| {
+            let lost = &row.value.lost_orders;
+            (!lost.is_empty()).then(|| json!(lost).to_string())
+        })),
         numbers_or_null(rows.iter().map(|row| row.value.weakened_above_upr)),
         counts_or_null(rows.iter().map(|row| row.value.absent_above_upr)),
         of_value(|value| &value.filter),

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod config;
+mod remarks;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

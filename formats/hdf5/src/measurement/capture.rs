@@ -80,8 +80,13 @@ impl CaptureSource {
             Phase::Angle(line) => {
                 let mut scan = EncoderScan::default();
                 line.each(|angle_deg| {
-                    scan.push(angle_deg)
-                        .map_err(|fault| line.place().error(format!("sample {}: {fault}", fault.sample)))
+                    scan.push(angle_deg).map_err(|fault| {
+                        let error = line.place().error(format!("sample {}: {fault}", fault.sample));
+                        match fault.help {
+                            Some(help) => error.help(help),
+                            None => error,
+                        }
+                    })
                 })?;
                 Ok((scan.marks().to_vec(), Some(scan)))
             }

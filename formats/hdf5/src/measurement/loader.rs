@@ -224,7 +224,9 @@ fn check_format(file: &File, place: &Place) -> Result<()> {
     }
     let unit = node::needed(node::text(file, place, "length_unit")?, place, "length_unit")?;
     if unit != "um" {
-        return Err(place.error(format!("attribute `length_unit`: expected \"um\", found \"{unit}\"")));
+        let help = "write length_unit = \"um\", and give each sensor of [rig] the unit of its numbers: unit = \"mm\"";
+        let problem = format!("attribute `length_unit`: expected \"um\", found \"{unit}\"");
+        return Err(place.error(problem).help(help));
     }
     Ok(())
 }

@@ -5,6 +5,7 @@
 
 use runout_core::{
     Complex64,
+    level_step::{LevelStep, level_step},
     model::diagnosis::Unexplained,
     numerics::least_squares::{cholesky, invert_lower},
     profile::{Profile, Turns, smooth},
@@ -89,6 +90,36 @@ fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[O
     let by = (0..turns.orders)
         .map(|order| if order < FIRST_ORDER { Complex64::ZERO } else { series.step(order, turn, sensor) });
     Some(Change { setup, sensor, turn: turns.numbers[turn], by: by.collect() })
+}
+
+/// Steps of the level of a sensor in a capture, but those of `known` changes.
+pub fn level_steps(selection: &Selection, stations: &[Station], known: &[&Change]) -> Vec<Unexplained> {
+    let rig = &selection.rig;
+    let mut found = Vec::new();
+    for station in stations {
+        for (setup, id) in selection.setups.iter().enumerate() {
+            let Some(profile) = station.profiles.iter().find(|profile| profile.setup == *id) else { continue };
+            for (sensor, id) in selection.sensors.iter().enumerate() {
+                let Some(channel) = profile.sensors.iter().position(|found| found == id) else { continue };
+                let step = level_step(&profile.levels, channel, profile.channels());
+                let Some(LevelStep { turn, by_um, .. }) = step else { continue };
+                if known.iter().any(|change| (change.setup, change.sensor) == (setup, sensor)) {
+                    continue;
+                }
+                let numbers = &profile.levels.numbers;
+                let share = numbers.iter().filter(|number| **number > turn).count() as f64 / numbers.len() as f64;
+                let at = if stations.len() > 1 { format!(" of station {}", station.name) } else { String::new() };
+                found.push(Unexplained {
+                    sensor: rig.sensors.get(sensor).map(|sensor| sensor.id.clone()),
+                    setup: rig.setups.get(setup).map(|setup| setup.id.clone()),
+                    orders: [0, 0],
+                    rms_um: by_um.abs() * (share * (1.0 - share)).sqrt(),
+                    place: format!("the level steps by {by_um:+.2} µm at turn {turn}{at}"),
+                });
+            }
+        }
+    }
+    found
 }
 
 /// The turns' harmonics about their mean, `[order][turn][channel]`, and their sums before each turn.

@@ -5,8 +5,9 @@ use std::{ops::Range, sync::Arc};
 use runout_core::{
     Complex64,
     creep::{Creep, Levels, creeps},
+    level_step::level_step,
     neighbours::Neighbours,
-    profile::Profile,
+    profile::{Profile, TurnLevels},
     stage::Station,
 };
 
@@ -169,7 +170,13 @@ pub fn creeping(selection: &Selection, stations: &[Station]) -> Vec<Vec<Option<C
         let profile = station.profiles.iter().find(|profile| profile.setup == *setup)?;
         let channel = profile.sensors.iter().position(|known| *known == sensor)?;
         let turns = &profile.split.as_ref()?.turns;
-        Some(Levels::new(turns.numbers.iter().copied().zip(turns.levels(channel))))
+        let mut levels = TurnLevels { numbers: turns.numbers.clone(), levels_um: turns.levels(channel).collect() };
+        // A straight line through a step is no creep.
+        if let Some(step) = level_step(&levels, 0, 1) {
+            let after = levels.numbers.iter().zip(&mut levels.levels_um).filter(|(number, _)| **number > step.turn);
+            after.for_each(|(_, level)| *level -= step.by_um);
+        }
+        Some(levels.of(0, 1))
     };
     let of_sensor = |sensor: &usize| -> Vec<Levels> {
         let captures = stations.iter().flat_map(|station| selection.setups.iter().map(move |setup| (station, setup)));

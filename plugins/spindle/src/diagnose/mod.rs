@@ -20,7 +20,7 @@ use runout_core::{
     model::{
         Effect, Fit, Model, Setting,
         closed_loop::{self, Settings},
-        diagnosis::{Estimated, LostOrders, Unexplained, Verdict},
+        diagnosis::{Blind, Estimated, LostOrders, Unexplained, Verdict},
     },
     rig::Rig,
     separation::NOTHING_SEPARATED,
@@ -93,6 +93,14 @@ impl SpindleModel {
         };
         let whole = Self { traced: Arc::new(whole), whole: None };
         Ok(Self { traced: Arc::new(traced), whole: Some(Box::new(whole)) })
+    }
+
+    /// Mistakes in the rig file that leave no trace in these data, and what they do to form or motion, in µm rms.
+    ///
+    /// # Errors
+    /// When the model cannot be fitted.
+    pub fn traceless_mistakes(&self) -> Result<Vec<Blind>> {
+        self.unobservable(&[])
     }
 }
 
@@ -295,7 +303,9 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
     for added in diagnosis.added.iter_mut().filter(|added| !added.confounded_with.is_empty()) {
         added.parameters.iter_mut().for_each(|parameter| parameter.std = None);
     }
-    let changes: Vec<Unexplained> = changes.iter().map(|change| change.said(&model.traced.selection)).collect();
+    let steps = changes::level_steps(&model.traced.selection, stations, &changes);
+    let said = changes.iter().map(|change| change.said(&model.traced.selection));
+    let changes: Vec<Unexplained> = said.chain(steps).collect();
     if !changes.is_empty() {
         if closed.after.remainder().noise_is_known() {
             diagnosis.verdict = Verdict::Unexplained;

@@ -1,5 +1,7 @@
 //! Where something is that no effect explains: in which sensor and setup, at which orders, over which angles.
 
+use std::collections::BTreeSet;
+
 use runout_core::{
     Complex64,
     model::{diagnosis::Unexplained, evidence::Group},
@@ -14,18 +16,29 @@ use crate::layout::Layout;
 const SHARE: f64 = 0.5;
 /// Orders at which less than this share of its square lies are left out, at both ends.
 const TAIL: f64 = 0.05;
+/// Readings that explain this share of what the best one explains are as likely as it.
+const ALIKE: f64 = 0.98;
 /// It has a place within the turn where half of its square lies within this share of the turn.
 const NARROW: f64 = 0.2;
 
-/// What a station's residual says of a stranger.
+/// What a station's residual says of a stranger: only orders at which a reading is redundant show one, and only a reading that explains
+/// it better than the others is named.
 pub fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexplained> {
     let count = solved.corrected.count;
     let mut total = 0.0;
     // What each reading would have to hold to explain the residual, and how much it would.
     let mut disturbance = vec![vec![Complex64::ZERO; solved.corrected.max_order + 1]; count];
     let mut explained = vec![0.0; count];
+    let mut left = vec![0.0; solved.corrected.max_order + 1];
+    let mut redundant = Vec::new();
     project(&solved.whitened, &solved.linear, count, |order, residual| {
-        total += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+        // Without a redundant reading, the residual is what rounding leaves.
+        if solved.operators.orders[order - 1].rank >= count {
+            return;
+        }
+        redundant.push(order);
+        left[order] = residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+        total += left[order];
         let matrix = &solved.whitened[order - 1];
         for reading in 0..count {
             let column = || matrix.iter().skip(reading).step_by(count);
@@ -46,6 +59,22 @@ pub fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexpla
     };
     let reading = &layout.readings[best];
     let all: f64 = explained.iter().sum();
+    let alike: Vec<usize> = (0..count).filter(|index| explained[*index] >= ALIKE * explained[best]).collect();
+    let place_of = |index: &usize| (layout.readings[*index].sensor, layout.readings[*index].setup);
+    if alike.iter().any(|index| place_of(index).0 != reading.sensor) {
+        let sensors: BTreeSet<usize> = alike.iter().map(|index| place_of(index).0).collect();
+        let one_setup = alike.iter().all(|index| place_of(index).1 == reading.setup);
+        return Some(Unexplained {
+            sensor: None,
+            setup: one_setup.then(|| rig.setups[reading.setup].id.clone()),
+            orders: held(&left),
+            rms_um: solved.residual().rms_um,
+            place: undecided(
+                &redundant,
+                &sensors.iter().map(|sensor| rig.sensors[*sensor].id.as_str()).collect::<Vec<_>>(),
+            ),
+        });
+    }
     let (sensor, setup) = if explained[best] > SHARE * total {
         (Some(reading.sensor), Some(reading.setup))
     } else if by_sensor(reading.sensor) > SHARE * all {
@@ -57,16 +86,30 @@ pub fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexpla
     };
     let harmonics = &disturbance[best];
     let squares: Vec<f64> = harmonics.iter().map(Complex64::norm_sqr).collect();
-    let sum: f64 = squares.iter().sum();
-    let lowest = beyond(squares.iter().copied().enumerate(), TAIL * sum);
-    let highest = beyond(squares.iter().copied().enumerate().rev(), TAIL * sum);
     Some(Unexplained {
         sensor: sensor.map(|index| rig.sensors[index].id.clone()),
         setup: setup.map(|index| rig.setups[index].id.clone()),
-        orders: [lowest.min(highest), highest],
-        rms_um: (0.5 * sum).sqrt(),
+        orders: held(&squares),
+        rms_um: (0.5 * squares.iter().sum::<f64>()).sqrt(),
         place: place(harmonics),
     })
+}
+
+/// Lowest and highest order that hold a sum of squares, `[order]`, but for its tails.
+fn held(squares: &[f64]) -> [usize; 2] {
+    let sum: f64 = squares.iter().sum();
+    let lowest = beyond(squares.iter().copied().enumerate(), TAIL * sum);
+    let highest = beyond(squares.iter().copied().enumerate().rev(), TAIL * sum);
+    [lowest.min(highest), highest]
+}
+
+/// What a residual says that several sensors explain equally well.
+fn undecided(redundant: &[usize], sensors: &[&str]) -> String {
+    let which = format!("the residual does not show which of {}", sensors.join(", "));
+    match redundant {
+        [order] => format!("this layout shows contradictions at order {order} only; {which}"),
+        _ => which,
+    }
 }
 
 /// Squares (µm²) that an unweighted fit leaves of each setup's readings, and their complex degrees of freedom: the trace of

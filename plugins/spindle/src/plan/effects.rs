@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use runout_core::{
     Result,
-    model::foresight::{self, Foresight},
+    model::foresight::{self, Foresight, Unseen},
     rig::Rig,
 };
 
@@ -55,17 +55,25 @@ pub fn foresee(
     selection: &Selection,
     layout: &Layout,
     second_order: bool,
-    mut kinds: Vec<Arc<dyn SpindleEffect>>,
+    kinds: Vec<Arc<dyn SpindleEffect>>,
 ) -> Result<Foresight> {
     let station = nominal::station(selection);
+    let (mistakes, mut kinds): (Vec<_>, Vec<_>) = kinds.into_iter().partition(|kind| kind.mistake().is_some());
     kinds.retain(|kind| {
         let about = kind.about();
-        // What single turns show, they show in any rig, and an average says little of it. Each mistake is there or not, and a
-        // ripple of one setup shows as a common one does.
-        kind.turn_evidence().is_none() && kind.mistake().is_none() && about.acts_on != ActsOn::Setup
+        // What single turns show, they show in any rig, and an average says little of it. A ripple of one setup shows as a
+        // common one does.
+        kind.turn_evidence().is_none() && about.acts_on != ActsOn::Setup
     });
-    let model = SpindleModel::new(selection.clone(), layout.clone(), second_order, kinds, &[station])?;
-    Ok(Foresight { assuming: nominal::words(), ..foresight::foresee(&model)? })
+    let model = |kinds| {
+        SpindleModel::new(selection.clone(), layout.clone(), second_order, kinds, std::slice::from_ref(&station))
+    };
+    let mut foresight = Foresight { assuming: nominal::words(), ..foresight::foresee(&model(kinds)?)? };
+    let traceless = model(mistakes)?.traceless_mistakes()?;
+    foresight
+        .blind_to
+        .extend(traceless.into_iter().map(|blind| Unseen { bias: vec![blind.bias_per_unit.clone()], blind }));
+    Ok(foresight)
 }
 
 /// The same with all of a rig, the general separator and every effect of this crate.
@@ -81,7 +89,12 @@ pub fn foresee_rig(rig: &Rig) -> Result<Foresight> {
 /// # Errors
 /// When a model cannot be fitted.
 pub fn changes(rig: &Rig, foresight: &Foresight, known: &[Suggestion], clearance_deg: f64) -> Result<Changes> {
-    let mut open = Open { blind: foresight.blind_names().collect(), confounded: foresight.confounded.clone() };
+    // What has no parameter is a mistake in the rig file, which a closer look at the rig prevents: no addition is needed for it.
+    let mistakes: Vec<&str> =
+        effects::all().iter().filter_map(|kind| kind.mistake().map(|_| kind.about().id)).collect();
+    let is_mistake = |name: &String| name.split(' ').next().is_some_and(|id| mistakes.contains(&id));
+    let blind = foresight.blind_names().filter(|name| !is_mistake(name)).collect();
+    let mut open = Open { blind, confounded: foresight.confounded.clone() };
     let mut found = Vec::new();
     for class in classes(rig, known) {
         if open.is_empty() {

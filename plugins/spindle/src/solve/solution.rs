@@ -39,9 +39,14 @@ const APART_UM: f64 = 1e-6;
 /// share of form that goes to either side.
 const COUPLED: f64 = 0.2;
 /// Passes of all orders together, at most.
-const JOINT_PASSES: usize = 10;
+const JOINT_PASSES: usize = 30;
 /// No result is given of a solution that still moves more than this, rms.
 const UNSETTLED_UM: f64 = 5e-4;
+
+/// From this eccentricity on, as a share of the radius, stated uncertainties lack what badly determined orders carry into others.
+const LARGE: f64 = 0.015;
+/// No part is clamped so far off centre, as a share of its radius.
+const FAR_OFF: f64 = 0.1;
 
 /// Solves one station.
 pub struct Solver<'a> {
@@ -82,6 +87,7 @@ impl Solver<'_> {
         let mut separation = self.report(station, &operators, &estimate, propagation.as_ref(), residual);
         let carried = self.second_order.then(|| self.carried(&readings, &separation)).flatten();
         separation.warnings.extend(carried);
+        separation.warnings.extend(self.far_off_centre(&readings));
         Ok((separation, readings))
     }
 
@@ -95,14 +101,32 @@ impl Solver<'_> {
                 "{ratio} couples the orders so strongly that no solution settles: the last pass still moves the readings \
                  by {moved_um:.2e} µm rms"
             );
-            let help = "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the \
-                        order";
+            let help = if eccentricity_um > FAR_OFF * 1e3 * radius_mm {
+                "check part_radius_mm and the unit of the readings"
+            } else {
+                "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the order"
+            };
             (problem, help)
         } else {
             let problem = format!("{ratio}: sensors' lines do not meet the part, and the result is no number");
             (problem, "check part_radius_mm and the unit of the readings")
         };
         Error::new("separate", format!("station {}", station.name), problem).of(ErrorKind::Numerical).help(help)
+    }
+
+    /// What the stated uncertainty of order by order lacks where the eccentricity is large.
+    fn far_off_centre(&self, readings: &Readings) -> Option<String> {
+        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
+        let is_large = self.second_order && eccentricity_um > LARGE * 1e3 * radius_mm;
+        is_large.then(|| {
+            // Stations that are alike are to say the same.
+            let share = 100.0 * LARGE;
+            format!(
+                "the eccentricity is above {share} % of the radius of {radius_mm} mm and couples neighbouring orders: an order that the layout \
+                 determines badly carries its error into those beside it, and their stated uncertainties do not include that; centre \
+                 the part better"
+            )
+        })
     }
 
     /// What a large eccentricity carries into orders that are told, of what is not: a surface that goes sideways by e turns

@@ -19,13 +19,12 @@ use std::{
 };
 
 pub use recording::{Recording, by_name, recordings};
-pub use report::{BatchReport, Failed, LimitCount};
+pub use report::{BatchReport, Failed, LimitCount, Warned};
 pub use trend::{RECORDING, Series, Signals, recording_column};
 
 use super::{
     config::Pipeline,
     document::{ConfigError, Document, Sources},
-    evaluate::Decision,
     registry::Registry,
     run::{Observer, run_alone},
     summary::Summary,
@@ -36,6 +35,7 @@ use crate::{
     stage::{About, Completed, Exporter, ResultInfo, Source},
 };
 use recording::{of_recording, without_recording};
+use report::Found;
 use runout_error::{Error, ErrorKind, Result};
 use runout_table::{RecordBatch, TableSpec};
 use runout_turning::provenance::{Input, Provenance, VERSION};
@@ -101,8 +101,8 @@ pub struct Batch<'a> {
 
 /// What became of a recording.
 enum Outcome {
-    Done(Vec<Decision>),
-    Skipped(Vec<Decision>),
+    Done(Found),
+    Skipped(Found),
     Failed(Error),
 }
 
@@ -139,27 +139,27 @@ impl<'a> Batch<'a> {
         let (mut complete, mut given) = (Vec::new(), HashSet::new());
         for (recording, outcome) in recordings.iter().zip(outcomes) {
             given.insert(recording.name.as_str());
-            let decisions = match outcome {
-                Outcome::Done(decisions) => {
+            let found = match outcome {
+                Outcome::Done(found) => {
                     report.done += 1;
-                    decisions
+                    found
                 }
-                Outcome::Skipped(decisions) => {
+                Outcome::Skipped(found) => {
                     report.skipped += 1;
-                    decisions
+                    found
                 }
                 Outcome::Failed(error) => {
                     report.failed.push(Failed::of(recording, &error));
                     continue;
                 }
             };
-            report.count(&decisions);
+            report.count(&recording.name, found);
             complete.push(recording.name.clone());
         }
         for name in self.store.recordings()?.into_iter().filter(|name| !given.contains(name.as_str())) {
             match self.summary(&name).filter(|summary| self.is_of_configuration(summary)) {
                 Some(summary) => {
-                    report.count(&decisions(&summary));
+                    report.count(&name, Found::of(&summary));
                     report.earlier += 1;
                     complete.push(name);
                 }
@@ -208,13 +208,13 @@ impl<'a> Batch<'a> {
             // What cannot be read now is not up to date; the run says why.
             && is_of_inputs(&summary, &pipeline).unwrap_or(false)
         {
-            return Ok(Outcome::Skipped(decisions(&summary)));
+            return Ok(Outcome::Skipped(Found::of(&summary)));
         }
         self.store.remove(&recording.name)?;
         pipeline.exporters = vec![self.store.exporter(&recording.name)];
         pipeline.diagnosed.clear();
         let summary = run_alone(&pipeline)?;
-        Ok(Outcome::Done(decisions(&summary)))
+        Ok(Outcome::Done(Found::of(&summary)))
     }
 
     /// The summary of a complete result; nothing where there is none that can be read.
@@ -294,10 +294,6 @@ impl<'a> Batch<'a> {
 
 fn program() -> String {
     format!("runout {VERSION}")
-}
-
-fn decisions(summary: &Summary) -> Vec<Decision> {
-    summary.limits.iter().map(|limit| limit.decision).collect()
 }
 
 /// Whether a result is of the files that the pipeline reads now, by their checksums.

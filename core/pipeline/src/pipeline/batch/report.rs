@@ -9,6 +9,7 @@ use super::{recording::Recording, trend::Series};
 use crate::pipeline::{
     config::Pipeline,
     evaluate::{Decision, Limit},
+    summary::Summary,
 };
 use runout_error::Error;
 
@@ -27,6 +28,10 @@ pub struct BatchReport {
     pub earlier: usize,
     /// Recordings that failed; nothing is kept of them.
     pub failed: Vec<Failed>,
+    /// Recordings of the data set with warnings.
+    pub warned: usize,
+    /// What the first of them warn of, in the order of this call; those of earlier calls come last.
+    pub warnings: Vec<Warned>,
     /// Recordings in the data set whose results are of another configuration or version: they are in no value and no trend. Given
     /// again they are brought up to date.
     pub other_configuration: Vec<String>,
@@ -53,6 +58,22 @@ pub struct Failed {
     pub help: Option<String>,
 }
 
+/// A recording with warnings.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Warned {
+    /// Its name.
+    pub recording: String,
+    /// How many warnings it has.
+    pub count: usize,
+    /// The first of them; its summary has all.
+    pub first: Vec<String>,
+}
+
+/// Recordings whose warnings are in the report: memory does not grow with the others.
+const MOST_WARNED: usize = 100;
+/// Warnings of one of them.
+const MOST_OF_ONE: usize = 3;
+
 /// How many recordings keep a limit.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LimitCount {
@@ -64,6 +85,25 @@ pub struct LimitCount {
     pub does_not_conform: usize,
     /// Recordings of which neither is proven.
     pub undecided: usize,
+}
+
+/// What a batch keeps of the summary of one recording.
+pub(super) struct Found {
+    decisions: Vec<Decision>,
+    warnings: usize,
+    first: Vec<String>,
+}
+
+impl Found {
+    /// Notes are of the pipeline, and no warnings.
+    pub(super) fn of(summary: &Summary) -> Self {
+        let warnings = || summary.all_warnings().filter(|warning| !summary.notes.contains(warning));
+        Self {
+            decisions: summary.limits.iter().map(|limit| limit.decision).collect(),
+            warnings: warnings().count(),
+            first: warnings().take(MOST_OF_ONE).collect(),
+        }
+    }
 }
 
 impl Failed {
@@ -88,6 +128,8 @@ impl BatchReport {
             skipped: 0,
             earlier: 0,
             failed: Vec::new(),
+            warned: 0,
+            warnings: Vec::new(),
             other_configuration: Vec::new(),
             limits: pipeline.evaluate.limits().iter().map(count).collect(),
             trend: Vec::new(),
@@ -95,9 +137,16 @@ impl BatchReport {
         }
     }
 
-    /// Counts what was decided of one recording.
-    pub(super) fn count(&mut self, decisions: &[Decision]) {
-        for (limit, decision) in self.limits.iter_mut().zip(decisions) {
+    /// Counts what was decided of one recording, and keeps what it warns of.
+    pub(super) fn count(&mut self, recording: &str, found: Found) {
+        if found.warnings > 0 {
+            self.warned += 1;
+            if self.warnings.len() < MOST_WARNED {
+                let Found { warnings: count, first, .. } = found;
+                self.warnings.push(Warned { recording: recording.to_owned(), count, first });
+            }
+        }
+        for (limit, decision) in self.limits.iter_mut().zip(found.decisions) {
             *match decision {
                 Decision::Conforms => &mut limit.conforms,
                 Decision::DoesNotConform => &mut limit.does_not_conform,

@@ -621,6 +621,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
             section("b", vec![value("LSCI", 4.0, None)]),
         ],
         motion_along_deg: None,
+        motion_z_mm: None,
         readings: vec![],
         motion_values: Vec::new(),
         residual_rms_um: None,

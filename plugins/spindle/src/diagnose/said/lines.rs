@@ -1,6 +1,7 @@
 //! What is said of lines: order, frequency, size, and whether it is the mains.
 
 use runout_core::{
+    mains,
     model::diagnosis::{Diagnosis, Estimated},
     stage::Station,
 };
@@ -12,20 +13,6 @@ use crate::{
     },
     effects::{ActsOn, TurnEvidence},
 };
-
-/// Frequencies of mains, in Hz.
-const MAINS_HZ: [f64; 2] = [50.0, 60.0];
-/// Multiples of them that are named.
-const MULTIPLES: std::ops::RangeInclusive<u32> = 1..=10;
-/// How far a grid's frequency is from its nominal value, as a share.
-const GRID: f64 = 0.002;
-
-/// A multiple of the mains' frequency within a tolerance, in Hz.
-pub(super) fn mains(frequency_hz: f64, tolerance_hz: f64) -> Option<f64> {
-    let known = MAINS_HZ.iter().flat_map(|hertz| MULTIPLES.map(move |multiple| hertz * f64::from(multiple)));
-    let near = known.filter(|hertz| (hertz - frequency_hz).abs() <= tolerance_hz + GRID * hertz);
-    near.min_by(|a, b| (a - frequency_hz).abs().total_cmp(&(b - frequency_hz).abs()))
-}
 
 /// Says each line that was found by its order, frequency and amplitude, and what it may be.
 pub fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
@@ -99,7 +86,7 @@ fn remark(line: &Line, targets: &[String]) -> Option<String> {
     let mains = line.turns_hz.and_then(|turns_hz| {
         // What the record resolves: a quarter of a period over all of its turns.
         let resolution = 0.25 / line.turns.max(1.0);
-        mains(line.order * turns_hz, (3.0 * line.order_std).max(resolution) * turns_hz)
+        mains::near(line.order * turns_hz, (3.0 * line.order_std).max(resolution) * turns_hz)
     });
     let frequency = hertz.map_or_else(|| format!("order {:.3}", line.order), |hertz| format!("{hertz:.2} Hz"));
     let is_mains = mains.map(|mains| format!("is mains ({mains:.0} Hz)"));
@@ -131,7 +118,7 @@ fn whole_order(diagnosis: &Diagnosis, stations: &[Station]) -> Option<String> {
     let resolution_hz = turns_hz / profile.turns.used.max(1) as f64;
     let narrow = diagnosis.unexplained.iter().filter(|left| left.orders[1] - left.orders[0] <= 1);
     let mut orders = narrow.flat_map(|left| left.orders);
-    let found = orders.find_map(|order| Some((order, mains(order as f64 * turns_hz, resolution_hz)?)));
+    let found = orders.find_map(|order| Some((order, mains::near(order as f64 * turns_hz, resolution_hz)?)));
     found.map(|(order, mains)| {
         format!(
             "order {order} is mains ({mains:.0} Hz) at this speed: pick-up at a whole order cannot be told from what repeats every turn; measure at another speed"
