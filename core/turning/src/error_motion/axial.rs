@@ -9,7 +9,7 @@
 //! how the face was clamped, and is left out.
 
 use super::{
-    ErrorMotion, RESIDUAL, SAID, STANDARD, between_setups, centre_of_chart, described, of_all_turns, over,
+    ErrorMotion, Measure, RESIDUAL, SAID, STANDARD, between_setups, centre_of_chart, described, of_all_turns, over,
     polar::Synchronous, rms_about_mean, rms_across, root_mean_square, unit, widest, without_noise,
 };
 use crate::spread::{Direction, Spread};
@@ -42,11 +42,10 @@ impl ErrorMotion<'_> {
 
     /// Range of what repeats, and its root mean square.
     fn synchronous(&self, kind: &str, what: &str, direction: Direction, plot: &Synchronous, z_mm: f64) -> [Value; 2] {
-        let drawn = plot.over_angle(&Angles::equal(self.angles));
+        let drawn = plot.over_angle(&Angles::shared(self.angles));
         let found = [ront_lsci_um(&drawn), rms_about_mean(&drawn)];
         let seed = uncertainty::seed(&[self.station, &self.id(direction), kind]);
-        let measure = |plot: &[f64]| [ront_lsci_um(plot), rms_about_mean(plot)];
-        let known = without_noise(found, &drawn, &plot.variance, plot.band[0], seed, measure);
+        let known = without_noise(found, &drawn, &plot.variance, plot.band[0], seed, &Measure::AboutFixedCentre);
         let [range, rms] = match known {
             Some([(range_share, range), (rms_share, rms)]) => {
                 [(found[0], range_share, Some(range)), (found[1], rms_share, Some(rms))]
@@ -87,9 +86,9 @@ impl ErrorMotion<'_> {
         z_mm: f64,
     ) -> Option<[Value; 2]> {
         let (mut all, mut each, mut each_rms) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new(), Vec::new());
-        let rms = rms_about_mean(&plot.over_angle(&Angles::equal(self.angles)));
+        let rms = rms_about_mean(&plot.over_angle(&Angles::shared(self.angles)));
         for spread in spreads {
-            let drawn = plot.over_angle(&Angles::equal(spread.angles));
+            let drawn = plot.over_angle(&Angles::shared(spread.angles));
             let (inner, outer) = of_all_turns(&drawn, spread.in_direction(direction)?);
             all = (all.0.min(inner), all.1.max(outer));
             each.push(outer - inner);

@@ -33,7 +33,7 @@ use polar::{Motion, Synchronous, seen_from};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
-    roundness::{Angles, Points, Reference, ront_lsci_um},
+    roundness::{self, Angles, FixedCentre, Points, Reference, ront_lsci_um},
     uncertainty::{self, DRAWS, Errors, NORMAL_95, Uncertainty, extreme, stand_in, student_95},
 };
 
@@ -141,22 +141,20 @@ impl ErrorMotion<'_> {
         spreads: &[&Spread],
     ) -> Option<Vec<Value>> {
         let points = RefCell::new(Points::default());
-        let angles = Angles::equal(self.angles);
+        let angles = Angles::shared(self.angles);
         let drawn = plot.over_angle(&angles);
         let place = centre.of(&angles, &drawn, &mut points.borrow_mut())?;
         let seen = seen_from(place, &angles, &drawn);
         let seed = uncertainty::seed(&[self.station, id(direction), centre.symbol()]);
-        let values = |plot: &[f64]| {
-            if centre.is_linear() {
-                return [ront_lsci_um(plot), rms_about_mean(plot)];
-            }
+        let about_moved = |plot: &[f64]| {
             let place = centre.of(&angles, plot, &mut points.borrow_mut()).unwrap_or_default();
             let seen = seen_from(place, &angles, plot);
             [ront_lsci_um(&seen), rms_about_mean(&seen)]
         };
+        let values = if centre.is_linear() { Measure::AboutFixedCentre } else { Measure::Of(&about_moved) };
         let found = [ront_lsci_um(&seen), rms_about_mean(&seen)];
         let [(range, range_share, range_known), (rms, rms_share, rms_known)] =
-            match without_noise(found, &seen, &plot.variance, 2, seed, values) {
+            match without_noise(found, &seen, &plot.variance, 2, seed, &values) {
                 Some(known) => {
                     let mut found = found.into_iter();
                     known
@@ -166,7 +164,7 @@ impl ErrorMotion<'_> {
             };
         let (mut all, mut each, mut each_rms) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new(), Vec::new());
         for spread in spreads {
-            let angles = Angles::equal(spread.angles);
+            let angles = Angles::shared(spread.angles);
             let drawn = plot.over_angle(&angles);
             let place = centre.of(&angles, &drawn, &mut points.borrow_mut())?;
             let seen = seen_from(place, &angles, &drawn);
@@ -233,7 +231,7 @@ impl ErrorMotion<'_> {
     ) -> Option<Value> {
         let (mut all, mut each) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new());
         for spread in spreads {
-            let drawn = plot.over_angle(&Angles::equal(spread.angles));
+            let drawn = plot.over_angle(&Angles::shared(spread.angles));
             let (inner, outer) = of_all_turns(&drawn, spread.in_direction(direction)?);
             all = (all.0.min(inner), all.1.max(outer));
             each.push(outer - inner);
@@ -365,6 +363,14 @@ impl ErrorMotion<'_> {
     }
 }
 
+/// How two values of a plot are found.
+enum Measure<'a> {
+    /// Peak to valley and root mean square, which errors change without moving the centre.
+    AboutFixedCentre,
+    /// By this.
+    Of(&'a dyn Fn(&[f64]) -> [f64; 2]),
+}
+
 /// What noise adds to two values of a plot in the mean, and the uncertainty of each without it; `None` where no variance is
 /// known. Tilt has noise of all orders and little motion above the low ones, so that noise adds up.
 fn without_noise(
@@ -373,7 +379,7 @@ fn without_noise(
     variance: &[f64],
     lowest: usize,
     seed: u64,
-    values: impl Fn(&[f64]) -> [f64; 2],
+    measure: &Measure,
 ) -> Option<[(f64, Uncertainty); 2]> {
     if plot.len() < 2 {
         return None;
@@ -387,15 +393,26 @@ fn without_noise(
     let noise: Vec<Complex64> = harmonics.iter().zip(weights).map(|(value, weight)| value * (1.0 - weight)).collect();
     let mut likely = plot.to_vec();
     likely.iter_mut().zip(fourier.synthesise(noise)).for_each(|(value, noise)| *value -= noise);
-    let mut drawn = likely.clone();
-    let (first, second): (Vec<f64>, Vec<f64>) = (0..DRAWS)
-        .map(|_| {
-            errors.draw(&mut fourier, &likely, &mut drawn);
-            let [first, second] = values(&drawn);
-            (first, second)
-        })
-        .unzip();
-    let about = values(&likely);
+    let (about, drawn): ([f64; 2], Vec<[f64; 2]>) = match measure {
+        Measure::AboutFixedCentre => {
+            // Errors of orders from 1 on leave the mean.
+            let mean = likely.iter().sum::<f64>() / likely.len() as f64;
+            likely.iter_mut().for_each(|value| *value -= mean);
+            let plot = FixedCentre::new(likely);
+            let both = |values: roundness::Values| [values.ront_um, values.ronq_um];
+            (both(plot.about()), (0..DRAWS).map(|_| both(plot.values(&errors.turned(&mut fourier)))).collect())
+        }
+        Measure::Of(values) => {
+            let mut drawn = likely.clone();
+            let mut next = || {
+                errors.draw(&mut fourier, &likely, &mut drawn);
+                values(&drawn)
+            };
+            let all = (0..DRAWS).map(|_| next()).collect();
+            (values(&likely), all)
+        }
+    };
+    let (first, second) = drawn.into_iter().map(|[first, second]| (first, second)).unzip();
     Some([extreme(found[0], about[0], first)?, extreme(found[1], about[1], second)?])
 }
 
@@ -421,10 +438,17 @@ fn widest(spread: &Spread, direction: Direction) -> f64 {
 
 /// Lowest and highest of all turns about a plot, from the lowest and the highest turn less the mean.
 fn of_all_turns(plot: &[f64], (low, high): (&[f64], &[f64])) -> (f64, f64) {
-    let turns = plot.iter().zip(low).zip(high);
-    turns.fold((f64::INFINITY, f64::NEG_INFINITY), |(inner, outer), ((value, low), high)| {
-        (inner.min(value + low), outer.max(value + high))
-    })
+    // Lanes that do not wait for each other.
+    let (mut inner, mut outer) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
+    for ((plot, low), high) in plot.chunks(8).zip(low.chunks(8)).zip(high.chunks(8)) {
+        for (lane, ((value, low), high)) in plot.iter().zip(low).zip(high).enumerate() {
+            let [low, high] = [value + low, value + high];
+            // Comparisons with NaN are false.
+            inner[lane] = if low < inner[lane] { low } else { inner[lane] };
+            outer[lane] = if high > outer[lane] { high } else { outer[lane] };
+        }
+    }
+    (inner.into_iter().fold(f64::INFINITY, f64::min), outer.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// Root mean square of a setup's turns about their mean; 0 where it is not known.
