@@ -45,12 +45,16 @@ struct Draws {
 }
 
 impl Draws {
-    /// The next numbers, without end.
-    fn next(&mut self) -> impl Iterator<Item = &'static Complex64> {
+    /// The next so many numbers, in stretches of the table: from its end on they are those of its beginning.
+    fn next(&mut self, count: usize) -> impl Iterator<Item = &'static [Complex64]> + use<> {
         let first = bits(self.seed, 0) as usize % TABLE;
-        let from = (first + self.taken * self.stride) % TABLE;
+        let (mut from, mut left) = ((first + self.taken * self.stride) % TABLE, count);
         self.taken += 1;
-        NORMALS[from..].iter().chain(NORMALS.iter().cycle())
+        std::iter::from_fn(move || {
+            let stretch = &NORMALS[from..TABLE.min(from + left)];
+            (from, left) = (0, left - stretch.len());
+            (!stretch.is_empty()).then_some(stretch)
+        })
     }
 
     /// Where the draw that was taken last starts in a turn of so many angles.
@@ -198,15 +202,16 @@ impl Errors {
 
     /// Harmonics of the next errors, independent of all before, by order from 0.
     fn harmonics(&mut self) -> Vec<Complex64> {
-        let mut sum = Vec::new();
+        let orders = self.sources.iter().map(|source| source.amplitudes.len()).max().unwrap_or(0);
+        let mut sum = vec![Complex64::ZERO; orders];
         for Source { draws, amplitudes } in &mut self.sources {
-            let numbers = amplitudes.iter().zip(draws.next());
-            if sum.is_empty() {
-                sum.extend(numbers.map(|(amplitude, number)| amplitude * number));
-                continue;
+            let mut done = 0;
+            for stretch in draws.next(amplitudes.len()) {
+                let all = done..done + stretch.len();
+                let places = sum[all.clone()].iter_mut().zip(&amplitudes[all]);
+                places.zip(stretch).for_each(|((sum, amplitude), number)| *sum += amplitude * number);
+                done += stretch.len();
             }
-            sum.resize(amplitudes.len().max(sum.len()), Complex64::ZERO);
-            sum.iter_mut().zip(numbers).for_each(|(sum, (amplitude, number))| *sum += amplitude * number);
         }
         sum
     }
@@ -326,7 +331,7 @@ mod tests {
     fn draws_have_no_numbers_in_common() {
         let orders = 1000;
         let mut draws = Draws { seed: 3, stride: orders, taken: 0 };
-        let all: Vec<Vec<Complex64>> = (0..100).map(|_| draws.next().take(orders).copied().collect()).collect();
+        let all: Vec<Vec<Complex64>> = (0..100).map(|_| draws.next(orders).flatten().copied().collect()).collect();
         let mut largest: f64 = 0.0;
         for (index, one) in all.iter().enumerate() {
             let power = one.iter().map(Complex64::norm_sqr).sum::<f64>() / orders as f64;
@@ -342,7 +347,7 @@ mod tests {
         let starts: Vec<usize> = (0..1000)
             .map(|seed| {
                 let mut draws = Draws { seed, stride: 10, taken: 0 };
-                let _ = draws.next();
+                let _ = draws.next(10);
                 draws.start(360)
             })
             .collect();

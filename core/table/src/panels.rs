@@ -170,7 +170,8 @@ impl Panels {
             }
             Drawing::Amplitudes { order, parts: [real, imaginary], std } => {
                 let y = [Some(real.clone()), Some(imaginary.clone())];
-                let source = Source { name: String::new(), x: order.clone(), y, third: std.clone(), marks: None, common: false };
+                let source =
+                    Source { name: String::new(), x: order.clone(), y, third: std.clone(), marks: None, common: false };
                 let amplitude = Axis { name: "amplitude".into(), ..axis(real) };
                 (Kind::Amplitudes, [axis(order), amplitude], vec![source])
             }
@@ -265,7 +266,8 @@ impl Panels {
                     [number(&columns[0]), number(&columns[1]), number(&columns[2]), number(&columns[3])];
                 let y = if columns[2].is_some() { y.hypot(second) } else { y };
                 let curve = &mut self.drawn[*panel].curves[places_of[offset]];
-                if self.values[offset].common && curve.points.last().is_some_and(|last| last.x.to_bits() == x.to_bits()) {
+                if self.values[offset].common && curve.points.last().is_some_and(|last| last.x.to_bits() == x.to_bits())
+                {
                     continue;
                 }
                 if let Some(places) = &places

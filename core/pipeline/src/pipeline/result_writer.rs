@@ -233,8 +233,14 @@ impl ResultWriter {
             About { convention: std::mem::take(&mut self.convention), ..About::default() }
         };
         let heights = self.heights.as_ref();
-        let completed =
-            Completed { summary: &self.summary, about: &about, surface, heights, diagnosis: self.diagnosis.as_ref(), overview: None };
+        let completed = Completed {
+            summary: &self.summary,
+            about: &about,
+            surface,
+            heights,
+            diagnosis: self.diagnosis.as_ref(),
+            overview: None,
+        };
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&completed)?);

@@ -117,9 +117,9 @@ impl StationTables {
             Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? })
         };
         let of_turns = turn_tables::rows(result);
-        let of_turns = of_turns.into_iter().map(|(table, columns)| {
-            Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? })
-        });
+        let of_turns = of_turns
+            .into_iter()
+            .map(|(table, columns)| Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? }));
         tables.into_iter().map(rows).chain(of_turns).collect()
     }
 

@@ -82,7 +82,7 @@ impl Disturbed {
             let form_um = drawn.get(*section).and_then(|section| section.form_um.get(*point));
             (*direction, *z_mm, form_um.copied().unwrap_or(f64::NAN))
         });
-        let points = Points::of(self.radius_mm, near.collect());
+        let points = Points::of(self.radius_mm, self.at.len(), near);
         let cylinder = points.reference_near(self.reference, &self.cylinder)?;
         let values = points.values(&cylinder);
         let ends = [cylinder.deviation_um - values.cylv_um, cylinder.deviation_um + values.cylp_um];

@@ -13,17 +13,13 @@ pub(super) fn axis(points: &Points) -> Option<(Axis, f64)> {
     let mut axis = Axis::default();
     let (mut best, mut step, mut scale, mut deviation) = (f64::INFINITY, Axis::default(), f64::INFINITY, f64::NAN);
     for _ in 0..MOST_STEPS {
-        let mut normal = [[0.0; 5]; 5];
-        let (mut right, mut squares) = ([0.0; 5], 0.0);
-        for point in points.there() {
-            let (d, [g_x, g_y, g_u, g_v]) = points.with_slopes(point, &axis);
-            let row = [-g_x, -g_y, -g_u, -g_v, 1.0];
-            for i in 0..5 {
-                (0..5).for_each(|j| normal[i][j] += row[i] * row[j]);
-                right[i] += row[i] * d;
-            }
-            squares += d * d;
-        }
+        let sums = points.held.squares(&points.frame(&axis));
+        // Row by row from the diagonal on.
+        let sum = |i: usize, j: usize| sums[i * 6 - i * (i + 1) / 2 + j];
+        let normal: [[f64; 5]; 5] =
+            std::array::from_fn(|i| std::array::from_fn(|j| if i <= j { sum(i, j) } else { sum(j, i) }));
+        let right: [f64; 5] = std::array::from_fn(|i| sum(i, 5));
+        let mut squares = sum(5, 5);
         squares -= right[4] * right[4] / normal[4][4];
         // 1e-9: a sum of squares is flat where it is least; what rounds there is no reason to go back.
         if squares > best * (1.0 + 1e-9) {

@@ -2,6 +2,7 @@
 //!
 //! The cylinders belong to the points (R + r)(cos θ, sin θ) at z themselves, at right angles to the tilted axis.
 
+mod columns;
 mod determine;
 mod disturbed;
 mod least_squares;

@@ -2,7 +2,10 @@
 
 use std::sync::OnceLock;
 
-use super::{Cylinder, Values};
+use super::{
+    Cylinder, Values,
+    columns::{About, Columns},
+};
 use crate::{near::Course, roundness::Angles};
 
 /// One circle of a wall.
@@ -27,12 +30,15 @@ pub struct Points {
     pub(super) middle_mm: f64,
     pub(super) half_um: f64,
     /// f, w and ζ; w is NaN where the point is missing.
-    held: Vec<[f64; 4]>,
+    pub(super) held: Columns,
     /// The largest |w|.
     pub(super) span_um: f64,
     /// LSCY, from which all others are sought, once it is known: its axis and radius deviation.
     pub(super) least_squares: OnceLock<Option<(Axis, f64)>>,
 }
+
+/// A point: sine and cosine of its angle, z in mm, radial deviation in µm.
+pub(super) type Place = ((f64, f64), f64, f64);
 
 /// An axis inside: x and y midway and how far it leans until the end, in µm.
 pub(super) type Axis = [f64; 4];
@@ -41,39 +47,40 @@ impl Points {
     /// Points (angle in rad, z in mm, radial deviation in µm) about a nominal radius (positive).
     #[must_use]
     pub fn new(radius_mm: f64, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
-        let points = points.into_iter().map(|(angle, z, form)| (angle.sin_cos(), z, form));
-        Self::of(radius_mm, points.collect())
+        let points: Vec<_> = points.into_iter().map(|(angle, z, form)| (angle.sin_cos(), z, form)).collect();
+        Self::of(radius_mm, points.len(), points.iter().copied())
     }
 
     /// The points of sections, one after the other.
     #[must_use]
     pub fn of_sections(radius_mm: f64, sections: &[Section]) -> Self {
-        let mut points = Vec::new();
-        for section in sections {
-            let directions = section.angles.sin_cos();
-            points.extend(directions.zip(section.form_um).map(|(direction, form)| (direction, section.z_mm, *form)));
-        }
-        Self::of(radius_mm, points)
+        let points = sections.iter().flat_map(|section| {
+            let directions = section.angles.sin_cos().zip(section.form_um);
+            directions.map(|(direction, form)| (direction, section.z_mm, *form))
+        });
+        Self::of(radius_mm, sections.iter().map(|section| section.form_um.len()).sum(), points)
     }
 
-    pub(super) fn of(radius_mm: f64, points: Vec<((f64, f64), f64, f64)>) -> Self {
+    /// So many points, looked at twice.
+    pub(super) fn of(radius_mm: f64, count: usize, points: impl Iterator<Item = Place> + Clone) -> Self {
         let radius = 1e3 * radius_mm;
         let there = |z: f64, form: f64| z.is_finite() && form.is_finite();
-        let heights = points.iter().filter(|(_, z, form)| there(*z, *form)).map(|(_, z, _)| *z);
+        let heights = points.clone().filter(|(_, z, form)| there(*z, *form)).map(|(_, z, _)| z);
         let (bottom, top) =
             heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
         let (middle_mm, half_mm) = (0.5 * (bottom + top), 0.5 * (top - bottom));
-        let held = points.into_iter().map(|((sin, cos), z, form)| {
+        let (mut held, mut span_um) = (Columns::default(), 0.0_f64);
+        held.reserve(count);
+        for ((sin, cos), z, form) in points {
             let scale = 1.0 + form / radius;
             let level = form + form * form / (2.0 * radius);
             if there(z, form) {
-                [scale * cos, scale * sin, level, (z - middle_mm) / half_mm]
+                span_um = span_um.max(level.abs());
+                held.push([scale * cos, scale * sin, level, (z - middle_mm) / half_mm]);
             } else {
-                [0.0, 0.0, f64::NAN, 0.0]
+                held.push([0.0, 0.0, f64::NAN, 0.0]);
             }
-        });
-        let held: Vec<[f64; 4]> = held.collect();
-        let span_um = held.iter().map(|held| held[2].abs()).fold(0.0, f64::max);
+        }
         let least_squares = OnceLock::new();
         Self { radius_um: radius, middle_mm, half_um: 1e3 * half_mm, held, span_um, least_squares }
     }
@@ -87,7 +94,7 @@ impl Points {
     /// Whether there is no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.held.is_empty()
+        self.len() == 0
     }
 
     /// Share of the points that are there.
@@ -97,18 +104,19 @@ impl Points {
     }
 
     pub(super) fn there(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.len()).filter(|point| !self.held[*point][2].is_nan())
+        let levels = self.held.levels().iter().enumerate();
+        levels.filter(|(_, level)| !level.is_nan()).map(|(point, _)| point)
     }
 
     /// Deviation of each point from a cylinder, at right angles to its axis, outward positive; NaN where it is missing.
-    pub fn deviations_um<'a>(&'a self, cylinder: &Cylinder) -> impl Iterator<Item = f64> + 'a {
+    pub fn deviations_um(&self, cylinder: &Cylinder) -> impl Iterator<Item = f64> + use<> {
         let lean = 1e-6 * self.half_um;
         let moved = 1e3 * (self.middle_mm - cylinder.z_mm) * 1e-6;
         let [x, y] = [(cylinder.x_um, cylinder.slope_x_urad), (cylinder.y_um, cylinder.slope_y_urad)]
             .map(|(at, slope)| at + slope * moved);
         let axis = [x, y, cylinder.slope_x_urad * lean, cylinder.slope_y_urad * lean];
         let deviation = cylinder.deviation_um;
-        (0..self.len()).map(move |point| self.deviation(point, &axis) - deviation)
+        self.held.deviations(&self.frame(&axis)).into_iter().map(move |distance| distance - deviation)
     }
 
     /// CYLt, CYLp, CYLv and CYLq about a cylinder; NaN where no point is there.
@@ -117,28 +125,14 @@ impl Points {
         Course::of(self.deviations_um(cylinder)).into()
     }
 
-    /// Distance from an axis less R.
-    pub(super) fn deviation(&self, point: usize, axis: &Axis) -> f64 {
-        self.with_slopes(point, axis).0
+    /// What distances from an axis need of it.
+    pub(super) fn frame(&self, axis: &Axis) -> About {
+        About::new(axis, self.radius_um, self.half_um)
     }
 
     /// Distance from an axis less R, and its derivatives by the axis.
     pub(super) fn with_slopes(&self, point: usize, axis: &Axis) -> (f64, Axis) {
-        let [u, v, level, zeta] = self.held[point];
-        let radius = self.radius_um;
-        let [a, b] = [axis[2] / self.half_um, axis[3] / self.half_um];
-        let length = 1.0 + a * a + b * b;
-        let [x, y] = [axis[0] + axis[2] * zeta, axis[1] + axis[3] * zeta];
-        let [q_x, q_y] = [radius * u - x, radius * v - y];
-        let along = a * q_x + b * q_y;
-        let lifted = level - x * u - y * v + (x * x + y * y - along * along / length) / (2.0 * radius);
-        let stretch = (1.0 + 2.0 * lifted / radius).max(f64::MIN_POSITIVE).sqrt();
-        let across = |q: f64, slope: f64| (slope * along / length - q) / (radius * stretch);
-        let turned =
-            |q: f64, slope: f64| along * (slope * along / length - q) / (radius * stretch * length * self.half_um);
-        let [s_x, s_y] = [across(q_x, a), across(q_y, b)];
-        let slopes = [s_x, s_y, s_x * zeta + turned(q_x, a), s_y * zeta + turned(q_y, b)];
-        (2.0 * lifted / (1.0 + stretch), slopes)
+        self.frame(axis).with_slopes(self.held.at(point))
     }
 
     /// Deviations that differ by less are equal: rounding of coordinates.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Cylinder, Points, Reference, Touch, Undetermined, points::Axis};
+use super::{Cylinder, Points, Reference, Touch, Undetermined, columns::Columns, points::Axis};
 use runout_numerics::{
     chebyshev::{Chebyshev, Contact, Optimum},
     cloud::Cloud,
@@ -32,7 +32,8 @@ pub(super) fn search(points: &Points, start: Axis, reference: Reference) -> Resu
         Reference::MinimumCircumscribed => [1.0 + SHARE, SHARE],
         Reference::MinimumZone | Reference::LeastSquares => [1.0, 1.0],
     };
-    let mut search = Search { points, weights, chosen: vec![], chebyshev: Chebyshev::new(true, true) };
+    let (held, chebyshev) = (Columns::default(), Chebyshev::new(true, true));
+    let mut search = Search { points, weights, chosen: vec![], held, deviations: vec![], chebyshev };
     let tolerance = points.tolerance();
     let (_, at_start) = search.grow(&start, f64::INFINITY, f64::NEG_INFINITY);
     let mut axis = start;
@@ -85,8 +86,11 @@ struct Search<'a> {
     points: &'a Points,
     /// Of the highest and of the lowest deviation in the merit, weights[0] · high − weights[1] · low.
     weights: [f64; 2],
-    /// Points that may touch.
+    /// Points that may touch, and these points themselves.
     chosen: Vec<usize>,
+    held: Columns,
+    /// Of all points, about the axis last looked at; its memory is used again.
+    deviations: Vec<f64>,
     chebyshev: Chebyshev<4, 6>,
 }
 
@@ -95,9 +99,10 @@ impl Search<'_> {
     /// any was new, and the merit of all points.
     fn grow(&mut self, axis: &Axis, low: f64, high: f64) -> (bool, f64) {
         let before = self.chosen.len();
-        let deviations: Vec<f64> = (0..self.points.len()).map(|point| self.points.deviation(point, axis)).collect();
+        let mut deviations = std::mem::take(&mut self.deviations);
+        self.points.held.fill(&self.points.frame(axis), &mut deviations);
         if before == 0 && deviations.len() <= FEW {
-            self.chosen.extend(self.points.there());
+            self.points.there().for_each(|point| self.choose(point));
         }
         let length = if deviations.len() <= FEW { deviations.len() } else { deviations.len().div_ceil(BLOCKS).max(4) };
         let (mut lowest_of_all, mut highest_of_all) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -117,16 +122,22 @@ impl Search<'_> {
             let highest = highest.1.filter(|_| highest.0 > high || before == 0);
             for point in [highest, lowest].into_iter().flatten() {
                 if !self.chosen.contains(&point) {
-                    self.chosen.push(point);
+                    self.choose(point);
                 }
             }
         }
+        self.deviations = deviations;
         (self.chosen.len() > before, self.weights[0] * highest_of_all - self.weights[1] * lowest_of_all)
+    }
+
+    fn choose(&mut self, point: usize) {
+        self.chosen.push(point);
+        self.held.push(self.points.held.at(point));
     }
 
     /// Lowest and highest deviation of the chosen points.
     fn extremes(&self, axis: &Axis) -> (f64, f64) {
-        let deviations = self.chosen.iter().map(|point| self.points.deviation(*point, axis));
+        let deviations = self.held.deviations(&self.points.frame(axis)).into_iter();
         deviations.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)))
     }
 
@@ -151,8 +162,9 @@ impl Search<'_> {
 
     fn linearise(&self, axis: &Axis, cloud: &mut Cloud<4>) {
         cloud.clear();
-        for point in &self.chosen {
-            let (deviation, slopes) = self.points.with_slopes(*point, axis);
+        let frame = self.points.frame(axis);
+        for point in 0..self.held.len() {
+            let (deviation, slopes) = frame.with_slopes(self.held.at(point));
             cloud.push(slopes.map(|slope| -slope), deviation);
         }
     }
@@ -184,8 +196,8 @@ impl Search<'_> {
             if merit - better < 0.75 * promised {
                 // The same slopes with the levels that the step turned out to have.
                 corrected.clear();
-                for (index, point) in self.chosen.iter().enumerate() {
-                    let level = self.points.deviation(*point, &next) + cloud.level_under(index, &optimum.place);
+                for (index, deviation) in self.held.deviations(&self.points.frame(&next)).into_iter().enumerate() {
+                    let level = deviation + cloud.level_under(index, &optimum.place);
                     corrected.push(cloud.features(index), level);
                 }
                 if let Some(second) = self.linear(&corrected, reach) {

@@ -2,7 +2,7 @@
 
 use super::{Circle, Points, Reference, Undetermined, Values, circumscribed, least_squares, search};
 use crate::near::Course;
-use runout_numerics::{chebyshev::Chebyshev, lanes::vectorised};
+use runout_numerics::lanes::vectorised;
 
 impl Points {
     /// The reference circle as [`determine`](Self::determine) finds it, without the reason where there is none.
@@ -36,29 +36,7 @@ impl Points {
         }
     }
 
-    /// Values about the minimum zone's centre, the centre, and lowest and highest deviation from the nominal radius. `near`
-    /// is a place near to it: the heights' shares in the zone are those there, which errs by deviation²/R times what the place
-    /// moves; for profiles that are drawn.
-    pub(super) fn zone_near(
-        &self,
-        near: [f64; 2],
-        chebyshev: &mut Chebyshev<2, 4>,
-    ) -> Option<(Values, [f64; 2], [f64; 2])> {
-        let cost = search::zone_slopes(self, &near);
-        let reach = self.radius_um + self.span_um;
-        let limits = near.map(|near| (near - reach, near + reach));
-        let optimum = chebyshev.solve(&self.cloud, &cost, &limits, self.tolerance())?;
-        let place = optimum.place;
-        let (low, high) = self.cloud.extremes(0..self.len(), &place);
-        let common = self.common(&place);
-        let [low, high] = [low, high].map(|height| self.deviation(height + common));
-        let half = 0.5 * (high - low);
-        let values =
-            Values { ront_um: high - low, ronp_um: half, ronv_um: half, ronq_um: f64::NAN, points: self.len() };
-        Some((values, place, [low, high]))
-    }
-
-    /// The same of the first `count` points for RONq, and of all for the others.
+    /// Values about a circle, RONq of the first `count` points, the others of all.
     pub(super) fn values_of_first(&self, circle: &Circle, count: usize) -> Values {
         let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
         let common = self.common(&place);

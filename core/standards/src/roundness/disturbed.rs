@@ -1,11 +1,13 @@
 //! A profile whose errors are drawn again and again.
 
-use super::{Angles, Points, Reference, Values};
+use super::{
+    Angles, FixedCentre, Points, Reference, Values,
+    warm::{Found, Warm},
+};
 use crate::{
-    near::{Course, Near, Ranked},
+    near::{Course, Near},
     uncertainty::DrawnErrors,
 };
-use runout_numerics::{chebyshev::Chebyshev, lanes::product};
 
 /// A profile about one reference circle. Only points that may come to touch it are looked at, where that is certain.
 #[derive(Debug, Clone)]
@@ -20,45 +22,10 @@ pub struct Disturbed<'a> {
     centre_um: [f64; 2],
     about: Values,
     /// Where errors move LSCI by nothing.
-    fixed: Option<Fixed>,
-    zone: Chebyshev<2, 4>,
+    fixed: Option<FixedCentre>,
+    search: Option<Warm>,
     points: Points,
     drawn_um: Vec<f64>,
-}
-
-/// Deviations about LSCI.
-#[derive(Debug, Clone)]
-struct Fixed {
-    deviations: Vec<f64>,
-    squares: f64,
-    highest: Ranked,
-    /// Of the deviations with the other sign.
-    lowest: Ranked,
-}
-
-impl Fixed {
-    fn new(deviations: Vec<f64>) -> Self {
-        let highest = Ranked::new(deviations.iter().copied());
-        let lowest = Ranked::new(deviations.iter().map(|deviation| -deviation));
-        let squares = Course::of(deviations.iter().copied()).squares;
-        Self { deviations, squares, highest, lowest }
-    }
-
-    fn values(&self, drawn: &DrawnErrors) -> Values {
-        let all = &self.deviations[..];
-        let high = self.highest.highest(drawn.largest_um(), |point| all[point] + drawn.at(point));
-        let low = self.lowest.highest(drawn.largest_um(), |point| -(all[point] + drawn.at(point)));
-        let [errors, others] = drawn.parts();
-        let course = if let (Some((high, _)), Some((low, _))) = (high, low) {
-            let crossed = product(all, errors) + product(&all[errors.len()..], others);
-            let squares = self.squares + 2.0 * crossed + drawn.squares_um2();
-            Course { low: -low, high, squares, points: all.len() }
-        } else {
-            let (first, rest) = all.split_at(errors.len());
-            Course::with_errors(first, errors).and(Course::with_errors(rest, others))
-        };
-        course.into()
-    }
 }
 
 impl<'a> Disturbed<'a> {
@@ -89,8 +56,8 @@ impl<'a> Disturbed<'a> {
             near,
             centre_um: [circle.x_um, circle.y_um],
             about,
-            fixed: stays.then(|| Fixed::new(deviations)),
-            zone: Chebyshev::new(true, true),
+            fixed: stays.then(|| FixedCentre::new(deviations)),
+            search: Warm::new(reference),
             points,
             drawn_um: Vec::new(),
         })
@@ -107,7 +74,7 @@ impl<'a> Disturbed<'a> {
         match (self.reference, &self.fixed) {
             (Reference::LeastSquares, Some(fixed)) => Some(fixed.values(drawn)),
             (Reference::LeastSquares, None) => self.of_all(drawn),
-            _ => self.of_near(drawn).or_else(|| self.of_all(drawn)),
+            _ => self.of_near(drawn).or_else(|| self.anew(drawn)).or_else(|| self.of_all(drawn)),
         }
     }
 
@@ -116,16 +83,18 @@ impl<'a> Disturbed<'a> {
         self.drawn_um.clear();
         self.drawn_um.extend(self.near.points.iter().map(|point| self.form_um[*point] + drawn.at(*point)));
         self.points.set_profile(&self.near_angles, &self.drawn_um, self.radius_mm);
-        let (values, place, ends) = if self.reference == Reference::MinimumZone {
-            self.points.zone_near(self.centre_um, &mut self.zone)?
-        } else {
-            let circle = self.points.reference(self.reference)?;
-            let values = self.points.values(&circle);
-            let ends = [circle.deviation_um - values.ronv_um, circle.deviation_um + values.ronp_um];
-            (values, [circle.x_um, circle.y_um], ends)
-        };
+        let Found { values, place, ends_um } = self.search.as_mut()?.values(&self.points, self.centre_um)?;
         let moved = (place[0] - self.centre_um[0]).hypot(place[1] - self.centre_um[1]);
-        self.near.suffice(ends, moved, drawn.largest_um()).then_some(values)
+        self.near.suffice(ends_um, moved, drawn.largest_um()).then_some(values)
+    }
+
+    /// The same, sought anew.
+    fn anew(&mut self, drawn: &DrawnErrors) -> Option<Values> {
+        let circle = self.points.reference(self.reference)?;
+        let values = self.points.values(&circle);
+        let ends_um = [circle.deviation_um - values.ronv_um, circle.deviation_um + values.ronp_um];
+        let moved = (circle.x_um - self.centre_um[0]).hypot(circle.y_um - self.centre_um[1]);
+        self.near.suffice(ends_um, moved, drawn.largest_um()).then_some(values)
     }
 
     fn of_all(&mut self, drawn: &DrawnErrors) -> Option<Values> {

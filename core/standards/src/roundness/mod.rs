@@ -19,14 +19,17 @@ mod circumscribed;
 mod determine;
 mod disturbed;
 mod equal_heights;
+mod fixed_centre;
 mod least_squares;
 mod points;
 mod search;
 mod series;
+mod warm;
 
 use super::near::Course;
 pub use super::reference::{Reference, Undetermined};
 pub use disturbed::Disturbed;
+pub use fixed_centre::FixedCentre;
 pub use points::{Angles, Points};
 pub use series::{Series, between_angles};
 

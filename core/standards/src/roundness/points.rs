@@ -34,7 +34,7 @@ impl Angles {
     }
 
     /// Sine and cosine of each.
-    pub fn sin_cos(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+    pub fn sin_cos(&self) -> impl Iterator<Item = (f64, f64)> + Clone + '_ {
         self.sin.iter().copied().zip(self.cos.iter().copied())
     }
 

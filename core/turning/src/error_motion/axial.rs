@@ -9,8 +9,8 @@
 //! how the face was clamped, and is left out.
 
 use super::{
-    ErrorMotion, FINER, RESIDUAL, SAID, STANDARD, between_setups, centre_of_chart, described, of_all_turns, over,
-    polar::Synchronous, rms_about_mean, rms_across, root_mean_square, unit, widest, without_noise,
+    ErrorMotion, FINER, Measure, RESIDUAL, SAID, STANDARD, between_setups, centre_of_chart, described, of_all_turns,
+    over, polar::Synchronous, rms_about_mean, rms_across, root_mean_square, unit, widest, without_noise,
 };
 use crate::spread::{Direction, Spread};
 use runout_standards::{
@@ -45,8 +45,7 @@ impl ErrorMotion<'_> {
         let drawn = plot.over_angle(&Angles::shared(self.angles));
         let found = [ront_lsci_um(&drawn), rms_about_mean(&drawn)];
         let seed = uncertainty::seed(&[self.station, &self.id(direction), kind]);
-        let measure = |plot: &[f64]| [ront_lsci_um(plot), rms_about_mean(plot)];
-        let known = without_noise(found, &drawn, &plot.variance, plot.band[0], seed, measure);
+        let known = without_noise(found, &drawn, &plot.variance, plot.band[0], seed, &Measure::AboutFixedCentre);
         let between = ront_lsci_um(&plot.over_angle(&Angles::shared(FINER * self.angles))) - found[0];
         let [range, rms] = match known {
             Some([(range_share, range), (rms_share, rms)]) => {

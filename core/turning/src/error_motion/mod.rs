@@ -35,7 +35,7 @@ use polar::{Motion, Synchronous, seen_from};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
-    roundness::{Angles, Points, Reference, ront_lsci_um},
+    roundness::{self, Angles, FixedCentre, Points, Reference, ront_lsci_um},
     uncertainty::{self, DRAWS, Errors, NORMAL_95, Uncertainty, extreme, stand_in, student_95},
 };
 
@@ -176,17 +176,15 @@ impl ErrorMotion<'_> {
         // Draws on fewer angles tell the error as well, not the range: its ends lie between those angles.
         let between = ront_lsci_um(&finely) - ront_lsci_um(&seen);
         let seed = uncertainty::seed(&[self.station, id(direction), centre.symbol()]);
-        let values = |plot: &[f64]| {
-            if centre.is_linear() {
-                return [ront_lsci_um(plot), rms_about_mean(plot)];
-            }
+        let about_moved = |plot: &[f64]| {
             let place = centre.of(&angles, plot, &mut points.borrow_mut()).unwrap_or_default();
             let seen = seen_from(place, &angles, plot);
             [ront_lsci_um(&seen), rms_about_mean(&seen)]
         };
+        let values = if centre.is_linear() { Measure::AboutFixedCentre } else { Measure::Of(&about_moved) };
         let found = [ront_lsci_um(&seen), rms_about_mean(&seen)];
         let [(range, range_share, range_known), (rms, rms_share, rms_known)] =
-            match without_noise(found, &seen, &plot.variance, 2, seed, values) {
+            match without_noise(found, &seen, &plot.variance, 2, seed, &values) {
                 Some(known) => {
                     let mut found = found.into_iter();
                     known
@@ -394,6 +392,14 @@ impl ErrorMotion<'_> {
     }
 }
 
+/// How two values of a plot are found.
+enum Measure<'a> {
+    /// Peak to valley and root mean square, which errors change without moving the centre.
+    AboutFixedCentre,
+    /// By this.
+    Of(&'a dyn Fn(&[f64]) -> [f64; 2]),
+}
+
 /// What noise adds to two values of a plot in the mean, and the uncertainty of each without it; `None` where no variance is
 /// known. Tilt has noise of all orders and little motion above the low ones, so that noise adds up.
 fn without_noise(
@@ -402,7 +408,7 @@ fn without_noise(
     variance: &[f64],
     lowest: usize,
     seed: u64,
-    values: impl Fn(&[f64]) -> [f64; 2],
+    measure: &Measure,
 ) -> Option<[(f64, Uncertainty); 2]> {
     if plot.len() < 2 {
         return None;
@@ -416,15 +422,26 @@ fn without_noise(
     let noise: Vec<Complex64> = harmonics.iter().zip(weights).map(|(value, weight)| value * (1.0 - weight)).collect();
     let mut likely = plot.to_vec();
     likely.iter_mut().zip(fourier.synthesise(noise)).for_each(|(value, noise)| *value -= noise);
-    let mut drawn = likely.clone();
-    let (first, second): (Vec<f64>, Vec<f64>) = (0..DRAWS)
-        .map(|_| {
-            errors.draw(&mut fourier, &likely, &mut drawn);
-            let [first, second] = values(&drawn);
-            (first, second)
-        })
-        .unzip();
-    let about = values(&likely);
+    let (about, drawn): ([f64; 2], Vec<[f64; 2]>) = match measure {
+        Measure::AboutFixedCentre => {
+            // Errors of orders from 1 on leave the mean.
+            let mean = likely.iter().sum::<f64>() / likely.len() as f64;
+            likely.iter_mut().for_each(|value| *value -= mean);
+            let plot = FixedCentre::new(likely);
+            let both = |values: roundness::Values| [values.ront_um, values.ronq_um];
+            (both(plot.about()), (0..DRAWS).map(|_| both(plot.values(&errors.turned(&mut fourier)))).collect())
+        }
+        Measure::Of(values) => {
+            let mut drawn = likely.clone();
+            let mut next = || {
+                errors.draw(&mut fourier, &likely, &mut drawn);
+                values(&drawn)
+            };
+            let all = (0..DRAWS).map(|_| next()).collect();
+            (values(&likely), all)
+        }
+    };
+    let (first, second) = drawn.into_iter().map(|[first, second]| (first, second)).unzip();
     Some([extreme(found[0], about[0], first)?, extreme(found[1], about[1], second)?])
 }
 
@@ -452,14 +469,19 @@ fn widest(spread: &Spread, direction: Direction) -> f64 {
 /// on fewer, and then straight from one angle to the next.
 fn of_all_turns(plot: &[f64], (low, high): (&[f64], &[f64])) -> (f64, f64) {
     let finer = plot.len() / low.len().max(1);
-    let at = |turns: &[f64], point: usize| {
-        let (before, along) = (point / finer, (point % finer) as f64 / finer as f64);
-        turns[before] + along * (turns[(before + 1) % turns.len()] - turns[before])
-    };
-    let turns = plot.iter().take(finer * low.len()).enumerate();
-    turns.fold((f64::INFINITY, f64::NEG_INFINITY), |(inner, outer), (point, value)| {
-        (inner.min(value + at(low, point)), outer.max(value + at(high, point)))
-    })
+    let (mut inner, mut outer) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (index, plot) in plot.chunks_exact(finer.max(1)).take(low.len()).enumerate() {
+        let next = (index + 1) % low.len();
+        let step = |turns: &[f64]| (turns[next] - turns[index]) / finer as f64;
+        let (low_step, high_step) = (step(low), step(high));
+        let (mut lowest, mut highest) = (low[index], high[index]);
+        for value in plot {
+            inner = inner.min(value + lowest);
+            outer = outer.max(value + highest);
+            (lowest, highest) = (lowest + low_step, highest + high_step);
+        }
+    }
+    (inner, outer)
 }
 
 /// Root mean square of a setup's turns about their mean; 0 where it is not known.

@@ -1,6 +1,9 @@
 //! Error motion to look at: the polar plot of all turns, and the spectrum of what repeats and what does not.
 
-use super::{CENTRE, ErrorMotion, directions, polar::{Synchronous, seen_from}};
+use super::{
+    CENTRE, ErrorMotion, directions,
+    polar::{Synchronous, seen_from},
+};
 use crate::{
     profile::Profile,
     spread::{Direction, Spread},

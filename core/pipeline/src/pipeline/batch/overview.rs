@@ -64,7 +64,8 @@ fn series(report: &BatchReport) -> Option<Part> {
         let numbers = numbers.map(|number| number.map_or_else(String::new, |number| significant(number, DIGITS)));
         std::iter::once(series.series.clone()).chain(numbers).chain([series.signals.to_string()]).collect()
     };
-    let header = ["value", "mean", "lower control limit", "upper control limit", "mean moving range", "its limit", "signals"];
+    let header =
+        ["value", "mean", "lower control limit", "upper control limit", "mean moving range", "its limit", "signals"];
     table(1, &header, sorted(report).into_iter().map(row).collect())
 }
 
@@ -78,8 +79,9 @@ fn signals(report: &BatchReport) -> Option<Part> {
 }
 
 fn failed(report: &BatchReport) -> Option<Part> {
-    let rows = report.failed.iter().map(|one| {
-        vec![one.recording.clone(), one.message.clone(), one.help.clone().unwrap_or_default()]
-    });
+    let rows = report
+        .failed
+        .iter()
+        .map(|one| vec![one.recording.clone(), one.message.clone(), one.help.clone().unwrap_or_default()]);
     table(3, &["recording", "error", "what to do"], rows.collect())
 }
