@@ -191,7 +191,12 @@ fn drive(program: &Path, inputs: u64, until: Option<Instant>, seed: u64) -> Outc
             fs::write(&kept, &input).map_err(words)?;
             let said = fs::read(&said).map_err(words)?;
             let said = String::from_utf8_lossy(&said[..said.len().min(LONGEST_SAID)]).escape_debug().to_string();
-            say(&format!("{name}: input {}, runout {} ({})\n  {said}", count.inputs, command.join(" "), kept.display()));
+            say(&format!(
+                "{name}: input {}, runout {} ({})\n  {said}",
+                count.inputs,
+                command.join(" "),
+                kept.display()
+            ));
         }
     }
     Ok(count)

@@ -154,7 +154,9 @@ impl Test {
         match shown {
             shown if shown == *old => Ok(0),
             shown if shown == *new => Ok(1),
-            _ if left.keys().any(|path| path.extension().is_some_and(|extension| extension == "journal")) => Ok(JOURNAL),
+            _ if left.keys().any(|path| path.extension().is_some_and(|extension| extension == "journal")) => {
+                Ok(JOURNAL)
+            }
             _ => Err(format!("old and new files stand side by side in {}", self.folder.display())),
         }
     }

@@ -90,7 +90,11 @@ fn numbers_that_no_rig_has_are_refused_at_their_keys() {
             assert_eq!(ran.status, 2, "{key}={number}: {}{}", ran.stdout, ran.stderr);
             let flat = ran.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
             let radius = key == "rig.part_radius_mm" && flat.contains("must be above 0 mm");
-            assert!((flat.contains(word) || radius) && flat.contains(&format!("--set {key}=")), "{key}: {}", ran.stderr);
+            assert!(
+                (flat.contains(word) || radius) && flat.contains(&format!("--set {key}=")),
+                "{key}: {}",
+                ran.stderr
+            );
         }
     }
     let ran = folder.run(&["check", "pipeline.toml", "--set", "title=\"a\\u0000b\""]);

@@ -262,8 +262,10 @@ impl RigConfig {
             if sensor.id.is_empty() || !ids.insert(sensor.id.clone()) {
                 return Err(fault("id", format!("sensor ids must differ and not be empty, found `{}`", sensor.id)));
             }
-            within(sensor.angle_deg, MOST_DEG).map_err(|problem| fault("angle_deg", format!("a sensor's angle {problem}°")))?;
-            within(sensor.z_mm, MOST_MM).map_err(|problem| fault("z_mm", format!("a sensor's axial position {problem} mm")))?;
+            within(sensor.angle_deg, MOST_DEG)
+                .map_err(|problem| fault("angle_deg", format!("a sensor's angle {problem}°")))?;
+            within(sensor.z_mm, MOST_MM)
+                .map_err(|problem| fault("z_mm", format!("a sensor's axial position {problem} mm")))?;
             if sensor.section.is_empty() {
                 return Err(fault("section", "a section's id must not be empty".into()));
             }
@@ -321,7 +323,8 @@ impl RigConfig {
             if setup.id == "truth" || setup.id.contains('/') {
                 return Err(fault("id", format!("`{}` cannot name a setup: `truth` and `/` are reserved", setup.id)));
             }
-            within(setup.part_deg, MOST_DEG).map_err(|problem| fault("part_deg", format!("the part's angle {problem}°")))?;
+            within(setup.part_deg, MOST_DEG)
+                .map_err(|problem| fault("part_deg", format!("the part's angle {problem}°")))?;
             let of_sensors = within(setup.sensors_deg, MOST_DEG);
             of_sensors.map_err(|problem| fault("sensors_deg", format!("the sensors' angle {problem}°")))?;
             setups.push(Setup {
@@ -338,7 +341,11 @@ impl RigConfig {
 
 /// Refuses a number whose size is not at most this, or that is none.
 fn within(number: f64, most: f64) -> Result<(), String> {
-    if number.abs() <= most { Ok(()) } else { Err(format!("must be a number from −{most} to {most}, found {number:e}")) }
+    if number.abs() <= most {
+        Ok(())
+    } else {
+        Err(format!("must be a number from −{most} to {most}, found {number:e}"))
+    }
 }
 
 impl SensorConfig {

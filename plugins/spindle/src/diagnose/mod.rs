@@ -279,8 +279,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
             !model.traced.data.iter().any(has)
         })
     };
-    let left_out =
-        |place: &data::Place| no_line(place) || steady(place) || (slipped(place) && !of_turns(model, place));
+    let left_out = |place: &data::Place| no_line(place) || steady(place) || (slipped(place) && !of_turns(model, place));
     let places = model.traced.places.iter().enumerate().filter(|(_, place)| left_out(place));
     let left_out = places.map(|(index, _)| index).chain(settings.left_out.iter().copied()).collect();
     // What single turns show for certain leaves room for what only averages show.

@@ -88,7 +88,17 @@ impl Solved {
         // A loop holds several fits of all stations: what is not asked for again goes.
         operators.weights = None;
         (corrected.covariance, corrected.scatter) = (None, None);
-        Self { operators, alterations: altered, propagation, with_angles, estimate, corrected, linear, whitened, residual }
+        Self {
+            operators,
+            alterations: altered,
+            propagation,
+            with_angles,
+            estimate,
+            corrected,
+            linear,
+            whitened,
+            residual,
+        }
     }
 }
 
