@@ -55,7 +55,8 @@ class SynchronousAverage:
 
     samples_per_rev: int
     """Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them, as far as the recording has
-    them."""
+    them. Above 4096, and far above the recording's own samples a turn (8 times, rounded up to a power of two), fewer are used,
+    with a warning."""
 
     speed_tolerance_percent: Union[float, None] = None
     """A mean speed that differs from the stated one by more is a warning, in percent. Default: 2.0."""

@@ -144,6 +144,10 @@ class Diagnose:
     known: Union[Sequence[Mapping[str, Any]], None] = None
     """Effects that are there and whose size is known: applied as they are, neither looked for nor fitted."""
 
+    memory_gb: Union[float, None] = None
+    """Memory that the loop may take, in GB: it holds all stations of recorded turns at once, and refuses those that need more.
+    Default: 4.0."""
+
     out: Union[str, None] = None
     """Folder for the exports of the final model: folders of exporters become this one, files go into it. Without it they go to
     `diagnosed/` in the folders of `run`'s exports."""

@@ -1,4 +1,4 @@
-//! Peak memory does not grow with the number of stations.
+//! Peak memory of a run does not grow with the number of stations; that of the closed loop grows as it says before it begins.
 //!
 //! One recording in a file, run from loading to exporting with 16 and with 48 stations. An allocator of this test's own
 //! counts every byte that Rust code holds; what libhdf5 holds shows in the process's resident memory.
@@ -20,6 +20,7 @@ use std::{
 use runout_core::pipeline::{
     Registry,
     config::{INCLUDE_KEY, Pipeline},
+    diagnose::diagnose,
     document::Sources,
     run::{Silent, run},
 };
@@ -126,7 +127,11 @@ fn registry() -> Registry {
 /// Writes a recording of so many stations.
 fn record(stations: usize, path: &Path) {
     let scenario = format!("{SCENARIO}\n[recording.stations]\ncount = {stations}\n");
-    let config: SpindleConfig = toml::from_str(&scenario).unwrap();
+    record_scenario(&scenario, path);
+}
+
+fn record_scenario(scenario: &str, path: &Path) {
+    let config: SpindleConfig = toml::from_str(scenario).unwrap();
     let simulator = simulator(&config).unwrap();
     let options = WriteOptions { deflate: None, ..WriteOptions::default() };
     write_measurement(&simulator.spindle_recording(), simulator.rig(), path, &options, &mut |_| {}).unwrap();
@@ -168,6 +173,43 @@ fn measure(stations: usize, folder: &Path) -> Peaks {
     least
 }
 
+/// The closed loop on so many stations of 128 samples a turn: most bytes of Rust code's at a time, or what it says against it.
+fn diagnosed(stations: usize, memory_gb: f64, folder: &Path) -> Result<usize, String> {
+    let small = SCENARIO
+        .replace("samples_per_rev = 4096", "samples_per_rev = 128")
+        .replace("revolutions = 6", "revolutions = 20");
+    let name = format!("small-{stations}");
+    let path = folder.join(format!("{name}.h5"));
+    if !path.exists() {
+        record_scenario(&format!("{small}\n[recording.stations]\ncount = {stations}\n"), &path);
+    }
+    let rig = small.split("[recording]").next().unwrap().replace("seed = 7", "").replace("geometry = \"linear\"", "");
+    let text = format!(
+        "{rig}\n[load]\nplugin = \"hdf5\"\npath = \"{name}.h5\"\n\
+         [[preprocess]]\nplugin = \"synchronous-average\"\nsamples_per_rev = 128\n\
+         [separate]\nplugin = \"harmonic-least-squares\"\n[evaluate]\nvalues = []\n\
+         [diagnose]\nmemory_gb = {memory_gb}\n[[export]]\nplugin = \"parquet\"\npath = \"{name}\"\n"
+    );
+    let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY).unwrap();
+    let pipeline = Pipeline::from_sources(&sources, &registry()).unwrap();
+    let before = HELD.load(Ordering::Relaxed);
+    PEAK.store(before, Ordering::Relaxed);
+    match diagnose(&pipeline, NonZeroUsize::new(1), &Silent) {
+        Ok(_) => Ok(PEAK.load(Ordering::Relaxed) - before),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// The loop holds all stations. What it asks for is enough, and at most three times what it takes.
+fn diagnose_takes_what_it_asks_for(folder: &Path) {
+    let refused = diagnosed(6, 1e-6, folder).unwrap_err();
+    let each_mb = refused.split(" some ").nth(1).and_then(|rest| rest.split(" MB each").next()).unwrap();
+    let asked = each_mb.parse::<f64>().unwrap() * 1e6;
+    let [few, many] = [6, 30].map(|stations| diagnosed(stations, 4.0, folder).unwrap());
+    let taken = many.saturating_sub(few) as f64 / 24.0;
+    assert!(taken <= asked && asked < 3.0 * taken, "{taken} bytes a station, {asked} asked for");
+}
+
 fn resident_peak() -> Option<usize> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -195,4 +237,6 @@ fn peak_memory_does_not_grow_with_stations() {
         assert!(grown < more * STATION_BYTES * 2 / 3, "{grown} bytes more resident with {more} stations more");
         assert!(many < RESIDENT_BYTES, "{many} bytes resident");
     }
+    // In the same test: what others hold at the same time would count.
+    diagnose_takes_what_it_asks_for(folder.path());
 }

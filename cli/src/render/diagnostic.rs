@@ -94,7 +94,10 @@ impl miette::Diagnostic for Shown<'_> {
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let span = &self.diagnostic.span;
-        Some(Box::new(std::iter::once(LabeledSpan::new(None, span.start, span.len()))))
+        let Diagnostic { source_text, span, .. } = self.diagnostic;
+        // A parser may stop within a character, at which nothing can be drawn.
+        let start = source_text.floor_char_boundary(span.start);
+        let end = source_text.ceil_char_boundary(span.end.max(start));
+        Some(Box::new(std::iter::once(LabeledSpan::new(None, start, end - start))))
     }
 }

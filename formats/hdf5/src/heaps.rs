@@ -58,6 +58,8 @@ struct Objects {
     /// Those with several links, which may lead in a circle, by their tokens' text: tokens cannot be hashed.
     known: HashSet<String>,
     visited: usize,
+    /// Whether some were left out.
+    cut: bool,
 }
 
 impl Objects {
@@ -67,6 +69,7 @@ impl Objects {
         // What the library cannot say is looked through.
         let _ = group.iter_visit_default(|name, link| {
             self.visited += 1;
+            self.cut |= self.visited > MOST_OBJECTS;
             if link.link_type != LinkType::Hard || self.visited > MOST_OBJECTS {
                 return Ok(());
             }
@@ -81,12 +84,20 @@ impl Objects {
             }
             Ok(())
         });
+        self.cut |= deepest == 0 && !groups.is_empty();
         if deepest > 0 {
             for group in groups.iter().filter_map(|name| group.group(name).ok()) {
                 self.extents(&group, deepest - 1, found);
             }
         }
     }
+}
+
+/// Where the numbers of all datasets lie; `None` where these are too many to be looked at.
+pub(crate) fn all_data(file: &File) -> Option<Vec<Range<u64>>> {
+    let (mut objects, mut found) = (Objects::default(), Vec::new());
+    objects.extents(file, DEEPEST, &mut found);
+    (!objects.cut).then_some(found)
 }
 
 /// Where the numbers of a dataset lie.

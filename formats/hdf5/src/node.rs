@@ -3,7 +3,7 @@
 use std::{fmt, path::Path, sync::Arc};
 
 use hdf5_metno::{
-    Attribute, Dataset, File, Group, H5Type, Location, LocationType,
+    Attribute, Dataset, Datatype, File, Group, H5Type, Location, LocationType,
     dataset::Layout,
     types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode},
 };
@@ -163,7 +163,9 @@ fn attribute(location: &Location, place: &Place, name: &str) -> Result<Option<At
 pub(crate) fn numbers(location: &Location, place: &Place, name: &str) -> Result<Option<Vec<f64>>> {
     let Some(attribute) = attribute(location, place, name)? else { return Ok(None) };
     let at = |problem: String| place.error(format!("attribute `{name}`: {problem}"));
-    let found = attribute.dtype().and_then(|dtype| dtype.to_descriptor()).map_err(|error| at(error.to_string()))?;
+    let stored = attribute.dtype().map_err(|error| at(error.to_string()))?;
+    let found = stored.to_descriptor().map_err(|error| at(error.to_string()))?;
+    standard(&stored, &found).map_err(at)?;
     if !matches!(found, TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) | TypeDescriptor::Float(_)) {
         return Err(at(format!("expected a number, found {}", type_name(&found))));
     }
@@ -234,7 +236,19 @@ pub(crate) fn needed<T>(value: Option<T>, place: &Place, name: &str) -> Result<T
 
 /// The type of a dataset's elements.
 pub(crate) fn element_type(dataset: &Dataset, place: &Place) -> Result<TypeDescriptor> {
-    dataset.dtype().and_then(|dtype| dtype.to_descriptor()).map_err(|error| place.error(error))
+    let stored = dataset.dtype().map_err(|error| place.error(error))?;
+    let found = stored.to_descriptor().map_err(|error| place.error(error))?;
+    standard(&stored, &found).map_err(|problem| place.error(problem))?;
+    Ok(found)
+}
+
+/// Refuses numbers that are like those of a standard type but for a part of it, as an exponent counted from elsewhere: no program
+/// writes such, and damage makes them.
+fn standard(stored: &Datatype, found: &TypeDescriptor) -> std::result::Result<(), String> {
+    if !is_number(found) || raw::is_standard(stored) {
+        return Ok(());
+    }
+    Err(format!("its type is none of the standard ones, though as long as {}: the file is damaged", type_name(found)))
 }
 
 /// Whether numbers of this type can be read as f64.
@@ -283,6 +297,11 @@ pub(crate) fn written_shape(dataset: &Dataset, place: &Place) -> Result<Vec<usiz
         }
         Layout::Contiguous | Layout::Compact => {
             let stored = dataset.storage_size();
+            // What lies in one piece cannot grow: the shape that was written takes it as a whole.
+            if stored > bytes as u64 && bytes > 0 && dataset.layout() == Layout::Contiguous {
+                let problem = format!("the shape {shape:?} was declared, but {stored} bytes were written, not {bytes}");
+                return Err(place.error(problem).help("the file is damaged: copy it again from where it was recorded"));
+            }
             if stored < bytes as u64 && dataset.dcpl().is_ok_and(|plist| plist.external().is_empty()) {
                 return incomplete(format!("only {stored} of {bytes} bytes were written"));
             }

@@ -6,11 +6,16 @@ use std::{
     sync::Once,
 };
 
-use hdf5_metno::{Group, plist::DatasetCreate, sync::sync};
+use hdf5_metno::{Datatype, Group, plist::DatasetCreate, sync::sync};
 use hdf5_metno_sys::{
     h5l::H5Lget_val,
     h5p::{H5P_DEFAULT, H5Pget_virtual_count, H5Pget_virtual_dsetname, H5Pget_virtual_filename},
     h5pl::H5PLset_loading_state,
+    h5t::{
+        H5T_IEEE_F32BE, H5T_IEEE_F32LE, H5T_IEEE_F64BE, H5T_IEEE_F64LE, H5T_STD_I8BE, H5T_STD_I8LE, H5T_STD_I16BE,
+        H5T_STD_I16LE, H5T_STD_I32BE, H5T_STD_I32LE, H5T_STD_I64BE, H5T_STD_I64LE, H5T_STD_U8BE, H5T_STD_U8LE,
+        H5T_STD_U16BE, H5T_STD_U16LE, H5T_STD_U32BE, H5T_STD_U32LE, H5T_STD_U64BE, H5T_STD_U64LE, H5Tequal,
+    },
 };
 
 /// Bytes of a link's value: names of files and paths are shorter.
@@ -25,6 +30,36 @@ pub(crate) fn forbid_plugins() {
     ONCE.call_once(|| {
         sync(|| unsafe { H5PLset_loading_state(std::ptr::null_mut()) });
     });
+}
+
+/// Whether a type is a standard one of numbers, in either order of bytes.
+pub(crate) fn is_standard(stored: &Datatype) -> bool {
+    let standard = sync(|| {
+        [
+            *H5T_IEEE_F32LE,
+            *H5T_IEEE_F32BE,
+            *H5T_IEEE_F64LE,
+            *H5T_IEEE_F64BE,
+            *H5T_STD_I8LE,
+            *H5T_STD_I8BE,
+            *H5T_STD_I16LE,
+            *H5T_STD_I16BE,
+            *H5T_STD_I32LE,
+            *H5T_STD_I32BE,
+            *H5T_STD_I64LE,
+            *H5T_STD_I64BE,
+            *H5T_STD_U8LE,
+            *H5T_STD_U8BE,
+            *H5T_STD_U16LE,
+            *H5T_STD_U16BE,
+            *H5T_STD_U32LE,
+            *H5T_STD_U32BE,
+            *H5T_STD_U64LE,
+            *H5T_STD_U64BE,
+        ]
+    });
+    // SAFETY: both are types that live, those of the library as long as it; the call is guarded by its lock.
+    standard.into_iter().any(|standard| sync(|| unsafe { H5Tequal(stored.id(), standard) }) > 0)
 }
 
 /// The value of a soft or external link: a path; or flags, a file and a path, each ended by NUL (HDF5 reference, H5Lget_val and

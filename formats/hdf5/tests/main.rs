@@ -8,6 +8,7 @@ mod foreign;
 mod harmful;
 mod height_map;
 mod mismatch;
+mod old_format;
 mod other_programs;
 mod result;
 mod round_trip;

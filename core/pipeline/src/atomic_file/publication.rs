@@ -211,9 +211,7 @@ pub(super) fn recover(folder: &Path, locked: bool) -> Result<()> {
             if locked || is_left(name) {
                 journals.push(entry.path());
             }
-        } else if !name.starts_with('.') || !is_left(name) {
-            continue;
-        } else if name.ends_with(PARTIAL) || name.ends_with(PREVIOUS) {
+        } else if name.starts_with('.') && is_left(name) && (name.ends_with(PARTIAL) || name.ends_with(PREVIOUS)) {
             debris.push(entry.path());
         }
     }

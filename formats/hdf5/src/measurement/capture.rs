@@ -64,13 +64,13 @@ impl CaptureSource {
         Ok(Self { place, z_mm, speed_rpm, dataset, samples_place, stored, phase })
     }
 
-    /// The bytes of the file that its numbers take, where they lie in one piece.
-    pub(super) fn extents(&self) -> impl Iterator<Item = Extent> {
+    /// The bytes of the file that its numbers take, those in chunks `with_chunks` only.
+    pub(super) fn extents(&self, with_chunks: bool) -> impl Iterator<Item = Extent> {
         let line = match &self.phase {
-            Phase::Index(line) | Phase::Angle(line) | Phase::Trace(Trace::Line(line), _) => line.extent(),
-            Phase::Trace(Trace::Channel(_), _) | Phase::Unknown(_) => None,
+            Phase::Index(line) | Phase::Angle(line) | Phase::Trace(Trace::Line(line), _) => line.extents(with_chunks),
+            Phase::Trace(Trace::Channel(_), _) | Phase::Unknown(_) => Vec::new(),
         };
-        Extent::of(&self.dataset, &self.samples_place).into_iter().chain(line)
+        Extent::of(&self.dataset, &self.samples_place, with_chunks).into_iter().chain(line)
     }
 
     /// Sample positions at which turns begin, and the scan that says how to read the encoder.

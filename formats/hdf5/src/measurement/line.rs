@@ -56,9 +56,9 @@ impl Line {
         &self.place
     }
 
-    /// The bytes of the file that it takes, where it lies in one piece.
-    pub(crate) fn extent(&self) -> Option<Extent> {
-        Extent::of(&self.dataset, &self.place)
+    /// The bytes of the file that it takes, in chunks `with_chunks` only.
+    pub(crate) fn extents(&self, with_chunks: bool) -> Vec<Extent> {
+        Extent::of(&self.dataset, &self.place, with_chunks)
     }
 
     pub(crate) fn length(&self) -> usize {

@@ -28,10 +28,10 @@ use super::{
     extent,
     orientation::Orientation,
     stream::{Hdf5Stream, columns_of},
-    truth,
+    structure, truth,
 };
 use crate::{
-    MEASUREMENT_FORMAT, VERSION,
+    MEASUREMENT_FORMAT, VERSION, heaps,
     links::Links,
     node::{self, Place},
     superblock,
@@ -121,13 +121,15 @@ impl Hdf5Recording {
         let mut extra_channels = Vec::new();
         let mut is_plain = true;
         let mut extents = Vec::new();
+        let structures = structure::of(links.input())?;
         for name in names {
             let mut z_mm = None;
             for setup in &setups {
                 let (group, setup_place) = node::group(&file, &place, setup)?;
                 let source = CaptureSource::open(&group, &setup_place, &name, marker.as_ref())?;
                 source.phase.check()?;
-                extents.extend(source.extents());
+                // Chunks of the new format have checksums; behind a block of the user, their places count from elsewhere.
+                extents.extend(source.extents(structures.as_ref().is_some_and(|found| found.from_start)));
                 columns_of(&source.stored.sensors, rig, &source.samples_place)?;
                 is_plain &= source.dataset.layout() == Layout::Contiguous
                     && source.stored.orientation == Orientation::SampleRows;
@@ -156,7 +158,13 @@ impl Hdf5Recording {
             keys.push(StationKey { name, z_mm: z_mm.map_or(0.0, |(_, z_mm)| z_mm) });
         }
         if links.is_one_file() {
-            extent::check(extents, links.input().bytes())?;
+            let bytes = structures.as_ref().map_or_else(Vec::new, |found| found.bytes.clone());
+            extent::check(extents, bytes, links.input().bytes())?;
+            if let Some(structures) = structures.filter(|found| found.from_start)
+                && let Some(data) = heaps::all_data(&file)
+            {
+                remarks.extend(structure::remark(links.input(), &structures, data)?);
+            }
         }
         if !extra_channels.is_empty() {
             remarks.push(format!("{place}: channels that the rig does not name: {}", extra_channels.join(", ")));

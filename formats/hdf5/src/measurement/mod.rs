@@ -9,6 +9,7 @@ mod orientation;
 mod rows;
 pub mod samples;
 mod stream;
+mod structure;
 mod truth;
 pub mod write;
 

@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn memory_is_a_number_above_0() {
-        assert_eq!(checked("").unwrap().memory_gb, 4.0);
+        assert!((checked("").unwrap().memory_gb - 4.0).abs() < 1e-12);
         for (memory_gb, fits) in [("0.0", false), ("-1", false), ("0.5", true), ("inf", false), ("nan", false)] {
             assert_eq!(checked(&format!("memory_gb = {memory_gb}")).is_ok(), fits, "{memory_gb}");
         }
