@@ -30,7 +30,7 @@ struct UnderWay {
     locks: Vec<PathBuf>,
     /// How many [`Abandoned`] there are.
     abandoning: usize,
-    /// How many threads give files their names now: they do so side by side, because syncing takes time.
+    /// How many threads publish files now, side by side because syncing takes time; [`abandon_all`] waits for them.
     publishing: usize,
 }
 
@@ -56,9 +56,8 @@ impl UnderWay {
 
     /// Begins to give files their final names, which nothing can abandon from here on.
     fn publish(&mut self, files: &[PendingFile]) -> Result<Publishing> {
-        let abandoned = files.first().filter(|_| self.abandoning > 0);
-        let gone = files.iter().find(|file| !self.files.contains(&file.temporary));
-        if let Some(gone) = gone.or(abandoned) {
+        let is_gone = |file: &&PendingFile| self.abandoning > 0 || !self.files.contains(&file.temporary);
+        if let Some(gone) = files.iter().find(is_gone) {
             return Err(gone.failure(ABANDONED).of(ErrorKind::Interrupted));
         }
         self.publishing += 1;
@@ -80,8 +79,7 @@ impl Drop for Publishing {
 const ABANDONED: &str = "the work was abandoned";
 
 /// Removes all that this process has begun and not finished, as a program does that is interrupted. What was abandoned cannot be
-/// finished any more, and nothing can be begun while the returned value lives: both fail with [`ErrorKind::Interrupted`]. Files that
-/// are getting their names have them first.
+/// finished any more, and nothing can be begun while the returned value lives: both fail with [`ErrorKind::Interrupted`].
 #[must_use = "new files can be begun as soon as it is dropped"]
 pub fn abandon_all() -> Abandoned {
     let mut under_way = UnderWay::now();
@@ -290,7 +288,7 @@ fn remove_stale(folder: &Path, name: &str) {
 /// # Errors
 /// When the file system refuses a rename; those before it are taken back.
 pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
-    let publishing = UnderWay::now().publish(&files)?;
+    let _publishing = UnderWay::now().publish(&files)?;
     files.iter().try_for_each(PendingFile::sync)?;
     let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();
     publication::publish(&names)?;
@@ -299,8 +297,6 @@ pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
         under_way.files.retain(|pending| *pending != file.temporary);
         file.committed = true;
     }
-    drop(under_way);
-    drop(publishing);
     Ok(files.iter().map(|file| file.destination.clone()).collect())
 }
 
