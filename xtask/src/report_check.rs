@@ -9,7 +9,7 @@ use std::{
 
 use crate::{
     foreign,
-    process::{Outcome, root, run, say, target, tools},
+    process::{Outcome, run, say, target, tools},
     results,
     setup::cargo,
 };
@@ -68,11 +68,18 @@ fn many_stations(program: &Path, example: &Path) -> Outcome {
     let count = format!("recording.stations.count={MANY}");
     let made = example.join("many.h5");
     let mut simulate = Command::new(program);
-    simulate.arg("simulate").arg(example.join("scenario.toml")).arg("--out").arg(&made).args(["--set", &count, "--set", &step]);
+    simulate
+        .arg("simulate")
+        .arg(example.join("scenario.toml"))
+        .arg("--out")
+        .arg(&made)
+        .args(["--set", &count, "--set", &step]);
     run(&mut simulate)?;
     let mut pipeline = Command::new(program);
     pipeline.arg("run").arg(example.join("pipeline.toml")).args(["--set", "load.path=many.h5"]);
-    for (export, path) in [(0, "many"), (1, "many/report.html"), (2, "many/result.h5"), (3, "many/shaft.glb"), (4, "many/shaft.obj")] {
+    for (export, path) in
+        [(0, "many"), (1, "many/report.html"), (2, "many/result.h5"), (3, "many/shaft.glb"), (4, "many/shaft.obj")]
+    {
         pipeline.arg("--set").arg(format!("export.{export}.path={path}"));
     }
     run(&mut pipeline)
@@ -81,7 +88,8 @@ fn many_stations(program: &Path, example: &Path) -> Outcome {
 /// Opens every page below a folder in Chromium and prints a table of them.
 fn look(folder: &Path) -> Outcome {
     let browser = foreign::browser().ok_or("Chromium is not installed")?;
-    let modules = std::env::var_os("RUNOUT_NODE_MODULES").map_or_else(|| tools().join("node/node_modules"), PathBuf::from);
+    let modules =
+        std::env::var_os("RUNOUT_NODE_MODULES").map_or_else(|| tools().join("node/node_modules"), PathBuf::from);
     let browser = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())
         .map(|folder| folder.join(browser))
         .find(|path| path.is_file())

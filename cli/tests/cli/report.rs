@@ -142,7 +142,15 @@ fn comparison_plan_and_batch_have_their_pages() {
     let (folder, [compared, planned, batch]) = pages_of_commands(false);
     let expected: [(&Path, &[&str]); 3] = [
         (&compared, &["Turned shaft", "compared with four-sensor-reversal", "E_n by order", "Methods", "BLAKE3"]),
-        (&planned, &["Plan of rig.toml", "Lost orders of form: none", "Noise gain of form, other layouts", "Setup <bdi>reversed"]),
+        (
+            &planned,
+            &[
+                "Plan of rig.toml",
+                "Lost orders of form: none",
+                "Noise gain of form, other layouts",
+                "Setup <bdi>reversed",
+            ],
+        ),
         (&batch, &["3 recordings. ", "Limits, recordings that are proven", "Individuals", "Moving range"]),
     ];
     for (path, parts) in expected {
@@ -313,11 +321,17 @@ fn chromium_draws_comparison_plan_and_batch() {
     // The first panel has the first station's first quantity: E_n of every method but the reference.
     let document: serde_json::Value = serde_json::from_str(&page(&folder.path().join("compare.json"))).unwrap();
     let first = &document["stations"][0]["quantities"][0]["differences"];
-    let expected: f64 = first.as_array().unwrap().iter().flat_map(|one| {
-        one["by_order"]["e_n"].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect::<Vec<_>>()
-    }).sum();
+    let expected: f64 = first
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|one| {
+            one["by_order"]["e_n"].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect::<Vec<_>>()
+        })
+        .sum();
     let traces = found["plots"]["plot-e-n"].as_array().unwrap();
-    let drawn: f64 = traces.iter().filter(|trace| trace["meta"] == "values").filter_map(|trace| trace["sum"].as_f64()).sum();
+    let drawn: f64 =
+        traces.iter().filter(|trace| trace["meta"] == "values").filter_map(|trace| trace["sum"].as_f64()).sum();
     assert!((expected - drawn).abs() < 1e-5 * expected.max(1.0), "{expected} {drawn}");
     for (name, path, plot) in [("plan", &planned, "plot-noise-gain"), ("batch", &batch, "plot-trend")] {
         let found = look(path).unwrap();

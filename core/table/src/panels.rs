@@ -154,7 +154,10 @@ impl Panels {
             Axis { name: without_unit(column, unit), unit: unit.to_owned() }
         };
         let values_axis = |values: &[Measure]| match values {
-            [one] => axis(&one.column),
+            [one] => {
+                let named = axis(&one.column);
+                Axis { name: one.symbol.clone().unwrap_or(named.name), ..named }
+            }
             several => {
                 Axis { name: String::new(), ..several.first().map_or_else(|| axis(""), |one| axis(&one.column)) }
             }
@@ -170,7 +173,8 @@ impl Panels {
             }
             Drawing::Amplitudes { order, parts: [real, imaginary], std } => {
                 let y = [Some(real.clone()), Some(imaginary.clone())];
-                let source = Source { name: String::new(), x: order.clone(), y, third: std.clone(), marks: None, common: false };
+                let source =
+                    Source { name: String::new(), x: order.clone(), y, third: std.clone(), marks: None, common: false };
                 let amplitude = Axis { name: "amplitude".into(), ..axis(real) };
                 (Kind::Amplitudes, [axis(order), amplitude], vec![source])
             }
@@ -265,7 +269,8 @@ impl Panels {
                     [number(&columns[0]), number(&columns[1]), number(&columns[2]), number(&columns[3])];
                 let y = if columns[2].is_some() { y.hypot(second) } else { y };
                 let curve = &mut self.drawn[*panel].curves[places_of[offset]];
-                if self.values[offset].common && curve.points.last().is_some_and(|last| last.x.to_bits() == x.to_bits()) {
+                if self.values[offset].common && curve.points.last().is_some_and(|last| last.x.to_bits() == x.to_bits())
+                {
                     continue;
                 }
                 if let Some(places) = &places
@@ -310,11 +315,14 @@ impl Panels {
             self.drawn.len() - 1
         };
         let curves = &mut self.drawn[index].curves;
+        let single = self.values.len() == 1;
         let place = |value: &Source| {
             let name = match (curve, value.name.as_str()) {
                 ("", name) => name.to_owned(),
                 (_, name) if value.common => name.to_owned(),
                 (curve, "") => curve.to_owned(),
+                // One value is named by the axis.
+                (curve, _) if single => curve.to_owned(),
                 (curve, name) => format!("{curve} {name}"),
             };
             curves.iter().position(|known| known.name == name).unwrap_or_else(|| {
@@ -376,6 +384,7 @@ fn curves(x: &str, values: &[Measure], axis: &dyn Fn(&str) -> Axis) -> Vec<Sourc
 
 /// `tilt_x_urad` as `tilt x`.
 fn without_unit(column: &str, unit: &str) -> String {
+    let unit = unit.to_lowercase();
     let name = if unit.is_empty() { column } else { column.strip_suffix(&format!("_{unit}")).unwrap_or(column) };
     name.replace('_', " ")
 }

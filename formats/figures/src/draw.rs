@@ -199,7 +199,9 @@ fn points(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
         plots.push(Plot::Scatter(if named { plot.with_legend(curve.name.clone()) } else { plot }));
         for point in curve.points.iter().filter(|point| point.third.is_finite()) {
             let ends = [-COVERAGE, COVERAGE].map(|side| (point.x, point.y + side * point.third));
-            plots.push(Plot::Line(LinePlot::new().with_data(ends.to_vec()).with_color(colour(index)).with_stroke_width(0.8)));
+            plots.push(Plot::Line(
+                LinePlot::new().with_data(ends.to_vec()).with_color(colour(index)).with_stroke_width(0.8),
+            ));
         }
     }
     let layout = Layout::auto_from_plots(&plots).with_x_label(label(&axes[0])).with_y_label(label(&axes[1]));
@@ -207,12 +209,7 @@ fn points(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
 }
 
 /// The first orders, side by side.
-fn bars(
-    curves: &[Curve],
-    axes: &[Axis; 2],
-    lowest_order: f64,
-    level: Option<(&str, f64)>,
-) -> (Vec<Plot>, Layout) {
+fn bars(curves: &[Curve], axes: &[Axis; 2], lowest_order: f64, level: Option<(&str, f64)>) -> (Vec<Plot>, Layout) {
     let mut plots = Vec::new();
     let width = 0.6 / curves.len().max(1) as f64;
     for (index, curve) in curves.iter().enumerate() {

@@ -7,7 +7,10 @@ use runout_core::{
     atomic_file::PendingFile,
     pipeline::compare::{Comparison, Difference, MethodValue, QuantityComparison, StationComparison},
     separation::CONVENTION,
-    table::{ArrayRef, ColumnSpec, Figure, Measure, RecordBatch, TableSpec, counts, flags, numbers, numbers_or_null, texts, texts_or_null},
+    table::{
+        ArrayRef, ColumnSpec, Figure, Measure, RecordBatch, TableSpec, counts, flags, numbers, numbers_or_null, texts,
+        texts_or_null,
+    },
 };
 
 use crate::{about, table::TableFile};

@@ -31,10 +31,12 @@ pub fn table() -> TableSpec {
         ],
     )
     .figure(
-        Figure::lines("variogram", "Variogram", "lag_mm", [
-            Measure::new("semivariance_um2").with_symbol("readings"),
-            Measure::new("model_um2").with_symbol("model"),
-        ])
+        Figure::lines(
+            "variogram",
+            "Variogram",
+            "lag_mm",
+            [Measure::new("semivariance_um2").with_symbol("readings"), Measure::new("model_um2").with_symbol("model")],
+        )
         .panels(["component", "axis"]),
     )
 }

@@ -8,7 +8,9 @@ use runout_core::{
     rig::Rig,
     stage::{NoiseGain, Overview},
     table::{
-        ColumnSpec, Figure, Measure, RecordBatch, TableSpec, counts, number::{ranges, significant}, numbers_or_null, texts,
+        ColumnSpec, Figure, Measure, RecordBatch, TableSpec, counts,
+        number::{ranges, significant},
+        numbers_or_null, texts,
     },
 };
 
@@ -54,11 +56,7 @@ fn write(path: &Path, sources: &Sources, overview: &Overview, tables: &[Table]) 
     let document = Document::parse(sources)?;
     let configuration =
         document::resolved_text(document.root(), sources).map_err(|fault| Failure::from(document.diagnose(fault)))?;
-    let provenance = Provenance {
-        program: format!("runout {VERSION}"),
-        configuration,
-        inputs: Vec::new(),
-    };
+    let provenance = Provenance { program: format!("runout {VERSION}"), configuration, inputs: Vec::new() };
     Ok(report.finish(provenance, overview)?)
 }
 

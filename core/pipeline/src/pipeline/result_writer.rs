@@ -74,7 +74,9 @@ impl ResultWriter {
         let info = ResultInfo {
             title: pipeline.title.clone(),
             tables: pipeline.tables.clone(),
-            longest_name: longest_name(pipeline.rig.as_ref(), stations),
+            // Names of chosen directions are as long as their angles are written.
+            longest_name: longest_name(pipeline.rig.as_ref(), stations)
+                .filter(|_| pipeline.evaluate.directions.is_empty()),
         };
         let outputs = written(exporters, &pipeline.tables);
         let lock = FolderLock::of(outputs.iter().map(PathBuf::as_path))?;
@@ -93,7 +95,8 @@ impl ResultWriter {
             exports: exports?,
             tables_wanted: takes(Takes::Tables) || takes(Takes::TablesAndSurface),
             specs: pipeline.tables.clone(),
-            station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref()),
+            station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref())
+                .of_stations(stations.len()),
             of_form: pipeline.route.gives_form(),
             sections: (gathered && pipeline.route.gives_form()).then(|| SurfaceBuilder::new(&pipeline.surface)),
             surface,
@@ -200,6 +203,9 @@ impl ResultWriter {
     ) -> Result<Finished> {
         self.summary.provenance.inputs = inputs;
         self.summary.warnings.extend(remarks);
+        let left_out = self.station_tables.remark();
+        self.summary.notes.extend(left_out.clone());
+        self.summary.warnings.extend(left_out);
         self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
         self.summary.warnings.extend(inflated(&self.summary.stations));
         let (limits, unmatched) = decide(self.evaluate.limits(), &self.summary.placed_values());
@@ -220,8 +226,13 @@ impl ResultWriter {
         } else {
             About { convention: std::mem::take(&mut self.convention), ..About::default() }
         };
-        let completed =
-            Completed { summary: &self.summary, about: &about, surface, diagnosis: self.diagnosis.as_ref(), overview: None };
+        let completed = Completed {
+            summary: &self.summary,
+            about: &about,
+            surface,
+            diagnosis: self.diagnosis.as_ref(),
+            overview: None,
+        };
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&completed)?);

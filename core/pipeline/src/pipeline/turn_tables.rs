@@ -2,9 +2,7 @@
 
 use std::iter::repeat_n;
 
-use runout_table::{
-    ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, numbers_or_null, texts,
-};
+use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, numbers_or_null, texts};
 use runout_turning::{
     error_motion::{ErrorMotion, Spectrum, TurnsPlot},
     station::StationResult,
@@ -13,6 +11,8 @@ use runout_turning::{
 /// Angles of a polar plot, and orders of a spectrum: more are not visible, and would make a result of many stations large.
 const ANGLES: usize = 360;
 const ORDERS: usize = 200;
+/// Stations of which a result holds these tables, at most.
+pub(super) const STATIONS: usize = 50;
 
 /// What a table is of: name, unit, and words for titles.
 struct Motion {
@@ -103,7 +103,10 @@ fn spectrum(motion: &Motion) -> TableSpec {
         ColumnSpec::number("frequency_hz", "Hz", "frequency at the mean speed; null where that is not known")
             .or_null()
             .repeating(),
-        column("synchronous", "amplitude of synchronous error motion; NaN at lost orders and at 1/rev, which holds the centring"),
+        column(
+            "synchronous",
+            "amplitude of synchronous error motion; NaN at lost orders and at 1/rev, which holds the centring",
+        ),
         column(
             "asynchronous",
             "root mean square amplitude of single turns about their mean, with the sensors' noise; at high orders the mean \
@@ -114,7 +117,8 @@ fn spectrum(motion: &Motion) -> TableSpec {
     let measures = [measure("synchronous"), measure("asynchronous")];
     let id = spectrum.replace('_', "-");
     let by_order = Figure::bars(id.clone(), format!("Spectrum of {title} by order"), "order", measures.clone());
-    let by_hz = Figure::lines(format!("{id}-hz"), format!("Spectrum of {title} by frequency"), "frequency_hz", measures);
+    let by_hz =
+        Figure::lines(format!("{id}-hz"), format!("Spectrum of {title} by frequency"), "frequency_hz", measures);
     let about = format!("amplitudes of {title} by order, up to {ORDERS}/rev");
     let table = TableSpec::new(*spectrum, about, columns).optional();
     table.figure(by_order.panels(["station", "direction"])).figure(by_hz.panels(["station", "direction"]))

@@ -105,7 +105,8 @@ fn what_all_curves_share_is_one_line() {
     let figure = Figure::points("campbell", "Campbell", "speed_rpm", values).curves(["whirl"]);
     let mut panels = Panels::new(&table, &figure, 4).unwrap();
     let whirls = texts(["forward", "backward", "forward", "backward"]);
-    let rows = vec![numbers([0.0, 0.0, 60.0, 60.0]), whirls, numbers([9.0, 8.0, 10.0, 7.0]), numbers([0.0, 0.0, 1.0, 1.0])];
+    let rows =
+        vec![numbers([0.0, 0.0, 60.0, 60.0]), whirls, numbers([9.0, 8.0, 10.0, 7.0]), numbers([0.0, 0.0, 1.0, 1.0])];
     panels.add(&table.rows(rows).unwrap());
     let found: Vec<_> =
         panels.drawn[0].curves.iter().map(|one| (one.name.as_str(), one.points.len(), one.joined)).collect();

@@ -14,15 +14,15 @@ pub(super) fn of(report: &BatchReport) -> Overview {
     let recordings = report.done + report.skipped + report.earlier;
     let with_signals = report.trend.iter().filter(|series| series.signals > 0).count();
     let broken: usize = report.limits.iter().map(|limit| limit.does_not_conform).sum();
-    let mut headline = format!(
-        "{recordings} recordings. {with_signals} of {} values have signals for special causes.",
-        report.trend.len()
-    );
+    let mut headline = vec![
+        format!("{}.", count(recordings, "recording")),
+        format!("{with_signals} of {} have signals for special causes.", count(report.trend.len(), "value")),
+    ];
     if !report.limits.is_empty() {
-        headline.push_str(&format!(" Limits are broken {broken} times."));
+        headline.push(format!("A limit is proven to be broken {}.", count(broken, "time")));
     }
     if !report.failed.is_empty() {
-        headline.push_str(&format!(" {} recordings failed.", report.failed.len()));
+        headline.push(format!("{} failed.", count(report.failed.len(), "recording")));
     }
     let sections = [
         section("Limits, recordings that are proven to keep them or not", limits(report)),
@@ -30,7 +30,12 @@ pub(super) fn of(report: &BatchReport) -> Overview {
         section("Signals", signals(report)),
         section("Recordings that failed", failed(report)),
     ];
-    Overview { headline, rig: None, sections: sections.into_iter().flatten().collect() }
+    Overview { headline: headline.join(" "), rig: None, sections: sections.into_iter().flatten().collect() }
+}
+
+/// "1 value", "2 values".
+fn count(number: usize, thing: &str) -> String {
+    if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
 }
 
 fn section(heading: &str, part: Option<Part>) -> Option<Section> {
@@ -64,7 +69,8 @@ fn series(report: &BatchReport) -> Option<Part> {
         let numbers = numbers.map(|number| number.map_or_else(String::new, |number| significant(number, DIGITS)));
         std::iter::once(series.series.clone()).chain(numbers).chain([series.signals.to_string()]).collect()
     };
-    let header = ["value", "mean", "lower control limit", "upper control limit", "mean moving range", "its limit", "signals"];
+    let header =
+        ["value", "mean", "lower control limit", "upper control limit", "mean moving range", "its limit", "signals"];
     table(1, &header, sorted(report).into_iter().map(row).collect())
 }
 
@@ -78,8 +84,9 @@ fn signals(report: &BatchReport) -> Option<Part> {
 }
 
 fn failed(report: &BatchReport) -> Option<Part> {
-    let rows = report.failed.iter().map(|one| {
-        vec![one.recording.clone(), one.message.clone(), one.help.clone().unwrap_or_default()]
-    });
+    let rows = report
+        .failed
+        .iter()
+        .map(|one| vec![one.recording.clone(), one.message.clone(), one.help.clone().unwrap_or_default()]);
     table(3, &["recording", "error", "what to do"], rows.collect())
 }

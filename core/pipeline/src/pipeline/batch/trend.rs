@@ -261,7 +261,10 @@ impl Trend {
         let [symbol, reference, filter, _, section, ..] = names;
         let section = Some(section.as_str()).filter(|id| !id.is_empty());
         let named = || self.limits.iter().filter(|limit| limit.names(symbol, section, reference, filter));
-        [named().filter_map(|limit| limit.lower).reduce(f64::max), named().filter_map(|limit| limit.upper).reduce(f64::min)]
+        [
+            named().filter_map(|limit| limit.lower).reduce(f64::max),
+            named().filter_map(|limit| limit.upper).reduce(f64::min),
+        ]
     }
 
     /// The series of these names; one that comes several times in a recording is as many series.
