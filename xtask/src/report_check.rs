@@ -9,7 +9,7 @@ use std::{
 
 use crate::{
     foreign,
-    process::{Outcome, root, run, say, target, tools},
+    process::{Outcome, run, say, target, tools},
     results,
     setup::cargo,
 };

@@ -76,27 +76,8 @@ fn what_never_ends_is_refused_at_once_wherever_a_file_is_named() {
 }
 
 #[test]
-fn numbers_that_no_rig_has_are_refused_at_their_keys() {
+fn a_title_with_nul_is_refused() {
     let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
-    for (key, word) in [
-        ("rig.sensors.0.angle_deg", "a sensor's angle must be a number from −36000 to 36000"),
-        ("rig.sensors.0.z_mm", "a sensor's axial position must be a number"),
-        ("rig.setups.1.part_deg", "the part's angle must be a number"),
-        ("rig.setups.1.sensors_deg", "the sensors' angle must be a number"),
-        ("rig.part_radius_mm", "the part's radius must be a number"),
-    ] {
-        for number in ["1e308", "-1e308", "inf", "nan"] {
-            let ran = folder.run(&["check", "pipeline.toml", "--set", &format!("{key}={number}")]);
-            assert_eq!(ran.status, 2, "{key}={number}: {}{}", ran.stdout, ran.stderr);
-            let flat = ran.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
-            let radius = key == "rig.part_radius_mm" && flat.contains("must be above 0 mm");
-            assert!(
-                (flat.contains(word) || radius) && flat.contains(&format!("--set {key}=")),
-                "{key}: {}",
-                ran.stderr
-            );
-        }
-    }
     let ran = folder.run(&["check", "pipeline.toml", "--set", "title=\"a\\u0000b\""]);
     assert!(ran.status == 2 && ran.stderr.contains("must not hold NUL"), "{}", ran.stderr);
 }

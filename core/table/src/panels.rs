@@ -154,7 +154,10 @@ impl Panels {
             Axis { name: without_unit(column, unit), unit: unit.to_owned() }
         };
         let values_axis = |values: &[Measure]| match values {
-            [one] => axis(&one.column),
+            [one] => {
+                let named = axis(&one.column);
+                Axis { name: one.symbol.clone().unwrap_or(named.name), ..named }
+            }
             several => {
                 Axis { name: String::new(), ..several.first().map_or_else(|| axis(""), |one| axis(&one.column)) }
             }
@@ -312,11 +315,14 @@ impl Panels {
             self.drawn.len() - 1
         };
         let curves = &mut self.drawn[index].curves;
+        let single = self.values.len() == 1;
         let place = |value: &Source| {
             let name = match (curve, value.name.as_str()) {
                 ("", name) => name.to_owned(),
                 (_, name) if value.common => name.to_owned(),
                 (curve, "") => curve.to_owned(),
+                // One value is named by the axis.
+                (curve, _) if single => curve.to_owned(),
                 (curve, name) => format!("{curve} {name}"),
             };
             curves.iter().position(|known| known.name == name).unwrap_or_else(|| {
@@ -378,6 +384,7 @@ fn curves(x: &str, values: &[Measure], axis: &dyn Fn(&str) -> Axis) -> Vec<Sourc
 
 /// `tilt_x_urad` as `tilt x`.
 fn without_unit(column: &str, unit: &str) -> String {
+    let unit = unit.to_lowercase();
     let name = if unit.is_empty() { column } else { column.strip_suffix(&format!("_{unit}")).unwrap_or(column) };
     name.replace('_', " ")
 }

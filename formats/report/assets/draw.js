@@ -208,7 +208,10 @@ const Draw = (() => {
         });
       }
     });
-    return { traces, layout: layout({ xaxis: across(figure, everyX), yaxis: axis(figure.y), height: 400, ...level(figure) }) };
+    // A spectrum has few high lines and many low ones.
+    const spectrum = figure.x.unit === "Hz" && traces.every(({ y }) => y.every((one) => !(one < 0)));
+    const yaxis = axis(figure.y, spectrum ? { type: "log", dtick: 1, exponentformat: "power" } : {});
+    return { traces, layout: layout({ xaxis: across(figure, everyX), yaxis, height: 400, ...level(figure) }), said: spectrum ? "logarithmic axis" : "" };
   }
 
   // Points with their expanded uncertainty; what all of them share is a line.
@@ -271,7 +274,7 @@ const Draw = (() => {
     }
     const first = lowest || 1;
     const xaxis = axis({ name: "order", unit: "UPR" }, { range: [first - 0.6, Math.min(highest, FIRST_ORDERS) + 0.6], tickformat: "d" });
-    const yaxis = wide ? { type: "log", range: [Math.log10(lowestShown), Math.log10(1.5 * tallest)], dtick: 1 } : { range: [0, 1.06 * tallest] };
+    const yaxis = wide ? { type: "log", range: [Math.log10(lowestShown), Math.log10(1.5 * tallest)], dtick: 1, exponentformat: "power" } : { range: [0, 1.06 * tallest] };
     const said = [
       wide ? "logarithmic axis" : "",
       highest > FIRST_ORDERS ? `orders up to ${highest}: drag the axis, or double-click for all` : "",

@@ -33,27 +33,27 @@ struct Row {
 /// All rows of the table of values.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Columns {
-    place: Texts,
-    symbol: Texts,
+    place: Column,
+    symbol: Column,
     shown: Vec<String>,
     value: Vec<Option<f64>>,
     std: Vec<Option<f64>>,
-    unit: Texts,
+    unit: Column,
     interval: Vec<String>,
-    refers: Texts,
-    about: Texts,
+    refers: Column,
+    about: Column,
 }
 
 /// A column of texts: each text once, and its place among them row by row.
 #[derive(Debug, Default, Serialize)]
-struct Texts {
+struct Column {
     texts: Vec<String>,
     rows: Vec<usize>,
     #[serde(skip)]
     known: HashMap<String, usize>,
 }
 
-impl Texts {
+impl Column {
     fn add(&mut self, text: String) {
         let next = self.texts.len();
         let place = *self.known.entry(text).or_insert_with_key(|text| {
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_text_that_repeats_is_written_once() {
-        let mut column = Texts::default();
+        let mut column = Column::default();
         ["a", "b", "a", "", "b"].into_iter().for_each(|text| column.add(text.to_owned()));
         assert_eq!((column.texts, column.rows), (vec!["a".into(), "b".into(), String::new()], vec![0, 1, 0, 2, 1]));
     }

@@ -76,7 +76,9 @@ impl ResultWriter {
         let info = ResultInfo {
             title: pipeline.title.clone(),
             tables: pipeline.tables.clone(),
-            longest_name: longest_name(pipeline.rig.as_ref(), stations),
+            // Names of chosen directions are as long as their angles are written.
+            longest_name: longest_name(pipeline.rig.as_ref(), stations)
+                .filter(|_| pipeline.evaluate.directions.is_empty()),
         };
         let outputs = written(exporters, &pipeline.tables);
         let lock = FolderLock::of(outputs.iter().map(PathBuf::as_path))?;
@@ -95,7 +97,8 @@ impl ResultWriter {
             exports: exports?,
             tables_wanted: takes(Takes::Tables) || takes(Takes::TablesAndSurface),
             specs: pipeline.tables.clone(),
-            station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref()),
+            station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref())
+                .of_stations(stations.len()),
             of_form: pipeline.route.gives_form(),
             sections: (gathered && pipeline.route.gives_form()).then(|| SurfaceBuilder::new(&pipeline.surface)),
             surface,
@@ -212,6 +215,9 @@ impl ResultWriter {
             self.summary.provenance.inputs.push(Input::of(file)?);
         }
         self.summary.warnings.extend(remarks);
+        let left_out = self.station_tables.remark();
+        self.summary.notes.extend(left_out.clone());
+        self.summary.warnings.extend(left_out);
         self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
         self.summary.warnings.extend(inflated(&self.summary.stations));
         let (limits, unmatched) = decide(self.evaluate.limits(), &self.summary.placed_values());

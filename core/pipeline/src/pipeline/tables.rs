@@ -54,8 +54,10 @@ pub struct StationTables {
     harmonics: TableSpec,
     reading: TableSpec,
     values: TableSpec,
-    /// Those of error motion turn by turn.
+    /// Those of error motion turn by turn, of each so many stations.
     turns: Vec<TableSpec>,
+    every: usize,
+    taken: usize,
     /// The line of the motion, where that is neither x nor y.
     line: Option<Azimuth>,
     /// Whether there is motion along the axis.
@@ -78,11 +80,32 @@ impl StationTables {
             reading: reading(),
             values: values(),
             turns: turn_tables::specs(),
+            every: 1,
+            taken: 0,
             line,
             axial,
             rig: rig.cloned(),
             content: Content::default(),
         }
+    }
+
+    /// The same for so many stations: of many, each second, third, … has tables of error motion turn by turn.
+    #[must_use]
+    pub fn of_stations(self, stations: usize) -> Self {
+        Self { every: stations.div_ceil(turn_tables::STATIONS).max(1), ..self }
+    }
+
+    /// What of error motion turn by turn is left out, where something is.
+    #[must_use]
+    pub fn remark(&self) -> Option<String> {
+        let every = self.every;
+        let any = self.taken > 0 && every > 1;
+        any.then(|| {
+            format!(
+                "plots of all turns and spectra are of 1 in {every} stations: a result holds at most {}",
+                turn_tables::STATIONS
+            )
+        })
     }
 
     /// All tables, also those that a result may lack.
@@ -117,10 +140,14 @@ impl StationTables {
             Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? })
         };
         let of_turns = turn_tables::rows(result);
+        let has_turns = !of_turns.is_empty();
         let of_turns = of_turns
             .into_iter()
+            .filter(|_| self.taken.is_multiple_of(self.every))
             .map(|(table, columns)| Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? }));
-        tables.into_iter().map(rows).chain(of_turns).collect()
+        let all = tables.into_iter().map(rows).chain(of_turns).collect();
+        self.taken += usize::from(has_turns);
+        all
     }
 
     /// The values of all stations and of the part.

@@ -11,6 +11,8 @@ use runout_turning::{
 /// Angles of a polar plot, and orders of a spectrum: more are not visible, and would make a result of many stations large.
 const ANGLES: usize = 360;
 const ORDERS: usize = 200;
+/// Stations of which a result holds these tables, at most.
+pub(super) const STATIONS: usize = 50;
 
 /// What a table is of: name, unit, and words for titles.
 struct Motion {

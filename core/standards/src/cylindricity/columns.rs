@@ -107,7 +107,7 @@ impl Columns {
 struct Deviations<'a> {
     columns: &'a Columns,
     about: &'a About,
-    deviations: &'a mut [f64],
+    into: &'a mut [f64],
 }
 
 impl NullaryFnOnce for Deviations<'_> {
@@ -115,10 +115,10 @@ impl NullaryFnOnce for Deviations<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { columns: Columns { u, v, levels, zeta }, about, deviations } = self;
+        let Self { columns: Columns { u, v, levels, zeta }, about, into } = self;
         let about = *about;
         let points = u.iter().zip(v).zip(levels.iter().zip(zeta));
-        for (deviation, ((u, v), (level, zeta))) in deviations.iter_mut().zip(points) {
+        for (deviation, ((u, v), (level, zeta))) in into.iter_mut().zip(points) {
             *deviation = about.deviation([*u, *v, *level, *zeta]);
         }
     }

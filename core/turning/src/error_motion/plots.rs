@@ -8,6 +8,7 @@ use crate::{
     profile::Profile,
     spread::{Direction, Spread},
 };
+use runout_numerics::Complex64;
 use runout_standards::roundness::{Angles, Points};
 
 /// All turns in one sensitive direction, about the least-squares centre of the synchronous plot, in µm or µrad.
@@ -92,7 +93,7 @@ impl ErrorMotion<'_> {
         let highest = highest_order.min(self.separation.max_order());
         let amplitude = |order: usize| {
             let counts = order >= synchronous.band[0] && synchronous.lost.binary_search(&order).is_err();
-            synchronous.harmonic(order).filter(|_| counts).map_or(f64::NAN, |value| value.norm())
+            synchronous.harmonic(order).filter(|_| counts).map_or(f64::NAN, Complex64::norm)
         };
         let speeds: Vec<f64> = self.profiles.iter().filter_map(|profile| profile.speed_rpm).collect();
         Some(Spectrum {

@@ -14,15 +14,15 @@ pub(super) fn of(report: &BatchReport) -> Overview {
     let recordings = report.done + report.skipped + report.earlier;
     let with_signals = report.trend.iter().filter(|series| series.signals > 0).count();
     let broken: usize = report.limits.iter().map(|limit| limit.does_not_conform).sum();
-    let mut headline = format!(
-        "{recordings} recordings. {with_signals} of {} values have signals for special causes.",
-        report.trend.len()
-    );
+    let mut headline = vec![
+        format!("{}.", count(recordings, "recording")),
+        format!("{with_signals} of {} have signals for special causes.", count(report.trend.len(), "value")),
+    ];
     if !report.limits.is_empty() {
-        headline.push_str(&format!(" Limits are broken {broken} times."));
+        headline.push(format!("A limit is proven to be broken {}.", count(broken, "time")));
     }
     if !report.failed.is_empty() {
-        headline.push_str(&format!(" {} recordings failed.", report.failed.len()));
+        headline.push(format!("{} failed.", count(report.failed.len(), "recording")));
     }
     let sections = [
         section("Limits, recordings that are proven to keep them or not", limits(report)),
@@ -30,7 +30,12 @@ pub(super) fn of(report: &BatchReport) -> Overview {
         section("Signals", signals(report)),
         section("Recordings that failed", failed(report)),
     ];
-    Overview { headline, rig: None, sections: sections.into_iter().flatten().collect() }
+    Overview { headline: headline.join(" "), rig: None, sections: sections.into_iter().flatten().collect() }
+}
+
+/// "1 value", "2 values".
+fn count(number: usize, thing: &str) -> String {
+    if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
 }
 
 fn section(heading: &str, part: Option<Part>) -> Option<Section> {
