@@ -90,7 +90,7 @@ mod tests {
         let mut fourier = Fourier::new(ANGLES);
         let mut harmonics = vec![Complex64::ZERO; 128];
         fourier.analyse((0..ANGLES).map(value), &mut harmonics);
-        fourier.synthesise(harmonics.into_iter()).to_vec()
+        fourier.synthesise(harmonics).to_vec()
     }
 
     #[test]

@@ -120,9 +120,9 @@ mod tests {
         for (radius_mm, sensors, parts, expected) in [
             (30.0, &[0.0, 450.0][..], &[0.0][..], "`angle_deg` of the sensor `S1` = 450.000000 is beyond a turn"),
             (30.0, &[0.0, 90.0], &[0.0, -540.0], "`part_deg` of the setup `k1`"),
-            (30.0, &[0.0, 1.5708], &[0.0], "may be in radians"),
+            (30.0, &[0.0, 1.571], &[0.0], "may be in radians"),
             (30.0, &[0.0, 1.7426, 3.5343], &[0.0], "may be in radians"),
-            (30.0, &[0.0, 90.0], &[0.0, 3.14159], "`part_deg` and `sensors_deg` of the setups"),
+            (30.0, &[0.0, 90.0], &[0.0, std::f64::consts::PI], "`part_deg` and `sensors_deg` of the setups"),
             (0.03, &[0.0, 90.0], &[0.0, 180.0], "is a radius of 30 µm"),
         ] {
             let found = remarks(radius_mm, sensors, parts);
