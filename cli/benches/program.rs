@@ -90,7 +90,7 @@ fn mesh(plugin: &str, extension: &str, surface: &Surface) -> u64 {
     let export = exporter.begin(&ResultInfo { title: "bench".into(), ..ResultInfo::default() }).unwrap();
     let (summary, about) = (summary(), About::default());
     let files = export
-        .finish(&Completed { summary: &summary, about: &about, surface: Some(surface), diagnosis: None })
+        .finish(&Completed { summary: &summary, about: &about, surface: Some(surface), heights: None, diagnosis: None })
         .unwrap();
     // The files are not kept: they go as they are dropped.
     files.iter().map(|file| fs::metadata(file.path()).unwrap().len()).sum()

@@ -38,14 +38,14 @@ class Gltf:
     plugin: ClassVar[str] = "gltf"
 
     capped: Union[bool, None] = None
-    """Closes both ends with flat discs, so that the mesh is a solid. Default: false."""
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
 
     colour_range_um: Union[float, None] = None
     """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
 
     magnification: Union[float, None] = None
-    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius drawn so many times
-    larger. Above 1, at most 1000000."""
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights
+    of a map, drawn so many times larger. Above 1, at most 1000000."""
 
     path: str
     """The file to write; the mesh in it is at true scale."""
@@ -58,14 +58,14 @@ class Obj:
     plugin: ClassVar[str] = "obj"
 
     capped: Union[bool, None] = None
-    """Closes both ends with flat discs, so that the mesh is a solid. Default: false."""
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
 
     colour_range_um: Union[float, None] = None
     """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
 
     magnification: Union[float, None] = None
-    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius drawn so many times
-    larger. Above 1, at most 1000000."""
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights
+    of a map, drawn so many times larger. Above 1, at most 1000000."""
 
     path: str
     """The file to write; the mesh in it is at true scale."""

@@ -46,6 +46,7 @@ fn write(result: &Path, report: &Path) -> Result<()> {
         summary: &stored.summary,
         about: &stored.about,
         surface: stored.surface.as_ref(),
+        heights: None,
         diagnosis: stored.diagnosis.as_ref(),
     };
     atomic_file::commit_all(export.finish(&completed)?).map(|_written| ())

@@ -39,6 +39,19 @@ impl HeightGrid {
         self.height_nm.iter().filter(|height| !height.is_finite()).count()
     }
 
+    /// BLAKE3 in hexadecimal of its numbers as little-endian f64, one after the other: `origin_x_mm`, `origin_y_mm`, `step_x_mm`,
+    /// `step_y_mm`, `height_nm`.
+    #[must_use]
+    pub fn checksum(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        let places = [self.origin_x_mm, self.origin_y_mm, self.step_x_mm, self.step_y_mm];
+        for numbers in std::iter::once(&places[..]).chain(self.height_nm.chunks(self.columns.max(1))) {
+            let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+            hasher.update(&bytes);
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+
     /// The nodes with a height, row by row, as points of a file.
     #[must_use]
     pub fn points(self, input: PathBuf) -> Points {

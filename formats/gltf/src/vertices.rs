@@ -5,7 +5,7 @@
 
 use std::io::{self, Write};
 
-use runout_mesh::{COLOUR_STEPS, Cap, LANES, Mesh, UNMEASURED, Vertices, in_order, linear, palette, processors};
+use runout_mesh::{COLOUR_STEPS, Cap, LANES, Mesh, UNMEASURED, Vertices, Wall, in_order, linear, palette, processors};
 
 /// Bytes from one vertex to the next.
 pub const STRIDE: usize = 32;
@@ -25,7 +25,7 @@ const PORTION: usize = 1 << 20;
 /// What the binary chunk holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
-    /// Vertices of wall and caps.
+    /// Vertices of wall and caps, or of a sheet.
     pub vertices: usize,
     /// Three a triangle.
     pub indices: usize,
@@ -38,14 +38,15 @@ pub struct Layout {
 impl Layout {
     /// Of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
-        let (rings, angles, caps) = (mesh.rings(), mesh.angles(), mesh.caps().len());
+        let caps = mesh.wall().map_or(0, |wall| wall.caps().len());
+        let angles = mesh.columns();
         // Rounding keeps the order, so that these are the extremes of what is written; the turn swaps those of one axis.
         let corners = mesh.bounds_mm().map(|corner| y_up(corner.map(metres)));
         let [min, max] =
             [f32::min, f32::max].map(|of| std::array::from_fn(|axis| of(corners[0][axis], corners[1][axis])));
         Self {
-            vertices: rings * angles + caps * Cap::vertex_count(angles),
-            indices: 6 * (rings - 1) * angles + 3 * caps * Cap::triangle_count(angles),
+            vertices: mesh.vertex_count() + caps * Cap::vertex_count(angles),
+            indices: 3 * (mesh.triangle_count() + caps * Cap::triangle_count(angles)),
             min,
             max,
         }
@@ -71,38 +72,48 @@ fn y_up([x, y, z]: [f32; 3]) -> [f32; 3] {
     [x, z, -y]
 }
 
-/// Writes the chunk: the wall ring by ring, then each cap's own vertices, then the triangles.
+/// Writes the chunk: wall or sheet row by row, then each cap's own vertices, then the triangles.
 pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     let colours: [[u8; 4]; COLOUR_STEPS] = palette().map(linear_rgba);
-    let together = PORTION / (STRIDE * mesh.angles());
+    let together = PORTION / (STRIDE * mesh.columns());
     // Writing keeps a processor as busy as making what is written.
     let threads = processors().saturating_sub(1);
-    in_order(mesh.rings(), together, threads, to, |ring, bytes| {
-        mesh.ring(ring, |vertices| put_vertices(bytes, vertices, &colours));
+    in_order(mesh.rows(), together, threads, to, |row, bytes| {
+        mesh.row(row, |vertices| put_vertices(bytes, vertices, &colours));
     })?;
-    let caps = mesh.caps();
+    match mesh {
+        Mesh::Wall(wall) => write_rest_of_wall(wall, together, threads, to),
+        Mesh::Sheet(sheet) => in_order(sheet.rows() - 1, together, threads, to, |row, bytes| {
+            sheet.band(row, |triangle| bytes.extend_from_slice(triangle.map(u32::to_le_bytes).as_flattened()));
+        }),
+    }
+}
+
+/// Vertices of caps, then all triangles.
+fn write_rest_of_wall(wall: &Wall, together: usize, threads: usize, to: &mut impl Write) -> io::Result<()> {
+    let caps = wall.caps();
     let mut bytes = Vec::new();
     for cap in &caps {
         // glTF has no "not measured": a cap's deviation is 0 and its colour says so.
         let normal = [0.0, 0.0, cap.normal_z];
-        for position_mm in cap.vertices(mesh) {
+        for position_mm in cap.vertices(wall) {
             put_vertices(&mut bytes, &Vertices::one(position_mm, normal), &[linear_rgba(UNMEASURED)]);
         }
     }
     to.write_all(&bytes)?;
     // Every band's triangles are the first one's, so many rings on.
-    let band: Vec<u32> = mesh.band(0).flatten().flatten().collect();
-    in_order(mesh.rings() - 1, together, threads, to, |ring, bytes| {
-        let (begin, on) = (bytes.len(), (ring * mesh.angles()) as u32);
+    let band: Vec<u32> = wall.band(0).flatten().flatten().collect();
+    in_order(wall.rings() - 1, together, threads, to, |ring, bytes| {
+        let (begin, on) = (bytes.len(), (ring * wall.angles()) as u32);
         bytes.resize(begin + INDEX * band.len(), 0);
         for (place, vertex) in bytes[begin..].as_chunks_mut().0.iter_mut().zip(&band) {
             *place = (vertex + on).to_le_bytes();
         }
     })?;
     bytes.clear();
-    let angles = mesh.angles() as u32;
+    let angles = wall.angles() as u32;
     for (index, cap) in caps.iter().enumerate() {
-        let own = mesh.rings() * mesh.angles() + index * Cap::vertex_count(mesh.angles());
+        let own = wall.rings() * wall.angles() + index * Cap::vertex_count(wall.angles());
         let triangles = cap.triangles(angles, own as u32);
         triangles.for_each(|triangle| bytes.extend_from_slice(triangle.map(u32::to_le_bytes).as_flattened()));
     }

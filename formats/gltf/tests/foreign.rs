@@ -10,14 +10,22 @@ use std::{
     process::Command,
 };
 
-use runout_core::pipeline::Registry;
-use support::{closed, export, exporter, report, skip, surface, trimesh, volume_mm3};
+use runout_core::{pipeline::Registry, stage::Exporter};
+use support::{closed, export, export_heights, exporter, heights, report, skip, surface, trimesh, volume_mm3};
 
-fn files(folder: &Path, keys: &str) -> Vec<PathBuf> {
+fn gltf(folder: &Path, keys: &str) -> Box<dyn Exporter> {
     let mut registry = Registry::default();
     runout_gltf::register(&mut registry);
     let toml = format!("plugin = \"gltf\"\npath = \"part.glb\"\n{keys}");
-    export(&*exporter(&registry, &toml, folder).unwrap(), Some(&surface())).unwrap()
+    exporter(&registry, &toml, folder).unwrap()
+}
+
+fn files(folder: &Path, keys: &str) -> Vec<PathBuf> {
+    export(&*gltf(folder, keys), Some(&surface())).unwrap()
+}
+
+fn flat_files(folder: &Path) -> Vec<PathBuf> {
+    export_heights(&*gltf(folder, "magnification = 1000"), &heights()).unwrap()
 }
 
 #[test]
@@ -28,8 +36,12 @@ fn khronos_validator_finds_nothing() {
         return skip("gltf-validator is not installed in RUNOUT_NODE_MODULES (default tests/foreign/node_modules)");
     }
     let folder = tempfile::tempdir().unwrap();
-    for keys in ["", "capped = true\nmagnification = 1000", "colour_range_um = 0.001"] {
-        for file in files(folder.path(), keys) {
+    let keys = ["", "capped = true\nmagnification = 1000", "colour_range_um = 0.001"];
+    let round = keys.map(|keys| -> Box<dyn Fn() -> Vec<PathBuf>> { Box::new(|| files(folder.path(), keys)) });
+    let flat: Box<dyn Fn() -> Vec<PathBuf>> = Box::new(|| flat_files(folder.path()));
+    // Each writes over the files before it.
+    for write in round.into_iter().chain([flat]) {
+        for file in write() {
             let output = Command::new("node").arg(here.join("validate.mjs")).arg(&modules).arg(&file).output();
             let Ok(output) = output else { return skip("node is not installed") };
             let report = report(&output);
@@ -58,5 +70,14 @@ fn trimesh_finds_a_coloured_solid() {
         let lowest = surface.deviation_um.iter().copied().fold(f64::INFINITY, f64::min);
         // Half a unit in the last place of an f32 near 8.
         assert!((range[0].as_f64().unwrap() - lowest).abs() < 5e-7);
+    }
+    for file in flat_files(folder.path()) {
+        let Some(found) = trimesh(&file) else { return };
+        assert_eq!(found["as_written"]["watertight"], false, "{found:#}");
+        assert_eq!(found["as_written"]["winding_consistent"], true, "{found:#}");
+        let range = found["deviation_range"].as_array().unwrap();
+        let lowest =
+            heights().height_nm.iter().copied().filter(|height| height.is_finite()).fold(f64::INFINITY, f64::min);
+        assert!((range[0].as_f64().unwrap() - 1e-3 * lowest).abs() < 5e-7);
     }
 }

@@ -12,7 +12,9 @@ use std::{
 
 use gltf::{Accessor, Gltf, Semantic};
 use runout_core::{pipeline::Registry, stage::Takes, surface::Surface};
-use support::{ANGLES, RADIUS_MM, angle, deviation_um, export, exporter, names, surface, volume_mm3};
+use support::{
+    ANGLES, RADIUS_MM, angle, deviation_um, export, export_heights, exporter, heights, names, surface, volume_mm3,
+};
 
 const RINGS: usize = 10;
 
@@ -239,4 +241,44 @@ fn wrong_keys_are_refused_by_name() {
     assert!(refused("path = \"a.glb\"\ncolour_range_um = 0").contains("above 0"));
     assert!(refused("path = \"a.glb\"\ncaps = true").contains("caps"));
     assert!(refused("").contains("path"));
+}
+
+#[test]
+fn a_height_map_is_an_open_sheet_with_its_hole() {
+    let folder = tempfile::tempdir().unwrap();
+    let build = |keys: &str| {
+        let toml = format!("plugin = \"gltf\"\npath = \"out/flat.glb\"\n{keys}");
+        exporter(&registry(), &toml, folder.path()).unwrap()
+    };
+    let heights = heights();
+    let files = export_heights(&*build("magnification = 1000"), &heights).unwrap();
+    let [plain, magnified] = [&files[0], &files[1]].map(|file| read(file));
+    let there: Vec<usize> = (0..heights.height_nm.len()).filter(|node| heights.height_nm[*node].is_finite()).collect();
+    assert!(heights.holes() > 20);
+    for (found, scale) in [(&plain, 1.0), (&magnified, 1000.0)] {
+        assert_eq!(found.positions.len(), there.len());
+        for ((position, deviation), node) in found.positions.iter().zip(&found.deviation_um).zip(&there) {
+            let (row, column) = (node / heights.columns, node % heights.columns);
+            let height_nm = heights.height_nm[*node];
+            // +Y is the height, and the map's y runs to −Z.
+            let expected = [1.0 + 0.1 * column as f64, scale * 1e-6 * height_nm, 2.0 - 0.1 * row as f64];
+            for (found, expected_mm) in position.iter().zip(expected) {
+                assert!((f64::from(*found) - 1e-3 * expected_mm).abs() < 1e-9, "{position:?} {expected:?}");
+            }
+            assert!((f64::from(*deviation) - 1e-3 * height_nm).abs() < 1e-6);
+        }
+        let area = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| found.positions[vertex as usize].map(|part| 1e3 * f64::from(part)));
+            cross(minus(b, a), minus(c, a))[1]
+        };
+        assert!(found.triangles.iter().all(|triangle| area(triangle) > 0.0));
+        // 12 mm² less a hole of 0.45 mm, up to the triangles at its edge.
+        let whole: f64 = found.triangles.iter().map(|triangle| 0.5 * area(triangle)).sum();
+        assert!((10.9..11.4).contains(&whole), "{whole}");
+        assert_eq!(found.extras["scale"], scale);
+        assert_eq!(found.extras.get("radius_mm"), None);
+    }
+    assert_eq!(plain.extras["checksum"], format!("blake3:{}", heights.checksum()));
+    let error = export_heights(&*build("capped = true"), &heights).unwrap_err().to_string();
+    assert!(error.contains("capped"), "{error}");
 }

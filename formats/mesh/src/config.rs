@@ -11,11 +11,11 @@ use serde::Deserialize;
 pub struct MeshConfig {
     /// The file to write; the mesh in it is at true scale.
     pub path: PathBuf,
-    /// Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius drawn
-    /// so many times larger. Above 1, at most 1000000.
+    /// Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the
+    /// heights of a map, drawn so many times larger. Above 1, at most 1000000.
     #[serde(default)]
     pub magnification: Option<f64>,
-    /// Closes both ends with flat discs, so that the mesh is a solid.
+    /// Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends.
     #[serde(default)]
     pub capped: bool,
     /// Deviation that the two strongest colours stand for, ± µm; without it the largest deviation.

@@ -10,7 +10,14 @@ use runout_core::{
     table::{RecordBatch, TableSpec},
 };
 
-use crate::{config::MeshConfig, format::Format, mesh::Mesh, notes::Notes};
+use crate::{
+    config::MeshConfig,
+    format::Format,
+    mesh::Mesh,
+    notes::{Drawn, Notes},
+    sheet::Sheet,
+    wall::Wall,
+};
 
 /// A micrometre drawn as a metre.
 const MOST_MAGNIFICATION: f64 = 1e6;
@@ -36,6 +43,21 @@ impl MeshConfig {
             return Err(Fault::at("colour_range_um", format!("the range must be above 0 µm, found {found}")));
         }
         Ok(Box::new(MeshExporter { format, config: Self { path: context.path(&self.path), ..self } }))
+    }
+}
+
+impl MeshConfig {
+    fn mesh<'a>(&self, drawn: Drawn<'a>, scale: f64) -> Result<Mesh<'a>> {
+        match drawn {
+            Drawn::Surface(surface) => Ok(Mesh::Wall(Wall::new(surface, scale, self.capped, self.colour_range_um)?)),
+            Drawn::Heights(_) if self.capped => Err(Error::new(
+                "draw",
+                "the height map",
+                "`capped` closes the ends of a part, and a height map has none",
+            )
+            .help("leave `capped` out")),
+            Drawn::Heights(heights) => Ok(Mesh::Sheet(Sheet::new(heights, scale, self.colour_range_um)?)),
+        }
     }
 }
 
@@ -85,12 +107,12 @@ impl Export for MeshExport {
     }
 
     fn finish(mut self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
-        let surface = result.surface.ok_or_else(|| {
+        let drawn = Drawn::of(result).ok_or_else(|| {
             Error::new("write", self.config.path.display().to_string(), "the run built no surface to draw")
         })?;
-        let draw = |target: &Target| Mesh::new(surface, target.scale, self.config.capped, self.config.colour_range_um);
+        let draw = |target: &Target| self.config.mesh(drawn, target.scale);
         let (meshes, checksum) = thread::scope(|scope| {
-            let checksum = scope.spawn(|| surface.checksum());
+            let checksum = scope.spawn(|| drawn.checksum());
             let meshes: Result<Vec<Mesh>> = self.files.iter().map(draw).collect();
             (meshes, checksum.join())
         });
@@ -98,7 +120,7 @@ impl Export for MeshExport {
             Error::new("draw", "the surface", "the thread of its checksum stopped").of(ErrorKind::Interrupted)
         })?;
         for (Target { place, file, .. }, mesh) in self.files.iter_mut().zip(meshes?) {
-            let notes = Notes::new(self.format.unit, &mesh, surface, &checksum, result);
+            let notes = Notes::new(self.format.unit, &mesh, drawn, &checksum, result);
             (self.format.write)(&mesh, &notes, file).map_err(|error| place.caused(error))?;
         }
         // Closed: some systems do not rename what is open.

@@ -1,8 +1,9 @@
 //! What mesh formats share.
 //!
-//! A [`Surface`](runout_core::surface::Surface) becomes a [`Mesh`]: a wall of rings that closes at 0°, with caps on its
-//! ends where asked. A format is a [`Format`]: an extension, a unit and a function that writes one mesh; configuration,
-//! the second, magnified file, notes and atomic files are here.
+//! A [`Surface`](runout_core::surface::Surface) becomes a [`Wall`] of rings that closes at 0°, with caps on its ends where
+//! asked; a [`HeightGrid`](runout_core::height_grid::HeightGrid) becomes a [`Sheet`], open at its edges and holes. A format
+//! is a [`Format`]: an extension, a unit and a function that writes one mesh; configuration, the second, magnified file,
+//! notes and atomic files are here.
 
 mod cap;
 mod colour;
@@ -13,11 +14,17 @@ mod format;
 mod mesh;
 mod notes;
 mod portions;
+mod sheet;
+mod vertices;
+mod wall;
 
 pub use cap::Cap;
 pub use colour::{ColourScale, STEPS as COLOUR_STEPS, UNMEASURED, linear, palette};
 pub use config::MeshConfig;
 pub use format::Format;
-pub use mesh::{LANES, Mesh, Vertices};
+pub use mesh::Mesh;
 pub use notes::{InputNote, Notes};
 pub use portions::{in_order, processors};
+pub use sheet::Sheet;
+pub use vertices::{LANES, Vertices};
+pub use wall::Wall;

@@ -1,6 +1,6 @@
 //! What a mesh says of itself, in glTF's extras and in comments.
 
-use runout_core::{numerics::fourier::max_order, stage::Completed, surface::Surface};
+use runout_core::{height_grid::HeightGrid, numerics::fourier::max_order, stage::Completed, surface::Surface};
 use serde::Serialize;
 
 use crate::mesh::Mesh;
@@ -14,8 +14,9 @@ pub struct Notes {
     pub unit: &'static str,
     /// How many times larger than they are the deviations are drawn.
     pub scale: f64,
-    /// Radius that the deviations are added to, in mm.
-    pub radius_mm: f64,
+    /// Radius that the deviations are added to, in mm; none on a plane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f64>,
     /// What the strongest colours stand for, ± µm.
     pub colour_range_um: f64,
     /// Lowest and highest order (undulations per revolution) that the form holds.
@@ -23,8 +24,9 @@ pub struct Notes {
     pub band_upr: Option<[usize; 2]>,
     /// Orders in that band that the layout cannot separate; they are missing in the form.
     pub lost_orders: Vec<usize>,
-    /// How the rings were filled between the sections.
-    pub interpolation: &'static str,
+    /// How the rings were filled between the sections; none on a plane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interpolation: Option<&'static str>,
     /// Effects that the form is corrected for, with their values; none after a run.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<String>,
@@ -50,26 +52,68 @@ pub struct InputNote {
     pub blake3: String,
 }
 
+/// What is drawn.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Drawn<'a> {
+    /// Form over angle and z.
+    Surface(&'a Surface),
+    /// Heights on a plane.
+    Heights(&'a HeightGrid),
+}
+
+impl<'a> Drawn<'a> {
+    /// What a result holds.
+    pub fn of(result: &Completed<'a>) -> Option<Self> {
+        result.surface.map(Self::Surface).or(result.heights.map(Self::Heights))
+    }
+
+    pub fn checksum(self) -> String {
+        match self {
+            Self::Surface(surface) => surface.checksum(),
+            Self::Heights(heights) => heights.checksum(),
+        }
+    }
+
+    fn surface(self) -> Option<&'a Surface> {
+        match self {
+            Self::Surface(surface) => Some(surface),
+            Self::Heights(_) => None,
+        }
+    }
+
+    fn checksum_of(self) -> &'static str {
+        match self {
+            Self::Surface(_) => "radius_mm, z_mm of each ring, deviation_um [ring][angle], as little-endian f64",
+            Self::Heights(_) => {
+                "origin_x_mm, origin_y_mm, step_x_mm, step_y_mm, height_nm [row][column] with NaN where there is none, as \
+                 little-endian f64"
+            }
+        }
+    }
+}
+
 impl Notes {
-    pub(crate) fn new(unit: &'static str, mesh: &Mesh, surface: &Surface, checksum: &str, result: &Completed) -> Self {
+    pub(crate) fn new(unit: &'static str, mesh: &Mesh, drawn: Drawn, checksum: &str, result: &Completed) -> Self {
         let Completed { summary, about, .. } = result;
-        let fitting = max_order(surface.angles);
-        let band_upr = about.form_band_upr.map(|[lowest, highest]| [lowest, highest.min(fitting)]);
+        let surface = drawn.surface();
+        let fitting = surface.map(|surface| max_order(surface.angles));
+        let band_upr =
+            about.form_band_upr.zip(fitting).map(|([lowest, highest], fitting)| [lowest, highest.min(fitting)]);
         let inputs = summary.provenance.inputs.iter();
         let within = |order: &&usize| band_upr.is_some_and(|[lowest, highest]| (lowest..=highest).contains(order));
         Self {
             title: summary.title.clone(),
             unit,
             scale: mesh.scale(),
-            radius_mm: surface.radius_mm,
+            radius_mm: surface.map(|surface| surface.radius_mm),
             colour_range_um: mesh.range_um(),
             band_upr,
             lost_orders: summary.lost_orders.form.iter().filter(within).copied().collect(),
-            interpolation: surface.interpolation,
+            interpolation: surface.map(|surface| surface.interpolation),
             effects: summary.effects.iter().map(ToString::to_string).collect(),
-            caps: (!mesh.caps().is_empty()).then_some("drawn, not measured: grey"),
+            caps: mesh.wall().is_some_and(|wall| !wall.caps().is_empty()).then_some("drawn, not measured: grey"),
             checksum: format!("blake3:{checksum}"),
-            checksum_of: "radius_mm, z_mm of each ring, deviation_um [ring][angle], as little-endian f64",
+            checksum_of: drawn.checksum_of(),
             program: summary.provenance.program.clone(),
             inputs: inputs.map(|input| InputNote { path: input.path.clone(), blake3: input.blake3.clone() }).collect(),
         }
@@ -82,9 +126,9 @@ impl Notes {
             format!("title: {}", self.title),
             format!("unit: {}", self.unit),
             format!("scale: deviations drawn x{}", self.scale),
-            format!("radius_mm: {}", self.radius_mm),
-            format!("colour_range_um: -{0} (blue) to +{0} (red)", self.colour_range_um),
         ];
+        lines.extend(self.radius_mm.map(|radius| format!("radius_mm: {radius}")));
+        lines.push(format!("colour_range_um: -{0} (blue) to +{0} (red)", self.colour_range_um));
         if let Some([lowest, highest]) = self.band_upr {
             lines.push(format!("band_upr: {lowest} to {highest}"));
         }
@@ -92,7 +136,7 @@ impl Notes {
             let orders: Vec<String> = self.lost_orders.iter().map(ToString::to_string).collect();
             lines.push(format!("lost_orders: {}", orders.join(" ")));
         }
-        lines.push(format!("interpolation: {}", self.interpolation));
+        lines.extend(self.interpolation.map(|filled| format!("interpolation: {filled}")));
         lines.extend(self.effects.iter().map(|effect| format!("corrected_for: {effect}")));
         lines.extend(self.caps.map(|caps| format!("caps: {caps}")));
         lines.push(format!("checksum: {} ({})", self.checksum, self.checksum_of));

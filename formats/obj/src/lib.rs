@@ -1,7 +1,7 @@
 //! Wavefront OBJ meshes.
 //!
-//! Millimetres, z along the spindle as measured. Vertices carry their colour (sRGB, 0 to 1) after their position, as
-//! MeshLab reads it. Where a magnified mesh is asked for, it is a second file (`NAME-x1000.obj`).
+//! Millimetres, z along the spindle, or upwards on a height map, as measured. Vertices carry their colour (sRGB, 0 to 1)
+//! after their position, as MeshLab reads it. Where a magnified mesh is asked for, it is a second file (`NAME-x1000.obj`).
 
 mod text;
 
@@ -17,7 +17,9 @@ use runout_core::{
     },
     stage::Exporter,
 };
-use runout_mesh::{COLOUR_STEPS, Cap, Format, Mesh, MeshConfig, Notes, UNMEASURED, in_order, palette, processors};
+use runout_mesh::{
+    COLOUR_STEPS, Cap, Format, Mesh, MeshConfig, Notes, UNMEASURED, Wall, in_order, palette, processors,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -47,7 +49,7 @@ pub fn register(registry: &mut Registry) {
 /// Rings that one thread writes out at a time: a megabyte of text with 2560 angles.
 const TOGETHER: usize = 4;
 
-/// Writes comments, vertices with their normals ring by ring, and triangles band by band.
+/// Writes comments, vertices with their normals row by row, and triangles band by band.
 ///
 /// Each vertex has one normal, of the same number: readers that tell vertices apart by both find the same solid.
 fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
@@ -56,13 +58,16 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
     for line in notes.lines() {
         text.raw("# ").raw(&line).raw("\n");
     }
-    text.raw("# axes: z along the spindle, x at the part's 0 deg\n");
+    text.raw(match mesh {
+        Mesh::Wall(_) => "# axes: z along the spindle, x at the part's 0 deg\n",
+        Mesh::Sheet(_) => "# axes: x along rows, y from row to row, z upwards\n",
+    });
     text.raw("o ").raw(&object_name(&notes.title)).raw("\n");
     file.write_all(&bytes)?;
     let colours: [String; COLOUR_STEPS] = palette().map(colour_text);
-    in_order(mesh.rings(), TOGETHER, processors(), file, |ring, bytes| {
+    in_order(mesh.rows(), TOGETHER, processors(), file, |row, bytes| {
         let mut text = Text::behind(bytes);
-        mesh.ring(ring, |vertices| {
+        mesh.row(row, |vertices| {
             for lane in 0..vertices.count {
                 let [position_mm, normal] =
                     [&vertices.position_mm, &vertices.normal].map(|of| of.map(|axis| axis[lane]));
@@ -71,25 +76,26 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
             }
         });
     })?;
-    let caps = mesh.caps();
+    let caps: Vec<(&Wall, Cap)> =
+        mesh.wall().into_iter().flat_map(|wall| wall.caps().into_iter().map(move |cap| (wall, cap))).collect();
     let mut bytes = Vec::new();
     let mut text = Text::behind(&mut bytes);
-    for cap in &caps {
-        for position_mm in cap.vertices(mesh) {
+    for (wall, cap) in &caps {
+        for position_mm in cap.vertices(wall) {
             text.raw("v").vector(position_mm).raw(&colour_text(UNMEASURED));
             text.raw("vn").vector([0.0, 0.0, cap.normal_z]).raw("\n");
         }
     }
     file.write_all(&bytes)?;
-    in_order(mesh.rings() - 1, TOGETHER, processors(), file, |ring, bytes| {
+    in_order(mesh.rows() - 1, TOGETHER, processors(), file, |row, bytes| {
         let mut text = Text::behind(bytes);
-        mesh.band(ring).flatten().for_each(|triangle| face(&mut text, triangle));
+        mesh.band(row, |triangle| face(&mut text, triangle));
     })?;
     let mut bytes = Vec::new();
     let mut text = Text::behind(&mut bytes);
-    let angles = mesh.angles() as u32;
-    for (index, cap) in caps.iter().enumerate() {
-        let own = mesh.rings() * mesh.angles() + index * Cap::vertex_count(mesh.angles());
+    let angles = mesh.columns() as u32;
+    for (index, (_, cap)) in caps.iter().enumerate() {
+        let own = mesh.vertex_count() + index * Cap::vertex_count(mesh.columns());
         cap.triangles(angles, own as u32).for_each(|triangle| face(&mut text, triangle));
     }
     file.write_all(&bytes)

@@ -12,7 +12,10 @@ use std::{
 };
 
 use runout_core::pipeline::Registry;
-use support::{ANGLES, RADIUS_MM, angle, closed, deviation_um, export, exporter, names, surface, trimesh, volume_mm3};
+use support::{
+    ANGLES, RADIUS_MM, angle, closed, deviation_um, export, export_heights, exporter, heights, names, surface, trimesh,
+    volume_mm3,
+};
 use tobj::{LoadOptions, Mesh};
 
 const RINGS: usize = 10;
@@ -137,4 +140,28 @@ fn failure_leaves_what_was_there() {
     assert!(export(&*exporter, None).unwrap_err().to_string().contains("no surface"));
     assert_eq!(names(folder.path()), ["part.obj"]);
     assert_eq!(std::fs::read(folder.path().join("part.obj")).unwrap(), b"before");
+}
+
+#[test]
+fn a_height_map_is_an_open_sheet_with_its_hole() {
+    let folder = tempfile::tempdir().unwrap();
+    let exporter =
+        exporter(&registry(), "plugin = \"obj\"\npath = \"flat.obj\"\nmagnification = 1000", folder.path()).unwrap();
+    let heights = heights();
+    let files = export_heights(&*exporter, &heights).unwrap();
+    for (file, scale) in files.iter().zip([1.0, 1000.0]) {
+        let mesh = read(file);
+        let positions = vectors(&mesh.positions);
+        assert_eq!(positions.len(), heights.height_nm.len() - heights.holes());
+        assert_eq!(mesh.indices, mesh.normal_indices);
+        let mut met = HashSet::new();
+        for [x, y, z] in positions {
+            let [column, row] = [(x - 1.0) / 0.1, (y + 2.0) / 0.1].map(|place| place.round() as usize);
+            let height_nm = heights.height_nm[row * heights.columns + column];
+            assert!(met.insert((row, column)));
+            assert!((z - scale * 1e-6 * height_nm).abs() < 1e-6 * scale.max(1.0) * 1e-3 + 1e-9, "{z} {height_nm}");
+        }
+        // Without a title of its own, the text still says which way is up.
+        assert!(std::fs::read_to_string(file).unwrap().contains("z upwards"));
+    }
 }

@@ -23,7 +23,7 @@ const STYLE: &str = include_str!("../assets/report.css");
 /// # Errors
 /// Never in practice: its data can be written as JSON.
 pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Result<Markup> {
-    let Completed { summary, about, surface, diagnosis } = *result;
+    let Completed { summary, about, surface, diagnosis, .. } = *result;
     let title = if title.is_empty() { "Result" } else { title };
     let rows = values::rows(summary);
     let drawn = data::figures(figures);

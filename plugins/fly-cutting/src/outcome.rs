@@ -3,6 +3,7 @@
 use runout_core::{
     Result,
     evaluate::areal::{self, HeightMap},
+    height_grid::HeightGrid,
     stage::{NamedValue, Outcome, points::value},
     table::{ColumnSpec, Figure, TableRows, TableSpec, numbers},
 };
@@ -82,7 +83,17 @@ impl Known<'_> {
         }
         values.extend(self.areal("residual", self.after_nm.iter().copied())?);
         values.extend(self.of_cut());
-        Ok(Outcome { convention: CONVENTION.into(), tables: rows, values, remarks, ..Outcome::default() })
+        let heights = Some(self.drawn(corrected())?);
+        Ok(Outcome { convention: CONVENTION.into(), tables: rows, values, heights, remarks, ..Outcome::default() })
+    }
+
+    /// Heights above their least-squares plane, as meshes draw them.
+    fn drawn(&self, heights_nm: impl Iterator<Item = f64>) -> Result<HeightGrid> {
+        let map = areal::without_polynomial(&self.grid.map_um(heights_nm)?, 1)?;
+        let Grid { columns, step_x_mm, step_y_mm, origin_mm: [origin_x_mm, origin_y_mm], .. } = *self.grid;
+        let height_nm = map.heights_um().iter().map(|height| 1e3 * height).collect();
+        let std_nm = self.heights.std_nm;
+        Ok(HeightGrid { columns, step_x_mm, step_y_mm, origin_x_mm, origin_y_mm, std_nm, height_nm })
     }
 
     /// Height parameters after removal of the least-squares plane.

@@ -88,6 +88,10 @@ impl PointSeparator for FlyCutting {
         self.concluded(&measured, (&fit, &fit), &[], remarks)
     }
 
+    fn gives_heights(&self) -> bool {
+        true
+    }
+
     fn notes(&self) -> Vec<String> {
         vec![
             "a line in the axial motion and one in the tilt about y are the same on the surface: the amplitude is that of the height of \

@@ -153,6 +153,7 @@ impl Found<'_> {
             tables,
             values: self.values(&lobes),
             form: self.form(&lobes),
+            heights: None,
             lost_orders: Some(LostOrders::of([("lobing", lobing), ("form", form)])),
             remarks: self.remarks(&lobes),
             notes: self.notes(&lobes),

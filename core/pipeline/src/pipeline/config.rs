@@ -110,6 +110,11 @@ impl Route {
         self.point_separator().is_none_or(PointSeparator::gives_form)
     }
 
+    /// Whether its result has a surface: form, or heights on a plane.
+    fn gives_surface(&self) -> bool {
+        self.gives_form() || self.point_separator().is_some_and(PointSeparator::gives_heights)
+    }
+
     /// Whether there is a model for the closed loop.
     fn has_model(&self) -> bool {
         match self {
@@ -264,9 +269,14 @@ impl Pipeline {
             .collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref())?;
         let of_result = route.tables(assessment.as_ref(), rig.as_ref());
-        let (gives_form, has_model) = (route.gives_form(), route.has_model());
-        let exporting =
-            Exporting { registry, context: &context, gives_form, has_model, tables: &of_result, diagnose: &diagnose };
+        let exporting = Exporting {
+            registry,
+            context: &context,
+            gives_surface: route.gives_surface(),
+            has_model: route.has_model(),
+            tables: &of_result,
+            diagnose: &diagnose,
+        };
         let Exports { exporters, diagnosed } = exporting.exports(&tables(root, "export")?, sources)?;
         Ok(Self {
             title,

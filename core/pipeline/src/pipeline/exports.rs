@@ -51,8 +51,8 @@ pub(super) struct Exports {
 pub(super) struct Exporting<'a> {
     pub registry: &'a Registry,
     pub context: &'a Context<'a>,
-    /// Whether the result has form.
-    pub gives_form: bool,
+    /// Whether the result has a surface: form, or heights on a plane.
+    pub gives_surface: bool,
     /// Whether there is a model for the closed loop.
     pub has_model: bool,
     pub tables: &'a [TableSpec],
@@ -69,8 +69,9 @@ impl Exporting<'_> {
         taken.files.extend(diagnose.path.as_ref().map(|path| (resolved(path), DIAGNOSIS_USE)));
         for table in tables {
             let exporter = registry.exporters.build(table, context)?;
-            if exporter.takes() == Takes::Surface && !self.gives_form {
-                let fault = Fault::at("plugin", "this exporter takes form along an axis; [separate] gives tables");
+            if exporter.takes() == Takes::Surface && !self.gives_surface {
+                let message = "this exporter takes form along an axis or a height map; [separate] gives tables";
+                let fault = Fault::at("plugin", message);
                 return Err(document::resolve(fault.help("take one that writes tables"), table));
             }
             taken

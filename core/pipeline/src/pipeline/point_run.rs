@@ -45,7 +45,7 @@ impl PointResult<'_> {
         points: &Points,
         observer: &dyn Observer,
     ) -> Result<Finished> {
-        let Outcome { convention, tables, values, form, lost_orders, mut remarks, notes } = self.outcome;
+        let Outcome { convention, tables, values, form, heights, lost_orders, mut remarks, notes } = self.outcome;
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
         if let Some(diagnosis) = self.diagnosis {
@@ -54,6 +54,7 @@ impl PointResult<'_> {
         writer.take_values(values, convention);
         writer.lost_orders(lost_orders);
         writer.note(notes);
+        writer.take_heights(heights);
         writer.write(&tables)?;
         let mut surface = None;
         if let Some(Form { sections, radius_mm }) = form {

@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all},
+    height_grid::HeightGrid,
     stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
@@ -60,6 +61,8 @@ pub(super) struct ResultWriter {
     interrupted: bool,
     /// Signs and references of a domain's own tables.
     convention: String,
+    /// Heights on a plane.
+    heights: Option<HeightGrid>,
     summary: Summary,
     /// What the closed loop found.
     diagnosis: Option<Diagnosis>,
@@ -102,6 +105,7 @@ impl ResultWriter {
             placed: pipeline.route.point_separator().is_some(),
             interrupted: false,
             convention: String::new(),
+            heights: None,
             summary: begun(pipeline),
             diagnosis: None,
             summary_path: summary_path(exporters, &pipeline.tables),
@@ -178,6 +182,11 @@ impl ResultWriter {
         self.diagnosis = Some(diagnosis.clone());
     }
 
+    /// Takes heights on a plane.
+    pub(super) fn take_heights(&mut self, heights: Option<HeightGrid>) {
+        self.heights = heights;
+    }
+
     /// Takes what the user should know and that is as it should be.
     pub(super) fn note(&mut self, notes: Vec<String>) {
         self.summary.warnings.extend(notes.iter().cloned());
@@ -220,8 +229,9 @@ impl ResultWriter {
         } else {
             About { convention: std::mem::take(&mut self.convention), ..About::default() }
         };
+        let heights = self.heights.as_ref();
         let completed =
-            Completed { summary: &self.summary, about: &about, surface, diagnosis: self.diagnosis.as_ref() };
+            Completed { summary: &self.summary, about: &about, surface, heights, diagnosis: self.diagnosis.as_ref() };
         let mut complete = Vec::new();
         for export in self.exports {
             complete.extend(export.finish(&completed)?);

@@ -145,7 +145,8 @@ impl StationTables {
         surface: Option<&Surface>,
     ) -> Result<Vec<PendingFile>> {
         export.rows(&self.values, &self.value_rows(summary)?.rows)?;
-        export.finish(&Completed { summary, about: &self.about(summary), surface, diagnosis: None })
+        let about = self.about(summary);
+        export.finish(&Completed { summary, about: &about, surface, heights: None, diagnosis: None })
     }
 
     /// What the numbers are.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::{atomic_file::PendingFile, pipeline::summary::Summary};
+use crate::{atomic_file::PendingFile, height_grid::HeightGrid, pipeline::summary::Summary};
 use runout_closed_loop::diagnosis::Diagnosis;
 use runout_error::Result;
 use runout_table::{RecordBatch, TableSpec};
@@ -34,7 +34,7 @@ pub trait Exporter: Send + Sync {
 pub enum Takes {
     /// Tables.
     Tables,
-    /// The surface.
+    /// The surface: form over angle and z, or heights on a plane.
     Surface,
     /// Tables, and the surface where there is one.
     TablesAndSurface,
@@ -75,6 +75,8 @@ pub struct Completed<'a> {
     pub about: &'a About,
     /// Form over angle and z, where an exporter or a value needs it.
     pub surface: Option<&'a Surface>,
+    /// Heights on a plane, where the result has them.
+    pub heights: Option<&'a HeightGrid>,
     /// What the closed loop found, where the result is that of its final model.
     pub diagnosis: Option<&'a Diagnosis>,
 }

@@ -4,7 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::plan::PointPlan;
-use crate::points::{PointColumn, Points};
+use crate::{
+    height_grid::HeightGrid,
+    points::{PointColumn, Points},
+};
 use runout_closed_loop::{
     Effect, Model,
     closed_loop::{self, Settings},
@@ -31,6 +34,11 @@ pub trait PointSeparator: Send + Sync {
 
     /// Whether its result has form: closed profiles, from which the standards' values and a surface are computed.
     fn gives_form(&self) -> bool {
+        false
+    }
+
+    /// Whether its result has heights on a plane, of which meshes are drawn.
+    fn gives_heights(&self) -> bool {
         false
     }
 
@@ -117,6 +125,8 @@ pub struct Outcome {
     pub values: Vec<NamedValue>,
     /// Form, where there is one.
     pub form: Option<Form>,
+    /// Heights on a plane above their least-squares plane, where there are any.
+    pub heights: Option<HeightGrid>,
     /// Orders that the points do not separate; nothing where the domain has no orders.
     pub lost_orders: Option<LostOrders>,
     /// What the user should know, as something may be wrong.

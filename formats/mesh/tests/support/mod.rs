@@ -11,6 +11,7 @@ use std::{
 use runout_core::{
     Complex64, Error,
     atomic_file::commit_all,
+    height_grid::HeightGrid,
     pipeline::{
         error::Fault,
         registry::{Context, Registry},
@@ -18,7 +19,7 @@ use runout_core::{
     },
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
-    stage::Exporter,
+    stage::{About, Completed, Exporter, ResultInfo},
     surface::Surface,
 };
 use toml::de::DeTable;
@@ -91,6 +92,33 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
         ..Summary::default()
     };
     commit_all(tables.finish(export, &summary, surface)?)
+}
+
+/// A height map of 4 × 3 mm with a hole: 1 µm a mm along x, with waves of 0.1 µm.
+pub fn heights() -> HeightGrid {
+    let (columns, rows) = (41, 31);
+    let height_nm = |index: usize| {
+        let [x, y] = [0.1 * (index % columns) as f64, 0.1 * (index / columns) as f64];
+        let is_hole = (x - 2.0).hypot(y - 1.5) < 0.45;
+        if is_hole { f64::NAN } else { 1000.0 * (x - 2.0) + 100.0 * (3.0 * y).sin() }
+    };
+    HeightGrid {
+        columns,
+        step_x_mm: 0.1,
+        step_y_mm: 0.1,
+        origin_x_mm: 1.0,
+        origin_y_mm: -2.0,
+        std_nm: None,
+        height_nm: (0..columns * rows).map(height_nm).collect(),
+    }
+}
+
+/// Runs an exporter over heights.
+pub fn export_heights(exporter: &dyn Exporter, heights: &HeightGrid) -> Result<Vec<PathBuf>, Error> {
+    let export = exporter.begin(&ResultInfo::default())?;
+    let (summary, about) = (Summary { title: "Flat".into(), ..Summary::default() }, About::default());
+    let result = Completed { summary: &summary, about: &about, surface: None, heights: Some(heights), diagnosis: None };
+    commit_all(export.finish(&result)?)
 }
 
 /// A form that holds orders 2 to 250, of which the surface's 360 angles hold 179.

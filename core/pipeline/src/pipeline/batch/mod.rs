@@ -261,7 +261,8 @@ impl<'a> Batch<'a> {
             },
             ..Summary::default()
         };
-        let completed = Completed { summary: &summary, about: &About::default(), surface: None, diagnosis: None };
+        let about = About::default();
+        let completed = Completed { summary: &summary, about: &about, surface: None, heights: None, diagnosis: None };
         let mut files: Vec<PendingFile> = gathered.into_iter().map(Gathered::finish).collect();
         for export in exports {
             files.extend(export.finish(&completed)?);
