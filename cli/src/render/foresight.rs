@@ -36,7 +36,10 @@ pub fn visible(page: &mut Page, foresight: &Foresight) {
 
 /// Effects that would not show, or not be told apart.
 pub fn hidden(page: &mut Page, foresight: &Foresight) {
-    let mut table = Table::new(4, ["effect", "at", "moves form by (rms)", "moves motion by (rms)"]);
+    // Face and z are of axial sensors: a table leaves out columns without entries.
+    let columns = ["form", "motion", "face", "z"];
+    let heads = ["effect", "at"].map(str::to_owned).into_iter();
+    let mut table = Table::new(6, heads.chain(columns.map(|on| format!("moves {on} by (rms)"))));
     for alike in groups(&foresight.blind_to, |one| (&one.blind.effect, &one.blind.targets)) {
         let Some(first) = alike.first() else { continue };
         let moves = |on: &str| {
@@ -49,7 +52,8 @@ pub fn hidden(page: &mut Page, foresight: &Foresight) {
         };
         let each = foresight.blind_to.iter().map(|one| (&one.blind.effect, &one.blind.targets));
         let targets = targets(&first.blind.effect, alike.iter().map(|one| &one.blind.targets), each);
-        table.row([first.blind.effect.clone(), targets, moves("form"), moves("motion")]);
+        let [form, motion, face, z] = columns.map(moves);
+        table.row([first.blind.effect.clone(), targets, form, motion, face, z]);
     }
     page.headed_table("Effects that would not show, and what one unit does all the same", &table);
     let sets: Vec<String> = foresight.confounded.iter().map(|set| names(set)).collect();
