@@ -14,6 +14,7 @@ pub mod points_pictures;
 pub mod results;
 pub mod rotor;
 pub mod scaling;
+pub mod spatial;
 pub mod straightness;
 pub mod surface;
 pub mod values;

@@ -10,7 +10,7 @@ use runout_studies::{
     blind::{self, domains, draw::Layout, points::Domain},
     coverage, eccentricity, flat,
     minimum_zone_cylinder::{self, Wall},
-    monte_carlo, points_pictures, results, rotor, scaling, straightness, surface as unrolled,
+    monte_carlo, points_pictures, results, rotor, scaling, spatial, straightness, surface as unrolled,
     values::{self, Spectrum},
     walls,
 };
@@ -28,6 +28,8 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies blind-campaign INDEX [SEED [LAYOUT]]   one of them in full; of points with --domain NAME
        runout-studies monte-carlo [CAMPAIGNS]   time of many campaigns, on one thread and on all
        runout-studies diagnose-scaling       time of a diagnosis over the number of stations
+       runout-studies spatial-coverage [MACHINES [SEED [PLACES]]]   predictions of the spatial error beside the truth: of 90 to
+                                             160 places, or of as many as PLACES
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies component-errors PIPELINE PICTURE   component errors of a C axis over the command
        runout-studies flat PIPELINE PICTURE      a fly-cut surface, and the same without what the closed loop found
@@ -94,6 +96,13 @@ fn main() -> ExitCode {
         ["compare-results", a, b] => compare_results(a, b, 1e-12),
         ["compare-results", a, b, relative] if relative.parse::<f64>().is_ok() => {
             compare_results(a, b, relative.parse().unwrap_or_default())
+        }
+        ["spatial-coverage", ref rest @ ..]
+            if rest.len() <= 3
+                && sizes(rest, [100, 1]).is_some()
+                && rest.get(2).is_none_or(|word| word.parse::<usize>().is_ok()) =>
+        {
+            spatial_coverage(sizes(rest, [100, 1]).unwrap_or_default(), rest.get(2).and_then(|word| word.parse().ok()))
         }
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["component-errors", pipeline, picture] => {
@@ -200,6 +209,12 @@ fn value_coverage(campaigns: u64, seed: u64, only: Option<Layout>) -> Result<()>
             println!("{}", values::table(&values::rows(rig, spectrum, seed..seed + campaigns, folder.path())?));
         }
     }
+    Ok(())
+}
+
+fn spatial_coverage([machines, seed]: [u64; 2], places: Option<usize>) -> Result<()> {
+    println!("{machines} machines from seed {seed}, simulated\n");
+    println!("{}", spatial::table(&[spatial::coverage(machines as usize, seed, places)?]));
     Ok(())
 }
 

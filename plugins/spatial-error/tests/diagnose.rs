@@ -1,9 +1,7 @@
-//! The loop: each effect alone, clean campaigns, strangers, and a short blind benchmark.
+//! The loop: each effect alone, clean campaigns, strangers.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
-#[path = "support/study.rs"]
-mod study;
 mod support;
 
 use runout_core::{
@@ -126,22 +124,4 @@ fn without_noise_from_elsewhere_nothing_is_at_its_floor() {
     let found = diagnose(&Scenario { passes: 1, ..scenario(51) }, COARSE);
     assert_eq!(found.verdict, Verdict::NothingFound, "{:?}", found.added);
     assert!(found.before.noise_floor_um.is_none());
-}
-
-/// The short version of `spatial_error_study blind`.
-#[test]
-fn a_short_blind_benchmark() {
-    let found = study::blind(6, 5);
-    found.print();
-    assert!(found.false_alarms == 0 && found.unexplained == found.strangers, "{found:?}");
-    assert!(found.visible - found.named <= 1, "{found:?}");
-}
-
-/// The short version of `spatial_error_study coverage`.
-#[test]
-fn a_short_study_of_coverage() {
-    let found = study::coverage(6, 5);
-    found.print();
-    assert!((0.6..1.6).contains(&found.chi2()) && found.share_inside() > 0.88, "{found:?}");
-    assert!(found.compensated >= 5, "{found:?}");
 }

@@ -2,12 +2,13 @@
 
 mod fly_cutting;
 mod rotary_axis;
+mod spatial_error;
 mod touch_probe;
 
 use super::points::Domain;
 
 /// All of them.
-pub const ALL: [Domain; 3] = [rotary_axis::DOMAIN, touch_probe::DOMAIN, fly_cutting::DOMAIN];
+pub const ALL: [Domain; 4] = [rotary_axis::DOMAIN, touch_probe::DOMAIN, fly_cutting::DOMAIN, spatial_error::DOMAIN];
 
 /// The domain of a name.
 #[must_use]

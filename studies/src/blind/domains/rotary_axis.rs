@@ -184,7 +184,7 @@ fn plant(id: &'static str, large: bool, layout: &Layout, scenario: &mut Scenario
             let names = courses.iter().map(|course| format!("thermal-drift {target} {course}")).collect();
             let mut parameters = vec![("drift", size)];
             parameters.extend(constant.map(|constant| ("time_constant", constant)));
-            let planted = Planted { id, names, size: words, parameters };
+            let planted = Planted { id, names, size: words, parameters, visible: None };
             let targets = [target.to_owned()];
             (SimulatedEffect::ThermalDrift { targets, drift_um: size, time_constant: constant }, planted)
         }

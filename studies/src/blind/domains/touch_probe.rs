@@ -179,7 +179,13 @@ fn plant(id: &'static str, large: bool, scenario: &mut TouchProbeScenario, chanc
             waves.push(wave);
             let (sine, cosine) = wave.phase_deg.to_radians().sin_cos();
             let parameters = vec![("cosine", amplitude_um * cosine), ("sine", -amplitude_um * sine)];
-            Planted { id, names: vec![format!("{id}-{order}")], size: format!("{amplitude_um:.2} µm"), parameters }
+            Planted {
+                id,
+                names: vec![format!("{id}-{order}")],
+                size: format!("{amplitude_um:.2} µm"),
+                parameters,
+                visible: None,
+            }
         }
         "chip" | "chip in one setup" => {
             let [at, width, height] =

@@ -34,16 +34,16 @@ pub struct Judged {
 }
 
 /// What became of a planted effect.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Traced {
-    /// Whether it raises the residual of the declared model by itself.
+    /// Whether it raises the residual of the declared model by itself, or shows beside a field.
     pub visible: bool,
     /// Whether it was named: itself, or a set that holds it.
     pub named: bool,
     /// Whether it was named alone.
     pub alone: bool,
-    /// Parameters within two standard uncertainties, and all that were compared: of effects named alone.
-    pub parameters: [usize; 2],
+    /// Error over standard uncertainty of its parameters, where it was named alone.
+    pub parameters: Vec<f64>,
 }
 
 /// A value beside its truth.
@@ -73,10 +73,10 @@ pub fn judge(index: u64, kind: Kind, campaign: &Campaign) -> Result<Judged> {
         let found = diagnosis.added.iter().find(|added| holds(added, planted));
         let alone = found.filter(|added| added.confounded_with.is_empty());
         Traced {
-            visible,
+            visible: planted.visible.unwrap_or(visible),
             named: found.is_some(),
             alone: alone.is_some(),
-            parameters: alone.map_or([0; 2], |added| within(added, planted)),
+            parameters: alone.map_or_else(Vec::new, |added| errors(added, planted)),
         }
     });
     let effects = effects.collect();
@@ -125,22 +125,31 @@ pub fn name(added: &Added) -> String {
 
 /// Whether what was named is, or could as well be, what was planted.
 fn holds(added: &Added, planted: &Planted) -> bool {
-    planted.names.iter().any(|wanted| name(added) == *wanted || added.confounded_with.contains(wanted))
+    let right = |wanted: &String| {
+        (name(added) == *wanted && has_order_of(added, planted)) || added.confounded_with.contains(wanted)
+    };
+    planted.names.iter().any(right)
 }
 
-/// Parameters within two standard uncertainties of the truth, of those that can be compared.
-fn within(added: &Added, planted: &Planted) -> [usize; 2] {
-    let mut counts = [0; 2];
+/// An effect that has orders is right with its own order only.
+fn has_order_of(added: &Added, planted: &Planted) -> bool {
+    let order = planted.parameters.iter().find(|(name, _)| *name == "order");
+    let found = added.parameters.iter().find(|parameter| parameter.name == "order");
+    order.zip(found).is_none_or(|((_, order), found)| (order - found.value).abs() < 0.5)
+}
+
+/// Errors of parameters over their standard uncertainties, of those that can be compared.
+fn errors(added: &Added, planted: &Planted) -> Vec<f64> {
+    let mut errors = Vec::new();
     if planted.names.first() != Some(&name(added)) {
-        return counts;
+        return errors;
     }
     for (parameter, truth) in &planted.parameters {
         let Some(found) = added.parameters.iter().find(|one| one.name == *parameter) else { continue };
         let Some(std) = found.std.filter(|std| *std > 0.0) else { continue };
-        counts[0] += usize::from((found.value - truth).abs() <= 2.0 * std);
-        counts[1] += 1;
+        errors.push((found.value - truth) / std);
     }
-    counts
+    errors
 }
 
 impl Judged {

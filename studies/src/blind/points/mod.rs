@@ -44,6 +44,8 @@ pub struct Planted {
     pub size: String,
     /// True values of parameters by the names that the loop gives them; of the first name.
     pub parameters: Vec<(&'static str, f64)>,
+    /// Whether it shows, where χ² of the declared model does not say so because a field that is part of the model takes it.
+    pub visible: Option<bool>,
 }
 
 impl Planted {
@@ -51,13 +53,13 @@ impl Planted {
     #[must_use]
     pub fn effect(id: &'static str, target: &str, size: String, parameters: Vec<(&'static str, f64)>) -> Self {
         let name = if target.is_empty() { id.to_owned() } else { format!("{id} {target}") };
-        Self { id, names: vec![name], size, parameters }
+        Self { id, names: vec![name], size, parameters, visible: None }
     }
 
     /// Something that the loop does not know.
     #[must_use]
     pub fn stranger(id: &'static str, size: String) -> Self {
-        Self { id, names: Vec::new(), size, parameters: Vec::new() }
+        Self { id, names: Vec::new(), size, parameters: Vec::new(), visible: None }
     }
 }
 

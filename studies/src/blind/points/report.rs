@@ -29,7 +29,8 @@ fn distinct<'a>(all: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 fn effects(all: &[Judged]) -> String {
     let mut text = format!(
         "| effect | campaigns | visible (χ² > {VISIBLE_CHI2}) | named | of these alone | missed | below, of these named | \
-         false alarms beside | parameters within 2 std |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+         false alarms beside | parameters within 2 std | mean square of error/std |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
     );
     let single = of(all, Kind::Single);
     let mut ids = distinct(single.iter().flat_map(|judged| judged.planted.iter().map(|planted| planted.id)));
@@ -53,16 +54,19 @@ fn row(text: &mut String, name: &str, these: &[&Judged]) {
     let alone = count(&|traced| traced.visible && traced.alone);
     let below = count(&|traced| !traced.visible && traced.named);
     let alarms: usize = these.iter().map(|judged| judged.false_alarms.len()).sum();
-    let [within, compared] = [0, 1].map(|place| traced.iter().map(|traced| traced.parameters[place]).sum::<usize>());
+    let errors: Vec<f64> = traced.iter().flat_map(|traced| traced.parameters.iter().copied()).collect();
+    let (compared, within) = (errors.len(), errors.iter().filter(|error| error.abs() <= 2.0).count());
+    let square = errors.iter().map(|error| error * error).sum::<f64>() / compared as f64;
     line(
         text,
         format_args!(
-            "| {name} | {} | {visible} | {}{named} | {alone} | {} | {}, {below} | {alarms} | {} |",
+            "| {name} | {} | {visible} | {}{named} | {alone} | {} | {}, {below} | {alarms} | {} | {} |",
             traced.len(),
             percent(named, visible),
             visible - named,
             traced.len() - visible,
             if compared == 0 { "-".into() } else { format!("{within} of {compared}") },
+            if compared == 0 { "-".into() } else { format!("{square:.2}") },
         ),
     );
 }

@@ -1,0 +1,13 @@
+//! The short version of `runout-studies spatial-coverage`.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use runout_studies::spatial;
+
+#[test]
+fn predictions_hold_the_truth_and_compensation_takes_it_away() {
+    let found = spatial::coverage(6, 5, None).unwrap();
+    println!("{}", spatial::table(std::slice::from_ref(&found)));
+    assert!((0.6..1.6).contains(&found.chi2()) && found.share_inside() > 0.88, "{found:?}");
+    assert!(found.compensated >= 5, "{found:?}");
+}
