@@ -146,7 +146,7 @@ fn of_numbers(campaign: &Campaign, solution: &Solution) -> Vec<String> {
     let count = campaign.places_mm.len();
     if let (Some(some), Some(_)) = (estimated_from(campaign), &solution.estimate) {
         all.push(format!(
-            "the covariance is estimated from {} of {count} places, drawn at random with close pairs",
+            "the covariance is estimated from {} of {count} places: half at random, half in dense clusters",
             some.len()
         ));
     }

@@ -17,16 +17,19 @@ use crate::{
     terms::Term,
 };
 
-/// Distinct places that covariances are estimated from at most, and how many of them are next to another one.
-const ESTIMATED_FROM: [usize; 2] = [600, 150];
+/// Distinct places that covariances are estimated from at most, and how many of them are at random over the volume.
+const ESTIMATED_FROM: [usize; 2] = [600, 300];
+/// Places of a cluster: it is as wide as the nearest places that a prediction takes.
+const CLUSTER: usize = 50;
 /// Distinct places that decide the trend where predictions come from nearest neighbours.
 const TREND_FROM: usize = 1500;
 /// Distinct places that an estimated covariance needs at least.
 const FEWEST: usize = 10;
 /// Share of a column outside the span of those before it, below which it is none of its own.
 const INDEPENDENT: f64 = 1e-6;
-/// Products of places and predictions up to which each prediction is widened by itself.
+/// Products of places and predictions up to which each prediction is widened by itself; predictions from nearest places that are.
 const WIDENED: usize = 20_000_000;
+const WIDENED_NEAR: usize = 64;
 /// Places up to which the uncertainty of the trend is widened: of more, covariances are known well.
 const WIDENED_TREND: usize = 1000;
 /// Largest move of the logarithm of a parameter: beyond, it is not known at all.
@@ -185,17 +188,18 @@ pub fn families(kriging: &Kriging) -> Vec<Family> {
     kriging.variogram.family().map_or_else(|| ORDER.to_vec(), |family| vec![family])
 }
 
-/// Places that covariances are estimated from: all, or some at random with the neighbours of some of these.
+/// Places that covariances are estimated from: all, or some at random, which show ranges, and dense clusters around some of these. Only
+/// the clusters show how smooth the field is between the places that a prediction is made from.
 #[must_use]
 pub fn estimated_from(campaign: &Campaign) -> Option<Vec<usize>> {
     let count = campaign.places_mm.len();
     if count <= ESTIMATED_FROM[0] {
         return None;
     }
-    let [all, pairs] = ESTIMATED_FROM;
+    let [all, scattered] = ESTIMATED_FROM;
     let mut order: Vec<usize> = (0..count).collect();
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(count as u64));
-    let mut chosen = order[..all - pairs].to_vec();
+    let mut chosen = order[..scattered].to_vec();
     let mut used = vec![false; count];
     for place in &chosen {
         used[*place] = true;
@@ -204,13 +208,13 @@ pub fn estimated_from(campaign: &Campaign) -> Option<Vec<usize>> {
         let [a, b] = [a, b].map(|place| Vector3::from(campaign.places_mm[place]));
         (a - b).norm_squared()
     };
-    for index in 0..pairs {
+    for index in 0..(all - scattered) / CLUSTER {
         let from = chosen[index];
-        let free = (0..count).filter(|place| !used[*place]);
-        if let Some(nearest) = free.min_by(|a, b| apart(from, *a).total_cmp(&apart(from, *b))) {
-            used[nearest] = true;
-            chosen.push(nearest);
-        }
+        let mut free: Vec<usize> = (0..count).filter(|place| !used[*place]).collect();
+        free.sort_by(|a, b| apart(from, *a).total_cmp(&apart(from, *b)));
+        free.truncate(CLUSTER);
+        free.iter().for_each(|place| used[*place] = true);
+        chosen.extend(free);
     }
     chosen.sort_unstable();
     Some(chosen)
@@ -348,8 +352,8 @@ impl Solution {
     /// What would be read at places, without noise. The variance contains what is not known of estimated covariances.
     #[must_use]
     pub fn predict(&self, campaign: &Campaign, places: &[[f64; 3]], variance: bool) -> Vec<[Predicted; 3]> {
-        let mut all = self.plain(campaign, &self.joint, places, variance);
-        if variance && self.neighbours.is_none() && self.estimate.is_some() {
+        let mut all = self.plain(campaign, &self.joint, self.neighbours.as_ref(), places, variance);
+        if variance && self.estimate.is_some() {
             self.widen(campaign, places, &mut all);
         }
         all
@@ -357,14 +361,27 @@ impl Solution {
 
     /// Adds what is not known of the covariances, to first order in the mean and to second order in the variance, along the
     /// directions in which the parameters of each field are independent (Harville, Jeske, J. Am. Stat. Assoc. 87 (1992) 724).
-    /// Where predictions are many, every so many are computed, and the others are widened by their mean ratio.
+    /// Where predictions are many, every so many are computed, and the others are widened by their mean ratio. Predictions from nearest
+    /// places keep the trend, of which next to nothing is left beside so many places.
     fn widen(&self, campaign: &Campaign, places: &[[f64; 3]], all: &mut [[Predicted; 3]]) {
-        let every = (places.len() * self.data.places.len()).div_ceil(WIDENED).max(1);
+        let every = match self.neighbours {
+            Some(_) => places.len().div_ceil(WIDENED_NEAR),
+            None => (places.len() * self.data.places.len()).div_ceil(WIDENED),
+        }
+        .max(1);
         let some: Vec<usize> = (0..places.len()).step_by(every).collect();
         let asked: Vec<[f64; 3]> = some.iter().map(|index| places[*index]).collect();
         let mut extra = vec![[0.0; 3]; asked.len()];
-        for pair in self.alternatives() {
-            let [above, below] = pair.map(|joint| self.plain(campaign, &joint, &asked, true));
+        let predicted = |covariances: &[Covariance]| {
+            if self.neighbours.is_some() {
+                let near = Neighbours::new(&self.data, covariances);
+                return Some(self.plain(campaign, &self.joint, Some(&near), &asked, true));
+            }
+            let joint = Joint::new(&self.data, covariances)?;
+            Some(self.plain(campaign, &joint, None, &asked, true))
+        };
+        for [above, below] in self.alternatives() {
+            let (Some(above), Some(below)) = (predicted(&above), predicted(&below)) else { continue };
             for (index, extra) in extra.iter_mut().enumerate() {
                 let at = &all[some[index]];
                 for axis in 0..3 {
@@ -389,8 +406,8 @@ impl Solution {
         }
     }
 
-    /// Fits with the parameters of all fields moved by their standard uncertainty, to both sides of each independent direction.
-    fn alternatives(&self) -> Vec<[Joint; 2]> {
+    /// Covariances with the parameters of all fields moved by their standard uncertainty, to both sides of each independent direction.
+    fn alternatives(&self) -> Vec<[Vec<Covariance>; 2]> {
         let Some(estimate) = &self.estimate else { return Vec::new() };
         let fields = self.covariances.len();
         let directions: Vec<_> = (0..fields)
@@ -407,9 +424,9 @@ impl Solution {
                 let mut part = parameters.rows_mut(field * PARAMETERS, PARAMETERS);
                 part.axpy(sign * size, &known.eigenvectors.column(direction), 1.0);
             }
-            Joint::new(&self.data, &covariances(self.family, &parameters))
+            covariances(self.family, &parameters)
         };
-        (0..PARAMETERS).filter_map(|direction| Some([moved(direction, 1.0)?, moved(direction, -1.0)?])).collect()
+        (0..PARAMETERS).map(|direction| [moved(direction, 1.0), moved(direction, -1.0)]).collect()
     }
 
     /// Standard uncertainty of each column of the trend, with what is not known of estimated covariances.
@@ -418,7 +435,8 @@ impl Solution {
         let plain = self.joint.trend_covariance.diagonal();
         let mut variance = plain.clone();
         if self.neighbours.is_none() && self.data.places.len() <= WIDENED_TREND {
-            for [above, below] in self.alternatives() {
+            for pair in self.alternatives() {
+                let [Some(above), Some(below)] = pair.map(|moved| Joint::new(&self.data, &moved)) else { continue };
                 let (a, b) = (above.trend_covariance.diagonal(), below.trend_covariance.diagonal());
                 let moved = (above.trend - below.trend) * 0.5;
                 variance += moved.component_mul(&moved) + (0.5 * (a + b) - &plain).map(|more| more.max(0.0));
@@ -427,15 +445,22 @@ impl Solution {
         variance.iter().map(|variance| variance.sqrt()).collect()
     }
 
-    fn plain(&self, campaign: &Campaign, joint: &Joint, places: &[[f64; 3]], variance: bool) -> Vec<[Predicted; 3]> {
+    fn plain(
+        &self,
+        campaign: &Campaign,
+        joint: &Joint,
+        near: Option<&Neighbours>,
+        places: &[[f64; 3]],
+        variance: bool,
+    ) -> Vec<[Predicted; 3]> {
         let nugget_counts = Self::nugget_counts(campaign);
-        let predictor = self.neighbours.is_none().then(|| Predictor::new(joint, &self.data.places, variance));
+        let predictor = near.is_none().then(|| Predictor::new(joint, &self.data.places, variance));
         let mut all = Vec::with_capacity(places.len());
         for places in places.chunks(CHUNK) {
             let axes = [0, 1, 2].map(|axis| {
                 let design = self.design(campaign, places, axis);
                 let query = Query { places, design: design.as_ref(), nugget_counts };
-                match (&predictor, &self.neighbours) {
+                match (&predictor, near) {
                     (Some(predictor), _) => predictor.predict(axis, &query),
                     (None, Some(near)) => near.predict(&self.data, joint, axis, &query),
                     (None, None) => Vec::new(),
