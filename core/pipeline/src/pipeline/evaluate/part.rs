@@ -1,4 +1,4 @@
-//! Values of all sections together: cylindricity.
+//! Values of all sections together: cylindricity. Long because all of them are of one wall, drawn the same way.
 
 use std::collections::BTreeSet;
 
