@@ -95,7 +95,7 @@ impl Columns {
     /// The same into memory that is there.
     pub fn fill(&self, about: &About, deviations: &mut Vec<f64>) {
         deviations.resize(self.len(), 0.0);
-        vectorised(Deviations { columns: self, about, deviations });
+        vectorised(Deviations { columns: self, about, out: deviations });
     }
 
     /// Sums for the least-squares cylinder, of the points that are there.
@@ -107,7 +107,7 @@ impl Columns {
 struct Deviations<'a> {
     columns: &'a Columns,
     about: &'a About,
-    into: &'a mut [f64],
+    out: &'a mut [f64],
 }
 
 impl NullaryFnOnce for Deviations<'_> {
@@ -115,10 +115,10 @@ impl NullaryFnOnce for Deviations<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { columns: Columns { u, v, levels, zeta }, about, into } = self;
+        let Self { columns: Columns { u, v, levels, zeta }, about, out } = self;
         let about = *about;
         let points = u.iter().zip(v).zip(levels.iter().zip(zeta));
-        for (deviation, ((u, v), (level, zeta))) in into.iter_mut().zip(points) {
+        for (deviation, ((u, v), (level, zeta))) in out.iter_mut().zip(points) {
             *deviation = about.deviation([*u, *v, *level, *zeta]);
         }
     }

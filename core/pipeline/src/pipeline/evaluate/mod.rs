@@ -1,6 +1,7 @@
 //! The standards' values of a run: which (`[evaluate]`), of what, and the limits that they have to keep (`[[limit]]`).
 
 mod areal;
+mod centres;
 mod config;
 mod filter;
 mod generatrix;

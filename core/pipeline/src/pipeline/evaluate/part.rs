@@ -1,11 +1,11 @@
-//! Values of all sections together: cylindricity.
+//! Values of all sections together: cylindricity. Long because all of them are of one wall, drawn the same way.
 
 use std::collections::BTreeSet;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
+use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, centres, labelled};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
@@ -235,7 +235,7 @@ impl Wall {
 
     /// Why the wall does not have the reference cylinders that are asked for, each with its reason.
     fn missing_cylinders(&self, references: &[Reference]) -> Vec<String> {
-        if self.rings.iter().all(|ring| ring.gaps.is_empty()) {
+        if self.is_whole() {
             return Vec::new();
         }
         let mut fourier = Fourier::new(self.count);
@@ -287,9 +287,10 @@ impl Wall {
         }
         let coaxiality = "ISO 1101:2017, coaxiality: twice the largest eccentricity";
         labels.push(Label::new("coaxiality", "µm", coaxiality, axis.clone()));
-        labels.push(Label::new("total-run-out", "µm", "ISO 1101:2017, total run-out, radial", axis));
+        labels.push(Label::new("total-run-out", "µm", "ISO 1101:2017, total run-out, radial", axis.clone()));
         let draws = (POINTS_DRAWN / (self.rings.len() * self.count).max(1)).clamp(FEWEST_DRAWS, DRAWS);
-        self.evaluate(filter, labels, (draws, DecidedBy::OneSection), About::WithoutNoise, |sections, _, found| {
+        let work = (draws, DecidedBy::OneSection);
+        let mut values = self.evaluate(filter, labels, work, About::WithoutNoise, |sections, _, found| {
             let of = |rings: &[usize]| rings.iter().filter_map(|ring| sections.get(*ring).copied()).collect::<Vec<_>>();
             let axis = Axis::through(&of(datums), self.radius_mm);
             let positions = axis.map(|axis| Positions::about(&of(others), self.radius_mm, &axis));
@@ -299,7 +300,43 @@ impl Wall {
             found.extend(all);
             found.push(positions.as_ref().map_or(f64::NAN, |all| all.coaxiality_um));
             found.push(positions.as_ref().map_or(f64::NAN, |all| all.total_runout_um));
-        })
+        });
+        for value in values.iter_mut().filter(|value| value.symbol == "eccentricity") {
+            let ring = others.iter().find(|ring| name(ring) == value.reference);
+            let std_um = ring.map(|ring| self.centre_std_um(filter, *ring, datums));
+            value.uncertainty = value.uncertainty.take().zip(std_um).map(|(known, std_um)| {
+                // The centre of an arc takes errors of other orders too.
+                let std_um = if self.is_whole() { std_um } else { std_um.max(known.std) };
+                Uncertainty::of_amplitude(value.value, std_um, 0)
+            });
+        }
+        self.diameters(&mut values, filter, datums, others);
+        values
+    }
+
+    /// Gives diameters that hold the centres of sections an interval that holds near 0 too.
+    fn diameters(&self, values: &mut [Value], filter: &Filter, datums: &[usize], others: &[usize]) {
+        let largest_um = others.iter().map(|ring| self.centre_std_um(filter, *ring, datums)).fold(0.0, f64::max);
+        for value in values.iter_mut().filter(|value| ["coaxiality", "STRsa"].contains(&value.symbol.as_str())) {
+            let known = value.uncertainty.take();
+            value.uncertainty = known.map(|known| centres::of_diameter(known, value.value, largest_um, others.len()));
+        }
+    }
+
+    /// Standard uncertainty of a section's centre beside the axis through those of others, along x and along y.
+    fn centre_std_um(&self, filter: &Filter, ring: usize, datums: &[usize]) -> f64 {
+        let z_mm: Vec<f64> = self.rings.iter().map(|ring| ring.z_mm).collect();
+        let of_order_1 = |ring: &Ring| {
+            let sources = ring.noise.iter().map(|(_, amplitudes)| filter.harmonics(amplitudes));
+            sources.filter_map(|amplitudes| Some(amplitudes.get(1)?.norm_sqr())).sum()
+        };
+        let variance: Vec<f64> = self.rings.iter().map(of_order_1).collect();
+        centres::std_um(&z_mm, &variance, ring, datums)
+    }
+
+    /// Whether no section is interrupted.
+    fn is_whole(&self) -> bool {
+        self.rings.iter().all(|ring| ring.gaps.is_empty())
     }
 
     /// What needs the sections' centres and mean radii.
@@ -316,7 +353,8 @@ impl Wall {
             Label::new("parallelism", "µm", parallelism, "LSLI of the opposite generatrix"),
         ];
         let draws = (DRAWS_OF_LINES, DecidedBy::OneSection);
-        self.evaluate(&Filter::low_pass(None), labels, draws, About::Form, |sections, _, found| {
+        let filter = Filter::low_pass(None);
+        let mut values = self.evaluate(&filter, labels, draws, About::Form, |sections, _, found| {
             let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
             let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
             let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
@@ -326,7 +364,10 @@ impl Wall {
             let coaxiality = median.iter().flat_map(|median| &median.coaxiality_um);
             found.push(coaxiality.copied().fold(f64::NAN, f64::max));
             found.push(lines.as_ref().map_or(f64::NAN, Generatrices::largest_parallelism_um));
-        })
+        });
+        let all: Vec<usize> = (0..self.rings.len()).collect();
+        self.diameters(&mut values, &filter, &all, &all);
+        values
     }
 
     /// Errors of each section; a wall of which some sections have no known error has none either.

@@ -434,6 +434,32 @@ fn placed_sections_have_taper_bend_and_coaxiality() {
     assert!((value("STRsg", "LSLI of generatrices") - 3.0).abs() < EXACT_UM);
 }
 
+/// Centres of noise alone: intervals of their distances from the datum axis begin at 0 and end above what was found.
+#[test]
+fn intervals_of_coaxial_sections_hold_nothing() {
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let (std, walls) = (0.003, 60);
+    let mut inside = [0; 3];
+    for _ in 0..walls {
+        let mut ring = |z: f64| {
+            let centre = Complex64::new(std * normal(), std * normal());
+            station(z, &[(1, centre), lobes(3, 1.5)], 10, 2.0 * std * std, &[])
+        };
+        let wall = [0.0, 5.0, 10.0, 15.0, 20.0].map(&mut ring);
+        let found = part(&wall, true, "references = ['LSCI']\nfilter_upr = []\ndatum = ['s0', 's20']");
+        for (inside, symbol) in inside.iter_mut().zip(["eccentricity", "coaxiality", "STRsa"]) {
+            for value in found.values.iter().filter(|value| value.symbol == symbol) {
+                let [low, high] = value.uncertainty.as_ref().unwrap().interval_95;
+                assert!(low <= value.value && value.value <= high, "{symbol} {} in {low} to {high}", value.value);
+                *inside += i32::from(low == 0.0);
+            }
+        }
+    }
+    // Three eccentricities a wall, coaxiality with the datum axis and with LSCY: 95 % ± 1.6, 2 and 2.8 %.
+    assert!(inside[0] >= 160 && inside[1] >= 106 && inside[2] >= 52, "{inside:?}");
+}
+
 #[test]
 fn harmonics_have_amplitude_and_the_first_crest() {
     let waves = [(3, Complex64::from_polar(2.0, -0.6)), (5, Complex64::from_polar(0.001, 1.0))];
