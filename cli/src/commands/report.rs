@@ -98,8 +98,14 @@ impl OverviewReport {
     pub(super) fn finish(self, provenance: Provenance, overview: &Overview) -> Result<()> {
         let summary = Summary { title: self.title, provenance, ..Summary::default() };
         let about = About::default();
-        let completed =
-            Completed { summary: &summary, about: &about, surface: None, diagnosis: None, overview: Some(overview) };
+        let completed = Completed {
+            summary: &summary,
+            about: &about,
+            surface: None,
+            heights: None,
+            diagnosis: None,
+            overview: Some(overview),
+        };
         atomic_file::commit_all(self.export.finish(&completed)?).map(|_written| ())
     }
 }

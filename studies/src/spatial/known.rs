@@ -28,7 +28,9 @@ impl Known {
         let mut places: Vec<[f64; 3]> = Vec::new();
         let mut sums: Vec<(Vector3<f64>, f64)> = Vec::new();
         for (place, reading) in made.commands_mm.iter().zip(&made.readings_um) {
-            let index = places.iter().position(|known| known == place).unwrap_or_else(|| {
+            // Commands are repeated to the last bit.
+            let same = |known: &[f64; 3]| known.iter().zip(place).all(|(a, b)| a.to_bits() == b.to_bits());
+            let index = places.iter().position(same).unwrap_or_else(|| {
                 places.push(*place);
                 sums.push((Vector3::zeros(), 0.0));
                 places.len() - 1

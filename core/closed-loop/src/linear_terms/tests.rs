@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::*;
-use crate::Parameter;
+use crate::{Fit, Parameter};
 
 /// Uniform between −0.5 and 0.5.
 fn noise(seed: &mut u64) -> f64 {
@@ -122,7 +122,7 @@ fn groups_left_out_are_predicted_by_the_others() {
                 left.map(|point| (y[point] - predicted(&columns, &fit, point)).powi(2)).sum::<f64>()
             })
             .sum();
-        let remainder = model.fit(&applied).unwrap().remainder;
+        let remainder = model.fit(&applied).unwrap().remainder().clone();
         assert!((remainder.held_out_chi2 / squares - 1.0).abs() < 1e-9, "{} {squares}", remainder.held_out_chi2);
         assert!((remainder.held_out_rms - (squares / 90.0).sqrt()).abs() < 1e-10);
         assert!(!remainder.noise_is_known());
@@ -198,8 +198,8 @@ fn what_only_one_group_tells_is_predicted_as_nothing() {
 fn known_effects_are_not_fitted_again() {
     let Made { model, .. } = made(None);
     let known = [Setting { effect: 0, values: vec![0.0] }];
-    let free = model.fit(&known).unwrap().remainder;
-    let fixed = model.with_known(&known).fit(&known).unwrap().remainder;
+    let free = model.fit(&known).unwrap().remainder().clone();
+    let fixed = model.with_known(&known).fit(&known).unwrap().remainder().clone();
     assert_eq!((free.dof, fixed.dof), (87, 88));
     assert!(free.held_out_rms < 0.8 * fixed.held_out_rms, "{} {}", free.held_out_rms, fixed.held_out_rms);
 }

@@ -117,7 +117,14 @@ pub fn heights() -> HeightGrid {
 pub fn export_heights(exporter: &dyn Exporter, heights: &HeightGrid) -> Result<Vec<PathBuf>, Error> {
     let export = exporter.begin(&ResultInfo::default())?;
     let (summary, about) = (Summary { title: "Flat".into(), ..Summary::default() }, About::default());
-    let result = Completed { summary: &summary, about: &about, surface: None, heights: Some(heights), diagnosis: None };
+    let result = Completed {
+        summary: &summary,
+        about: &about,
+        surface: None,
+        heights: Some(heights),
+        diagnosis: None,
+        overview: None,
+    };
     commit_all(export.finish(&result)?)
 }
 

@@ -68,7 +68,7 @@ pub fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexpla
             sensor: None,
             setup: one_setup.then(|| rig.setups[reading.setup].id.clone()),
             orders: held(&left),
-            rms_um: solved.residual().rms_um,
+            rms_um: solved.residual.rms_um,
             place: undecided(
                 &redundant,
                 &sensors.iter().map(|sensor| rig.sensors[*sensor].id.as_str()).collect::<Vec<_>>(),
