@@ -44,8 +44,8 @@ class Gltf:
     """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
 
     magnification: Union[float, None] = None
-    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights
-    of a map, drawn so many times larger. Above 1, at most 1000000."""
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
 
     path: str
     """The file to write; the mesh in it is at true scale."""
@@ -64,8 +64,8 @@ class Obj:
     """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
 
     magnification: Union[float, None] = None
-    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights
-    of a map, drawn so many times larger. Above 1, at most 1000000."""
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
 
     path: str
     """The file to write; the mesh in it is at true scale."""

@@ -4,6 +4,7 @@ pub mod averaging;
 pub mod axial;
 pub mod blind;
 pub mod campaign;
+pub mod chance;
 pub mod coverage;
 pub mod eccentricity;
 pub mod flat;

@@ -90,7 +90,11 @@ fn corrected_results_are_recognisable() {
         "harmonics.parquet",
         "motion.parquet",
         "report.html",
+        "spectrum.parquet",
         "summary.json",
+        "tilt_spectrum.parquet",
+        "tilt_turns.parquet",
+        "turns.parquet",
         "values.parquet",
     ];
     let mut expected: Vec<String> = names.map(|name| format!("out/diagnosed/{name}")).into();

@@ -19,6 +19,16 @@ stations = { count = 1 }
 [form]
 rms_um = 2
 max_order = 12
+
+[motion]
+x_rms_um = 0.5
+y_rms_um = 0.5
+
+[asynchronous]
+rms_um = 0.1
+
+[noise]
+rms_um = 0.02
 "#;
 
 /// Recorded with the rig as it is; then the pipeline has `from` replaced.

@@ -263,7 +263,8 @@ pub(crate) fn is_number(descriptor: &TypeDescriptor) -> bool {
 /// A recording that was cut short can declare any shape; HDF5 would fill what is missing with zeros.
 pub(crate) fn written_shape(dataset: &Dataset, place: &Place) -> Result<Vec<usize>> {
     let shape = dataset.get_shape().map_err(|error| place.error(error))?;
-    let width = dataset.dtype().map_err(|error| place.error(error))?.size();
+    let kind = dataset.dtype().map_err(|error| place.error(error))?;
+    let width = kind.size();
     let elements = shape.iter().try_fold(1_usize, |product, extent| product.checked_mul(*extent));
     let Some(bytes) = elements.and_then(|elements| elements.checked_mul(width)) else {
         return Err(place.error(format!("the shape {shape:?} is beyond any memory")));
@@ -297,8 +298,10 @@ pub(crate) fn written_shape(dataset: &Dataset, place: &Place) -> Result<Vec<usiz
         }
         Layout::Contiguous | Layout::Compact => {
             let stored = dataset.storage_size();
-            // What lies in one piece cannot grow: the shape that was written takes it as a whole.
-            if stored > bytes as u64 && bytes > 0 && dataset.layout() == Layout::Contiguous {
+            // What lies in one piece cannot grow: the shape that was written takes it as a whole. Texts of any length take another
+            // number of bytes in the file than their type says.
+            let is_fixed = kind.to_descriptor().is_ok_and(|descriptor| is_number(&descriptor));
+            if is_fixed && stored > bytes as u64 && bytes > 0 && dataset.layout() == Layout::Contiguous {
                 let problem = format!("the shape {shape:?} was declared, but {stored} bytes were written, not {bytes}");
                 return Err(place.error(problem).help("the file is damaged: copy it again from where it was recorded"));
             }

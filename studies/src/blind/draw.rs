@@ -4,8 +4,9 @@ use runout_core::rig::{RigConfig, SensorConfig};
 use runout_spindle::simulate::{FormHarmonic, Geometry, Orders, SpindleConfig};
 
 pub use super::Kind;
-use super::{chance::Chance, turn};
+use super::turn;
 use crate::campaign;
+use crate::chance::Chance;
 
 /// A campaign, and what the loop is to find in it.
 #[derive(Debug, Clone)]

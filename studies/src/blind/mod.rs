@@ -4,7 +4,6 @@
 //! [`draw`], [`judge`] and [`report`] are the spindle's. Measured points share one driver, [`points`]; a domain adds one file to
 //! [`domains`].
 
-pub mod chance;
 pub mod domains;
 pub mod draw;
 pub mod judge;

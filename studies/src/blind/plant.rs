@@ -7,7 +7,8 @@ use runout_spindle::simulate::{
     SpeedRipple, SpindleConfig, Step, ThermalDrift,
 };
 
-use super::{chance::Chance, draw::Planted};
+use super::draw::Planted;
+use crate::chance::Chance;
 
 fn planted(id: &'static str, target: Option<&String>, parameters: Vec<(&'static str, f64)>, size: String) -> Planted {
     Planted { id, target: target.cloned(), parameters, size }

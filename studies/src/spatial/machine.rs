@@ -2,7 +2,7 @@
 
 use runout_spatial_error::simulate::{Field, Layout, Placement, Scenario, Tracker};
 
-use crate::blind::chance::Chance;
+use crate::chance::Chance;
 
 /// Travel of all machines.
 pub const TRAVEL_MM: [f64; 3] = [600.0, 400.0, 350.0];

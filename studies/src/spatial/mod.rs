@@ -17,7 +17,7 @@ use runout_spatial_error::{
     simulate::{Scenario, Simulated},
 };
 
-use crate::blind::chance::Chance;
+use crate::chance::Chance;
 use known::Known;
 use machine::TRAVEL_MM;
 

@@ -139,8 +139,8 @@ fn diagnose_turns(
         diagnosis.truth = Some(Truth { form_rms_error_um: Step { before: rms(&errors[0]), after: rms(&errors[1]) } });
     }
     let surface = writer.build_surface(radius_mm)?;
+    diagnosis.warnings.extend(line.rig.remarks());
     let mut remarks = recording.remarks();
-    remarks.extend(line.rig.remarks());
     remarks.extend(diagnosis.warnings.iter().cloned());
     if pipeline.evaluate.has(Group::ErrorMotion) && !diagnosis.added.is_empty() {
         remarks.push(UNCORRECTED_SPREAD.into());

@@ -2,13 +2,15 @@
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
 
-use super::points::Axis;
 use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
 
 const LANES: usize = 8;
 /// Sums over points of products of two of the derivatives by the axis, with a sign of their own, 1 and the deviation: the upper
 /// triangle of a 6 by 6 matrix, row by row.
 pub(super) type Squares = [f64; 21];
+
+/// An axis inside: x and y midway and how far it leans until the end, in µm.
+pub(super) type Axis = [f64; 4];
 
 /// Points as f = p/R, w = (|p|² − R²)/2R and ζ, as `Points` describes them.
 #[derive(Debug, Clone, Default)]

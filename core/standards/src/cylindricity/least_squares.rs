@@ -1,6 +1,6 @@
 //! The least-squares cylinder by Gauss and Newton.
 
-use super::{Points, points::Axis};
+use super::{Points, columns::Axis};
 use runout_numerics::chebyshev::inverse;
 
 const MOST_STEPS: usize = 100;

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::{
     Cylinder, Values,
-    columns::{About, Columns},
+    columns::{About, Axis, Columns},
 };
 use crate::{near::Course, roundness::Angles};
 
@@ -39,9 +39,6 @@ pub struct Points {
 
 /// A point: sine and cosine of its angle, z in mm, radial deviation in µm.
 pub(super) type Place = ((f64, f64), f64, f64);
-
-/// An axis inside: x and y midway and how far it leans until the end, in µm.
-pub(super) type Axis = [f64; 4];
 
 impl Points {
     /// Points (angle in rad, z in mm, radial deviation in µm) about a nominal radius (positive).

@@ -2,7 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Cylinder, Points, Reference, Touch, Undetermined, columns::Columns, points::Axis};
+use super::{
+    Cylinder, Points, Reference, Touch, Undetermined,
+    columns::{Axis, Columns},
+};
 use runout_numerics::{
     chebyshev::{Chebyshev, Contact, Optimum},
     cloud::Cloud,

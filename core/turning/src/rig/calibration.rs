@@ -3,9 +3,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::SensorConfig;
-use runout_error::fault::Fault;
-
 /// Unit of the numbers that a channel records.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[non_exhaustive]
@@ -30,7 +27,7 @@ pub enum Unit {
 
 impl Unit {
     /// µm (or V) of one unit, and whether it is one of voltage.
-    fn scale(self) -> (f64, bool) {
+    pub(super) fn scale(self) -> (f64, bool) {
         match self {
             Self::Micrometre => (1.0, false),
             Self::Millimetre => (1e3, false),
@@ -109,43 +106,6 @@ pub fn straightened(reading_um: f64, quadratic_per_um: f64, cubic_per_um2: f64) 
         u -= (u * (1.0 + u * (a + b * u)) - reading_um) / slope;
     }
     Some(u)
-}
-
-impl SensorConfig {
-    pub(super) fn calibration(&self) -> Result<Calibration, Fault> {
-        let (scale, is_voltage) = self.unit.scale();
-        let um_per_unit = match (self.um_per_volt, is_voltage) {
-            (None, false) => scale,
-            (Some(um_per_volt), true) if um_per_volt.is_finite() && um_per_volt > 0.0 => scale * um_per_volt,
-            (Some(um_per_volt), true) => {
-                let fault = Fault::at("um_per_volt", format!("expected a number above 0, found {um_per_volt}"));
-                return Err(fault.help("a reading that shrinks when the surface comes nearer has `sign = -1`"));
-            }
-            (None, true) => {
-                let fault = Fault::at("unit", "volts need `um_per_volt`, the displacement that one volt stands for");
-                return Err(fault.help("take it from the sensor's certificate"));
-            }
-            (Some(_), false) => {
-                let fault = Fault::at("um_per_volt", "the readings are no voltage");
-                return Err(fault.help("add `unit = \"V\"`, or leave `um_per_volt` out"));
-            }
-        };
-        if !(self.gain.is_finite() && self.gain > 0.0) {
-            let fault = Fault::at("gain", format!("expected a number above 0, found {}", self.gain));
-            return Err(fault.help("it is reading over displacement: 1.05 where the sensor reads 5 % too much"));
-        }
-        for (key, value) in [("quadratic_per_um", self.quadratic_per_um), ("cubic_per_um2", self.cubic_per_um2)] {
-            if !value.is_finite() {
-                return Err(Fault::at(key, format!("expected a finite number, found {value}")));
-            }
-        }
-        Ok(Calibration {
-            um_per_unit,
-            gain: self.gain,
-            quadratic_per_um: self.quadratic_per_um,
-            cubic_per_um2: self.cubic_per_um2,
-        })
-    }
 }
 
 #[cfg(test)]

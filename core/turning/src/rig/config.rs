@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Gaps, Looks, Rig, Rotation, Sensor, Setup, Unit};
+use super::{Calibration, Gaps, Looks, Rig, Rotation, Sensor, Setup, Unit};
 use runout_error::Fault;
 
 /// Longer interruptions leave too little to bridge them by, in degrees.
@@ -268,6 +268,42 @@ fn radians(angle_deg: f64) -> Result<f64, String> {
 }
 
 impl SensorConfig {
+    /// From its numbers to displacements.
+    fn calibration(&self) -> Result<Calibration, Fault> {
+        let (scale, is_voltage) = self.unit.scale();
+        let um_per_unit = match (self.um_per_volt, is_voltage) {
+            (None, false) => scale,
+            (Some(um_per_volt), true) if um_per_volt.is_finite() && um_per_volt > 0.0 => scale * um_per_volt,
+            (Some(um_per_volt), true) => {
+                let fault = Fault::at("um_per_volt", format!("expected a number above 0, found {um_per_volt}"));
+                return Err(fault.help("a reading that shrinks when the surface comes nearer has `sign = -1`"));
+            }
+            (None, true) => {
+                let fault = Fault::at("unit", "volts need `um_per_volt`, the displacement that one volt stands for");
+                return Err(fault.help("take it from the sensor's certificate"));
+            }
+            (Some(_), false) => {
+                let fault = Fault::at("um_per_volt", "the readings are no voltage");
+                return Err(fault.help("add `unit = \"V\"`, or leave `um_per_volt` out"));
+            }
+        };
+        if !(self.gain.is_finite() && self.gain > 0.0) {
+            let fault = Fault::at("gain", format!("expected a number above 0, found {}", self.gain));
+            return Err(fault.help("it is reading over displacement: 1.05 where the sensor reads 5 % too much"));
+        }
+        for (key, value) in [("quadratic_per_um", self.quadratic_per_um), ("cubic_per_um2", self.cubic_per_um2)] {
+            if !value.is_finite() {
+                return Err(Fault::at(key, format!("expected a finite number, found {value}")));
+            }
+        }
+        Ok(Calibration {
+            um_per_unit,
+            gain: self.gain,
+            quadratic_per_um: self.quadratic_per_um,
+            cubic_per_um2: self.cubic_per_um2,
+        })
+    }
+
     /// Distance from the axis of a sensor that looks along it.
     fn axial_radius_mm(&self) -> Result<Option<f64>, Fault> {
         if let Some(bound_um) = self.form_um.filter(|bound_um| !(bound_um.is_finite() && *bound_um >= 0.0)) {

@@ -148,6 +148,9 @@ fn place(harmonics: &[Complex64]) -> String {
     let curve = Fourier::new(samples).synthesise(harmonics.iter().map(Complex64::conj)).to_vec();
     let squares: Vec<f64> = curve.iter().map(|value| value * value).collect();
     let half = 0.5 * squares.iter().sum::<f64>();
+    if half.is_nan() || half <= 0.0 {
+        return "over the whole turn".into();
+    }
     // The shortest arc that holds half of the square, by two pointers around the turn.
     let (mut end, mut sum, mut shortest) = (0, 0.0, (samples, 0));
     for start in 0..samples {
@@ -158,7 +161,8 @@ fn place(harmonics: &[Complex64]) -> String {
         if end - start < shortest.0 {
             shortest = (end - start, start);
         }
-        sum -= squares[start];
+        // Rounding of sums, where next to nothing is left of the arc.
+        (end, sum) = if end > start { (end, sum - squares[start]) } else { (start + 1, 0.0) };
     }
     let (length, start) = shortest;
     if length as f64 > NARROW * samples as f64 {

@@ -6,10 +6,12 @@ use runout_fly_cutting::{
     simulate::{CutConfig, Direction, FlyCuttingScenario, GridConfig, SimulatedEffect},
 };
 
-use crate::blind::{
-    Kind,
+use crate::{
+    blind::{
+        Kind,
+        points::{Campaign, Domain, Planted},
+    },
     chance::Chance,
-    points::{Campaign, Domain, Planted},
 };
 
 /// Height maps.

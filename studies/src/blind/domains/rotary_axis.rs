@@ -8,10 +8,12 @@ use runout_rotary_axis::{
     simulate::{Commands, Harmonic, Scenario, SimulatedEffect},
 };
 
-use crate::blind::{
-    Kind,
+use crate::{
+    blind::{
+        Kind,
+        points::{Campaign, Domain, Planted, True},
+    },
     chance::Chance,
-    points::{Campaign, Domain, Planted, True},
 };
 
 /// R-tests.

@@ -9,9 +9,9 @@ use runout_spatial_error::{
 use crate::{
     blind::{
         Kind,
-        chance::Chance,
         points::{Campaign, Domain, Planted, True},
     },
+    chance::Chance,
     spatial::{
         known::Known,
         machine::{self, TRAVEL_MM},

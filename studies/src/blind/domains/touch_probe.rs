@@ -8,10 +8,12 @@ use runout_touch_probe::{
     simulate::{Placed, Ring, TouchProbeScenario, Wave},
 };
 
-use crate::blind::{
-    Kind,
+use crate::{
+    blind::{
+        Kind,
+        points::{Campaign, Domain, Planted, True},
+    },
     chance::Chance,
-    points::{Campaign, Domain, Planted, True},
 };
 
 /// Touch-trigger probes.

@@ -5,7 +5,8 @@ pub mod report;
 
 use runout_core::{Result, points::Points, stage::PointSeparator};
 
-use super::{Kind, chance::Chance, each, turn};
+use super::{Kind, each, turn};
+use crate::chance::Chance;
 use judge::Judged;
 
 /// A domain of measured points.

@@ -31,7 +31,7 @@ use super::{
     tables,
 };
 use crate::{
-    atomic_file::{self, FolderLock, PendingFile, commit_all},
+    atomic_file::{self, FolderLock, PendingFile, commit_all, resolved},
     stage::{About, Completed, Exporter, ResultInfo, Source},
 };
 use recording::{of_recording, without_recording};
@@ -281,7 +281,10 @@ impl<'a> Batch<'a> {
             files.extend(export.finish(&completed)?);
         }
         report.outputs = files.iter().map(|file| file.destination().to_owned()).collect();
-        let _lock = FolderLock::of(files.iter().map(PendingFile::destination))?;
+        // The data set's own folder is locked already.
+        let own = resolved(self.store.folder());
+        let elsewhere = |file: &&Path| file.parent().is_none_or(|folder| resolved(folder) != own);
+        let _lock = FolderLock::of(files.iter().map(PendingFile::destination).filter(elsewhere))?;
         commit_all(files)?;
         let path = self.store.folder().join(REPORT);
         report.outputs.push(path.clone());
