@@ -58,7 +58,7 @@ fn mains_at_a_whole_order_is_a_note() {
     let text = "50 Hz is order 6.00 at 500 rpm";
     assert_eq!(said(&json(&at_500, &["check", "pipeline.toml"]), "notes", text), 1);
     let summary = json(&at_500, &["run", "pipeline.toml"]);
-    assert_eq!([said(&summary, "notes", text), said(&summary, "warnings", text)], [1, 1], "{summary}");
+    assert_eq!(said(&summary, "warnings", text), 1, "{summary}");
     assert_eq!(said(&json(&at_500, &["diagnose", "pipeline.toml"]), "warnings", text), 1);
     // No warning that fails a run.
     assert_eq!(at_500.run(&["run", "pipeline.toml", "--fail-on-warning"]).status, 0);

@@ -40,6 +40,8 @@ const APART_UM: f64 = 1e-6;
 const COUPLED: f64 = 0.2;
 /// Passes of all orders together, at most.
 const JOINT_PASSES: usize = 30;
+/// Form or motion of an order above so many times its readings is not what they show.
+const CANCELLING: f64 = 30.0;
 /// No result is given of a solution that still moves more than this, rms.
 const UNSETTLED_UM: f64 = 5e-4;
 
@@ -295,6 +297,14 @@ impl Solver<'_> {
                 first = solution;
             } else {
                 values[order * width..(order + 1) * width].copy_from_slice(&solution);
+                // Next to a lost order, form and motion are amplified noise that cancels in every reading; what exact geometry would
+                // make of it grows from pass to pass.
+                let read = readings[order * count..(order + 1) * count].iter();
+                let most = CANCELLING * read.map(|reading| reading.norm()).fold(0.0, f64::max);
+                let cancels = |(quantity, value): (&Quantity, &Complex64)| !quantity.is_tilt() && value.norm() > most;
+                if self.layout.unknowns.iter().zip(&solution).any(cancels) {
+                    told[order * width..(order + 1) * width].fill(false);
+                }
             }
         }
         let likely = self.likely_forms(&values, &told, readings, max_order);
