@@ -74,7 +74,8 @@ impl Solver<'_> {
         }
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
-        if self.couples(&readings) && is_above(estimate.moved_um, UNSETTLED_UM) {
+        let beyond = self.eccentricity_um(&readings) > FAR_OFF * 1e3 * self.selection.rig.part_radius_mm;
+        if self.second_order && beyond || self.couples(&readings) && is_above(estimate.moved_um, UNSETTLED_UM) {
             return Err(self.unsettled(station, &readings, &estimate));
         }
         let mut propagation = Propagation::of(&readings, &operators);
@@ -97,21 +98,20 @@ impl Solver<'_> {
     fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
         let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
         let ratio = format!("an eccentricity of {eccentricity_um:.0} µm on a radius of {radius_mm} mm");
-        let (problem, help) = if estimate.moved_um.is_finite() {
+        let check = "check part_radius_mm and the unit of the readings";
+        let (problem, help) = if eccentricity_um > FAR_OFF * 1e3 * radius_mm {
+            (format!("{ratio} is more than exact geometry is solved for"), check)
+        } else if estimate.moved_um.is_finite() {
             let moved_um = estimate.moved_um;
             let problem = format!(
                 "{ratio} couples the orders so strongly that no solution settles: the last pass still moves the readings \
                  by {moved_um:.2e} µm rms"
             );
-            let help = if eccentricity_um > FAR_OFF * 1e3 * radius_mm {
-                "check part_radius_mm and the unit of the readings"
-            } else {
-                "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the order"
-            };
+            let help = "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the order";
             (problem, help)
         } else {
             let problem = format!("{ratio}: sensors' lines do not meet the part, and the result is no number");
-            (problem, "check part_radius_mm and the unit of the readings")
+            (problem, check)
         };
         Error::new("separate", format!("station {}", station.name), problem).of(ErrorKind::Numerical).help(help)
     }
