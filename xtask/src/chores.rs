@@ -18,9 +18,9 @@ pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
     let nextest = answer("cargo-nextest", &["--version"]).is_some();
     let runner: &[&str] = if nextest {
-        &["nextest", "run", "--workspace", "--no-fail-fast"]
+        &["nextest", "run", "--workspace"]
     } else {
-        &["test", "--workspace", "--all-targets", "--no-fail-fast"]
+        &["test", "--workspace", "--all-targets"]
     };
     // Packages are fetched while the compiler works.
     let readers = std::thread::scope(|scope| {
@@ -37,6 +37,7 @@ pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
         readers.transpose()?.transpose()
     })?;
     let mut tests = cargo(runner)?;
+    tests.arg("--no-fail-fast");
     // Foreign readers that one test starts inherit the open files of the others, and HDF5's locks on them with it.
     tests.env("HDF5_USE_FILE_LOCKING", "FALSE");
     let skips = target().join("skipped-tests.txt");
