@@ -17,11 +17,8 @@ pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
     let nextest = answer("cargo-nextest", &["--version"]).is_some();
-    let runner: &[&str] = if nextest {
-        &["nextest", "run", "--workspace"]
-    } else {
-        &["test", "--workspace", "--all-targets"]
-    };
+    let runner: &[&str] =
+        if nextest { &["nextest", "run", "--workspace"] } else { &["test", "--workspace", "--all-targets"] };
     // Packages are fetched while the compiler works.
     let readers = std::thread::scope(|scope| {
         let readers = foreign_readers.then(|| {
