@@ -56,8 +56,10 @@ fn readings_that_contradict_the_rig_are_a_warning() {
 #[test]
 fn a_result_that_is_no_number_or_no_part_is_an_error() {
     let folder = campaign(&pipeline());
-    // The eccentricity is larger than the part: no line meets it; and without lines, its form is no smaller.
-    for (second_order, radius_mm, said) in [(true, 1e-3, "no number"), (false, 1e-6, "mm rms on 0.000001 mm radius")] {
+    // The eccentricity is larger than the part; and without exact geometry, its form is no smaller.
+    for (second_order, radius_mm, said) in
+        [(true, 1e-3, "more than exact geometry is solved for"), (false, 1e-6, "mm rms on 0.000001 mm radius")]
+    {
         let radius = format!("rig.part_radius_mm={radius_mm}");
         let geometry = format!("separate.second_order={second_order}");
         let ran = folder.run(&["run", "pipeline.toml", "--set", &radius, "--set", &geometry]);
