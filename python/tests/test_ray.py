@@ -130,7 +130,7 @@ def test_object_storage_takes_the_place_of_folders(cluster: None, folder: Path, 
 
 
 def test_simulated_campaigns_are_a_blind_benchmark(cluster: None, tmp_path: Path) -> None:
-    few = {"recording.stations.count": 1, "recording.revolutions": 8, "recording.format": "f32"}
+    few = {"recording.stations.count": 1, "recording.revolutions": 8}
     scenario = EXAMPLE / "scenario.toml"
 
     def vary(seed: int) -> dict[str, Any]:

@@ -21,7 +21,7 @@ const SUSPICIOUS_SHARE: f64 = 0.25;
 /// that.
 const FAR_FROM_NOISE: f64 = 100.0;
 const SHARE_OF_ONE: f64 = 0.1;
-/// χ² that differs by less, relative, is the same.
+/// χ² that differs by less of it, and of what noise leaves, is the same.
 const TRACELESS: f64 = 1e-6;
 /// `run`, which looks for nothing else, names two mistakes only where they leave less than this share.
 const SHARE_OF_TWO: f64 = 1e-3;
@@ -87,8 +87,10 @@ pub fn traceless(
 ) -> Vec<Vec<(Mistake, usize)>> {
     let trial = Trial::new(layout, applied, readings, weights);
     let Some(declared) = trial.left(&[], f64::INFINITY) else { return Vec::new() };
+    // Where readings are foreseen without noise, next to nothing is left by either.
+    let apart = TRACELESS * if weights.is_some() { declared.max(1.0) } else { declared };
     let same = |mistakes: &Vec<(Mistake, usize)>| {
-        trial.left(mistakes, declared * (1.0 + TRACELESS)).is_some_and(|left| left > declared * (1.0 - TRACELESS))
+        trial.left(mistakes, declared + apart).is_some_and(|left| left > declared - apart)
     };
     let mut found: Vec<_> = file_mistakes(layout).into_iter().map(|mistake| vec![mistake]).filter(same).collect();
     let signs = |wanted: &dyn Fn(usize) -> bool| -> Vec<(Mistake, usize)> {

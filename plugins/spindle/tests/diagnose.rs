@@ -256,7 +256,7 @@ fn a_stranger_stays_unexplained() {
 #[test]
 fn a_residual_that_every_sensor_explains_names_none() {
     let mut config = campaign(9, r#"[{"plugin":"sensor-gain","targets":["S2"],"relative_gain":0.05}]"#);
-    for (sensor, angle_deg) in config.rig.sensors.iter_mut().zip([0.0, 99.84375, 202.5]) {
+    for (sensor, angle_deg) in config.rig.sensors.iter_mut().zip([0.0, 99.844, 202.5]) {
         (sensor.angle_deg, sensor.z_mm, sensor.section) = (angle_deg, 100.0, "a".into());
     }
     config.rig.sensors.truncate(3);
