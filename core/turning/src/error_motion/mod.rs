@@ -95,7 +95,7 @@ const RESIDUAL: &str = "residual-synchronous";
 pub const WITH_FUNDAMENTAL: &str = "-with-fundamental";
 
 /// The ends of a range are looked for on so many times the angles of the average: 16 to a wave of its highest order or more, so that a
-/// crest between two of them is at most 0.5 % higher, and one of a tenth of that order 5e-5.
+/// crest between two of them is at most 1 − cos(π/16), 2 %, higher, and one of a tenth of that order 2e-4.
 const FINER: usize = 8;
 
 /// Shares of noise below this, in µm or µrad, are not said: they would be written as 0.
