@@ -15,6 +15,8 @@ use crate::limits;
 pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (String, &'static str) {
     let found = diagnosis.map(|diagnosis| {
         let class = match diagnosis.verdict {
+            // Effects between which the data do not decide leave the result open.
+            Verdict::Explained if diagnosis.added.iter().any(|added| !added.confounded_with.is_empty()) => "open",
             Verdict::AtNoiseFloor | Verdict::Explained => "good",
             Verdict::Unexplained => "bad",
             Verdict::Improved | Verdict::NothingFound => "open",
