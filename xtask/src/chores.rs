@@ -52,8 +52,8 @@ pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
         // Each of them takes one processor.
         std::thread::scope(|scope| {
             let program = program.display().to_string();
-            let inputs = program.clone();
-            let inputs = scope.spawn(move || fuzz::fuzz(&["--minutes", "2", &inputs]));
+            let worker = target().join("debug/examples/many_command_lines").display().to_string();
+            let inputs = scope.spawn(move || fuzz::fuzz(&["--minutes", "2", &worker]));
             kill_test::test(&["--kills", "100", &program])?;
             package()?;
             inputs.join().map_err(|_| "the fuzz run ended early".to_owned())?

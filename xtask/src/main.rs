@@ -35,8 +35,9 @@ cargo xtask COMMAND
   check-house [--strict]
                 print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, and
                 on a cycle of modules; with --strict also on long files without a reason
-  fuzz [--inputs N] [--minutes M] [--seed S] [PROGRAM]
-                give mutated configurations, tables, HDF5 files and overrides to the program; 2 minutes without more
+  fuzz [--inputs N] [--minutes M] [--seed S] [--folder DIR] [WORKER]
+                give mutated configurations, tables, HDF5 files and overrides to the program, many in one process; 2 minutes
+                without more; with a folder in memory (DIR) no file is synced to a disk
   kill-test [--kills N] [--seed S] [PROGRAM]
                 kill runs at every step and at all times, and look at what is left; 1000 kills without more
   deny          advisories, licences, yanked versions and sources of dependencies (deny.toml), by cargo-deny

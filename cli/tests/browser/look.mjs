@@ -83,8 +83,8 @@ if (map) {
   const box = await map.boundingBox();
   await page.mouse.move(box.x + box.width / 3, box.y + box.height / 2);
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2, { steps: 4 });
-  await page.waitForFunction(() => /deviation -?[0-9]/.test(document.querySelector("#surface .readout").textContent.replace("−", "-")));
-  found.pointed = await page.$eval("#surface .readout", (one) => one.textContent);
+  await page.waitForFunction(() => /: .* -?[0-9]/.test(document.querySelector("#map-surface ~ .readout").textContent.replace("−", "-")));
+  found.pointed = await page.$eval("#map-surface ~ .readout", (one) => one.textContent);
   await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
   await page.waitForFunction(() => document.getElementById("ring-surface").data);
   found.ring = (await plots())["ring-surface"];

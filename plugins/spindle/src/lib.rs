@@ -8,6 +8,7 @@ pub mod plan;
 pub mod selection;
 pub mod separators;
 pub mod simulate;
+mod sizes;
 mod solve;
 mod wiring;
 

@@ -29,6 +29,8 @@ const SHARE_OF_TWO: f64 = 1e-3;
 const ALIKE: f64 = 1.5;
 /// A gain that is wrong by more is no effect of usual kind: -2 is a wrong sign.
 const LARGEST_GAIN: f64 = 0.5;
+/// What was measured twice differs by noise only, whatever else is wrong with the rig.
+const COPIES: [Mistake; 2] = [Mistake::SensorsIdentical, Mistake::SetupRepeated];
 /// As many are worth a whole fit.
 const MOST: usize = 8;
 /// Form, motion and eccentricity live in the low orders.
@@ -55,8 +57,11 @@ pub fn suspects(
     let Some(declared) = trial.left(&[], f64::INFINITY) else { return Vec::new() };
     let single = single_mistakes(layout);
     let mut found: Vec<Suspect> = Vec::new();
+    let noise = if weights.is_some() { FAR_FROM_NOISE } else { SHARE_OF_TWO * declared };
     for mistake in &single {
-        found.extend(trial.suspect(vec![*mistake], SUSPICIOUS_SHARE * declared));
+        let limit = SUSPICIOUS_SHARE * declared;
+        let limit = if COPIES.contains(&mistake.0) { limit.min(noise) } else { limit };
+        found.extend(trial.suspect(vec![*mistake], limit));
     }
     let least = |found: &[Suspect]| found.iter().map(|suspect| suspect.chi2).fold(declared, f64::min);
     let far = if weights.is_some() { FAR_FROM_NOISE } else { SHARE_OF_ONE * declared };
@@ -109,8 +114,7 @@ pub fn traceless(
 
 /// Mistakes of the rig file: the recording holds what was measured.
 fn file_mistakes(layout: &Layout) -> Vec<(Mistake, usize)> {
-    let copies = [Mistake::SensorsIdentical, Mistake::SetupRepeated];
-    single_mistakes(layout).into_iter().filter(|(mistake, _)| !copies.contains(mistake)).collect()
+    single_mistakes(layout).into_iter().filter(|(mistake, _)| !COPIES.contains(mistake)).collect()
 }
 
 /// Every mistake at each of its targets.

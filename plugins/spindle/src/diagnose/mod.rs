@@ -31,7 +31,7 @@ use crate::{
     effects::{ActsOn, SpindleEffect, TurnEvidence, ordered_pairs, pair_of, pairs},
     layout::Layout,
     selection::Selection,
-    wiring,
+    sizes, wiring,
 };
 use changes::Change;
 use data::{Shared, StationData, TurnObservations};
@@ -319,8 +319,11 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
         level.orders = fit.redundant();
         level.chi2_per_dof = level.chi2_per_dof.and(fit.stated_chi2_per_dof());
     }
-    let copies = model.traced.data.iter().flat_map(|data| wiring::copies(&model.traced.selection.rig, &data.readings));
-    diagnosis.warnings.extend(copies);
+    let rig = &model.traced.selection.rig;
+    for data in &model.traced.data {
+        diagnosis.warnings.extend(wiring::copies(rig, &data.readings));
+        diagnosis.warnings.extend(sizes::mistaken_units(rig, &data.readings));
+    }
     let highest = TRACED_ORDERS.min(closed.after.max_order());
     if model.traced.layout.assess(highest).tells_no_form() {
         // Single turns may show a drift or a line all the same; the averaged turn shows nothing.

@@ -3,6 +3,7 @@
 use runout_core::{Result, separation::Separation, stage::Station};
 
 use crate::{
+    sizes,
     solve::{Operators, Readings, Solver, whitening},
     wiring,
 };
@@ -18,10 +19,12 @@ pub(super) fn separate(
 ) -> Result<Separation> {
     let (mut separation, readings) = solver.separate(station, method)?;
     let mut warnings = wiring::copies(&solver.selection.rig, &readings);
-    if separation.residual.chi2_per_dof > wiring::SUSPICIOUS_CHI2 {
+    let units = sizes::mistaken_units(&solver.selection.rig, &readings);
+    if units.is_empty() && separation.residual.chi2_per_dof > wiring::SUSPICIOUS_CHI2 {
         let weights = whitening(&readings);
         warnings.extend(wiring::warning(solver.selection, solver.layout, &readings, weights.as_deref()));
     }
+    warnings.extend(units);
     separation.warnings.splice(..0, warnings);
     Ok(separation)
 }

@@ -46,6 +46,14 @@ fn six(seed: u64, effects: &str) -> SpindleConfig {
     config
 }
 
+/// A campaign with the part and all sensors turned round.
+fn reversed(seed: u64, effects: &str) -> SpindleConfig {
+    let mut config = campaign(seed, effects);
+    config.rig.setups.truncate(2);
+    (config.rig.setups[1].part_deg, config.rig.setups[1].sensors_deg) = (180.0, 180.0);
+    config
+}
+
 fn looked_into(rig: &RigConfig, station: &Station) -> StationDiagnosis {
     let rig = rig.clone().check().unwrap();
     let layout = Layout::new(&rig, false);
@@ -339,4 +347,33 @@ fn a_wrong_gain_is_no_mistake_to_a_run() {
         }
     }
     assert_eq!(said, Vec::<String>::new());
+}
+
+/// Neither is a sensor at another angle or height: setups that differ by the motion alone leave more than noise.
+#[test]
+fn a_wrong_place_is_no_mistake_to_a_run() {
+    let mut said = Vec::new();
+    for effect in [
+        r#"[{"plugin":"sensor-angle","targets":["S2"],"angle_deg":5}]"#,
+        r#"[{"plugin":"sensor-axial-position","targets":["S2"],"shift_mm":20}]"#,
+    ] {
+        for seed in 1..=4 {
+            let config = reversed(seed, effect);
+            let rig = config.rig.clone().check().unwrap();
+            let warnings = warned(&config.rig, &averaged(&config, &rig).0);
+            said.extend(warnings.into_iter().filter(|warning| warning.contains("a mistake is likely")));
+        }
+    }
+    assert_eq!(said, Vec::<String>::new());
+}
+
+/// A channel in millimetres where the rig says µm is named by its size, and no mistake of the wiring is looked for.
+#[test]
+fn a_channel_in_another_unit_is_named() {
+    let config = six(3, r#"[{"plugin":"sensor-gain","targets":["S2"],"relative_gain":-0.999}]"#);
+    let rig = config.rig.clone().check().unwrap();
+    let warnings = warned(&config.rig, &averaged(&config, &rig).0);
+    let named = |warning: &String| warning.contains("sensor `S2`") && warning.contains("`unit = \"mm\"`");
+    assert!(warnings.iter().any(named), "{warnings:?}");
+    assert!(!warnings.iter().any(|warning| warning.contains("a mistake is likely")), "{warnings:?}");
 }

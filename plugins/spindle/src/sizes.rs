@@ -1,0 +1,54 @@
+//! Channels whose readings are a thousand times larger or smaller than those of the others: numbers in another unit.
+
+use runout_core::rig::Rig;
+
+use crate::solve::Readings;
+
+/// From one unit of length to the next.
+const BETWEEN_UNITS: f64 = 1e3;
+/// Readings of sensors that look the same way differ by less than this in size.
+const USUAL_RATIO: f64 = 3.0;
+/// So many others show what is usual.
+const FEWEST_OTHERS: usize = 2;
+
+/// Names each sensor whose readings are about a thousand times smaller or larger than the median of the other sensors that look
+/// the same way.
+pub fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
+    let sensors = rig.sensors.len();
+    let size = |sensor: usize| {
+        let orders = readings.mean.chunks_exact(readings.count).skip(1);
+        orders
+            .flat_map(|order| order.iter().skip(sensor).step_by(sensors))
+            .map(|value| value.norm_sqr())
+            .sum::<f64>()
+            .sqrt()
+    };
+    let sizes: Vec<f64> = (0..sensors).map(size).collect();
+    let looks_along = |sensor: usize| rig.sensors[sensor].axial_radius_mm.is_some();
+    let said = |sensor: usize| {
+        let others = (0..sensors).filter(|other| *other != sensor && looks_along(*other) == looks_along(sensor));
+        let mut others: Vec<f64> = others.map(|other| sizes[other]).collect();
+        if others.len() < FEWEST_OTHERS || sizes[sensor] == 0.0 {
+            return None;
+        }
+        others.sort_by(f64::total_cmp);
+        let ratio = sizes[sensor] / others[others.len() / 2];
+        let id = &rig.sensors[sensor].id;
+        let near = |ratio: f64| (BETWEEN_UNITS / USUAL_RATIO..BETWEEN_UNITS * USUAL_RATIO).contains(&ratio);
+        if near(1.0 / ratio) {
+            Some(format!(
+                "the readings of sensor `{id}` are {:.0} times smaller than those of the others: they may be in a larger unit (millimetres \
+                 where µm is declared): write `unit = \"mm\"` at the sensor",
+                1.0 / ratio
+            ))
+        } else if near(ratio) {
+            Some(format!(
+                "the readings of sensor `{id}` are {ratio:.0} times larger than those of the others: they may be in a smaller unit \
+                 (nanometres where µm is declared): write `unit = \"nm\"` at the sensor"
+            ))
+        } else {
+            None
+        }
+    };
+    (0..sensors).filter_map(said).collect()
+}
