@@ -5,12 +5,13 @@ use std::{collections::BTreeSet, iter::repeat_n};
 use serde_json::json;
 
 use super::{
-    summary::{Summary, sensor_id, setup_id},
+    station_summary::{sensor_id, setup_id},
     turn_tables,
 };
 use crate::{
     atomic_file::PendingFile,
     stage::{About, Completed, Export, NamedValue, ResultInfo},
+    summary::Summary,
 };
 use runout_closed_loop::diagnosis::Correction;
 use runout_error::Result;
