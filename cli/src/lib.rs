@@ -17,6 +17,7 @@ pub mod documents;
 mod failure;
 mod progress;
 mod render;
+mod reports;
 
 use std::{
     ffi::OsString,

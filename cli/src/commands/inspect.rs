@@ -1,53 +1,17 @@
 //! `runout inspect`: what a file holds.
 
-use std::{collections::BTreeMap, fs::File, io::Read, path::Path};
+use std::{fs::File, io::Read, path::Path};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use runout_core::{Error, ErrorKind, Result, atomic_file::complete_publication, input_file::open_regular};
-use runout_csv::TextReport;
-use runout_hdf5::FileReport;
-use serde::Serialize;
 
 use super::print;
-use crate::{args::InspectArgs, failure::Failure, render};
-
-/// What a file holds.
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-pub enum Report {
-    /// A measurement, a result, or another HDF5 file.
-    Hdf5(FileReport),
-    /// A table.
-    Parquet(TableReport),
-    /// Samples as text.
-    Text(TextReport),
-}
-
-/// A Parquet table in short.
-#[derive(Debug, Serialize)]
-pub struct TableReport {
-    /// "parquet".
-    pub format: &'static str,
-    /// Number of rows.
-    pub rows: i64,
-    /// Parts that a reader can skip.
-    pub row_groups: usize,
-    /// In the file's order.
-    pub columns: Vec<ColumnReport>,
-    /// What the writer noted.
-    pub metadata: BTreeMap<String, Option<String>>,
-}
-
-/// A column of a Parquet table.
-#[derive(Debug, Serialize)]
-pub struct ColumnReport {
-    /// Its name.
-    pub name: String,
-    /// As Parquet stores it.
-    pub r#type: String,
-    /// Whether values may be absent.
-    pub optional: bool,
-}
+use crate::{
+    args::InspectArgs,
+    failure::Failure,
+    render,
+    reports::inspect::{ColumnReport, Report, TableReport},
+};
 
 /// Says what a file holds, told by its first bytes and not by its name.
 ///

@@ -4,7 +4,6 @@
 mod drawn;
 mod map;
 pub mod points;
-mod report;
 
 use std::ops::RangeInclusive;
 
@@ -25,14 +24,17 @@ use runout_spindle::{
 
 use serde_json::Value;
 
-use super::{check::Separability, print};
+use super::print;
 use crate::{
     args::{Criterion, Optimise, PlanArgs},
     failure::{Failure, to_value},
     progress::Progress,
     render,
+    reports::{
+        check::Separability,
+        plan::{Optimised, PointReport, Report, Suggested, Unresolved},
+    },
 };
-pub use report::{Arrangement, Gain, Optimised, Report, Score, Suggested, Unresolved};
 
 /// Plans a rig, or the layout of a pipeline of measured points.
 ///
@@ -59,7 +61,7 @@ pub fn document(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Re
 /// What was planned.
 enum Planned {
     Rig(Box<Report>),
-    Points(Box<points::PointReport>),
+    Points(Box<PointReport>),
 }
 
 fn planned(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<Planned, Failure> {

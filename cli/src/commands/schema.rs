@@ -17,8 +17,13 @@ use runout_core::{
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
-use super::{check, plan, plugins};
-use crate::{args::SchemaArgs, failure::Failure, render};
+use super::plugins;
+use crate::{
+    args::SchemaArgs,
+    failure::Failure,
+    render,
+    reports::{check, plan},
+};
 
 /// Prints schemas, or writes them to a folder.
 ///
@@ -54,7 +59,7 @@ fn files(registry: &Registry) -> Vec<(&'static str, Value)> {
         ("plan", of::<plan::Report>("runout plan", SchemaSettings::default().for_serialize())),
         (
             "plan-points",
-            of::<plan::points::PointReport>("runout plan, measured points", SchemaSettings::default().for_serialize()),
+            of::<plan::PointReport>("runout plan, measured points", SchemaSettings::default().for_serialize()),
         ),
     ]
 }

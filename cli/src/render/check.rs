@@ -10,7 +10,7 @@ use super::{
     page::Page,
     table::Table,
 };
-use crate::commands::check::{Order, Report, RigSize, Separability, Unknown};
+use crate::reports::check::{Order, Report, RigSize, Separability, Unknown};
 
 /// The text of a report.
 #[must_use]

@@ -4,7 +4,7 @@ use runout_csv::TextReport;
 use runout_hdf5::{FileReport, StationReport};
 
 use super::{number::significant, page::Page, table::Table};
-use crate::commands::inspect::{Report, TableReport};
+use crate::reports::inspect::{Report, TableReport};
 
 /// The text of a report.
 #[must_use]

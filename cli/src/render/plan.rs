@@ -6,7 +6,7 @@ use super::{
     page::Page,
     table::Table,
 };
-use crate::commands::plan::{Arrangement, Gain, Optimised, Report, Score, Suggested};
+use crate::reports::plan::{Arrangement, Gain, Optimised, Report, Score, Suggested};
 
 /// Lines of ten gains that a terminal shows before it takes orders together.
 const LINES: usize = 20;

@@ -11,7 +11,7 @@ use super::{
     page::Page,
     table::Table,
 };
-use crate::commands::plan::points::PointReport;
+use crate::reports::plan::PointReport;
 
 /// A plan as lines and tables.
 #[must_use]

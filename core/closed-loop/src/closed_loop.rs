@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 
 use super::{
     Effect, Fit, Model, Remainder, Setting,
-    confounded::choices,
     diagnosis::{Diagnosis, Refused},
     evidence::{Evidence, agreement},
     fit::{INDEPENDENT, Refit, refit},
     found::Found,
     judgement::{
         BIC_LIMIT, OVERLAP, P_LIMIT, above_chance, at_the_floor, disturbed, independent, is, mixed, no_gain, overlap,
-        raises_held_out, same_finding, unit, weak,
+        raises_held_out, unit, weak,
     },
     report::{added, blind, level, moved, verdict},
 };
@@ -21,7 +20,7 @@ use runout_numerics::least_squares::{dot, orthonormal};
 /// Candidates whose joint refits differ by less than this, in BIC, cannot be told apart.
 const SAME_BIC: f64 = 10.0;
 /// Refits whose BIC differs by less than this share are equal up to rounding.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 /// Candidates of which a joint refit is tried, and the least share of the best linear gain that they must promise.
 const SHORTLIST: (usize, f64) = (6, 0.2);
 /// Effects of single parts on that list at most.
@@ -166,7 +165,7 @@ impl<M: Model> Tracing<'_, M> {
     }
 
     /// The same with another member of each set.
-    fn refit_chosen(&self, model: &M, start: &[Setting], choice: &[usize]) -> Result<Refit<M::Fit>> {
+    pub(super) fn refit_chosen(&self, model: &M, start: &[Setting], choice: &[usize]) -> Result<Refit<M::Fit>> {
         let mut settings = self.settings.known.clone();
         for (found, member) in self.found.iter().zip(choice) {
             let (effect, alone) = (found.members[*member], &found.alone[*member]);
@@ -175,60 +174,6 @@ impl<M: Model> Tracing<'_, M> {
             settings.push(Setting { effect, values });
         }
         refit(model, settings, self.settings.known.len())
-    }
-
-    /// The best refit over all combinations of members, of which `current` is the first, and the others that are at most so
-    /// much worse in χ², in units of what is left. Members that are in none of these leave their sets; those of the best
-    /// combination come first.
-    fn combinations(&mut self, model: &M, current: Refit<M::Fit>, worse: f64) -> (Refit<M::Fit>, Vec<Refit<M::Fit>>) {
-        let sizes: Vec<usize> = self.found.iter().map(|found| found.members.len()).collect();
-        let mut choices = choices(&sizes).into_iter();
-        let start = current.settings.clone();
-        let mut best = (choices.next().unwrap_or_default(), current);
-        let mut others = Vec::new();
-        for choice in choices {
-            // A combination that cannot be fitted does not explain the data.
-            let Ok(refit) = self.refit_chosen(model, &start, &choice) else { continue };
-            let free = &refit.settings[self.settings.known.len()..];
-            if free.iter().any(|setting| !model.is_possible(setting.effect, &setting.values)) {
-                continue;
-            }
-            let mut other = (choice, refit);
-            // Of those that are equal up to rounding, the one that the model names first.
-            if other.1.chi2 < best.1.chi2 * (1.0 - SAME) {
-                std::mem::swap(&mut best, &mut other);
-            }
-            others.push(other);
-        }
-        let most = best.1.chi2 + worse * unit(best.1.fit.remainder());
-        // χ² does not decide which of two copies is the original.
-        let copies = |choice: &[usize]| {
-            let differing =
-                self.found.iter().zip(choice.iter().zip(&best.0)).filter(|(_, (member, best))| member != best);
-            differing
-                .into_iter()
-                .all(|(found, (member, best))| same_finding(model, found.members[*member], found.members[*best]))
-        };
-        others.retain(|(choice, refit)| refit.chi2 <= most || copies(choice));
-        for (index, found) in self.found.iter_mut().enumerate() {
-            let mut kept: Vec<usize> = Vec::new();
-            for choice in std::iter::once(&best.0).chain(others.iter().map(|(choice, _)| choice)) {
-                if !kept.contains(&choice[index]) {
-                    kept.push(choice[index]);
-                }
-            }
-            found.members = kept.iter().map(|member| found.members[*member]).collect();
-            found.alone = kept.iter().map(|member| found.alone[*member].clone()).collect();
-        }
-        (best.1, others.into_iter().map(|(_, refit)| refit).collect())
-    }
-
-    /// Of each set, the member first that explains the data best beside all other effects.
-    fn choose_best(&mut self, model: &M, current: Refit<M::Fit>) -> Refit<M::Fit> {
-        if self.found.len() < 2 || self.found.iter().all(|found| found.members.len() == 1) {
-            return current;
-        }
-        self.combinations(model, current, f64::INFINITY).0
     }
 
     /// The effect of the lowest rank that earns its place, if any does.

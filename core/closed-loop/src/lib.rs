@@ -35,6 +35,7 @@
 //! ```
 
 pub mod closed_loop;
+mod combinations;
 mod confounded;
 pub mod diagnosis;
 pub mod evidence;

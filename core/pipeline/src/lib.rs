@@ -16,13 +16,15 @@
 //! assert_eq!(mistake.line_and_column(), (1, 19));
 //! ```
 //!
-//! `Pipeline::run` gives what was found as a [`Summary`](pipeline::summary::Summary), and writes the files that `[[export]]` names.
+//! `Pipeline::run` gives what was found as a [`Summary`](summary::Summary), and writes the files that `[[export]]` names.
 
 pub mod atomic_file;
+pub mod effects;
 pub mod height_grid;
 pub mod pipeline;
 pub mod points;
 pub mod stage;
+pub mod summary;
 
 pub use runout_closed_loop as model;
 pub use runout_error::{Error, ErrorKind, Result};

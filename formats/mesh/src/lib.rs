@@ -10,6 +10,7 @@ mod colour;
 mod config;
 mod ends;
 mod export;
+mod extremes;
 mod format;
 mod mesh;
 mod notes;

@@ -13,6 +13,7 @@ use runout_core::{
 use crate::{
     cap::Cap,
     colour::ColourScale,
+    extremes::{Extremes, ends, widen},
     vertices::{LANES, Vertices},
 };
 
@@ -228,30 +229,6 @@ impl<V: FnMut(&Vertices)> Ring<'_, V> {
     }
 }
 
-/// Smallest and largest of numbers; NaN where one of them is not finite.
-struct Extremes<'a>(&'a [f64]);
-
-impl NullaryFnOnce for Extremes<'_> {
-    type Output = [f64; 2];
-
-    #[inline(always)]
-    fn call(self) -> [f64; 2] {
-        let mut range = [[f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]];
-        let (eights, rest) = self.0.as_chunks::<LANES>();
-        // Becomes NaN with what is not finite.
-        let mut nothing = [0.0; LANES];
-        for values in eights {
-            for lane in 0..LANES {
-                nothing[lane] += 0.0 * values[lane];
-            }
-            widen(&mut range, *values);
-        }
-        let nothing = nothing.into_iter().chain(rest.iter().map(|value| 0.0 * value)).sum::<f64>();
-        let [low, high] = ends(range);
-        [rest.iter().copied().fold(low, lower) + nothing, rest.iter().copied().fold(high, higher) + nothing]
-    }
-}
-
 /// See [`Wall::bounds_mm`].
 struct Bounds<'a>(&'a Wall<'a>);
 
@@ -282,33 +259,6 @@ impl NullaryFnOnce for Bounds<'_> {
         let z = [wall.surface.z_mm[0], wall.surface.z_mm[wall.rings() - 1]];
         [0, 1].map(|end| [x[end], y[end], z[end]])
     }
-}
-
-/// Takes values between the lowest and the highest in each lane.
-#[inline(always)]
-fn widen([low, high]: &mut [[f64; LANES]; 2], values: [f64; LANES]) {
-    for lane in 0..LANES {
-        low[lane] = lower(values[lane], low[lane]);
-    }
-    for lane in 0..LANES {
-        high[lane] = higher(values[lane], high[lane]);
-    }
-}
-
-/// Of all lanes together.
-fn ends([low, high]: [[f64; LANES]; 2]) -> [f64; 2] {
-    [low.into_iter().fold(f64::INFINITY, lower), high.into_iter().fold(f64::NEG_INFINITY, higher)]
-}
-
-/// Comparisons compile to single instructions; `f64::min` has to look after NaN.
-#[inline(always)]
-fn lower(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn higher(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 /// Values and, behind them, enough zeros for [`LANES`] to begin at each.

@@ -7,8 +7,7 @@ use runout_core::{
     Error, Result,
     input_file::InputFile,
     pipeline::{
-        config::checked,
-        document::{ConfigError, Document, Sources},
+        document::{ConfigError, Document, Sources, checked},
         error::Fault,
         registry::{Context, StageConfig},
     },

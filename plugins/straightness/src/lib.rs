@@ -5,6 +5,7 @@
 //! takes traces of both setups and separates part and slide.
 
 mod data;
+mod design;
 mod diagnose;
 mod effects;
 mod grid;

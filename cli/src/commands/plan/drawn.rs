@@ -14,8 +14,13 @@ use runout_core::{
     },
 };
 
-use super::{Report, assess, map::Layout, points::PointReport, report::form_gains};
-use crate::{commands::report::OverviewReport, failure::Failure, render};
+use super::{assess, map::Layout};
+use crate::{
+    commands::report::OverviewReport,
+    failure::Failure,
+    render,
+    reports::plan::{PointReport, Report, form_gains},
+};
 
 /// Writes the report of a rig's plan. The first layout is the declared one.
 pub(super) fn of_rig(

@@ -14,11 +14,11 @@ use runout_core::{
 };
 use runout_spindle::plan::{Optimum, Suggestion};
 
-use super::{
-    assess,
-    report::{degrees, form_gains, words},
+use super::assess;
+use crate::{
+    failure::Failure,
+    reports::plan::{degrees, form_gains, words},
 };
-use crate::failure::Failure;
 
 /// Refuses a file that is no CSV or is read.
 pub(super) fn refuse(path: Option<&Path>, sources: &Sources) -> Result<(), Failure> {

@@ -5,24 +5,10 @@ use runout_core::{
         Pipeline, Registry,
         document::{Document, Sources},
     },
-    stage::{PointPlan, Source},
+    stage::Source,
 };
-use schemars::JsonSchema;
-use serde::Serialize;
 
-use crate::{args::PlanArgs, failure::Failure};
-
-/// What a layout of measured points tells and how well, and what to add to it.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct PointReport {
-    /// The pipeline's title.
-    pub title: String,
-    /// Its separator.
-    pub separator: String,
-    /// What the separator says.
-    #[serde(flatten)]
-    pub plan: PointPlan,
-}
+use crate::{args::PlanArgs, failure::Failure, reports::plan::PointReport};
 
 /// Whether a file is a pipeline of measured points: it has `[separate]` and no `[rig]`.
 ///

@@ -8,7 +8,7 @@ use std::{
 
 use runout_error::{Error, ErrorKind, Result};
 
-use super::{UnderWay, make, publication, resolved};
+use super::{make, publication, resolved, under_way::UnderWay};
 
 const NAME: &str = ".runout.lock";
 /// Bytes of a holder's name that are read, at most.

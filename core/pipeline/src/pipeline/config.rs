@@ -1,34 +1,35 @@
 //! A pipeline, from TOML to stages that can only be valid.
-//!
-//! Long because every stage is built here, with what one has to know of another.
+
+pub(super) mod candidate;
+pub mod diagnose;
+pub(super) mod exports;
+mod route;
+mod schema;
 
 use std::path::{Path, PathBuf};
 
-use toml::{Spanned, de::DeValue};
+use toml::de::DeValue;
 
-pub use super::schema::{PlainTable, choice, pipeline_schema, plain_tables};
+pub use candidate::Candidate;
+pub use route::Route;
+pub use schema::{PlainTable, choice, pipeline_schema, plain_tables};
+
 use super::{
-    compare::{self, Candidate},
-    diagnose::config::{Diagnose, DiagnoseConfig},
-    document::{self, ConfigError, Document, Sources, Table},
+    document::{self, ConfigError, Document, Sources, Table, checked, required, table, tables},
     error::{Fault, known_names},
-    evaluate::{Evaluate, EvaluateConfig, Limit},
-    exports::{DIAGNOSIS, Exporting, Exports, beside_the_first, summary_path, written},
+    evaluate::{Evaluate, EvaluateConfig},
     registry::{Context, Registry},
-    tables::{self, StationTables},
 };
 use crate::{
-    points::PointColumn,
-    stage::{
-        Averager, Check, Conditioner, Exporter, Loader, PointModel, PointSeparator, Preprocessor, Request, Separator,
-        SourceKind, StationModel, StationSeparator,
-    },
+    stage::{Check, Exporter, Loader, Request, SourceKind},
+    summary::Limit,
 };
-use runout_closed_loop::Effect;
+use diagnose::{Diagnose, DiagnoseConfig};
+use exports::{DIAGNOSIS, Exporting, Exports, beside_the_first, summary_path, written};
 use runout_table::TableSpec;
 use runout_turning::{
     rig::{Rig, RigConfig},
-    separation::{Assessment, NOTHING_SEPARATED},
+    separation::Assessment,
     surface::SurfaceConfig,
 };
 
@@ -72,89 +73,6 @@ pub struct Pipeline {
     pub named_files: Vec<PathBuf>,
     /// The configuration with includes and overrides in their places, for provenance: it runs again as it is.
     pub configuration: String,
-}
-
-/// The ways from a measurement to form.
-pub enum Route {
-    /// Recorded turns, station by station.
-    Turns {
-        /// Samples to samples.
-        conditioners: Vec<Box<dyn Conditioner>>,
-        /// Samples to a profile.
-        averager: Box<dyn Averager>,
-        /// Profiles to form and motion.
-        separator: Box<dyn StationSeparator>,
-        /// The separator's model for the closed loop, where it has one.
-        model: Option<Box<dyn StationModel>>,
-    },
-    /// Measured points, all at once.
-    Points {
-        /// Points to tables, values and form.
-        separator: Box<dyn PointSeparator>,
-        /// The columns that it takes.
-        columns: Vec<PointColumn>,
-    },
-}
-
-impl Route {
-    /// The separator of measured points.
-    #[must_use]
-    pub fn point_separator(&self) -> Option<&dyn PointSeparator> {
-        match self {
-            Self::Turns { .. } => None,
-            Self::Points { separator, .. } => Some(&**separator),
-        }
-    }
-
-    /// Whether its result has form.
-    #[must_use]
-    pub fn gives_form(&self) -> bool {
-        self.point_separator().is_none_or(PointSeparator::gives_form)
-    }
-
-    /// Whether its result has a surface: form, or heights on a plane.
-    fn gives_surface(&self) -> bool {
-        self.gives_form() || self.point_separator().is_some_and(PointSeparator::gives_heights)
-    }
-
-    /// Whether there is a model for the closed loop.
-    fn has_model(&self) -> bool {
-        match self {
-            Self::Turns { model, .. } => model.is_some(),
-            Self::Points { separator, .. } => separator.model().is_some(),
-        }
-    }
-
-    /// What its model may lack.
-    fn effects(&self) -> Vec<Effect> {
-        match self {
-            Self::Turns { model, .. } => model.as_ref().map_or_else(Vec::new, |model| model.effects().to_vec()),
-            Self::Points { separator, .. } => separator.model().map_or_else(Vec::new, PointModel::effects),
-        }
-    }
-
-    /// Whether only the data name the targets of its effects.
-    fn data_name_targets(&self) -> bool {
-        let model = self.point_separator().and_then(PointSeparator::model);
-        model.is_some_and(PointModel::points_name_targets)
-    }
-
-    /// The tables of its result.
-    fn tables(&self, assessment: Option<&Assessment>, rig: Option<&Rig>) -> Vec<TableSpec> {
-        let mut tables = Vec::new();
-        if self.gives_form() {
-            tables.extend(StationTables::new(assessment, rig).specs());
-        }
-        tables.extend(self.point_separator().into_iter().flat_map(PointSeparator::tables));
-        let own = tables::named_values(self.gives_form());
-        match self {
-            Self::Turns { .. } => {}
-            Self::Points { .. } if self.gives_form() => tables.push(own.optional()),
-            Self::Points { .. } => tables.push(own),
-        }
-        tables.push(tables::corrections());
-        tables
-    }
 }
 
 const KEYS: [&str; 12] = [
@@ -237,7 +155,7 @@ impl Pipeline {
                     return Err(Fault::here("missing key `rig`").help("describe sensors and setups in [rig]"));
                 }
                 let separator = registry.separators.build(&separate_table, &context)?;
-                turns(preprocessors, separator, &separate_table, root, registry)?
+                route::turns(preprocessors, separator, &separate_table, root, registry)?
             }
             SourceKind::Points => {
                 if let Some((_, table)) = preprocessors.first() {
@@ -248,7 +166,7 @@ impl Pipeline {
                     let fault = Fault::span(table.span(), "measured points take no [rig]");
                     return Err(fault.help("leave it out; [separate] describes how points were measured"));
                 }
-                (points(registry.separators.build(&separate_table, &context)?, &separate_table, root)?, None)
+                (route::points(registry.separators.build(&separate_table, &context)?, &separate_table, root)?, None)
             }
         };
         let diagnose = table(root, "diagnose")?
@@ -262,8 +180,8 @@ impl Pipeline {
         let mut compare = Vec::new();
         for table in tables(root, "compare")? {
             let shared = loader.kind() == SourceKind::Points;
-            let whole = if shared { compare::with_shared_keys(&table, &separate_table, registry) } else { table };
-            compare.push(compare::candidate(&whole, registry, &context)?);
+            let whole = if shared { candidate::with_shared_keys(&table, &separate_table, registry) } else { table };
+            compare.push(candidate::candidate(&whole, registry, &context)?);
         }
         let checks = tables(root, "check")?
             .iter()
@@ -286,7 +204,7 @@ impl Pipeline {
             rig_text,
             loader,
             route,
-            separator: compare::plugin_name(&separate_table),
+            separator: candidate::plugin_name(&separate_table),
             compare,
             diagnose,
             surface,
@@ -373,22 +291,6 @@ fn named_files(root: &Table, folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The route of measured points.
-fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<Route, Fault> {
-    match separator {
-        Separator::Points(separator) => match table(root, "surface")? {
-            Some(table) if !separator.gives_form() => {
-                Err(Fault::span(table.span(), "this separator gives no form: it makes no surface"))
-            }
-            _ => Ok(Route::Points { columns: separator.columns(), separator }),
-        },
-        Separator::Stations(_) => {
-            let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
-            Err(document::resolve(fault, separate_table))
-        }
-    }
-}
-
 /// What is evaluated of a form, and the limits of it.
 fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, Fault> {
     let configured = table(root, "evaluate")?;
@@ -412,99 +314,4 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
         evaluate.add_limit(limit);
     }
     Ok(evaluate)
-}
-
-fn turns(
-    preprocessors: Vec<(Preprocessor, Table)>,
-    separator: Separator,
-    separate_table: &Table,
-    root: &Table,
-    registry: &Registry,
-) -> Result<(Route, Option<Assessment>), Fault> {
-    let mut conditioners = Vec::new();
-    let mut averager = None;
-    for (preprocessor, table) in preprocessors {
-        if averager.is_some() {
-            let fault = Fault::at("plugin", "no preprocessor can follow the one that averages the turns");
-            return Err(document::resolve(fault.help("move it above"), &table));
-        }
-        match preprocessor {
-            Preprocessor::Conditioner(conditioner) => conditioners.push(conditioner),
-            Preprocessor::Averager(found) => averager = Some(found),
-        }
-    }
-    let averager = averager.ok_or_else(|| {
-        let fault = Fault::at("preprocess", "the turns are never averaged");
-        document::resolve(fault.help("end [[preprocess]] with plugin = \"synchronous-average\""), root)
-    })?;
-    match separator {
-        Separator::Stations(separator) => {
-            let mut assessment =
-                separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
-            if assessment.tells_no_form() {
-                assessment.notes.insert(0, NOTHING_SEPARATED.into());
-            }
-            let model = separator.model(&registry.effects);
-            Ok((Route::Turns { conditioners, averager, separator, model }, Some(assessment)))
-        }
-        Separator::Points(_) => {
-            let fault = Fault::at("plugin", "this separator takes measured points; [load] gives recorded turns");
-            Err(document::resolve(fault, separate_table))
-        }
-    }
-}
-
-/// Reads a table and checks it, with the places of the check's faults resolved.
-///
-/// # Errors
-/// The first mistake.
-pub fn checked<C: serde::de::DeserializeOwned, T>(
-    table: &Table,
-    check: impl FnOnce(C) -> Result<T, Fault>,
-) -> Result<T, Fault> {
-    check(document::read(table)?).map_err(|fault| document::resolve(fault, table))
-}
-
-/// A top-level table, where there is one.
-///
-/// # Errors
-/// When the key holds something else.
-pub fn table<'a>(root: &Table<'a>, key: &str) -> Result<Option<Table<'a>>, Fault> {
-    match root.get_ref().get_key_value(key) {
-        None => Ok(None),
-        Some((name, value)) => match value.get_ref() {
-            // The key is the better place to point at: the table's own span may be all its lines.
-            DeValue::Table(table) => Ok(Some(Spanned::new(name.span(), table.clone()))),
-            other => Err(Fault::span(value.span(), format!("expected a table `{key}`, found {}", other.type_str()))),
-        },
-    }
-}
-
-/// A top-level table that has to be there.
-///
-/// # Errors
-/// When it is not.
-pub(super) fn required<'a>(root: &Table<'a>, key: &str) -> Result<Table<'a>, Fault> {
-    table(root, key)?.ok_or_else(|| {
-        document::resolve(Fault::here(format!("missing key `{key}`")).help(format!("add a table [{key}]")), root)
-    })
-}
-
-/// Top-level tables of one name, in their order; none where there is none.
-///
-/// # Errors
-/// When the key holds something else.
-pub(super) fn tables<'a>(root: &Table<'a>, key: &str) -> Result<Vec<Table<'a>>, Fault> {
-    let Some(value) = root.get_ref().get(key) else { return Ok(Vec::new()) };
-    let expected = |span, found: &str| Fault::span(span, format!("expected tables [[{key}]], found {found}"));
-    match value.get_ref() {
-        DeValue::Array(items) => items
-            .iter()
-            .map(|item| match item.get_ref() {
-                DeValue::Table(table) => Ok(Spanned::new(item.span(), table.clone())),
-                other => Err(expected(item.span(), other.type_str())),
-            })
-            .collect(),
-        other => Err(expected(value.span(), other.type_str())),
-    }
 }

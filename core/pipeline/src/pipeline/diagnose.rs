@@ -1,6 +1,5 @@
 //! The closed loop on a pipeline: load → fit → find what the model lacks → export the final model.
 
-pub mod config;
 mod corrected_rig;
 mod moved;
 
@@ -9,13 +8,14 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use corrected_rig::Change;
 
 use super::{
-    config::{Pipeline, Route},
+    config::{Pipeline, Route, exports::spare_inputs},
     evaluate::Group,
+    observer::Observer,
     point_run::PointResult,
     record_reader::RecordReader,
     result::{Evaluation, complete, true_error},
     result_writer::{Finished, ResultWriter},
-    run::{Observer, projections, spare_inputs, speeds_and_turns, with_motion_values},
+    run::{projections, speeds_and_turns, with_motion_values},
     undeclared::Undeclared,
 };
 use crate::{

@@ -1,29 +1,26 @@
 //! TOML text with places: a file, the files that it includes and overrides, read as one document.
 
+mod table;
+
 use std::{
     io::Read,
     ops::Range,
     path::{Path, PathBuf},
 };
 
-use serde::de::DeserializeOwned;
+pub use table::{Table, checked, read, read_besides, resolve, table, table_text};
+pub(super) use table::{required, tables};
 use toml::{
     Spanned,
-    de::{DeTable, DeValue, ValueDeserializer},
+    de::{DeTable, DeValue},
 };
 
-use super::{
-    error::{Diagnostic, Fault, Place, Step, known_names},
-    pinpoint::pinpoint,
-};
+use super::error::{Diagnostic, Fault, Place};
 use runout_error::{Error, ErrorKind};
 use runout_turning::input_file::open_regular;
 
 /// Keys in a path, at most.
 const DEEPEST: usize = 64;
-
-/// A table whose every key and value knows its place.
-pub type Table<'a> = Spanned<DeTable<'a>>;
 
 /// The texts that a configuration is read from.
 #[derive(Debug, Clone)]
@@ -315,27 +312,6 @@ fn read_text(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// Reads a table into a type; unknown keys and wrong types come back as faults with their place.
-///
-/// # Errors
-/// When the table does not fit the type.
-pub fn read<T: DeserializeOwned>(table: &Table) -> Result<T, Fault> {
-    read_besides(table, &[])
-}
-
-/// The same, of a table in which these keys stood besides: what is misspelt may have been meant for one of them.
-///
-/// # Errors
-/// When the table does not fit the type.
-pub fn read_besides<T: DeserializeOwned>(table: &Table, besides: &[&str]) -> Result<T, Fault> {
-    let value = Spanned::new(table.span(), DeValue::Table(table.get_ref().clone()));
-    T::deserialize(ValueDeserializer::from(value)).map_err(|error| {
-        let span = error.span().filter(|span| *span != table.span());
-        let exact = pinpoint(table.get_ref(), span.as_ref(), error.message());
-        explain(exact.or(span).unwrap_or_else(|| head(table.span())), error.message(), besides)
-    })
-}
-
 /// The document as one TOML text that reads as it does: the file itself, or, where other files or overrides went into
 /// it, all of it written anew.
 ///
@@ -349,86 +325,5 @@ pub fn resolved_text(root: &Table, sources: &Sources) -> Result<String, Fault> {
             let text = table_text(root)?;
             Ok(format!("# joined from {}; paths are relative to the first\n\n{text}", names.join(", ")))
         }
-    }
-}
-
-/// A table as a TOML text of its own.
-///
-/// # Errors
-/// When a value cannot be written.
-pub fn table_text(table: &Table) -> Result<String, Fault> {
-    let table: toml::Table = read(table)?;
-    toml::to_string(&table).map_err(|error| Fault::here(error.to_string()))
-}
-
-/// A table's own span may cover many lines; its beginning is where a reader looks.
-fn head(span: Range<usize>) -> Range<usize> {
-    span.start..span.end.min(span.start + 1)
-}
-
-/// Adds near names to serde's "unknown field `x`, expected one of `a`, `b`".
-fn explain(span: Range<usize>, message: &str, besides: &[&str]) -> Fault {
-    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-    let noun = match message {
-        _ if message.starts_with("unknown field") => "key",
-        _ if message.starts_with("unknown variant") => "value",
-        _ => return Fault::span(span, plain(message)),
-    };
-    match quoted.split_first() {
-        Some((name, known)) => {
-            let besides = besides.iter().filter(|_| noun == "key");
-            let known = known.iter().chain(besides).copied();
-            Fault::span(span, format!("unknown {noun} `{name}`")).help(known_names(name, known))
-        }
-        None => Fault::span(span, message),
-    }
-}
-
-/// Serde's words without Rust's types.
-fn plain(message: &str) -> String {
-    let mismatch = message.strip_prefix("invalid type: ").or_else(|| message.strip_prefix("invalid value: "));
-    let Some((found, expected)) = mismatch.and_then(|rest| rest.rsplit_once(", expected ")) else {
-        return message.replace("missing field", "missing key");
-    };
-    let expected = match expected {
-        "usize" | "u8" | "u16" | "u32" | "u64" => "a whole number from 0",
-        "isize" | "i8" | "i16" | "i32" | "i64" => "a whole number",
-        "f32" | "f64" => "a number",
-        "a string" | "path string" => "a string",
-        "a boolean" => "true or false",
-        "a sequence" => "a list",
-        other if other.starts_with("struct ") => "a table",
-        other => other,
-    };
-    format!("expected {expected}, found {found}")
-}
-
-/// Resolves a fault's path against the table that was checked, so that it can travel on by itself.
-#[must_use]
-pub fn resolve(fault: Fault, table: &Table) -> Fault {
-    match &fault.place {
-        Place::Span(_) => fault,
-        Place::Path(path) => Fault { place: Place::Span(locate(table.get_ref(), table.span(), path)), ..fault },
-    }
-}
-
-/// The place of a path below a table, or of the deepest part of it that there is.
-fn locate(table: &DeTable, span: Range<usize>, path: &[Step]) -> Range<usize> {
-    let Some((Step::Key(key), rest)) = path.split_first() else { return head(span) };
-    let Some((name, value)) = table.get_key_value(key.as_str()) else { return head(span) };
-    match value.get_ref() {
-        DeValue::Table(_) | DeValue::Array(_) if rest.is_empty() => name.span(),
-        _ => descend(value, rest),
-    }
-}
-
-fn descend(value: &Spanned<DeValue>, path: &[Step]) -> Range<usize> {
-    match (value.get_ref(), path.split_first()) {
-        (DeValue::Table(inner), Some(_)) => locate(inner, value.span(), path),
-        (DeValue::Array(items), Some((Step::Index(index), rest))) => {
-            items.get(*index).map_or_else(|| value.span(), |item| descend(item, rest))
-        }
-        (DeValue::Table(_), None) => head(value.span()),
-        _ => value.span(),
     }
 }

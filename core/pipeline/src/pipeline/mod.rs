@@ -5,9 +5,8 @@ pub mod compare;
 pub mod config;
 pub mod diagnose;
 pub mod document;
-pub mod effects;
 pub mod evaluate;
-mod exports;
+mod observer;
 mod ordered_collector;
 mod outdated;
 mod pinpoint;
@@ -18,13 +17,13 @@ pub mod registry;
 pub mod result;
 mod result_writer;
 pub mod run;
-mod schema;
+mod station_summary;
 mod steadiness;
-pub mod summary;
 pub mod tables;
 mod turn_tables;
 mod undeclared;
 
+pub use crate::{effects, summary};
 pub use config::Pipeline;
 pub use registry::Registry;
 

@@ -1,15 +1,15 @@
 //! The run and the diagnosis of measured points: load → separate → evaluate → export, all at once.
 
 use super::{
-    config::Pipeline,
+    config::{Pipeline, exports::spare_inputs},
+    observer::Observer,
     result::{Evaluation, complete},
     result_writer::{Finished, ResultWriter},
-    run::{Observer, spare_inputs},
-    summary::Summary,
 };
 use crate::{
     points::Points,
     stage::{Exporter, Form, Outcome, PointSeparator},
+    summary::Summary,
 };
 use runout_closed_loop::diagnosis::{Correction, Diagnosis};
 use runout_error::Result;

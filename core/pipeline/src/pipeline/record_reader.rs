@@ -9,9 +9,9 @@ use std::{
 };
 
 use super::{
+    observer::Observer,
     ordered_collector::OrderedCollector,
     read_ahead::{Captures, read_ahead, read_along},
-    run::Observer,
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
 use runout_error::{Error, ErrorKind, Result};

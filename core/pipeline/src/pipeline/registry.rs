@@ -9,10 +9,12 @@ use toml::{Spanned, de::DeTable};
 
 use super::{
     document::{self, Table},
-    effects::EffectCatalogue,
     error::{Fault, known_names},
 };
-use crate::stage::{Check, Exporter, Loader, Preprocessor, Separator, Simulator};
+use crate::{
+    effects::EffectCatalogue,
+    stage::{Check, Exporter, Loader, Preprocessor, Separator, Simulator},
+};
 use runout_turning::rig::Rig;
 
 /// Every plugin by stage, and every effect.

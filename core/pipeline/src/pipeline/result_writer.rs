@@ -3,17 +3,20 @@
 use std::path::PathBuf;
 
 use super::{
-    config::Pipeline,
-    evaluate::{Evaluate, Group, PartSummary, add_areal, add_generatrices, decide, part_summary},
-    exports::{summary_path, written},
+    config::{
+        Pipeline,
+        exports::{summary_path, written},
+    },
+    evaluate::{Evaluate, Group, add_areal, add_generatrices, decide, part_summary},
+    station_summary::summarise,
     steadiness::inflated,
-    summary::{LostOrders, StationSummary, Summary, SurfaceSummary, summarise},
     tables::{StationTables, correction_rows, named_value_rows},
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all},
     height_grid::HeightGrid,
     stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
+    summary::{LostOrders, PartSummary, StationSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_error::{Error, Result};

@@ -1,9 +1,9 @@
 //! The run: load → preprocess → separate → evaluate → export, station by station, threads across stations.
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::num::NonZeroUsize;
 
 use super::{
-    config::{Pipeline, Route},
+    config::{Pipeline, Route, exports::spare_inputs},
     evaluate::{Group, steepest_um_per_deg},
     outdated, point_run,
     read_ahead::write_behind,
@@ -13,23 +13,19 @@ use super::{
     steadiness::Steadiness,
     undeclared::Undeclared,
 };
-pub use runout_turning::station::StationResult;
-
 pub use super::{
-    evaluate::{Decision, Limit, LimitSummary, LimitValue, PartSummary, PlacedValue},
-    summary::{
-        CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
-        SurfaceSummary,
-    },
+    observer::{Observer, Silent},
     tables::StationTables,
 };
-use crate::{
-    atomic_file::resolved,
-    stage::{Averager, Conditioner, Source, Station, StationSeparator},
+use crate::stage::{Averager, Conditioner, Source, Station, StationSeparator};
+pub use crate::summary::{
+    CaptureSummary, Decision, Limit, LimitSummary, LimitValue, LostOrders, MotionTruth, PartSummary, PlacedValue,
+    RejectedTurnSummary, SectionSummary, StationSummary, Summary, SurfaceSummary,
 };
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::threads;
 use runout_standards::Value;
+pub use runout_turning::station::StationResult;
 use runout_turning::{
     error_motion::{Centre, ErrorMotion},
     mains,
@@ -39,19 +35,6 @@ use runout_turning::{
     separation::Quantity,
     spread::Projection,
 };
-
-/// Watches a run, for a progress bar.
-pub trait Observer: Sync {
-    /// The run begins.
-    fn begin(&self, _stations: usize) {}
-    /// A station is done.
-    fn station(&self, _name: &str) {}
-}
-
-/// Watches nothing.
-pub struct Silent;
-
-impl Observer for Silent {}
 
 impl Pipeline {
     /// Runs it on all threads: [`run`] without a progress bar.
@@ -185,18 +168,4 @@ fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f6
     let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
     let slope = steepest.to_degrees() / (1e3 * radius_mm);
     ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres)
-}
-
-/// Refuses to write over what the run reads.
-pub(super) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<()> {
-    let read: Vec<PathBuf> = inputs.iter().map(|input| resolved(input)).collect();
-    for output in outputs {
-        if read.contains(&resolved(output)) {
-            let problem = "it is what the run reads";
-            return Err(Error::new("write", output.display().to_string(), problem)
-                .of(ErrorKind::Configuration)
-                .help("export to another path"));
-        }
-    }
-    Ok(())
 }

@@ -1,6 +1,6 @@
 //! Whether the turns of a run are steady: levels that creep or step, and noise that is estimated too high.
 
-use super::summary::StationSummary;
+use crate::summary::StationSummary;
 use runout_turning::{
     creep::{Creep, Levels, creeps},
     level_step::{LevelStep, level_step},

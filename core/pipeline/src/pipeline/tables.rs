@@ -1,50 +1,39 @@
 //! The tables of form and motion: their columns, and the rows of one station.
 
-use std::{collections::BTreeSet, iter::repeat_n};
+mod content;
+mod reading;
+mod values;
 
-use serde_json::json;
+use std::iter::repeat_n;
 
-use super::{
-    summary::{Summary, sensor_id, setup_id},
-    turn_tables,
-};
+use super::turn_tables;
 use crate::{
     atomic_file::PendingFile,
-    stage::{About, Completed, Export, NamedValue, ResultInfo},
+    stage::{About, Completed, Export, ResultInfo},
+    summary::Summary,
 };
-use runout_closed_loop::diagnosis::Correction;
+use content::Content;
+use reading::{reading, reading_rows};
 use runout_error::Result;
-use runout_numerics::{
-    Complex64,
-    fourier::{self, Fourier},
-};
-use runout_standards::{Value, uncertainty::Uncertainty};
 use runout_table::{
-    ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, counts_or_null, flags, no_numbers, numbers,
-    numbers_or_null, texts, texts_or_null,
+    ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, no_numbers, numbers, texts,
+    texts_or_null,
 };
 use runout_turning::station::StationResult;
 use runout_turning::{
     azimuth::Azimuth,
-    reading::{coefficients, variances},
     rig::Rig,
-    separation::{ALONG_COLUMN, Assessment, CONVENTION, MotionColumn, Quantity, motion_columns},
+    separation::{ALONG_COLUMN, Assessment, MotionColumn, Quantity, motion_columns},
     surface::Surface,
 };
+pub(super) use values::holds_values;
+pub use values::{correction_rows, corrections, named_value_rows, named_values};
+use values::{values, values_rows};
 
 const STATION: &str = "name of the axial station";
 const SECTION: &str = "id of the section";
 /// Unit of coefficients, whose rows are of all quantities.
 const MIXED: &str = "um; urad for tilt";
-
-/// The table of values, and that of a domain's own values beside it.
-const VALUES: &str = "values";
-const NAMED_VALUES: &str = "named_values";
-
-/// Whether the table of this name holds values.
-pub(super) fn holds_values(table: &str) -> bool {
-    [VALUES, NAMED_VALUES].contains(&table)
-}
 
 /// The tables of form, motion and the values that are computed from them.
 #[derive(Debug, Clone)]
@@ -357,272 +346,6 @@ fn harmonics_rows(result: &StationResult) -> Vec<ArrayRef> {
         flags(rows.iter().cloned().flatten().map(observable)),
     ]
 }
-
-fn reading() -> TableSpec {
-    TableSpec::new(
-        "reading",
-        "averaged readings, where the layout separates nothing",
-        vec![
-            ColumnSpec::name("station", STATION),
-            ColumnSpec::name("setup", "id of the setup"),
-            ColumnSpec::name("sensor", "id of the sensor"),
-            ColumnSpec::number("angle_deg", "deg", "the spindle's angle").repeating(),
-            ColumnSpec::number(
-                "reading_um",
-                "um",
-                "averaged reading without its level: form, eccentricity and error motion together",
-            ),
-            ColumnSpec::number("std_um", "um", std_of("reading_um")).repeating(),
-        ],
-    )
-    .optional()
-    .figure(
-        Figure::polar("reading", "Averaged reading", "angle_deg", [Measure::new("reading_um").with_std("std_um")])
-            .panels(["station"])
-            .curves(["setup", "sensor"]),
-    )
-}
-
-fn reading_rows(result: &StationResult, rig: Option<&Rig>) -> Vec<ArrayRef> {
-    let angles = result.angles;
-    let channels = || {
-        result.profiles.iter().flat_map(|profile| {
-            profile.sensors.iter().enumerate().map(move |(channel, sensor)| (profile, channel, *sensor))
-        })
-    };
-    let count = channels().count();
-    let mut fourier = Fourier::new(angles);
-    let mut readings = Vec::with_capacity(count * angles);
-    for (profile, channel, _) in channels() {
-        let mean = coefficients(profile, channel).into_iter().enumerate();
-        let without_level = mean.map(|(order, value)| if order == 0 { Complex64::ZERO } else { value.conj() });
-        readings.extend_from_slice(fourier.synthesise(without_level));
-    }
-    let std = |all: Option<Vec<f64>>| all.map_or(f64::NAN, |all| (0.5 * all.iter().skip(1).sum::<f64>()).sqrt());
-    let repeated = |ids: Vec<String>| texts(ids.iter().flat_map(|id| repeat_n(id.as_str(), angles)));
-    vec![
-        texts(repeat_n(result.station.as_str(), count * angles)),
-        repeated(channels().map(|(profile, ..)| setup_id(profile, rig)).collect()),
-        repeated(channels().map(|(.., sensor)| sensor_id(sensor, rig)).collect()),
-        numbers((0..count).flat_map(|_| angles_deg(angles))),
-        numbers(readings),
-        numbers(channels().flat_map(|(profile, channel, _)| repeat_n(std(variances(profile, channel)), angles))),
-    ]
-}
-
-fn values() -> TableSpec {
-    let uncertain = |name: &str, about: &str| {
-        ColumnSpec::number(name, "the value's", format!("{about}; null where it is not known")).or_null()
-    };
-    let order = |name: &str, about: &str| ColumnSpec::count(name, "1/rev", about);
-    TableSpec::new(
-        VALUES,
-        "the standards' values of sections, stations and the whole part",
-        vec![
-            ColumnSpec::name("station", "name of the axial station; null for the whole part").or_null(),
-            ColumnSpec::name("section", "id of the section; null for a station or the whole part").or_null(),
-            ColumnSpec::number("z_mm", "mm", "place of the section along the axis; null where there is none").or_null(),
-            ColumnSpec::text("symbol", "the standard's symbol"),
-            ColumnSpec::number("value", "the column unit", "the number"),
-            ColumnSpec::text("unit", "its unit; empty for a number without one"),
-            ColumnSpec::text("standard", "standard and clause, or paper and equation"),
-            order("band_low_upr", "lowest order that it was computed over"),
-            order("band_high_upr", "highest order that it was computed over; of a filter, where half passes"),
-            ColumnSpec::text(
-                "lost_orders",
-                "orders of it that are lost and that are not in the value, as JSON; null where none is",
-            )
-            .or_null(),
-            ColumnSpec::number(
-                "weakened_above_upr",
-                "1/rev",
-                "a filter before the average passes less than half above, where the value's filter asks for more; null \
-                 where nothing is missing",
-            )
-            .or_null(),
-            order(
-                "absent_above_upr",
-                "highest order there is, where the value's filter passes 0.1 % or more above it; null where nothing is \
-                 missing",
-            )
-            .or_null(),
-            ColumnSpec::text("filter", "the filter applied"),
-            ColumnSpec::text("reference", "what the profile was referred to"),
-            ColumnSpec::number("coverage", "", "share of the profile or surface that was there"),
-            uncertain("std", "standard uncertainty"),
-            uncertain("low_95", "lower end of the 95 % interval"),
-            uncertain("high_95", "upper end of the 95 % interval"),
-            ColumnSpec::count("draws", "", "draws of the Monte Carlo; null without uncertainty").or_null(),
-            ColumnSpec::text(
-                "no_uncertainty",
-                "why no uncertainty is stated; null where one is, or where the errors are not known",
-            )
-            .or_null(),
-        ],
-    )
-}
-
-fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
-    let rows = summary.placed_values();
-    let uncertainty =
-        |of: fn(&Uncertainty) -> f64| numbers_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(of)));
-    let of_value = |of: fn(&Value) -> &str| texts(rows.iter().map(|row| of(row.value)));
-    vec![
-        texts_or_null(rows.iter().map(|row| row.station)),
-        texts_or_null(rows.iter().map(|row| row.section)),
-        numbers_or_null(rows.iter().map(|row| row.z_mm)),
-        of_value(|value| &value.symbol),
-        numbers(rows.iter().map(|row| row.value.value)),
-        of_value(|value| &value.unit),
-        of_value(|value| &value.source),
-        counts(rows.iter().map(|row| row.value.band_upr[0])),
-        counts(rows.iter().map(|row| row.value.band_upr[1])),
-        texts_or_null(rows.iter().map(|row| {
-            let lost = &row.value.lost_orders;
-            (!lost.is_empty()).then(|| json!(lost).to_string())
-        })),
-        numbers_or_null(rows.iter().map(|row| row.value.weakened_above_upr)),
-        counts_or_null(rows.iter().map(|row| row.value.absent_above_upr)),
-        of_value(|value| &value.filter),
-        of_value(|value| &value.reference),
-        numbers(rows.iter().map(|row| row.value.coverage)),
-        uncertainty(|uncertainty| uncertainty.std),
-        uncertainty(|uncertainty| uncertainty.interval_95[0]),
-        uncertainty(|uncertainty| uncertainty.interval_95[1]),
-        counts_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(|uncertainty| uncertainty.draws))),
-        texts_or_null(rows.iter().map(|row| row.value.no_uncertainty.as_deref())),
-    ]
-}
-
-/// The table of a domain's own values; `of_form` where the result has form, whose values are in the table `values`.
-#[must_use]
-pub fn named_values(of_form: bool) -> TableSpec {
-    TableSpec::new(
-        // Beside those that are computed from form.
-        if of_form { NAMED_VALUES } else { VALUES },
-        "values of the result",
-        vec![
-            ColumnSpec::text("symbol", "the standard's symbol, or a short name"),
-            ColumnSpec::name("of", "what it is of; null where the result has one only").or_null(),
-            ColumnSpec::number("value", "the column unit", "the number; null where it is not observable").or_null(),
-            ColumnSpec::number("std", "the column unit", "its standard uncertainty; null where it is not known")
-                .or_null(),
-            ColumnSpec::text("unit", "its unit; empty for a number without one"),
-            ColumnSpec::text("about", "what it is, with standard and clause"),
-        ],
-    )
-}
-
-/// Rows of [`named_values`].
-///
-/// # Errors
-/// Never in practice: the columns are of one length.
-pub fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRows> {
-    let spec = named_values(of_form);
-    let rows = spec.rows(vec![
-        texts(values.iter().map(|value| &value.symbol)),
-        texts_or_null(values.iter().map(|value| value.of.as_ref())),
-        numbers_or_null(values.iter().map(|value| value.value)),
-        numbers_or_null(values.iter().map(|value| value.std)),
-        texts(values.iter().map(|value| &value.unit)),
-        texts(values.iter().map(|value| &value.about)),
-    ])?;
-    Ok(TableRows { table: spec.name, rows })
-}
-
-/// The table of the effects that a result is corrected for.
-#[must_use]
-pub fn corrections() -> TableSpec {
-    TableSpec::new(
-        "corrections",
-        "effects that the results are corrected for, one row a parameter",
-        vec![
-            ColumnSpec::text("effect", "id of the effect"),
-            ColumnSpec::text("targets", "where it acts; of a confounded set, one representative"),
-            ColumnSpec::text("confounded_with", "what these data cannot separate it from; empty for nothing"),
-            ColumnSpec::flag("known", "whether it was declared with its size"),
-            ColumnSpec::text("parameter", "name of the parameter"),
-            ColumnSpec::number("value", "the column unit", "its value"),
-            ColumnSpec::number("std", "the column unit", "its standard uncertainty; null where it is not known")
-                .or_null(),
-            ColumnSpec::text("unit", "unit of the parameter"),
-        ],
-    )
-    .optional()
-}
-
-/// Rows of [`corrections`]; none where results are corrected for nothing.
-///
-/// # Errors
-/// Never in practice: the columns are of one length.
-pub fn correction_rows(effects: &[Correction]) -> Result<Option<TableRows>> {
-    if effects.is_empty() {
-        return Ok(None);
-    }
-    let each = || effects.iter().flat_map(|one| one.parameters.iter().map(move |parameter| (one, parameter)));
-    let spec = corrections();
-    let rows = spec.rows(vec![
-        texts(each().map(|(one, _)| &one.effect)),
-        texts(each().map(|(one, _)| one.targets.join(" "))),
-        texts(each().map(|(one, _)| one.confounded_with.join("; "))),
-        flags(each().map(|(one, _)| one.known)),
-        texts(each().map(|(_, parameter)| &parameter.name)),
-        numbers(each().map(|(_, parameter)| parameter.value)),
-        numbers_or_null(each().map(|(_, parameter)| parameter.std)),
-        texts(each().map(|(_, parameter)| &parameter.unit)),
-    ])?;
-    Ok(Some(TableRows { table: spec.name, rows }))
-}
-
-/// What the stations hold, as they come in.
-#[derive(Debug, Clone, Default)]
-struct Content {
-    lost_form: BTreeSet<usize>,
-    lost_motion: BTreeSet<usize>,
-    level_known: bool,
-    highest_order: usize,
-    highest_on_angles: usize,
-    line: Option<Azimuth>,
-    form_band_upr: Option<[usize; 2]>,
-}
-
-impl Content {
-    fn note(&mut self, result: &StationResult) {
-        let separation = &result.separation;
-        let highest = separation.max_order();
-        for (unknown, quantity) in separation.unknowns.iter().enumerate() {
-            let lost = if quantity.is_form() { &mut self.lost_form } else { &mut self.lost_motion };
-            lost.extend(separation.lost_orders(unknown));
-            self.level_known |= separation.coefficients(unknown).next().is_some_and(|level| level.re != 0.0);
-            let lowest = separation.coefficients(unknown).position(|value| value.norm_sqr() > 0.0);
-            if let (true, Some(lowest)) = (quantity.is_form(), lowest) {
-                let [low, high] = self.form_band_upr.unwrap_or([lowest, highest]);
-                self.form_band_upr = Some([low.min(lowest), high.max(highest)]);
-            }
-        }
-        self.line = self.line.or(separation.azimuth());
-        self.highest_order = self.highest_order.max(highest);
-        self.highest_on_angles = self.highest_on_angles.max(highest.min(fourier::max_order(result.angles)));
-    }
-
-    fn about(&self, summary: &Summary) -> About {
-        let lowest = usize::from(!self.level_known);
-        let lost_form: BTreeSet<_> = self.lost_form.iter().chain(&summary.lost_orders.form).collect();
-        let lost_motion: BTreeSet<_> = self.lost_motion.iter().chain(&summary.lost_orders.motion).collect();
-        let notes = [
-            ("lost_orders", json!({ "form": lost_form, "motion": lost_motion }).to_string()),
-            ("band_upr", json!([lowest, self.highest_order]).to_string()),
-            ("band_over_angle_upr", json!([lowest, self.highest_on_angles]).to_string()),
-        ];
-        let line = self.line.map(|line| ("motion_along_deg", json!(line.degrees()).to_string()));
-        let notes = notes.into_iter().chain(line).map(|(key, value)| (key.to_owned(), value)).collect();
-        About { convention: format!("{CONVENTION} {BANDS}"), notes, form_band_upr: self.form_band_upr }
-    }
-}
-
-/// What `band_upr` and `band_over_angle_upr` are.
-const BANDS: &str =
-    "band_upr: lowest and highest order of the harmonics; band_over_angle_upr: of form and motion over angle.";
 
 fn angles_deg(angles: usize) -> impl Iterator<Item = f64> {
     (0..angles).map(move |index| 360.0 * index as f64 / angles as f64)

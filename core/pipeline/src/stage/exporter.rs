@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::Overview;
-use crate::{atomic_file::PendingFile, height_grid::HeightGrid, pipeline::summary::Summary};
+use crate::{atomic_file::PendingFile, height_grid::HeightGrid, summary::Summary};
 use runout_closed_loop::diagnosis::Diagnosis;
 use runout_error::Result;
 use runout_table::{RecordBatch, TableSpec};

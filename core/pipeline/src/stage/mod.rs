@@ -10,12 +10,13 @@ pub mod preprocessor;
 pub mod separator;
 pub mod simulator;
 
+pub use crate::summary::NamedValue;
 pub use check::{Check, Planned};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
 pub use overview::{Overview, Part, Section};
 pub use plan::{LayoutScore, NoiseGain, PointAddition, PointPlan};
-pub use points::{Form, LinearModel, NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator};
+pub use points::{Form, LinearModel, Outcome, PointDiagnosis, PointModel, PointSeparator};
 pub use preprocessor::{AverageRequest, Averager, Conditioner, Preprocessor};
 pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator};
 pub use simulator::{Simulation, Simulator};

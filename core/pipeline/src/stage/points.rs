@@ -1,12 +1,10 @@
 //! Separation of measured points, of any domain: points in; tables, values and form out.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use super::plan::PointPlan;
 use crate::{
     height_grid::HeightGrid,
     points::{PointColumn, Points},
+    summary::NamedValue,
 };
 use runout_closed_loop::{
     Effect, Model,
@@ -135,25 +133,6 @@ pub struct Outcome {
     pub notes: Vec<String>,
 }
 
-/// A value of a result.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[non_exhaustive]
-pub struct NamedValue {
-    /// The standard's symbol, or a short name.
-    pub symbol: String,
-    /// What it is of, where the result has several: a part, a section, an axis.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub of: Option<String>,
-    /// The number; null where it is not observable.
-    pub value: Option<f64>,
-    /// Its standard uncertainty; null where it is not known.
-    pub std: Option<f64>,
-    /// Its unit; empty for a number without one.
-    pub unit: String,
-    /// What it is, with standard and clause.
-    pub about: String,
-}
-
 /// Closed profiles of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Form {
@@ -256,13 +235,5 @@ pub fn value(symbol: &str, value: f64, std: f64, unit: &str, about: &str) -> Nam
         std: known(std),
         unit: unit.into(),
         about: about.into(),
-    }
-}
-
-impl NamedValue {
-    /// The same of one of several parts.
-    #[must_use]
-    pub fn of(self, of: impl Into<String>) -> Self {
-        Self { of: Some(of.into()), ..self }
     }
 }

@@ -1,7 +1,7 @@
 //! Separation: from profiles to form and motion.
 
 use super::points::PointSeparator;
-use crate::pipeline::effects::EffectCatalogue;
+use crate::effects::EffectCatalogue;
 use runout_closed_loop::{Effect, Setting, closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight};
 use runout_error::{Result, fault::Fault};
 use runout_turning::{

@@ -9,8 +9,11 @@
 //! how the face was clamped, and is left out.
 
 use super::{
-    ErrorMotion, FINER, Measure, RESIDUAL, SAID, STANDARD, between_setups, centre_of_chart, described, of_all_turns,
-    over, polar::Synchronous, rms_about_mean, rms_across, root_mean_square, unit, widest, without_noise,
+    ErrorMotion, FINER, SAID,
+    names::{RESIDUAL, STANDARD, centre_of_chart, described, over, unit},
+    noise::{Measure, without_noise},
+    polar::Synchronous,
+    turns::{between_setups, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest},
 };
 use crate::spread::{Direction, Spread};
 use runout_standards::{

@@ -14,30 +14,35 @@
 //! x and y are those in the plane midway between the sensors, where noise is least.
 
 mod axial;
+mod names;
+mod noise;
 mod plots;
 mod polar;
 #[cfg(test)]
 mod tests;
+mod turns;
 
+pub use names::{WITH_FUNDAMENTAL, symbols};
 pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;
 
 use std::cell::RefCell;
 
 use crate::{
-    azimuth::{Azimuth, FacePlace},
     profile::Profile,
     separation::{Quantity, Separation},
     spread::{Direction, Spread},
 };
 use axial::bounded;
+use names::{RESIDUAL, STANDARD, chosen_id, described, id, millimetres, over, unit};
+use noise::{Measure, without_noise};
 use polar::{Motion, Synchronous, seen_from};
-use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
-    roundness::{self, Angles, FixedCentre, Points, Reference, ront_lsci_um},
-    uncertainty::{self, DRAWS, Errors, NORMAL_95, Uncertainty, extreme, stand_in, student_95},
+    roundness::{Angles, Points, Reference, ront_lsci_um},
+    uncertainty::{self, Uncertainty},
 };
+use turns::{between_setups, directions, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest};
 
 /// What error motion is evaluated from: one station.
 #[derive(Debug, Clone, Copy)]
@@ -58,41 +63,6 @@ pub struct ErrorMotion<'a> {
 
 /// The centre where none is named.
 pub const CENTRE: Centre = Centre::Plot(Reference::LeastSquares);
-
-const STANDARD: &str = "ISO 230-7:2015";
-
-/// Directions as symbols name them, but for those that are chosen.
-const DIRECTIONS: [&str; 8] =
-    ["radial-x", "radial-y", "radial-rotating", "radial-along", "tilt-x", "tilt-y", "tilt-rotating", "tilt-along"];
-
-/// Symbol and unit of every value that there may be, with those in chosen directions.
-#[must_use]
-pub fn symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<(String, &'static str)> {
-    let chosen = lines.iter().flat_map(|line| [Direction::Along(*line), Direction::TiltAlong(*line)]).map(chosen_id);
-    let mut symbols = Vec::new();
-    for id in DIRECTIONS.into_iter().map(str::to_owned).chain(chosen) {
-        let tilt = id.starts_with("tilt");
-        let unit = if tilt { "µrad" } else { "µm" };
-        for kind in [if tilt { RESIDUAL } else { "synchronous" }, "total", "asynchronous"] {
-            symbols.extend([format!("{kind}-{id}"), format!("{kind}-{id}-rms")].map(|symbol| (symbol, unit)));
-        }
-        symbols.push((format!("total-{id}{WITH_FUNDAMENTAL}"), unit));
-    }
-    let axial = std::iter::once(Direction::Axial).chain(faces.iter().copied().map(Direction::Face));
-    for id in axial.map(chosen_id) {
-        for kind in ["synchronous", RESIDUAL, "total", "asynchronous"] {
-            symbols.extend([format!("{kind}-{id}"), format!("{kind}-{id}-rms")].map(|symbol| (symbol, "µm")));
-        }
-        symbols.push((format!("fundamental-{id}"), "µm"));
-    }
-    symbols.extend([("fundamental-radial".to_owned(), "µm"), ("fundamental-tilt".to_owned(), "µrad")]);
-    symbols
-}
-
-/// Kind of the synchronous values of tilt.
-const RESIDUAL: &str = "residual-synchronous";
-/// End of the symbols of total values with 1/rev. Their centre is that of the polar chart: any other moves with 1/rev.
-pub const WITH_FUNDAMENTAL: &str = "-with-fundamental";
 
 /// The ends of a range are looked for on so many times the angles of the average: 16 to a wave of its highest order or more, so that a
 /// crest between two of them is at most 1 − cos(π/16), 2 %, higher, and one of a tenth of that order 2e-4.
@@ -390,198 +360,4 @@ impl ErrorMotion<'_> {
                 .then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1))),
         })
     }
-}
-
-/// How two values of a plot are found.
-enum Measure<'a> {
-    /// Peak to valley and root mean square, which errors change without moving the centre.
-    AboutFixedCentre,
-    /// By this.
-    Of(&'a dyn Fn(&[f64]) -> [f64; 2]),
-}
-
-/// What noise adds to two values of a plot in the mean, and the uncertainty of each without it; `None` where no variance is
-/// known. Tilt has noise of all orders and little motion above the low ones, so that noise adds up.
-fn without_noise(
-    found: [f64; 2],
-    plot: &[f64],
-    variance: &[f64],
-    lowest: usize,
-    seed: u64,
-    measure: &Measure,
-) -> Option<[(f64, Uncertainty); 2]> {
-    if plot.len() < 2 {
-        return None;
-    }
-    let mut errors = Errors::new(variance, lowest, seed)?;
-    let mut fourier = Fourier::new(plot.len());
-    let mut harmonics = vec![Complex64::ZERO; variance.len().min(fourier.max_order() + 1)];
-    fourier.analyse(plot.iter().copied(), &mut harmonics);
-    let weights = stand_in(&harmonics, variance, lowest);
-    // What is above the orders with a known variance stays.
-    let noise: Vec<Complex64> = harmonics.iter().zip(weights).map(|(value, weight)| value * (1.0 - weight)).collect();
-    let mut likely = plot.to_vec();
-    likely.iter_mut().zip(fourier.synthesise(noise)).for_each(|(value, noise)| *value -= noise);
-    let (about, drawn): ([f64; 2], Vec<[f64; 2]>) = match measure {
-        Measure::AboutFixedCentre => {
-            // Errors of orders from 1 on leave the mean.
-            let mean = likely.iter().sum::<f64>() / likely.len() as f64;
-            likely.iter_mut().for_each(|value| *value -= mean);
-            let plot = FixedCentre::new(likely);
-            let both = |values: roundness::Values| [values.ront_um, values.ronq_um];
-            (both(plot.about()), (0..DRAWS).map(|_| both(plot.values(&errors.turned(&mut fourier)))).collect())
-        }
-        Measure::Of(values) => {
-            let mut drawn = likely.clone();
-            let mut next = || {
-                errors.draw(&mut fourier, &likely, &mut drawn);
-                values(&drawn)
-            };
-            let all = (0..DRAWS).map(|_| next()).collect();
-            (values(&likely), all)
-        }
-    };
-    let (first, second) = drawn.into_iter().map(|[first, second]| (first, second)).unzip();
-    Some([extreme(found[0], about[0], first)?, extreme(found[1], about[1], second)?])
-}
-
-/// The directions that some setup gives, each once.
-fn directions(spreads: &[&Spread]) -> Vec<Direction> {
-    let mut directions: Vec<Direction> = Vec::new();
-    for direction in spreads.iter().flat_map(|spread| &spread.directions) {
-        if !directions.contains(direction) {
-            directions.push(*direction);
-        }
-    }
-    // In the same order, whichever setup gives them.
-    directions
-        .sort_by_key(|direction| Direction::ALL.iter().position(|known| known == direction).unwrap_or(usize::MAX));
-    directions
-}
-
-/// The largest spread of a setup's turns at one angle.
-fn widest(spread: &Spread, direction: Direction) -> f64 {
-    let (low, high) = spread.in_direction(direction).unwrap_or_default();
-    low.iter().zip(high).map(|(low, high)| high - low).fold(0.0, f64::max)
-}
-
-/// Lowest and highest of all turns about a plot, from the lowest and the highest turn less the mean: on as many angles as the plot or
-/// on fewer, and then straight from one angle to the next.
-fn of_all_turns(plot: &[f64], (low, high): (&[f64], &[f64])) -> (f64, f64) {
-    let finer = plot.len() / low.len().max(1);
-    let (mut inner, mut outer) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (index, plot) in plot.chunks_exact(finer.max(1)).take(low.len()).enumerate() {
-        let next = (index + 1) % low.len();
-        let step = |turns: &[f64]| (turns[next] - turns[index]) / finer as f64;
-        let (low_step, high_step) = (step(low), step(high));
-        let (mut lowest, mut highest) = (low[index], high[index]);
-        for value in plot {
-            inner = inner.min(value + lowest);
-            outer = outer.max(value + highest);
-            (lowest, highest) = (lowest + low_step, highest + high_step);
-        }
-    }
-    (inner, outer)
-}
-
-/// Root mean square of a setup's turns about their mean; 0 where it is not known.
-fn rms_across(spread: &Spread, direction: Direction) -> f64 {
-    spread.rms(direction).unwrap_or(0.0)
-}
-
-/// Root mean square about the mean: that of a polar plot about the circle of its mean radius.
-fn rms_about_mean(plot: &[f64]) -> f64 {
-    let count = plot.len().max(1) as f64;
-    let mean = plot.iter().sum::<f64>() / count;
-    (plot.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
-}
-
-fn root_mean_square(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
-/// What setups, each a capture of its own, say of a range over turns: the scatter of one of them, and where another one
-/// would lie with 95 % probability; `std` is of what they share. `None` of one.
-fn between_setups(each: &[f64], std: f64) -> Option<Uncertainty> {
-    let freedom = each.len().checked_sub(1).filter(|freedom| *freedom > 0)?;
-    let count = each.len() as f64;
-    let mean = each.iter().sum::<f64>() / count;
-    let scatter = (each.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64).sqrt();
-    let student = student_95(freedom as f64);
-    let half = (student * scatter * (1.0 + 1.0 / count).sqrt()).hypot(NORMAL_95 * std);
-    Some(Uncertainty { std: scatter.hypot(std), interval_95: [(mean - half).max(0.0), mean + half], draws: 0 })
-}
-
-/// The turns behind a range.
-fn over(spreads: &[&Spread]) -> String {
-    let turns = spreads.iter().map(|spread| spread.turns);
-    let (fewest, most) = (turns.clone().min().unwrap_or(0), turns.max().unwrap_or(0));
-    let turns = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };
-    match spreads.len() {
-        1 => format!("{turns} turns"),
-        setups => format!("{turns} turns in each of {setups} setups"),
-    }
-}
-
-/// "radial-at-45deg": a direction that was chosen.
-fn chosen_id(direction: Direction) -> String {
-    match direction {
-        Direction::Along(line) => format!("radial-at-{}deg", line.degrees()),
-        Direction::TiltAlong(line) => format!("tilt-at-{}deg", line.degrees()),
-        Direction::Face(place) => format!("face-at-{place}"),
-        _ => id(direction).to_owned(),
-    }
-}
-
-fn id(direction: Direction) -> &'static str {
-    match direction {
-        Direction::X => "radial-x",
-        Direction::Y => "radial-y",
-        Direction::Rotating => "radial-rotating",
-        Direction::TiltX => "tilt-x",
-        Direction::TiltY => "tilt-y",
-        Direction::RotatingTilt => "tilt-rotating",
-        Direction::Along(_) => "radial-along",
-        Direction::TiltAlong(_) => "tilt-along",
-        Direction::Axial => "axial",
-        Direction::Face(_) => "face",
-    }
-}
-
-fn unit(direction: Direction) -> String {
-    if direction.is_tilt() { "urad".into() } else { "um".into() }
-}
-
-fn described(direction: Direction, z_mm: f64) -> String {
-    let z_mm = millimetres(z_mm);
-    match direction {
-        Direction::X => format!("radial, fixed sensitive direction x, at z = {z_mm} mm"),
-        Direction::Y => format!("radial, fixed sensitive direction y, at z = {z_mm} mm"),
-        Direction::Rotating => format!("radial, rotating sensitive direction, at z = {z_mm} mm"),
-        Direction::TiltX => "tilt about x, fixed sensitive direction".into(),
-        Direction::TiltY => "tilt about y, fixed sensitive direction".into(),
-        Direction::RotatingTilt => "tilt, rotating sensitive direction".into(),
-        Direction::Along(azimuth) => {
-            format!("radial, fixed sensitive direction at {azimuth} from x towards y, at z = {z_mm} mm")
-        }
-        Direction::TiltAlong(azimuth) => {
-            format!("tilt towards the fixed sensitive direction at {azimuth} from x towards y")
-        }
-        Direction::Axial => "axial, fixed sensitive direction".into(),
-        Direction::Face(place) => format!(
-            "face, fixed sensitive direction, {} mm from the axis at {}° from x towards y",
-            place.radius_mm(),
-            place.degrees()
-        ),
-    }
-}
-
-/// What axial values are referred to.
-fn centre_of_chart() -> &'static str {
-    Centre::PolarChart.symbol()
-}
-
-/// To a micrometre, without trailing zeros.
-fn millimetres(z_mm: f64) -> f64 {
-    (1e3 * z_mm).round() / 1e3
 }

@@ -1,8 +1,9 @@
 //! Error motion to look at: the polar plot of all turns, and the spectrum of what repeats and what does not.
 
 use super::{
-    CENTRE, ErrorMotion, directions,
+    CENTRE, ErrorMotion,
     polar::{Synchronous, seen_from},
+    turns::directions,
 };
 use crate::{
     profile::Profile,

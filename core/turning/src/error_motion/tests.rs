@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::{profile::TurnCount, separation::Residual, spread::Projection};
+use crate::{azimuth::Azimuth, profile::TurnCount, separation::Residual, spread::Projection};
 use runout_numerics::Complex64;
 
 const ANGLES: usize = 720;

@@ -3,9 +3,10 @@
 use super::{
     Meeting, Surface, SurfaceConfig,
     monotone::{STENCIL, Stencil},
+    section::{Order, Section, mean, noise, orders},
 };
 use crate::{
-    separation::{Quantity, SectionAt, Separation},
+    separation::{Quantity, SectionAt},
     station::StationResult,
 };
 use runout_error::{Error, ErrorKind, Result};
@@ -14,7 +15,7 @@ use runout_numerics::{
     fourier::{Fourier, max_order},
     threads::both,
 };
-use runout_standards::{drawn::remove_noise, gaps::Gaps, uncertainty::Errors};
+use runout_standards::{drawn::remove_noise, uncertainty::Errors};
 
 /// Sections nearer to each other than this lie at one z, in mm: a carriage's repeatability.
 const SAME_Z_MM: f64 = 1e-3;
@@ -29,57 +30,6 @@ pub struct SurfaceBuilder {
     sections: Vec<Section>,
     /// Whether a section had orders that do not fit on the grid.
     band_limited: bool,
-}
-
-/// One section's form, order by order from 0; `None` where it is not known.
-#[derive(Debug)]
-pub struct Section {
-    /// Id of the section.
-    pub id: String,
-    /// Name of the station.
-    pub station: String,
-    /// Place along the axis, in mm.
-    pub z_mm: f64,
-    /// Where around it there is no surface.
-    pub gaps: Gaps,
-    /// Share of what was measured that was used.
-    pub used: f64,
-    /// Order of which filters before the average pass half.
-    pub half_power_upr: Option<f64>,
-    /// One entry an order from 0; `None` where it is lost.
-    pub orders: Vec<Option<Order>>,
-    /// What noise its errors are made of, as wide as their variance is badly known.
-    pub noise: Vec<Noise>,
-}
-
-/// A source of noise of a station, shared by its sections.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct Noise {
-    /// The section whose own noise it is, by its place in the station.
-    pub of: usize,
-    /// What noise of E|g|² = 1 makes of each order, by order from 0; 0 where it is not known.
-    pub amplitudes: Vec<Complex64>,
-}
-
-/// One order of a form.
-#[derive(Debug, Clone, Copy)]
-pub struct Order {
-    pub value: Complex64,
-    /// E|δ|², µm²; NaN where not known.
-    pub variance: f64,
-}
-
-impl Section {
-    /// Orders from 2 that are not known, ascending.
-    pub fn lost_orders(&self) -> impl Iterator<Item = usize> + '_ {
-        let orders = self.orders.iter().enumerate().skip(2);
-        orders.filter(|(_, known)| known.is_none()).map(|(order, _)| order)
-    }
-
-    fn label(&self) -> String {
-        format!("{}@{}", self.id, self.station)
-    }
 }
 
 impl SurfaceBuilder {
@@ -303,65 +253,6 @@ fn describe(sections: usize, band_limited: bool) -> &'static str {
     }
 }
 
-/// Standard deviations of own noise below this share of the whole are rounding.
-const ROUNDING: f64 = 1e-6;
-
-/// Of each section, the noise that its errors are made of: own noise, and where covariances are known a part of that of the
-/// sections before it (Cholesky's factor of the covariance, order by order).
-fn noise(separation: &Separation, orders: usize) -> Vec<Vec<Noise>> {
-    let (width, sections) = (separation.unknowns.len(), separation.sections.len());
-    let forms: Vec<Option<usize>> = (0..sections).map(|index| separation.position(Quantity::Form(index))).collect();
-    let count = forms.iter().flatten().count();
-    let joint = separation.form_covariance.as_ref().filter(|_| count == sections);
-    let widening = separation.widening();
-    let orders = orders.min(widening.len());
-    let shared = |index: usize| if joint.is_some() { 0..=index } else { index..=index };
-    let mut noise: Vec<Vec<Noise>> = (0..sections)
-        .map(|index| shared(index).map(|of| Noise { of, amplitudes: vec![Complex64::ZERO; orders] }).collect())
-        .collect();
-    let (mut factor, mut total) = (vec![Complex64::ZERO; sections * sections], vec![0.0; sections]);
-    for order in 0..orders {
-        for row in 0..sections {
-            let variance = forms[row].and_then(|form| separation.variance.get(order * width + form).copied());
-            // Of what is not known, nothing is drawn.
-            let variance = variance.filter(|variance| variance.is_finite() && *variance > 0.0).unwrap_or(0.0);
-            let mut left = variance;
-            total[row] = variance.sqrt();
-            for column in 0..row {
-                let before: Complex64 =
-                    (0..column).map(|k| factor[row * sections + k] * factor[column * sections + k].conj()).sum();
-                let own = factor[column * sections + column].re;
-                let entry = joint.and_then(|joint| joint.get((order * sections + row) * sections + column));
-                // A section whose noise is all that of others has none of its own, but for rounding.
-                let entry = entry.filter(|entry| entry.is_finite() && own > ROUNDING * total[column] && variance > 0.0);
-                let share = entry.map_or(Complex64::ZERO, |entry| (entry - before) / own);
-                // Never more than there is, whatever rounding says.
-                let share = share * (left.sqrt() / share.norm()).min(1.0);
-                let share = if share.is_finite() { share } else { Complex64::ZERO };
-                left = (left - share.norm_sqr()).max(0.0);
-                factor[row * sections + column] = share;
-            }
-            factor[row * sections + row] = Complex64::from(left.sqrt());
-            for noise in &mut noise[row] {
-                noise.amplitudes[order] = factor[row * sections + noise.of] * widening[order];
-            }
-        }
-    }
-    noise
-}
-
-fn orders(separation: &Separation, unknown: usize) -> Vec<Option<Order>> {
-    let width = separation.unknowns.len();
-    let seen = separation.observable.iter().skip(unknown).step_by(width);
-    let variances = separation.variance.iter().skip(unknown).step_by(width).copied().chain(std::iter::repeat(f64::NAN));
-    separation
-        .coefficients(unknown)
-        .zip(seen)
-        .zip(variances)
-        .map(|((value, seen), variance)| (*seen && value.is_finite()).then_some(Order { value, variance }))
-        .collect()
-}
-
 /// Orders of two sections side by side, where both know them.
 fn common<'a>(a: &'a Section, b: &'a Section) -> impl Iterator<Item = Option<(Order, Order)>> + 'a {
     a.orders.iter().zip(&b.orders).map(|(a, b)| a.zip(*b))
@@ -381,22 +272,4 @@ fn meeting(a: &Section, b: &Section, fourier: &mut Fourier) -> Meeting {
         max_um: difference.iter().fold(0.0, |largest: f64, value| largest.max(value.abs())),
         expected_rms_um: (expected.is_finite() && expected > 0.0).then_some(expected),
     }
-}
-
-/// The mean of sections at one z, order by order over those that know it; its variance is NaN where not known.
-fn mean(group: &[Section]) -> impl Iterator<Item = Order> + '_ {
-    let orders = group.iter().map(|section| section.orders.len()).max().unwrap_or(0);
-    (0..orders).map(move |order| {
-        let known = || group.iter().filter_map(move |section| *section.orders.get(order)?);
-        let weighted = known().all(|known| known.variance.is_finite() && known.variance > 0.0);
-        let weight = |order: &Order| if weighted { order.variance.recip() } else { 1.0 };
-        let weights: f64 = known().map(|order| weight(&order)).sum();
-        let sum: Complex64 = known().map(|order| order.value * weight(&order)).sum();
-        let spread: f64 = known().map(|order| order.variance * weight(&order).powi(2)).sum();
-        if weights > 0.0 {
-            Order { value: sum / weights, variance: spread / weights.powi(2) }
-        } else {
-            Order { value: Complex64::ZERO, variance: f64::NAN }
-        }
-    })
 }

@@ -2,16 +2,18 @@
 
 mod builder;
 mod monotone;
+mod section;
 
 use std::f64::consts::{PI, TAU};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use builder::{Noise, Section, SurfaceBuilder, Uncertain};
+pub use builder::{SurfaceBuilder, Uncertain};
 use monotone::{STENCIL, Stencil};
 use runout_error::Fault;
 use runout_numerics::height_map::HeightMap;
+pub use section::{Noise, Section};
 
 /// `[surface]`: how sections become a surface.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]

@@ -8,8 +8,7 @@ use super::ResultStore;
 use crate::{
     atomic_file::resolved,
     pipeline::{
-        config,
-        document::{Sources, Table},
+        document::{self, Sources, Table},
         error::Fault,
         registry::{Context, Registry},
     },
@@ -35,7 +34,7 @@ pub(super) fn of_batch(
         exporter.outputs(tables).iter().map(|path| resolved(path)).collect()
     };
     let mut taken = written(&*exporters[0]);
-    for table in config::tables(root, "export")? {
+    for table in document::tables(root, "export")? {
         let configured = registry.exporters.build(&table, &context)?;
         if configured.takes() == Takes::Surface {
             continue;

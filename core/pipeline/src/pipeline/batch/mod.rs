@@ -25,14 +25,15 @@ pub use trend::{RECORDING, Series, Signals, recording_column};
 use super::{
     config::Pipeline,
     document::{ConfigError, Document, Sources},
+    observer::Observer,
     registry::Registry,
-    run::{Observer, run_alone},
-    summary::Summary,
+    run::run_alone,
     tables,
 };
 use crate::{
     atomic_file::{self, FolderLock, PendingFile, commit_all, resolved},
     stage::{About, Completed, Exporter, ResultInfo, Source},
+    summary::Summary,
 };
 use recording::{of_recording, without_recording};
 use report::Found;

@@ -6,10 +6,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{recording::Recording, trend::Series};
-use crate::pipeline::{
-    config::Pipeline,
-    evaluate::{Decision, Limit},
-    summary::Summary,
+use crate::{
+    pipeline::config::Pipeline,
+    summary::{Decision, Limit, Summary},
 };
 use runout_error::Error;
 

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::pipeline::evaluate::Limit;
+use crate::summary::Limit;
 use runout_error::Result;
 use runout_standards::control_chart::{ControlChart, Signal, Tests};
 use runout_table::{

@@ -17,8 +17,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-pub use methods::{Candidate, Method, Refusal};
-pub(super) use methods::{candidate, plugin_name, with_shared_keys};
+pub use super::config::candidate::{Candidate, Method, Refusal};
 pub use points::{ComparingPoints, PointMethod};
 pub use report::{
     ColumnComparison, ColumnDifference, Comparison, Difference, DifferenceOrders, Harmonics, MethodSummary,
@@ -27,16 +26,18 @@ pub use report::{
 
 use super::{
     Pipeline, Registry,
-    config::Route,
+    config::{Route, exports::spare_inputs},
     error::Fault,
     evaluate::Evaluate,
+    observer::Observer,
     record_reader::{RecordReader, separate},
     registry::Context,
     result::{Evaluation, complete},
-    run::{Observer, spare_inputs},
+};
+use crate::{
+    stage::{Averager, Conditioner, Request, Source, Station, StationSeparator},
     summary::LostOrders,
 };
-use crate::stage::{Averager, Conditioner, Request, Source, Station, StationSeparator};
 use estimates::{Estimates, Scatter};
 use runout_error::{Error, Result};
 use runout_turning::{

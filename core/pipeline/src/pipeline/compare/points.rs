@@ -13,15 +13,14 @@ use super::{
 use crate::{
     pipeline::{
         Pipeline, Registry,
-        config::Route,
+        config::{Route, exports::spare_inputs},
         document::{Document, Sources},
         error::Fault,
         registry::Context,
-        run::spare_inputs,
-        summary::LostOrders,
     },
     points::PointColumn,
     stage::{NamedValue, Outcome, PointSeparator, Request, Source},
+    summary::LostOrders,
 };
 use runout_error::{Error, Result};
 use runout_table::{Array, Float64Array, TableRows};

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::methods::Refusal;
-use crate::pipeline::summary::LostOrders;
+use crate::{pipeline::config::candidate::Refusal, summary::LostOrders};
 use runout_turning::provenance::Provenance;
 
 /// What a comparison found.

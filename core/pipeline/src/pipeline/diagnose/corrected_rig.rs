@@ -8,8 +8,8 @@ use std::{
 use crate::{
     atomic_file::PendingFile,
     pipeline::{
-        config::{Pipeline, checked},
-        document::{ConfigError, Document, Sources, table_text},
+        config::Pipeline,
+        document::{ConfigError, Document, Sources, checked, table_text},
     },
 };
 use runout_closed_loop::diagnosis::Correction;

@@ -9,8 +9,8 @@ use serde::{
 };
 
 use super::{
+    Limit,
     filter::{Filter, between_name, robust_name, waviness_name},
-    limit::Limit,
 };
 use runout_error::fault::{Fault, Place, known_names};
 use runout_numerics::filter::Kind as FilterKind;

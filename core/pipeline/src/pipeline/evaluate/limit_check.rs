@@ -1,6 +1,6 @@
 //! Whether a limit names a value that is computed.
 
-use super::{Evaluate, ascii_unit, limit::Limit};
+use super::{Evaluate, Limit, ascii_unit};
 use runout_error::fault::{Fault, known_names};
 use runout_turning::{
     error_motion::{Centre, WITH_FUNDAMENTAL},

@@ -17,27 +17,12 @@ pub use config::{
 };
 pub(super) use generatrix::add_generatrices;
 pub(super) use limit::decide;
-pub use limit::{Decision, Limit, LimitSummary, LimitValue};
-pub use part::PartSummary;
 pub(super) use part::part_summary;
 pub(super) use section::{missing_circles, section_values, steepest_um_per_deg};
 
+use crate::summary::{Limit, PartSummary};
 use filter::Filter;
 use runout_standards::{Value, uncertainty::Uncertainty};
-
-/// A value and where it belongs.
-#[derive(Debug, Clone, Copy)]
-#[non_exhaustive]
-pub struct PlacedValue<'a> {
-    /// The station; none for a value of the whole part.
-    pub station: Option<&'a str>,
-    /// The section; none for a value of a station or the whole part.
-    pub section: Option<&'a str>,
-    /// Place of the section, or of the carriage, along the axis.
-    pub z_mm: Option<f64>,
-    /// The value.
-    pub value: &'a Value,
-}
 
 /// What a number is, before it is known.
 #[derive(Debug, Clone)]

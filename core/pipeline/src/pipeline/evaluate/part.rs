@@ -2,10 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, centres, labelled};
+use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, PartSummary, centres, labelled};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
@@ -31,21 +28,6 @@ const FEWEST_DRAWS: usize = 50;
 const POINTS_FOUND: usize = 500_000;
 /// Draws of what is fitted to each of a wall's generatrices.
 const DRAWS_OF_LINES: usize = 200;
-
-/// Values of all sections together.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PartSummary {
-    /// Sections that they are of.
-    pub sections: usize,
-    /// First and last place of a section along the axis, in mm.
-    pub z_mm: [f64; 2],
-    /// Equal angles at which errors of each section were drawn; itself it is looked at on more.
-    pub angles: usize,
-    /// The standards' values.
-    pub values: Vec<Value>,
-    /// What the values are not.
-    pub remarks: Vec<String>,
-}
 
 /// Cylindricity of sections about a nominal radius; `None` where they do not lie at two heights. `placed` says that their
 /// centres and mean radii are known relative to each other, which only a measuring machine tells.

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::pipeline::summary::{SectionSummary, StationSummary, Summary};
+use crate::summary::{Decision, LimitValue, PlacedValue, SectionSummary, StationSummary, Summary};
 use runout_error::fault::{Fault, Place, Step};
 use runout_numerics::Complex64;
 use runout_standards::gaps::Gaps;

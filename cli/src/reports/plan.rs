@@ -2,15 +2,13 @@
 
 use std::path::PathBuf;
 
-use runout_core::{model::foresight::Foresight, rig::Rig};
+use runout_core::{model::foresight::Foresight, rig::Rig, stage::PointPlan};
 use runout_spindle::plan::{self, Addition, Change, Optimum, Suggestion};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::{
-    args::{Criterion, PlanArgs},
-    commands::check::{Order, RigSize, Separability},
-};
+use super::check::{Order, RigSize, Separability};
+use crate::args::{Criterion, PlanArgs};
 
 /// What a rig can separate and how well, what to add to it, and better angles for its sensors.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -150,8 +148,20 @@ pub struct Arrangement {
     pub within_tolerance: Score,
 }
 
+/// What a layout of measured points tells and how well, and what to add to it.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PointReport {
+    /// The pipeline's title.
+    pub title: String,
+    /// Its separator.
+    pub separator: String,
+    /// What the separator says.
+    #[serde(flatten)]
+    pub plan: PointPlan,
+}
+
 /// An addition in words.
-pub(super) fn words(addition: &Addition, rig: &Rig) -> String {
+pub fn words(addition: &Addition, rig: &Rig) -> String {
     match addition {
         Addition::Setup { part_deg, sensors_turned: false } => format!("a setup, part at {part_deg}°, sensors fixed"),
         Addition::Setup { part_deg, sensors_turned: true } => {
@@ -165,7 +175,7 @@ pub(super) fn words(addition: &Addition, rig: &Rig) -> String {
 }
 
 /// Noise gain of form by order, the worst over the sections.
-pub(super) fn form_gains(separability: &Separability) -> Vec<Gain> {
+pub fn form_gains(separability: &Separability) -> Vec<Gain> {
     let gain = |order: &Order| {
         let forms =
             separability.unknowns.iter().zip(&order.noise_gain).filter(|(unknown, _)| unknown.quantity == "form");
@@ -177,7 +187,7 @@ pub(super) fn form_gains(separability: &Separability) -> Vec<Gain> {
 
 impl Report {
     /// Without suggestions yet.
-    pub(super) fn new(rig: &Rig, separability: Separability, foresight: Foresight) -> Self {
+    pub fn new(rig: &Rig, separability: Separability, foresight: Foresight) -> Self {
         let dof = |order: &Order| ResidualDof { order: order.order, dof: order.residual_dof };
         Self {
             rig: RigSize::from(rig),
@@ -195,7 +205,7 @@ impl Report {
 }
 
 impl Suggested {
-    pub(super) fn new(found: &Suggestion, change: Option<&Change>, rig: &Rig, before: plan::Score) -> Self {
+    pub fn new(found: &Suggestion, change: Option<&Change>, rig: &Rig, before: plan::Score) -> Self {
         let setup = found.rig.setups.last().filter(|_| matches!(found.addition, Addition::Setup { .. }));
         let (add, part_deg, section, angle_deg) = match found.addition {
             Addition::Setup { part_deg, .. } => ("setup", Some(part_deg), None, None),
@@ -219,7 +229,7 @@ impl Suggested {
 }
 
 impl Optimised {
-    pub(super) fn new(optimum: &Optimum, rig: &Rig, args: &PlanArgs) -> Self {
+    pub fn new(optimum: &Optimum, rig: &Rig, args: &PlanArgs) -> Self {
         Self {
             criterion: match args.criterion {
                 Criterion::Worst => "worst",
@@ -260,6 +270,6 @@ impl From<plan::Score> for Score {
 }
 
 /// Degrees as they stood in the file, before they became radians.
-pub(super) fn degrees(angle_rad: f64) -> f64 {
+pub fn degrees(angle_rad: f64) -> f64 {
     (angle_rad.to_degrees() * 1e9).round() / 1e9
 }

@@ -4,21 +4,22 @@ use std::path::{Path, PathBuf};
 
 use toml::{Spanned, de::DeValue};
 
-use super::{
-    diagnose::config::Diagnose,
-    document::{self, Sources, Table},
-    error::Fault,
-    registry::{Context, Registry},
-};
+use super::diagnose::Diagnose;
 use crate::{
     atomic_file::resolved,
+    pipeline::{
+        document::{self, Sources, Table},
+        error::Fault,
+        registry::{Context, Registry},
+    },
     stage::{Exporter, Takes},
 };
+use runout_error::{Error, ErrorKind};
 use runout_table::TableSpec;
 
 const SUMMARY: &str = "summary.json";
 const SUMMARY_USE: &str = "where the run's summary goes";
-pub(super) const DIAGNOSIS: &str = "diagnosis.json";
+pub(crate) const DIAGNOSIS: &str = "diagnosis.json";
 const DIAGNOSIS_USE: &str = "where the diagnosis goes";
 const DIAGNOSED: &str = "diagnosed";
 const DIAGNOSED_USE: &str = "written by `diagnose`";
@@ -27,28 +28,42 @@ fn beside(output: &Path, name: &str) -> PathBuf {
     output.with_file_name(name)
 }
 
-pub(super) fn beside_the_first(exporters: &[Box<dyn Exporter>], tables: &[TableSpec], name: &str) -> Option<PathBuf> {
+pub(crate) fn beside_the_first(exporters: &[Box<dyn Exporter>], tables: &[TableSpec], name: &str) -> Option<PathBuf> {
     exporters.iter().find_map(|exporter| exporter.outputs(tables).first().map(|path| beside(path, name)))
 }
 
 /// Where the summary of these exports goes: where the first exporter has it.
-pub(super) fn summary_path(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Option<PathBuf> {
+pub(crate) fn summary_path(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Option<PathBuf> {
     exporters.iter().find_map(|exporter| exporter.summary(tables))
 }
 
-pub(super) fn written(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Vec<PathBuf> {
+pub(crate) fn written(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> Vec<PathBuf> {
     exporters.iter().flat_map(|exporter| exporter.outputs(tables)).chain(summary_path(exporters, tables)).collect()
+}
+
+/// Refuses to write over what the run reads.
+pub(crate) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> runout_error::Result<()> {
+    let read: Vec<PathBuf> = inputs.iter().map(|input| resolved(input)).collect();
+    for output in outputs {
+        if read.contains(&resolved(output)) {
+            let problem = "it is what the run reads";
+            return Err(Error::new("write", output.display().to_string(), problem)
+                .of(ErrorKind::Configuration)
+                .help("export to another path"));
+        }
+    }
+    Ok(())
 }
 
 /// The exporters of `run` and those of `diagnose`.
 #[derive(Default)]
-pub(super) struct Exports {
+pub(crate) struct Exports {
     pub exporters: Vec<Box<dyn Exporter>>,
     pub diagnosed: Vec<Box<dyn Exporter>>,
 }
 
 /// What exporters are built from.
-pub(super) struct Exporting<'a> {
+pub(crate) struct Exporting<'a> {
     pub registry: &'a Registry,
     pub context: &'a Context<'a>,
     /// Whether the result has a surface: form, or heights on a plane.

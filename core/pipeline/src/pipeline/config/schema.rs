@@ -3,10 +3,13 @@
 use schemars::Schema;
 use serde_json::{Value, json};
 
-use super::{
-    diagnose::config::DiagnoseConfig,
-    evaluate::{EvaluateConfig, Limit},
-    registry::{Catalogue, Plugin, Registry, inline},
+use super::diagnose::DiagnoseConfig;
+use crate::{
+    pipeline::{
+        evaluate::EvaluateConfig,
+        registry::{Catalogue, Plugin, Registry, inline},
+    },
+    summary::Limit,
 };
 use runout_turning::{rig::RigConfig, surface::SurfaceConfig};
 

@@ -1,0 +1,45 @@
+//! What `runout inspect` says.
+
+use std::collections::BTreeMap;
+
+use runout_csv::TextReport;
+use runout_hdf5::FileReport;
+use serde::Serialize;
+
+/// What a file holds.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Report {
+    /// A measurement, a result, or another HDF5 file.
+    Hdf5(FileReport),
+    /// A table.
+    Parquet(TableReport),
+    /// Samples as text.
+    Text(TextReport),
+}
+
+/// A Parquet table in short.
+#[derive(Debug, Serialize)]
+pub struct TableReport {
+    /// "parquet".
+    pub format: &'static str,
+    /// Number of rows.
+    pub rows: i64,
+    /// Parts that a reader can skip.
+    pub row_groups: usize,
+    /// In the file's order.
+    pub columns: Vec<ColumnReport>,
+    /// What the writer noted.
+    pub metadata: BTreeMap<String, Option<String>>,
+}
+
+/// A column of a Parquet table.
+#[derive(Debug, Serialize)]
+pub struct ColumnReport {
+    /// Its name.
+    pub name: String,
+    /// As Parquet stores it.
+    pub r#type: String,
+    /// Whether values may be absent.
+    pub optional: bool,
+}

@@ -1,0 +1,160 @@
+//! The ways from a measurement to form, built from their stages.
+
+use crate::{
+    pipeline::{
+        document::{self, Table, table},
+        error::Fault,
+        registry::Registry,
+        tables::{self, StationTables},
+    },
+    points::PointColumn,
+    stage::{
+        Averager, Conditioner, PointModel, PointSeparator, Preprocessor, Separator, StationModel, StationSeparator,
+    },
+};
+use runout_closed_loop::Effect;
+use runout_table::TableSpec;
+use runout_turning::{
+    rig::Rig,
+    separation::{Assessment, NOTHING_SEPARATED},
+};
+
+/// The ways from a measurement to form.
+pub enum Route {
+    /// Recorded turns, station by station.
+    Turns {
+        /// Samples to samples.
+        conditioners: Vec<Box<dyn Conditioner>>,
+        /// Samples to a profile.
+        averager: Box<dyn Averager>,
+        /// Profiles to form and motion.
+        separator: Box<dyn StationSeparator>,
+        /// The separator's model for the closed loop, where it has one.
+        model: Option<Box<dyn StationModel>>,
+    },
+    /// Measured points, all at once.
+    Points {
+        /// Points to tables, values and form.
+        separator: Box<dyn PointSeparator>,
+        /// The columns that it takes.
+        columns: Vec<PointColumn>,
+    },
+}
+
+impl Route {
+    /// The separator of measured points.
+    #[must_use]
+    pub fn point_separator(&self) -> Option<&dyn PointSeparator> {
+        match self {
+            Self::Turns { .. } => None,
+            Self::Points { separator, .. } => Some(&**separator),
+        }
+    }
+
+    /// Whether its result has form.
+    #[must_use]
+    pub fn gives_form(&self) -> bool {
+        self.point_separator().is_none_or(PointSeparator::gives_form)
+    }
+
+    /// Whether its result has a surface: form, or heights on a plane.
+    pub(super) fn gives_surface(&self) -> bool {
+        self.gives_form() || self.point_separator().is_some_and(PointSeparator::gives_heights)
+    }
+
+    /// Whether there is a model for the closed loop.
+    pub(super) fn has_model(&self) -> bool {
+        match self {
+            Self::Turns { model, .. } => model.is_some(),
+            Self::Points { separator, .. } => separator.model().is_some(),
+        }
+    }
+
+    /// What its model may lack.
+    pub(super) fn effects(&self) -> Vec<Effect> {
+        match self {
+            Self::Turns { model, .. } => model.as_ref().map_or_else(Vec::new, |model| model.effects().to_vec()),
+            Self::Points { separator, .. } => separator.model().map_or_else(Vec::new, PointModel::effects),
+        }
+    }
+
+    /// Whether only the data name the targets of its effects.
+    pub(super) fn data_name_targets(&self) -> bool {
+        let model = self.point_separator().and_then(PointSeparator::model);
+        model.is_some_and(PointModel::points_name_targets)
+    }
+
+    /// The tables of its result.
+    pub(super) fn tables(&self, assessment: Option<&Assessment>, rig: Option<&Rig>) -> Vec<TableSpec> {
+        let mut tables = Vec::new();
+        if self.gives_form() {
+            tables.extend(StationTables::new(assessment, rig).specs());
+        }
+        tables.extend(self.point_separator().into_iter().flat_map(PointSeparator::tables));
+        let own = tables::named_values(self.gives_form());
+        match self {
+            Self::Turns { .. } => {}
+            Self::Points { .. } if self.gives_form() => tables.push(own.optional()),
+            Self::Points { .. } => tables.push(own),
+        }
+        tables.push(tables::corrections());
+        tables
+    }
+}
+
+/// The route of measured points.
+pub(super) fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<Route, Fault> {
+    match separator {
+        Separator::Points(separator) => match table(root, "surface")? {
+            Some(table) if !separator.gives_form() => {
+                Err(Fault::span(table.span(), "this separator gives no form: it makes no surface"))
+            }
+            _ => Ok(Route::Points { columns: separator.columns(), separator }),
+        },
+        Separator::Stations(_) => {
+            let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
+            Err(document::resolve(fault, separate_table))
+        }
+    }
+}
+
+/// The route of recorded turns, and what its separator can tell.
+pub(super) fn turns(
+    preprocessors: Vec<(Preprocessor, Table)>,
+    separator: Separator,
+    separate_table: &Table,
+    root: &Table,
+    registry: &Registry,
+) -> Result<(Route, Option<Assessment>), Fault> {
+    let mut conditioners = Vec::new();
+    let mut averager = None;
+    for (preprocessor, table) in preprocessors {
+        if averager.is_some() {
+            let fault = Fault::at("plugin", "no preprocessor can follow the one that averages the turns");
+            return Err(document::resolve(fault.help("move it above"), &table));
+        }
+        match preprocessor {
+            Preprocessor::Conditioner(conditioner) => conditioners.push(conditioner),
+            Preprocessor::Averager(found) => averager = Some(found),
+        }
+    }
+    let averager = averager.ok_or_else(|| {
+        let fault = Fault::at("preprocess", "the turns are never averaged");
+        document::resolve(fault.help("end [[preprocess]] with plugin = \"synchronous-average\""), root)
+    })?;
+    match separator {
+        Separator::Stations(separator) => {
+            let mut assessment =
+                separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
+            if assessment.tells_no_form() {
+                assessment.notes.insert(0, NOTHING_SEPARATED.into());
+            }
+            let model = separator.model(&registry.effects);
+            Ok((Route::Turns { conditioners, averager, separator, model }, Some(assessment)))
+        }
+        Separator::Points(_) => {
+            let fault = Fault::at("plugin", "this separator takes measured points; [load] gives recorded turns");
+            Err(document::resolve(fault, separate_table))
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The tables of values, and of the effects that a result is corrected for.
+
+use serde_json::json;
+
+use crate::{stage::NamedValue, summary::Summary};
+use runout_closed_loop::diagnosis::Correction;
+use runout_error::Result;
+use runout_standards::{Value, uncertainty::Uncertainty};
+use runout_table::{
+    ArrayRef, ColumnSpec, TableRows, TableSpec, counts, counts_or_null, flags, numbers, numbers_or_null, texts,
+    texts_or_null,
+};
+
+/// The table of values, and that of a domain's own values beside it.
+const VALUES: &str = "values";
+const NAMED_VALUES: &str = "named_values";
+
+/// Whether the table of this name holds values.
+pub(in crate::pipeline) fn holds_values(table: &str) -> bool {
+    [VALUES, NAMED_VALUES].contains(&table)
+}
+
+/// The table of values that are computed from form and motion.
+pub(super) fn values() -> TableSpec {
+    let uncertain = |name: &str, about: &str| {
+        ColumnSpec::number(name, "the value's", format!("{about}; null where it is not known")).or_null()
+    };
+    let order = |name: &str, about: &str| ColumnSpec::count(name, "1/rev", about);
+    TableSpec::new(
+        VALUES,
+        "the standards' values of sections, stations and the whole part",
+        vec![
+            ColumnSpec::name("station", "name of the axial station; null for the whole part").or_null(),
+            ColumnSpec::name("section", "id of the section; null for a station or the whole part").or_null(),
+            ColumnSpec::number("z_mm", "mm", "place of the section along the axis; null where there is none").or_null(),
+            ColumnSpec::text("symbol", "the standard's symbol"),
+            ColumnSpec::number("value", "the column unit", "the number"),
+            ColumnSpec::text("unit", "its unit; empty for a number without one"),
+            ColumnSpec::text("standard", "standard and clause, or paper and equation"),
+            order("band_low_upr", "lowest order that it was computed over"),
+            order("band_high_upr", "highest order that it was computed over; of a filter, where half passes"),
+            ColumnSpec::text(
+                "lost_orders",
+                "orders of it that are lost and that are not in the value, as JSON; null where none is",
+            )
+            .or_null(),
+            ColumnSpec::number(
+                "weakened_above_upr",
+                "1/rev",
+                "a filter before the average passes less than half above, where the value's filter asks for more; null \
+                 where nothing is missing",
+            )
+            .or_null(),
+            order(
+                "absent_above_upr",
+                "highest order there is, where the value's filter passes 0.1 % or more above it; null where nothing is \
+                 missing",
+            )
+            .or_null(),
+            ColumnSpec::text("filter", "the filter applied"),
+            ColumnSpec::text("reference", "what the profile was referred to"),
+            ColumnSpec::number("coverage", "", "share of the profile or surface that was there"),
+            uncertain("std", "standard uncertainty"),
+            uncertain("low_95", "lower end of the 95 % interval"),
+            uncertain("high_95", "upper end of the 95 % interval"),
+            ColumnSpec::count("draws", "", "draws of the Monte Carlo; null without uncertainty").or_null(),
+            ColumnSpec::text(
+                "no_uncertainty",
+                "why no uncertainty is stated; null where one is, or where the errors are not known",
+            )
+            .or_null(),
+        ],
+    )
+}
+
+pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
+    let rows = summary.placed_values();
+    let uncertainty =
+        |of: fn(&Uncertainty) -> f64| numbers_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(of)));
+    let of_value = |of: fn(&Value) -> &str| texts(rows.iter().map(|row| of(row.value)));
+    vec![
+        texts_or_null(rows.iter().map(|row| row.station)),
+        texts_or_null(rows.iter().map(|row| row.section)),
+        numbers_or_null(rows.iter().map(|row| row.z_mm)),
+        of_value(|value| &value.symbol),
+        numbers(rows.iter().map(|row| row.value.value)),
+        of_value(|value| &value.unit),
+        of_value(|value| &value.source),
+        counts(rows.iter().map(|row| row.value.band_upr[0])),
+        counts(rows.iter().map(|row| row.value.band_upr[1])),
+        texts_or_null(rows.iter().map(|row| {
+            let lost = &row.value.lost_orders;
+            (!lost.is_empty()).then(|| json!(lost).to_string())
+        })),
+        numbers_or_null(rows.iter().map(|row| row.value.weakened_above_upr)),
+        counts_or_null(rows.iter().map(|row| row.value.absent_above_upr)),
+        of_value(|value| &value.filter),
+        of_value(|value| &value.reference),
+        numbers(rows.iter().map(|row| row.value.coverage)),
+        uncertainty(|uncertainty| uncertainty.std),
+        uncertainty(|uncertainty| uncertainty.interval_95[0]),
+        uncertainty(|uncertainty| uncertainty.interval_95[1]),
+        counts_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(|uncertainty| uncertainty.draws))),
+        texts_or_null(rows.iter().map(|row| row.value.no_uncertainty.as_deref())),
+    ]
+}
+
+/// The table of a domain's own values; `of_form` where the result has form, whose values are in the table `values`.
+#[must_use]
+pub fn named_values(of_form: bool) -> TableSpec {
+    TableSpec::new(
+        // Beside those that are computed from form.
+        if of_form { NAMED_VALUES } else { VALUES },
+        "values of the result",
+        vec![
+            ColumnSpec::text("symbol", "the standard's symbol, or a short name"),
+            ColumnSpec::name("of", "what it is of; null where the result has one only").or_null(),
+            ColumnSpec::number("value", "the column unit", "the number; null where it is not observable").or_null(),
+            ColumnSpec::number("std", "the column unit", "its standard uncertainty; null where it is not known")
+                .or_null(),
+            ColumnSpec::text("unit", "its unit; empty for a number without one"),
+            ColumnSpec::text("about", "what it is, with standard and clause"),
+        ],
+    )
+}
+
+/// Rows of [`named_values`].
+///
+/// # Errors
+/// Never in practice: the columns are of one length.
+pub fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRows> {
+    let spec = named_values(of_form);
+    let rows = spec.rows(vec![
+        texts(values.iter().map(|value| &value.symbol)),
+        texts_or_null(values.iter().map(|value| value.of.as_ref())),
+        numbers_or_null(values.iter().map(|value| value.value)),
+        numbers_or_null(values.iter().map(|value| value.std)),
+        texts(values.iter().map(|value| &value.unit)),
+        texts(values.iter().map(|value| &value.about)),
+    ])?;
+    Ok(TableRows { table: spec.name, rows })
+}
+
+/// The table of the effects that a result is corrected for.
+#[must_use]
+pub fn corrections() -> TableSpec {
+    TableSpec::new(
+        "corrections",
+        "effects that the results are corrected for, one row a parameter",
+        vec![
+            ColumnSpec::text("effect", "id of the effect"),
+            ColumnSpec::text("targets", "where it acts; of a confounded set, one representative"),
+            ColumnSpec::text("confounded_with", "what these data cannot separate it from; empty for nothing"),
+            ColumnSpec::flag("known", "whether it was declared with its size"),
+            ColumnSpec::text("parameter", "name of the parameter"),
+            ColumnSpec::number("value", "the column unit", "its value"),
+            ColumnSpec::number("std", "the column unit", "its standard uncertainty; null where it is not known")
+                .or_null(),
+            ColumnSpec::text("unit", "unit of the parameter"),
+        ],
+    )
+    .optional()
+}
+
+/// Rows of [`corrections`]; none where results are corrected for nothing.
+///
+/// # Errors
+/// Never in practice: the columns are of one length.
+pub fn correction_rows(effects: &[Correction]) -> Result<Option<TableRows>> {
+    if effects.is_empty() {
+        return Ok(None);
+    }
+    let each = || effects.iter().flat_map(|one| one.parameters.iter().map(move |parameter| (one, parameter)));
+    let spec = corrections();
+    let rows = spec.rows(vec![
+        texts(each().map(|(one, _)| &one.effect)),
+        texts(each().map(|(one, _)| one.targets.join(" "))),
+        texts(each().map(|(one, _)| one.confounded_with.join("; "))),
+        flags(each().map(|(one, _)| one.known)),
+        texts(each().map(|(_, parameter)| &parameter.name)),
+        numbers(each().map(|(_, parameter)| parameter.value)),
+        numbers_or_null(each().map(|(_, parameter)| parameter.std)),
+        texts(each().map(|(_, parameter)| &parameter.unit)),
+    ])?;
+    Ok(Some(TableRows { table: spec.name, rows }))
+}
