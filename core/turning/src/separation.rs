@@ -180,6 +180,17 @@ pub struct Residual {
     /// Lowest and highest order at which a reading is redundant; `None` where the fit is not one of single orders, and where
     /// none is.
     pub orders: Option<[usize; 2]>,
+    /// What is left of each reading at the redundant orders; none where the fit is not one of single orders.
+    pub by_reading: Vec<ReadingResidual>,
+}
+
+/// What a fit leaves of one averaged reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadingResidual {
+    /// Place of the reading among the channels of all profiles of the station.
+    pub place: usize,
+    /// Order and coefficient c in µm, Re Σ c e^{−inΦ} over the spindle's angle Φ.
+    pub harmonics: Vec<(usize, Complex64)>,
 }
 
 impl Separation {

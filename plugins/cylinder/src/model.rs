@@ -256,7 +256,7 @@ impl LeastSquaresCylinder {
                 expected_rms_um: f64::NAN,
                 chi2_per_dof: f64::NAN,
                 dof: fit.remainder().dof,
-                orders: None,
+                ..Residual::default()
             },
             warnings: circle.warnings.clone(),
         }

@@ -13,7 +13,7 @@ use runout_core::{
     Complex64,
     numerics::fourier::Fourier,
     rig::{Rig, Rotation},
-    separation::{Quantity, Separation},
+    separation::{Quantity, ReadingResidual, Separation},
     stage::StationSeparator,
 };
 use runout_spindle::{
@@ -259,4 +259,29 @@ fn what_lost_orders_carry_is_in_the_uncertainty() {
         assert!(off < 4.0, "{off}");
         assert!(found.warnings.is_empty(), "{:?}", found.warnings);
     }
+}
+
+/// A wave of the fourth order in one reading is left where it was read: the fit cannot follow it wholly, and its rms is that of all
+/// readings together.
+#[test]
+fn what_is_left_is_told_by_reading_and_order() {
+    let mut config = campaign(5, r#"[{"plugin":"sensor-line","targets":["S3"],"order":4,"amplitude_um":2.0}]"#);
+    config.rig.setups.truncate(2);
+    (config.rig.setups[1].part_deg, config.rig.setups[1].sensors_deg) = (180.0, 180.0);
+    let rig = config.rig.clone().check().unwrap();
+    let residual = least_squares(&rig).separate(&averaged(&config, &rig).0).unwrap().residual;
+    let sensors = rig.sensors.len();
+    assert_eq!(residual.by_reading.len(), sensors * rig.setups.len());
+    let square = |left: &ReadingResidual, of: Option<usize>| {
+        let wanted = left.harmonics.iter().filter(|(order, _)| of.is_none_or(|of| of == *order));
+        wanted.map(|(_, value)| value.norm_sqr()).sum::<f64>()
+    };
+    let all: f64 = residual.by_reading.iter().map(|left| square(left, None)).sum();
+    let rms_um = (0.5 * all / residual.by_reading.len() as f64).sqrt();
+    assert!((rms_um - residual.rms_um).abs() < 1e-12 * rms_um, "{rms_um} {}", residual.rms_um);
+    let fourth: Vec<f64> = residual.by_reading.iter().map(|left| square(left, Some(4)).sqrt()).collect();
+    println!("simulated, S3 reads 2 µm of order 4 more: left at order 4 {fourth:.3?} µm, {all:.3} µm² of all orders");
+    let own = |sensor: usize| fourth.iter().skip(sensor).step_by(sensors).copied().fold(0.0, f64::max);
+    assert!((0..sensors).all(|other| own(other) <= own(2) * (1.0 + 1e-9)), "{fourth:?}");
+    assert!(fourth.iter().map(|one| one * one).sum::<f64>() > 0.99 * all, "{all}");
 }

@@ -350,7 +350,7 @@ impl Found<'_> {
                 expected_rms_um: expected,
                 chi2_per_dof: self.fit.chi2_per_dof,
                 dof: self.fit.solved.dof,
-                orders: None,
+                ..Residual::default()
             },
             warnings: Vec::new(),
         };

@@ -2,6 +2,7 @@
 
 mod content;
 mod reading;
+mod residual;
 mod values;
 
 use std::iter::repeat_n;
@@ -14,6 +15,7 @@ use crate::{
 };
 use content::Content;
 use reading::{reading, reading_rows};
+use residual::{residual, residual_rows};
 use runout_error::Result;
 use runout_table::{
     ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, no_numbers, numbers, texts,
@@ -42,6 +44,7 @@ pub struct StationTables {
     motion: TableSpec,
     harmonics: TableSpec,
     reading: TableSpec,
+    residual: TableSpec,
     values: TableSpec,
     /// Those of error motion turn by turn, of each so many stations.
     turns: Vec<TableSpec>,
@@ -67,6 +70,7 @@ impl StationTables {
             motion: motion(line, axial),
             harmonics: harmonics(),
             reading: reading(),
+            residual: residual(),
             values: values(),
             turns: turn_tables::specs(),
             every: 1,
@@ -101,7 +105,7 @@ impl StationTables {
     #[must_use]
     pub fn specs(&self) -> Vec<TableSpec> {
         let mut all: Vec<TableSpec> =
-            [&self.form, &self.motion, &self.harmonics, &self.reading].map(Clone::clone).into();
+            [&self.form, &self.motion, &self.harmonics, &self.reading, &self.residual].map(Clone::clone).into();
         all.extend(self.turns.iter().cloned());
         all.push(self.values.clone());
         all
@@ -124,6 +128,9 @@ impl StationTables {
         }
         if separation.tells_no_form() {
             tables.push((&self.reading, reading_rows(result, self.rig.as_ref())));
+        }
+        if !separation.residual.by_reading.is_empty() {
+            tables.push((&self.residual, residual_rows(result, self.rig.as_ref())));
         }
         let rows = |(table, columns): (&TableSpec, Vec<ArrayRef>)| {
             Ok(TableRows { table: table.name.clone(), rows: table.rows(columns)? })

@@ -9,7 +9,7 @@ use runout_core::{
         diagnosis::Unexplained,
         evidence::{Group, far_worse},
     },
-    separation::{Quantity, Separation},
+    separation::{Quantity, Residual, Separation},
     stage::Station,
 };
 
@@ -22,7 +22,7 @@ use super::{
 use crate::{
     effects::{ActsOn, Alterations, Predicted},
     layout::{Layout, View},
-    solve::apply,
+    solve::{apply, by_reading},
 };
 
 /// A fit, and what its partials need.
@@ -175,7 +175,8 @@ impl SpindleFit {
         let solver = self.shared.solver(&self.layout, &self.alterations);
         let each = self.stations.iter().zip(stations).map(|(solved, station)| {
             let propagation = solved.with_angles.as_ref().or(solved.propagation.as_ref());
-            let residual = solved.residual.clone();
+            let by_reading = by_reading(&solved.operators, &solved.corrected, &solved.linear);
+            let residual = Residual { by_reading, ..solved.residual.clone() };
             solver.report(station, &solved.operators, &solved.estimate, propagation, residual)
         });
         each.collect()

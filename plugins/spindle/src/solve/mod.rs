@@ -22,7 +22,7 @@ pub(crate) use operators::{Operators, OrderOperator};
 pub(crate) use projection::projection;
 pub(crate) use propagation::Propagation;
 pub(crate) use readings::{Readings, Scatter};
-pub(crate) use residual::residual;
+pub(crate) use residual::{by_reading, residual};
 pub(crate) use second_order::{OVERSAMPLING, interpolate};
 pub(crate) use solution::Solver;
 pub(crate) use weights::{smooth_by_order, whitening};

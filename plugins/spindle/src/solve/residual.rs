@@ -1,6 +1,9 @@
 //! What a solution leaves of the readings, beside what noise lets expect.
 
-use runout_core::{Complex64, separation::Residual};
+use runout_core::{
+    Complex64,
+    separation::{ReadingResidual, Residual},
+};
 
 use super::{
     algebra::apply,
@@ -42,7 +45,8 @@ pub fn residual(
         }
     }
     if dof == 0 {
-        return Residual { rms_um: f64::NAN, expected_rms_um: f64::NAN, chi2_per_dof: f64::NAN, dof: 0, orders };
+        let nan = f64::NAN;
+        return Residual { rms_um: nan, expected_rms_um: nan, chi2_per_dof: nan, orders, ..Residual::default() };
     }
     // A coefficient of size c is a wave of mean square c²/2.
     let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
@@ -57,5 +61,23 @@ pub fn residual(
         chi2_per_dof,
         dof: 2 * dof,
         orders,
+        by_reading: Vec::new(),
     }
+}
+
+/// What the solution leaves of each of the linear readings `[order][reading]`, at the orders that are redundant.
+pub fn by_reading(operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Vec<ReadingResidual> {
+    let count = readings.count;
+    let of = |place: &usize| ReadingResidual { place: *place, harmonics: Vec::with_capacity(operators.orders.len()) };
+    let mut found: Vec<_> = readings.places.iter().map(of).collect();
+    let orders = operators.orders.iter().zip(&operators.systems).enumerate();
+    for (index, (one, system)) in orders.filter(|(_, (one, _))| one.rank < count) {
+        let recorded = &linear[(index + 1) * count..(index + 2) * count];
+        let fitted = apply(&system.matrix, &apply(&one.operator, recorded));
+        for ((reading, recorded), fitted) in found.iter_mut().zip(recorded).zip(fitted) {
+            reading.harmonics.push((index + 1, recorded - fitted));
+        }
+    }
+    found.retain(|reading| !reading.harmonics.is_empty());
+    found
 }

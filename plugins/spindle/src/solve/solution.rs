@@ -16,7 +16,7 @@ use super::{
     operators::Operators,
     propagation::Propagation,
     readings::{Readings, Scatter},
-    residual::residual,
+    residual::{by_reading, residual},
     second_order::SecondOrder,
     weights,
 };
@@ -80,6 +80,7 @@ impl Solver<'_> {
         }
         let mut propagation = Propagation::of(&readings, &operators);
         let mut residual = residual(&operators, &readings, &linear, propagation.as_ref());
+        residual.by_reading = by_reading(&operators, &readings, &linear);
         if readings.has_uncertain_angles() {
             // What is left is held against noise and angles, results are uncertain by both.
             residual.chi2_per_dof *=
