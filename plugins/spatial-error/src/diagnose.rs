@@ -92,6 +92,7 @@ impl PointModel for SpatialError {
             .map(|found| self.unexplained(&campaign, &terms, &jumps[found.members[0]]))
             .collect::<Result<_>>()?;
         let levels = [&before, &after].map(|solution| level(&campaign, solution));
+        let trend_std = after.trend_std(&campaign);
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
         let mut diagnosis = Diagnosis {
             verdict: verdict(&campaign, added.is_empty(), unexplained.is_empty()),
@@ -112,7 +113,7 @@ impl PointModel for SpatialError {
                         targets: effect.targets.clone(),
                         told_apart_by: (!alone).then(|| TOLD_APART_BY.to_owned()),
                         confounded_with,
-                        parameters: parameters(&candidates[found.members[0]], effect, &after, alone),
+                        parameters: parameters(&candidates[found.members[0]], effect, &after, alone.then_some(&trend_std)),
                         change: None,
                         residual_rms_um: Step {
                             before: Some(pair[0].residual_rms_um),
@@ -250,7 +251,12 @@ fn subtract_known(campaign: &mut Campaign, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone: bool) -> Vec<Estimated> {
+fn parameters(
+    candidate: &Candidate,
+    effect: &Effect,
+    solution: &Solution,
+    trend_std: Option<&Vec<f64>>,
+) -> Vec<Estimated> {
     let names = &effect.parameters;
     let mut all = Vec::new();
     if let Some(order) = candidate.order {
@@ -261,14 +267,13 @@ fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone
             unit: names[0].unit.clone(),
         });
     }
-    let trend_std = solution.trend_std();
     let rest = &names[usize::from(candidate.order.is_some())..];
     for (parameter, wanted) in rest.iter().zip(&candidate.terms) {
         let Some(column) = solution.terms.iter().position(|term| term == wanted) else { continue };
         all.push(Estimated {
             name: parameter.name.clone(),
             value: solution.joint.trend[column],
-            std: alone.then_some(trend_std[column]),
+            std: trend_std.map(|std| std[column]),
             unit: parameter.unit.clone(),
         });
     }

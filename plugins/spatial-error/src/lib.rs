@@ -20,10 +20,12 @@ mod query;
 mod remarks;
 mod separate;
 pub mod simulate;
+mod solution;
 mod solve;
 mod span;
 mod terms;
 mod trace;
+mod trend;
 mod variogram;
 
 use runout_core::pipeline::registry::{Plugin, Registry};
