@@ -3,7 +3,7 @@
 use runout_core::{
     Result,
     model::{
-        Effect, Model,
+        Effect, Fit as _, Model,
         closed_loop::{self, Closed, Settings},
         diagnosis::{Diagnosis, Estimated, Moved, Unexplained, Verdict},
     },
@@ -15,7 +15,7 @@ use crate::{
     aliases::{self, Aliases, named},
     effects::{MISSING, SPINDLE_LINE},
     model::{CutFit, CutModel},
-    separate::{FlyCutting, Measured, left_of},
+    separate::{FlyCutting, Measured, left_of, smaller, too_smooth},
     strangers::{self, Stranger},
 };
 
@@ -87,6 +87,17 @@ impl FlyCutting {
                 }
             ));
         }
+        let left = last.remainder();
+        let below = smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof);
+        if below.is_some() || too_smooth(&measured.heights, &self.0).is_some() {
+            // The noise, or the unit of the heights, is wrong: nothing says what noise is.
+            diagnosis.verdict = match diagnosis.verdict {
+                Verdict::Explained => Verdict::Improved,
+                Verdict::AtNoiseFloor => Verdict::NothingFound,
+                other => other,
+            };
+        }
+        diagnosis.warnings.extend(below);
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after })
     }

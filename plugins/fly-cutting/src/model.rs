@@ -34,12 +34,16 @@ const HELD_OUT: usize = 5;
 const LEAST_GAIN: f64 = 25.0;
 /// Factors of the amplitude that a spectrum shows, where passes bury others.
 const ENLARGED: [f64; 3] = [1.0, 2.0, 4.0];
+/// Lines of which the phase of the scallops is fitted anew.
+const PHASED: usize = 6;
 /// Lines that look alike, of which a refit decides.
 const ALIKE: usize = 4;
 /// Harmonics of a line that passes which bury others may show instead of it.
 const HARMONICS: usize = 3;
 /// A line is taken as its spectrum shows it where its amplitude is below this share of the height that buries a pass.
 const LINEAR: f64 = 0.2;
+/// A nose radius of less than this share of the declared one, or of more than its inverse, is none.
+const LEAST_RADIUS: f64 = 0.1;
 /// Parts of the map that have to agree on an effect where the noise is not known.
 const PARTS: usize = 8;
 
@@ -95,7 +99,7 @@ impl CutModel {
 
 impl CutModel {
     /// Of lines that look alike on a sample of the points, the one with which least is left of all.
-    fn best_start(&self, effect: usize, applied: &[Setting], starts: &[[f64; 3]]) -> Option<Vec<f64>> {
+    fn best_start(&self, effect: usize, applied: &[Setting], fit: &CutFit, starts: &[[f64; 3]]) -> Option<Vec<f64>> {
         let [start, _, ..] = starts else { return starts.first().map(|only| only.to_vec()) };
         let refitted = |values: &[f64]| {
             let mut settings = applied.to_vec();
@@ -107,7 +111,8 @@ impl CutModel {
         let [ratio, amplitude, phase_deg] = values[..] else { return Some(values) };
         // At the middle of the rows, where an alias has the same height, only the slope of its phase along y differs.
         let angles = self.data.fitted.rows.iter().map(|row| row.angle.to_degrees());
-        let middle_deg = angles.sum::<f64>() / self.data.fitted.rows.len().max(1) as f64;
+        let middle_deg =
+            angles.sum::<f64>() / self.data.fitted.rows.len().max(1) as f64 + 360.0 * fit.phased.surface.shift;
         #[allow(clippy::cast_possible_wrap, reason = "ratios up to some tens")]
         let highest = self.data.config.max_frequency_ratio as i32;
         let whole = ratio.floor() as i32;
@@ -149,6 +154,10 @@ impl Model for CutModel {
 
     fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
         match (MISSING.get(effect).map(|missing| missing.line()), values) {
+            (Some(None), [change]) if MISSING.get(effect) == Some(&Missing::NoseRadius) => {
+                let share = 1.0 + change / self.data.config.nose_radius_mm;
+                (LEAST_RADIUS..=1.0 / LEAST_RADIUS).contains(&share)
+            }
             (Some(Some(_)), [ratio, ..]) => *ratio > 0.0 && *ratio <= self.data.config.max_frequency_ratio as f64 + 0.5,
             _ => true,
         }
@@ -162,7 +171,8 @@ impl Model for CutModel {
                 fit.left().feed_scale(&fit.cut).map(|scale| vec![1e6 * scale])
             }
             Missing::SpindleLine(_) | Missing::TiltLine => {
-                self.best_start(effect, applied, self.fit(applied).ok()?.starts(*missing))
+                let fit = self.fit(applied).ok()?;
+                self.best_start(effect, applied, &fit, fit.starts(*missing))
             }
             _ => None,
         }
@@ -267,7 +277,8 @@ impl CutFit {
             Some(std_nm) => std_nm * level.max(1.0).sqrt(),
             None => 1e3 * level.sqrt(),
         };
-        Some([1e3 * self.phased.phase_mm, 1e3 * noise_nm / norm])
+        let nearest_mm = self.phased.phase_mm - self.cut.feed_mm * self.phased.surface.shift.round();
+        Some([1e3 * nearest_mm, 1e3 * noise_nm / norm])
     }
 
     /// Whether a line may earn its place, by what its spectrum shows: a refit beside it may gain for other reasons.
@@ -291,17 +302,26 @@ impl CutFit {
         if first.amplitude * lever < LINEAR * buried_nm {
             return vec![first];
         }
-        let left_with = |line: &Line| {
+        let with = |line: &Line| {
             let mut applied = self.cut.applied.clone();
             applied.lines.push(*line);
             let cut = Cut::new(&self.data.config, self.data.extent_mm, applied)?;
-            let residual_nm = phase::fit(&cut, &self.data.sample, &self.data.sample).residual_nm;
-            Some((dot(&residual_nm, &residual_nm), *line))
+            Some((cut, *line))
         };
+        // Every line is tried near the phase of the scallops that is known; the best of them with a phase of its own.
         let sorted = |lines: Vec<Line>| -> Vec<Line> {
-            let mut all: Vec<(f64, Line)> = lines.iter().filter_map(left_with).collect();
+            let near = |(cut, line): (Cut, Line)| {
+                (phase::squares_near(&cut, &self.data.sample, self.phased.phase_mm), cut, line)
+            };
+            let mut all: Vec<(f64, Cut, Line)> = lines.iter().filter_map(with).map(near).collect();
             all.sort_by(|one, other| one.0.total_cmp(&other.0));
-            all.into_iter().map(|(_, line)| line).collect()
+            for (squares, cut, _) in all.iter_mut().take(PHASED) {
+                let residual_nm = phase::fit(cut, &self.data.sample, &self.data.sample).residual_nm;
+                *squares = dot(&residual_nm, &residual_nm);
+            }
+            let phased = PHASED.min(all.len());
+            all[..phased].sort_by(|one, other| one.0.total_cmp(&other.0));
+            all.into_iter().map(|(.., line)| line).collect()
         };
         let least = |lines: Vec<Line>| sorted(lines).first().copied().unwrap_or(first);
         // Buried passes show a line by its harmonics: the line itself may be at a half or a third of what the spectrum shows.

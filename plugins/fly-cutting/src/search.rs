@@ -1,6 +1,6 @@
 //! Where a line or another feed may be: correlations of what is left with every frequency.
 //!
-//! A line of q periods a turn adds Re a·e^{2πi q τ} at the turns τ = n + θ/2π. n is whole, so that e^{2πi q n} has the fraction of q
+//! A line of q periods a turn adds Re a·e^{2πi q τ} at the turns τ = n + θ/2π + p/f. n is whole, so that e^{2πi q n} has the fraction of q
 //! only; the rows, whose angles θ differ, show the whole part. The sum over passes is a Fourier transform a row, the sum over rows is
 //! taken at the few whole parts that they resolve, and at all of them where the fraction is known.
 
@@ -76,7 +76,7 @@ impl Left<'_> {
                     let turns = fraction * f64::from(self.surface.pass[point]);
                     Complex64::from_polar(self.residual_nm[point] * lever, -TAU * turns)
                 };
-                (row.angle, row.points.clone().map(turned).sum())
+                (row.angle + TAU * self.surface.shift, row.points.clone().map(turned).sum())
             })
             .collect();
         let at = |ratio: f64, conjugate: bool| -> (f64, Complex64) {

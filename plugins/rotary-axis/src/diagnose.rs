@@ -10,7 +10,8 @@ use runout_core::{
     model::{
         Effect, Setting,
         closed_loop::{self, Settings},
-        diagnosis::{BiasPerUnit, Blind, Diagnosis, Moved},
+        Fit as _,
+        diagnosis::{BiasPerUnit, Blind, Diagnosis, Moved, Unexplained, Verdict},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
     numerics::least_squares::dot,
@@ -22,7 +23,9 @@ use crate::{
     campaign::Campaign,
     config::RotaryAxis,
     effects::{CANDIDATES, Candidate, TIME_CONSTANTS, USUAL_TIME_CONSTANT},
+    nest::{self, Nest},
     noise::Noise,
+    separate::scale,
     solve::{Column, Redundant, fit, redundant},
 };
 
@@ -82,6 +85,7 @@ struct Assembled {
     data: Redundant,
     first: Vec<usize>,
     tried: [usize; 3],
+    nest: usize,
 }
 
 /// One run of the loop at fixed time constants.
@@ -95,9 +99,32 @@ struct Run {
     first: Vec<usize>,
     /// And that of the first time constant tried, of each coordinate.
     tried: [usize; 3],
+    /// And those of errors of the nest.
+    nest: usize,
+    /// Where most is left.
+    left: Vec<Unexplained>,
 }
 
 impl Run {
+    /// Errors of the nest that explain as much as scale and squareness that were added.
+    fn nests(&self) -> Vec<Nest> {
+        let columns_of = |setting: &Setting| {
+            self.data.effects[self.first[setting.effect]..].iter().take(setting.values.len()).cloned().collect()
+        };
+        let added: Vec<(bool, Vec<Vec<f64>>)> = self
+            .added
+            .iter()
+            .map(|setting| {
+                let of_axes = matches!(
+                    CANDIDATES.get(setting.effect),
+                    Some(Candidate::Scale(_) | Candidate::Squareness(..))
+                );
+                (of_axes, columns_of(setting))
+            })
+            .collect();
+        nest::instead(&self.data, &added, self.nest)
+    }
+
     /// Time constants for the next run: of a drift that was added, its own; else the one that explains most of what is left.
     fn next_constants(&self, grid: &[f64]) -> [f64; 3] {
         let [low, high] = TIME_CONSTANTS;
@@ -160,11 +187,12 @@ impl RotaryAxis {
         constants: [f64; 3],
         grid: &[f64],
     ) -> std::result::Result<Run, String> {
-        let Assembled { terms, data, first, tried } = self.assembled(campaign, constants, grid)?;
+        let Assembled { terms, data, first, tried, nest } = self.assembled(campaign, constants, grid)?;
         let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
         let closed = closed_loop::diagnose(&terms, settings).map_err(|error| error.to_string())?;
         let added = closed.settings.into_iter().skip(settings.known.len()).collect();
-        Ok(Run { diagnosis: closed.diagnosis, added, constants, data, first, tried })
+        let left = closed.after.unexplained();
+        Ok(Run { diagnosis: closed.diagnosis, added, constants, data, first, tried, nest, left })
     }
 
     /// The terms of the loop at the usual time constants.
@@ -192,6 +220,8 @@ impl RotaryAxis {
             columns.extend(grid.iter().filter_map(|tried| drift.columns(axis, campaign, *tried).into_iter().next()));
             start
         });
+        let nest = columns.len();
+        columns.extend(nest::columns(self.0.axis, campaign)?);
         let data = redundant(&campaign.layout, &campaign.readings, &columns)?;
         if data.rows.len() <= data.declared.len() {
             return Err(
@@ -225,7 +255,7 @@ impl RotaryAxis {
             .told_apart_by(
                 "a calibration of the linear axes on their own, or a campaign with the balls in another order of time",
             );
-        Ok(Assembled { terms: model, data, first, tried })
+        Ok(Assembled { terms: model, data, first, tried, nest })
     }
 
     /// Columns of effects that were added.
@@ -243,7 +273,8 @@ impl RotaryAxis {
         settings: &Settings,
         run: Run,
     ) -> Result<PointDiagnosis> {
-        let Run { mut diagnosis, added, constants, .. } = run;
+        let instead = run.nests();
+        let Run { mut diagnosis, added, constants, left, .. } = run;
         let names: Vec<String> = CANDIDATES.iter().map(|candidate| name(&candidate.effect())).collect();
         let effects: Vec<usize> = added.iter().map(|setting| setting.effect).collect();
         // Members of confounded sets: the results with each of them.
@@ -258,8 +289,25 @@ impl RotaryAxis {
                 alternatives.push(self.columns_of(campaign, &chosen, constants));
             }
         }
+        // Errors of the nest that explain as much as errors of the linear axes.
+        let of_nest = nest::columns(self.0.axis, campaign).unwrap_or_default();
+        for Nest { index, replaced } in &instead {
+            let kept: Vec<usize> =
+                (0..effects.len()).filter(|place| !replaced.contains(place)).map(|place| effects[place]).collect();
+            let mut columns = self.columns_of(campaign, &kept, constants);
+            columns.extend(of_nest.get(*index).cloned());
+            alternatives.push(columns);
+        }
+        nest::confound(&mut diagnosis, &instead);
         let columns = self.columns_of(campaign, &effects, constants);
         let mut after = self.conclude(points, campaign, &columns, before, &alternatives)?;
+        let last = fit(&campaign.layout, &campaign.readings, &columns)
+            .map_err(|problem| Error::new("fit", points.input.display().to_string(), problem))?;
+        if scale(&last, campaign.noise).is_more && diagnosis.verdict != Verdict::Unexplained {
+            // As the warning says.
+            diagnosis.verdict = Verdict::Unexplained;
+            diagnosis.unexplained.extend(left);
+        }
         for (found, setting) in diagnosis.added.iter_mut().zip(&added) {
             if let (Some(Candidate::Exponential(coordinate)), [drift, ..]) =
                 (CANDIDATES.get(setting.effect), &setting.values[..])
@@ -275,6 +323,9 @@ impl RotaryAxis {
             if let Some(bias) = self.bias(campaign, blind, &names, constants) {
                 blind.bias_per_unit = bias;
             }
+        }
+        if instead.is_empty() {
+            diagnosis.blind_to.extend(nest::blind(self.0.axis, &last));
         }
         if !settings.known.is_empty() {
             after.remarks.push("effects that are declared as known are taken out of the readings".into());

@@ -12,6 +12,7 @@ mod diagnose;
 mod effects;
 mod kinematics;
 mod model;
+mod nest;
 mod noise;
 mod paper;
 mod plan;

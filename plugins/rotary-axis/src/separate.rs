@@ -7,7 +7,7 @@ use runout_core::{
     points::{PointColumn, Points},
     stage::{
         NamedValue, Outcome, PointModel, PointPlan, PointSeparator,
-        points::{residual_table, value},
+        points::{far_below_noise, residual_table, value},
     },
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
 };
@@ -69,6 +69,8 @@ impl PointSeparator for RotaryAxis {
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![
             "the zero error of the sensor nest enters the two offsets of the axis one to one: not observable".to_owned(),
+            "a gain error or cross-talk of the sensor nest acts as scale and squareness of the linear axes do: no ball separates them"
+                .to_owned(),
             "component errors have mean 0 over the distinct commands and no part that turns with the table (1/rev): those are \
              location of the axis and placement of the balls"
                 .to_owned(),
@@ -193,6 +195,9 @@ impl RotaryAxis {
         remarks.extend(self.lost(&found, campaign));
         let notes = noise_remark(campaign.noise).into_iter().collect();
         remarks.extend(scale.remark.clone());
+        if campaign.noise != Noise::Unknown {
+            remarks.extend(far_below_noise(found.chi2_per_dof(), found.dof));
+        }
         if left_out.iter().any(Option::is_none) {
             remarks.push(
                 "commands beside a gap are not predicted when they are left out: the ranges after compensation lack them"
@@ -520,6 +525,8 @@ fn between(kept: &[usize], commands_deg: &[f64], command: usize, widest: f64, fo
 pub(crate) struct Scale {
     pub factor: f64,
     pub remark: Option<String>,
+    /// Whether more is left than the known noise.
+    pub is_more: bool,
 }
 
 /// Where the noise is not known, the residual gives it; where more is left than the noise explains, uncertainties grow with it.
@@ -538,18 +545,19 @@ pub(crate) fn scale(found: &Fit, noise: Noise) -> Scale {
                 found.dof
             )
         };
-        return Scale { factor: left.sqrt(), remark: Some(remark) };
+        return Scale { factor: left.sqrt(), remark: Some(remark), is_more: false };
     }
-    let chance = 1.0 + 3.0 * (2.0 / found.dof.max(1) as f64).sqrt();
+    let of_noise = if let Noise::Repeats { dof, .. } = noise { 2.0 / dof as f64 } else { 0.0 };
+    let chance = 1.0 + 3.0 * (2.0 / found.dof.max(1) as f64 + of_noise).sqrt();
     if left > chance {
         let remark = format!(
             "the fit leaves more than the noise: χ² per degree of freedom is {left:.2}, where chance makes up to {chance:.2}. \
              The standard uncertainties are {:.2} times as large as the noise makes them; `diagnose` looks for the cause",
             left.sqrt()
         );
-        return Scale { factor: left.sqrt(), remark: Some(remark) };
+        return Scale { factor: left.sqrt(), remark: Some(remark), is_more: true };
     }
-    Scale { factor: 1.0, remark: None }
+    Scale { factor: 1.0, remark: None, is_more: false }
 }
 
 fn noise_remark(noise: Noise) -> Option<String> {

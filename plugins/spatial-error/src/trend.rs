@@ -21,9 +21,9 @@ use crate::{
 /// Places at random that the draws take at most: how far the uncertainty grows depends on them little.
 const MOST_PLACES: usize = 180;
 /// Covariances drawn of each field and family, and combinations of the fields' draws.
-const DRAWS: [usize; 2] = [64, 1500];
-/// Spread of the draws in standard deviations of the estimate: wider, so that tails are drawn too.
-const SPREAD: f64 = 1.4;
+const DRAWS: [usize; 2] = [160, 6000];
+/// Spreads of the draws, in turn, in standard deviations of the estimate: wider, so that tails are drawn too.
+const SPREADS: [f64; 2] = [1.2, 2.4];
 /// Families with less ln of the likelihood than the best one by this are left out.
 const UNLIKELY: f64 = 7.0;
 
@@ -85,6 +85,8 @@ impl Solution {
             variance += (given + apart.component_mul(&apart)) * weight;
             whole += weight;
         }
+        let ess = whole * whole / drawn.iter().map(|(ln, ..)| (2.0 * (ln - most)).exp()).sum::<f64>();
+        eprintln!("DEBUG ess {ess:.0} families {}", drawn.len() as f64 / DRAWS[1] as f64);
         let growth = (variance / whole).component_div(&stated.trend_covariance.diagonal());
         growth.iter().all(|factor| factor.is_finite()).then(|| growth.map(|factor| factor.max(1.0)))
     }
@@ -94,17 +96,21 @@ fn draws(data: &Data, prior: &Prior, guess: &Guess, field: usize, random: &mut C
     let first = field * PARAMETERS;
     let block: DMatrix<f64> = guess.covariance.view((first, first), (PARAMETERS, PARAMETERS)).into_owned();
     let directions = SymmetricEigen::new(block);
-    let sizes = directions.eigenvalues.map(|value| SPREAD * value.max(0.0).sqrt());
+    let sizes = directions.eigenvalues.map(|value| value.max(0.0).sqrt());
+    let free = sizes.iter().filter(|size| **size > 0.0).count();
     let ln_size: f64 = sizes.iter().filter(|size| **size > 0.0).map(|size| size.ln()).sum();
     let centre = guess.parameters.rows(first, PARAMETERS).into_owned();
-    let one = || {
-        let normal = DVector::from_fn(PARAMETERS, |_, _| random.sample::<f64, _>(StandardNormal));
-        let at = &centre + &directions.eigenvectors * normal.component_mul(&sizes);
+    let one = |index: usize| {
+        let spread = SPREADS[index % SPREADS.len()];
+        let draw = |place: usize| if sizes[place] > 0.0 { spread * random.sample::<f64, _>(StandardNormal) } else { 0.0 };
+        let moved = DVector::from_iterator(PARAMETERS, (0..PARAMETERS).map(draw));
+        let at = &centre + &directions.eigenvectors * moved.component_mul(&sizes);
         let covariance = covariances(guess.family, &at).first().copied()?;
         let (_, _, sums) = Field::new(data, field, &covariance)?;
-        let free = normal.iter().zip(&sizes).filter(|(_, size)| **size > 0.0);
-        let ln_density: f64 = -0.5 * free.map(|(normal, _)| normal * normal).sum::<f64>() - ln_size;
-        Some((sums, prior.ln_of(field, &at) - ln_density))
+        // Density of the mixture of all spreads.
+        let square = moved.norm_squared();
+        let parts = SPREADS.map(|spread| (-0.5 * square / (spread * spread)).exp() / spread.powi(free as i32));
+        Some((sums, prior.ln_of(field, &at) - parts.iter().sum::<f64>().ln() + ln_size))
     };
-    std::iter::repeat_with(one).take(DRAWS[0]).flatten().collect()
+    (0..DRAWS[0]).filter_map(one).collect()
 }

@@ -69,6 +69,9 @@ fn one(chance: &mut Chance) -> Result<Placed> {
     let known = Known::new(&scenario, &made)
         .ok_or_else(|| Error::new("invert", "the true covariance", "it is singular"))?
         .placement();
+    let z = [0, 1, 2, 3, 4, 5].map(|index| of(SYMBOLS[index], truth[index]));
+    let show = |symbol: &str| values.iter().filter(|value| value.symbol == symbol).map(|value| value.value.unwrap_or(f64::NAN)).collect::<Vec<_>>();
+    eprintln!("DEBUG z {z:.1?} field {:?} noise {} passes {} sill {:.2?} rx {:.0?} ry {:.0?} rz {:.0?} nugget {:.2?}", scenario.field, scenario.tracker.noise_um, scenario.passes, show("sill"), show("range_x"), show("range_y"), show("range_z"), show("nugget"));
     let at_travel = [tx, ty, tz, rx, ry, rz];
     Ok(Placed {
         stated: [0, 1, 2, 3, 4, 5].map(|index| of(SYMBOLS[index], truth[index])),
