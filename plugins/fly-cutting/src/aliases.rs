@@ -93,7 +93,8 @@ fn promising(fit: &CutFit, line: Line, highest: usize) -> (Vec<(f64, f64, f64, f
         let lever = line.lever(row);
         weight += lever * lever * row.points.len() as f64;
         for point in row.points.clone() {
-            residual_nm[point] += line.amplitude * lever * line.at(fit.phased.surface.turns(point, row)).cos();
+            let pass = f64::from(fit.phased.surface.pass[point]);
+            residual_nm[point] += line.amplitude * lever * line.at(pass, row).cos();
         }
     }
     let left = Left { heights, surface: &fit.phased.surface, residual_nm: &residual_nm };

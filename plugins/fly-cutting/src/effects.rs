@@ -131,18 +131,17 @@ impl Missing {
         let line = applied.lines.first().copied();
         for row in &heights.rows {
             for point in row.points.clone() {
-                let (turns, beside_mm) = (surface.turns(point, row), surface.beside_mm[point]);
+                let (pass, beside_mm) = (f64::from(surface.pass[point]), surface.beside_mm[point]);
                 let mut add =
                     |values: &[f64]| columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
                 match self {
                     // µrad times mm is nm.
                     Self::WorkpieceTilt => add(&[heights.x_mm[point], row.y_mm]),
-                    Self::TableStraightness => add(&legendre(cut.table_at(turns))),
+                    Self::TableStraightness => add(&legendre(cut.table_at(pass, row))),
                     Self::SynchronousMotion => add(&cut.across(row)),
                     Self::FeedScale => {
-                        // The phase of the scallops is a length, which does not grow with the feed.
-                        let of_feed = turns - surface.shift;
-                        add(&[-1e-6 * cut.slope(beside_mm) * row.cosine * cut.declared_mm * of_feed]);
+                        let turns = pass + row.angle / TAU;
+                        add(&[-1e-6 * cut.slope(beside_mm) * row.cosine * cut.declared_mm * turns]);
                     }
                     Self::NoseRadius => {
                         let square = beside_mm * beside_mm;
@@ -153,8 +152,9 @@ impl Missing {
                     Self::SpindleLine(_) | Self::TiltLine => {
                         let Some(line) = line else { continue };
                         let lever = line.lever(row);
-                        let (sine, cosine) = line.at(turns).sin_cos();
+                        let (sine, cosine) = line.at(pass, row).sin_cos();
                         let turned = -line.amplitude * lever * sine;
+                        let turns = pass + row.angle / TAU;
                         add(&[TAU * turns * turned, lever * cosine, turned.to_radians()]);
                     }
                 }

@@ -1,8 +1,7 @@
 //! The model of a surface: heights of passes, and the lowest of them at each point.
 //!
 //! Pass n crosses a row at x = n·f + f·θ/2π + r(cos θ − 1) + p, with sin θ = y/r and p the phase of the scallops. At a distance d from
-//! it, measured along the radius of the cutter, its edge is R − √(R² − d²) above its tip. What varies in time counts turns from the
-//! instant at which the tool would be at x = y = 0: n + θ/2π + p/f at pass n, so that p and p + f are the same surface.
+//! it, measured along the radius of the cutter, its edge is R − √(R² − d²) above its tip.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +22,7 @@ pub(crate) struct Line {
     pub ratio: f64,
     /// In nm; of a tilt about x in µrad.
     pub amplitude: f64,
-    /// At x = y = 0.
+    /// At the pass n = 0 and y = 0.
     pub phase: f64,
     /// A tilt about x: its height is the tilt times y.
     pub tilts: bool,
@@ -35,9 +34,9 @@ impl Line {
         if self.tilts { row.y_mm } else { 1.0 }
     }
 
-    /// Phase after so many turns, in radians.
-    pub fn at(&self, turns: f64) -> f64 {
-        TAU * self.ratio * turns + self.phase
+    /// Phase at a pass, in radians.
+    pub fn at(&self, pass: f64, row: &Row) -> f64 {
+        TAU * self.ratio * (pass + row.angle / TAU) + self.phase
     }
 }
 
@@ -93,15 +92,6 @@ pub(crate) struct Surface {
     pub pass: Vec<i32>,
     /// Distance of each point from that pass, along the radius of the cutter, in mm.
     pub beside_mm: Vec<f64>,
-    /// Phase of the scallops in feeds.
-    pub shift: f64,
-}
-
-impl Surface {
-    /// Turns from x = y = 0 to the pass that remains at a point of a row.
-    pub fn turns(&self, point: usize, row: &Row) -> f64 {
-        f64::from(self.pass[point]) + row.angle / TAU + self.shift
-    }
 }
 
 /// Values of the Legendre polynomials 2 to 5.
@@ -134,10 +124,10 @@ impl Cut {
         row.sag_mm + self.feed_mm * row.angle / TAU
     }
 
-    /// Place of the table after so many turns, from −1 to 1 over the map.
-    pub fn table_at(&self, turns: f64) -> f64 {
+    /// Place of the table at a pass, from −1 to 1 over the map.
+    pub fn table_at(&self, pass: f64, row: &Row) -> f64 {
         let [middle_mm, half_mm] = self.middle_mm[0];
-        (self.feed_mm * turns - middle_mm) / half_mm
+        (self.feed_mm * (pass + row.angle / TAU) - middle_mm) / half_mm
     }
 
     /// Legendre polynomials of a row over the map.
@@ -146,10 +136,9 @@ impl Cut {
         legendre((row.y_mm - middle_mm) / half_mm)
     }
 
-    /// Height of the tip at consecutive passes with the scallops at a phase, in nm.
-    fn tips(&self, row: &Row, phase_mm: f64, first: i64, count: usize) -> Vec<f64> {
+    /// Height of the tip at consecutive passes, in nm.
+    fn tips(&self, row: &Row, first: i64, count: usize) -> Vec<f64> {
         let mut tips = vec![0.0; count];
-        let turns = |index: usize| first as f64 + index as f64 + row.angle / TAU + phase_mm / self.feed_mm;
         for line in &self.applied.lines {
             let size = line.amplitude * line.lever(row);
             let (step_sine, step_cosine) = (TAU * line.ratio).sin_cos();
@@ -157,7 +146,7 @@ impl Cut {
             for (index, tip) in tips.iter_mut().enumerate() {
                 // A rotation by a constant angle, begun anew before its rounding grows.
                 if index % 64 == 0 {
-                    (sine, cosine) = line.at(turns(index)).sin_cos();
+                    (sine, cosine) = line.at(first as f64 + index as f64, row).sin_cos();
                 }
                 *tip += size * cosine;
                 (sine, cosine) = (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
@@ -165,7 +154,7 @@ impl Cut {
         }
         if self.applied.table_nm.iter().any(|size| *size != 0.0) {
             for (index, tip) in tips.iter_mut().enumerate() {
-                let values = legendre(self.table_at(turns(index)));
+                let values = legendre(self.table_at(first as f64 + index as f64, row));
                 *tip += values.iter().zip(self.applied.table_nm).map(|(value, size)| value * size).sum::<f64>();
             }
         }
@@ -201,7 +190,6 @@ impl Cut {
             height_nm: Vec::with_capacity(heights.len()),
             pass: Vec::with_capacity(heights.len()),
             beside_mm: Vec::with_capacity(heights.len()),
-            shift: phase_mm / self.feed_mm,
         };
         for row in &heights.rows {
             self.row(heights, row, phase_mm, &mut surface);
@@ -216,11 +204,11 @@ impl Cut {
         let [low, high] = [x_mm.first(), x_mm.last()].map(|x| turns(x.copied().unwrap_or(start_mm)));
         // Passes around the row, so that the reach is known before the ends are.
         let most = (2.0 * self.nose_mm / (self.feed_mm * row.cosine)).ceil() as i64;
-        let probe = self.tips(row, phase_mm, low.round() as i64, (high - low) as usize + 2);
+        let probe = self.tips(row, low.round() as i64, (high - low) as usize + 2);
         let reach = self.reach(row, &probe).min(most);
         let first = low.round() as i64 - reach;
         let count = (high.round() as i64 + reach - first + 1) as usize;
-        let tips = if reach == 0 { vec![0.0; count] } else { self.tips(row, phase_mm, first, count) };
+        let tips = if reach == 0 { vec![0.0; count] } else { self.tips(row, first, count) };
         let square = self.nose_mm * self.nose_mm;
         let per_pass_mm = self.feed_mm * row.cosine;
         let [tilt_x, tilt_y] = self.applied.tilt_urad;

@@ -1,14 +1,14 @@
 //! Level and phase of the scallops: what is always fitted.
 
-use std::f64::consts::TAU;
-
 use crate::{
     heights::Heights,
-    passes::{Cut, Line, Surface},
+    passes::{Cut, Surface},
 };
 
 /// Phases that are tried first, over one feed.
 const TRIED: usize = 8;
+/// Phases by which lines are ranked.
+const NEAR: usize = 4;
 /// Steps of a fit at most.
 const MAX_STEPS: usize = 8;
 /// A fit has settled when a step is below this share of the feed.
@@ -52,18 +52,12 @@ impl Trial {
         Self { phase_mm, level_nm, surface, residual_nm, squares }
     }
 
-    /// Change of the surface with the phase, in nm/mm, without its mean: passes move, and meet lines at another instant.
+    /// Change of the surface with the phase, in nm/mm, without its mean.
     fn partial(&self, cut: &Cut, heights: &Heights) -> Vec<f64> {
         let mut column: Vec<f64> = Vec::with_capacity(heights.len());
         for row in &heights.rows {
-            for point in row.points.clone() {
-                let turns = self.surface.turns(point, row);
-                let of_line = |line: &Line| {
-                    -line.amplitude * line.lever(row) * TAU * line.ratio / cut.feed_mm * line.at(turns).sin()
-                };
-                let of_lines: f64 = cut.applied.lines.iter().map(of_line).sum();
-                column.push(of_lines - cut.slope(self.surface.beside_mm[point]) * row.cosine);
-            }
+            let beside = &self.surface.beside_mm[row.points.clone()];
+            column.extend(beside.iter().map(|beside| -cut.slope(*beside) * row.cosine));
         }
         without_mean(&mut column);
         column
@@ -124,10 +118,10 @@ pub(crate) fn fit(cut: &Cut, heights: &Heights, sample: &Heights) -> Phased {
     Phased { phase_mm, level_nm, surface, residual_nm, direction, norm_nm_per_mm: shows.then_some(norm) }
 }
 
-/// Squares that a phase leaves of a part of the points, or the phase half a feed from it.
+/// Squares that the best of some phases leaves of a part of the points: that phase and others evenly over one feed.
 pub(crate) fn squares_near(cut: &Cut, sample: &Heights, phase_mm: f64) -> f64 {
-    let at = |phase_mm: f64| Trial::new(cut, sample, phase_mm).squares;
-    at(phase_mm).min(at(phase_mm + 0.5 * cut.feed_mm))
+    let at = |index: usize| phase_mm + index as f64 / NEAR as f64 * cut.feed_mm;
+    (0..NEAR).map(|index| Trial::new(cut, sample, at(index)).squares).fold(f64::INFINITY, f64::min)
 }
 
 pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {

@@ -1,6 +1,6 @@
 //! Where a line or another feed may be: correlations of what is left with every frequency.
 //!
-//! A line of q periods a turn adds Re a·e^{2πi q τ} at the turns τ = n + θ/2π + p/f. n is whole, so that e^{2πi q n} has the fraction of q
+//! A line of q periods a turn adds Re a·e^{2πi q τ} at the turns τ = n + θ/2π. n is whole, so that e^{2πi q n} has the fraction of q
 //! only; the rows, whose angles θ differ, show the whole part. The sum over passes is a Fourier transform a row, the sum over rows is
 //! taken at the few whole parts that they resolve, and at all of them where the fraction is known.
 
@@ -21,7 +21,7 @@ const LONGEST: usize = 1 << 18;
 /// Angle over the rows between whole parts that are summed apart, in radians.
 const RESOLVED: f64 = 1.5;
 /// A line has at least so many periods, counted from the next whole ratio, over the map: with fewer it is a bend.
-const FEWEST_PERIODS: f64 = 0.8;
+pub(crate) const FEWEST_PERIODS: f64 = 0.8;
 /// Peaks of the spectrum that are tried, and the least of them beside the strongest.
 const PEAKS: usize = 4;
 const LEAST_PEAK: f64 = 0.1;
@@ -76,7 +76,7 @@ impl Left<'_> {
                     let turns = fraction * f64::from(self.surface.pass[point]);
                     Complex64::from_polar(self.residual_nm[point] * lever, -TAU * turns)
                 };
-                (row.angle + TAU * self.surface.shift, row.points.clone().map(turned).sum())
+                (row.angle, row.points.clone().map(turned).sum())
             })
             .collect();
         let at = |ratio: f64, conjugate: bool| -> (f64, Complex64) {

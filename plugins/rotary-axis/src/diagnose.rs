@@ -8,10 +8,9 @@ use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
     model::{
-        Effect, Setting,
+        Effect, Fit as _, Setting,
         closed_loop::{self, Settings},
-        Fit as _,
-        diagnosis::{BiasPerUnit, Blind, Diagnosis, Moved, Unexplained, Verdict},
+        diagnosis::{Diagnosis, Moved, Unexplained, Verdict},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
     numerics::least_squares::dot,
@@ -25,7 +24,7 @@ use crate::{
     effects::{CANDIDATES, Candidate, TIME_CONSTANTS, USUAL_TIME_CONSTANT},
     nest::{self, Nest},
     noise::Noise,
-    separate::scale,
+    scale::scale,
     solve::{Column, Redundant, fit, redundant},
 };
 
@@ -34,8 +33,6 @@ const TRIED: usize = 24;
 /// Runs of the loop in which time constants settle, and the share of a change at which they are settled.
 const MOST_RUNS: usize = 5;
 const SETTLED: f64 = 0.01;
-/// Smallest change of a result per usual size of an effect that is worth reporting, mm or rad times lever arm.
-const NO_BIAS: f64 = 1e-9;
 
 /// Place of a candidate among all.
 fn index_of(candidate: Candidate) -> usize {
@@ -115,10 +112,8 @@ impl Run {
             .added
             .iter()
             .map(|setting| {
-                let of_axes = matches!(
-                    CANDIDATES.get(setting.effect),
-                    Some(Candidate::Scale(_) | Candidate::Squareness(..))
-                );
+                let of_axes =
+                    matches!(CANDIDATES.get(setting.effect), Some(Candidate::Scale(_) | Candidate::Squareness(..)));
                 (of_axes, columns_of(setting))
             })
             .collect();
@@ -340,48 +335,13 @@ impl RotaryAxis {
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after })
     }
-
-    /// What an effect that is not visible does to the results all the same.
-    fn bias(&self, campaign: &Campaign, blind: &Blind, names: &[String], constants: [f64; 3]) -> Option<BiasPerUnit> {
-        let own = blind.targets.iter().fold(blind.effect.clone(), |name, target| format!("{name} {target}"));
-        let candidate = CANDIDATES.get(names.iter().position(|name| *name == own)?)?;
-        let effect = candidate.effect();
-        let parameter = effect.parameters.first()?;
-        let column = candidate.columns(self.0.axis, campaign, constant_of(*candidate, constants)).into_iter().next()?;
-        let mut readings = campaign.readings.clone();
-        let plain = fit(&campaign.layout, &readings, &[]).ok()?;
-        readings.iter_mut().zip(&column).for_each(|(reading, column)| reading.value += column * parameter.tolerance);
-        let moved = fit(&campaign.layout, &readings, &[]).ok()?;
-        let symbols = self.0.axis.location_symbols();
-        let lever = campaign.layout.balls.iter().map(Vector3::norm).fold(1.0, f64::max);
-        let mut changes: Vec<(f64, f64, &str, String)> = Vec::new();
-        for (index, (one, other)) in plain.location().into_iter().zip(moved.location()).enumerate() {
-            let change = (other.value - one.value).abs() / parameter.tolerance;
-            let (reach, scale, unit) = if index < 2 { (1.0, 1e3, "um") } else { (lever, 1e6, "urad") };
-            changes.push((change * reach, scale * change, unit, symbols[index].clone()));
-        }
-        for (ball, id) in campaign.balls.iter().enumerate() {
-            for (one, other) in plain.placement(ball).into_iter().zip(moved.placement(ball)) {
-                let change = (other.value - one.value).abs() / parameter.tolerance;
-                changes.push((change, 1e3 * change, "um", format!("placement of {id}")));
-            }
-        }
-        let known =
-            |change: &&(f64, f64, &str, String)| change.0.is_finite() && change.0 > NO_BIAS / parameter.tolerance;
-        let (location, placement) = changes.split_at(4);
-        let largest = |changes: &[(f64, f64, &'static str, String)]| {
-            changes.iter().filter(|change| known(change)).max_by(|a, b| a.0.total_cmp(&b.0)).cloned()
-        };
-        let (_, value, unit, on) = largest(location).or_else(|| largest(placement))?;
-        Some(BiasPerUnit { value, unit: format!("{unit}/{}", per(&parameter.unit)), on })
-    }
 }
 
 fn name(effect: &Effect) -> String {
     effect.targets.iter().fold(effect.id.clone(), |name, target| format!("{name} {target}"))
 }
 
-fn constant_of(candidate: Candidate, constants: [f64; 3]) -> f64 {
+pub(crate) fn constant_of(candidate: Candidate, constants: [f64; 3]) -> f64 {
     if let Candidate::Exponential(coordinate) = candidate { constants[coordinate] } else { USUAL_TIME_CONSTANT }
 }
 
@@ -408,9 +368,4 @@ fn moved(before: &[NamedValue], after: &[NamedValue]) -> Vec<Moved> {
         })
     });
     both.collect()
-}
-
-/// A unit in a denominator.
-fn per(unit: &str) -> String {
-    if unit.contains('/') { format!("({unit})") } else { unit.to_owned() }
 }

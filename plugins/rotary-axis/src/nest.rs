@@ -23,7 +23,8 @@ const LARGEST: f64 = 20.0;
 /// χ² by which two explanations differ, up to which the data do not decide.
 const SAME_CHI2: f64 = 10.0;
 /// What separates the nest from the axes.
-const TOLD_APART_BY: &str = "a calibration of the nest against known displacements along each axis, or of the linear axes on their own";
+const TOLD_APART_BY: &str =
+    "a calibration of the nest against known displacements along each axis, or of the linear axes on their own";
 
 /// An error of the nest instead of errors of linear axes.
 #[derive(Debug, Clone, PartialEq)]

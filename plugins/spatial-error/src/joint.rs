@@ -3,6 +3,8 @@
 //! y_c = X_c·b + f_c + noise, with f_c of covariance s²R(d) + n²·1 and one b for all fields c. b, its covariance and the weights
 //! of the prediction follow from the Cholesky factors of the fields' covariance matrices (Rasmussen, Williams, *Gaussian Processes
 //! for Machine Learning* (2006), section 2.7; Chilès, Delfiner, *Geostatistics* (2012), section 3.4).
+//!
+//! Long because fit and prediction share the factors of the covariance matrices.
 
 use faer::{
     Accum, Mat, MatRef, Par, Side,

@@ -25,7 +25,12 @@ pub(crate) struct Correlated {
 }
 
 /// Correlation of the noise, where it is more than chance; `columns` and `residual` in the order of time, of weight 1.
-pub(crate) fn of(columns: &DMatrix<f64>, covariance: &DMatrix<f64>, residual: &[f64], dof: usize) -> Option<Correlated> {
+pub(crate) fn of(
+    columns: &DMatrix<f64>,
+    covariance: &DMatrix<f64>,
+    residual: &[f64],
+    dof: usize,
+) -> Option<Correlated> {
     let count = residual.len();
     let lag_one: f64 = residual.windows(2).map(|pair| pair[0] * pair[1]).sum();
     let squares: f64 = residual.iter().map(|left| left * left).sum();

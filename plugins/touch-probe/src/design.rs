@@ -59,7 +59,8 @@ impl Design {
     /// The model of touches.
     pub fn new(config: &TouchProbeConfig, touches: &Touches, missing: &[Missing], content: &Content) -> Self {
         let Touches { all, setups, .. } = touches;
-        let mut design = Self { parameters: Vec::new(), columns: Vec::new(), time: all.iter().map(|touch| touch.time).collect() };
+        let mut design =
+            Self { parameters: Vec::new(), columns: Vec::new(), time: all.iter().map(|touch| touch.time).collect() };
         design.add(Parameter::Mean, all.iter().map(|_| 1.0).collect());
         for setup in setups.iter().copied() {
             for (axis, part) in [Part::Cosine, Part::Sine].into_iter().enumerate() {

@@ -1,4 +1,6 @@
 //! From a fit to lobes, tables and values.
+//!
+//! Long because each table and value is declared beside what fills it, from one fit.
 
 use std::f64::consts::TAU;
 
@@ -239,8 +241,7 @@ impl Found<'_> {
 
     fn values(&self, lobes: &[Lobe]) -> Vec<NamedValue> {
         let [mean, std] = self.mean().unwrap_or([f64::NAN; 2]);
-        let about =
-            "mean pre-travel and stylus, over the time of the campaign: reading less ring radius; holds the error of the ring's radius, \
+        let about = "mean pre-travel and stylus, over the time of the campaign: reading less ring radius; holds the error of the ring's radius, \
              and a scale error common to X and Y, one to one";
         let mut values = vec![value("pretravel_mean", mean, std, "um", about)];
         let Ranges { before, after, without_form, by_repeats, .. } = self.ranges;

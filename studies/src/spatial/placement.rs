@@ -69,9 +69,6 @@ fn one(chance: &mut Chance) -> Result<Placed> {
     let known = Known::new(&scenario, &made)
         .ok_or_else(|| Error::new("invert", "the true covariance", "it is singular"))?
         .placement();
-    let z = [0, 1, 2, 3, 4, 5].map(|index| of(SYMBOLS[index], truth[index]));
-    let show = |symbol: &str| values.iter().filter(|value| value.symbol == symbol).map(|value| value.value.unwrap_or(f64::NAN)).collect::<Vec<_>>();
-    eprintln!("DEBUG z {z:.1?} field {:?} noise {} passes {} sill {:.2?} rx {:.0?} ry {:.0?} rz {:.0?} nugget {:.2?}", scenario.field, scenario.tracker.noise_um, scenario.passes, show("sill"), show("range_x"), show("range_y"), show("range_z"), show("nugget"));
     let at_travel = [tx, ty, tz, rx, ry, rz];
     Ok(Placed {
         stated: [0, 1, 2, 3, 4, 5].map(|index| of(SYMBOLS[index], truth[index])),
@@ -93,9 +90,8 @@ pub fn table(all: &[Placed]) -> String {
         };
         let (stated, known) = (pick(|one| one.stated), pick(|one| one.known));
         let mean = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64;
-        let within = |most: f64| {
-            100.0 * stated.iter().filter(|value| value.abs() <= most).count() as f64 / stated.len() as f64
-        };
+        let within =
+            |most: f64| 100.0 * stated.iter().filter(|value| value.abs() <= most).count() as f64 / stated.len() as f64;
         let largest = stated.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -113,9 +109,12 @@ pub fn table(all: &[Placed]) -> String {
     row("displacements", 0..3, &|_| true);
     row("rotations", 3..6, &|_| true);
     row("all", 0..6, &|_| true);
-    for (name, smoothness) in
-        [("exponential fields", 0.5), ("matern-3/2 fields", 1.5), ("matern-5/2 fields", 2.5), ("gaussian fields", f64::INFINITY)]
-    {
+    for (name, smoothness) in [
+        ("exponential fields", 0.5),
+        ("matern-3/2 fields", 1.5),
+        ("matern-5/2 fields", 2.5),
+        ("gaussian fields", f64::INFINITY),
+    ] {
         row(name, 0..6, &|one| one.smoothness.total_cmp(&smoothness).is_eq());
     }
     text
