@@ -30,6 +30,7 @@ const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error aga
        runout-studies diagnose-scaling       time of a diagnosis over the number of stations
        runout-studies spatial-coverage [MACHINES [SEED [PLACES]]]   predictions of the spatial error beside the truth: of 90 to
                                              160 places, or of as many as PLACES
+       runout-studies spatial-placement [MACHINES [SEED]]   placement of the tracker beside the truth
        runout-studies surface PIPELINE PICTURE   the surface of a pipeline, unrolled
        runout-studies component-errors PIPELINE PICTURE   component errors of a C axis over the command
        runout-studies flat PIPELINE PICTURE      a fly-cut surface, and the same without what the closed loop found
@@ -103,6 +104,10 @@ fn main() -> ExitCode {
                 && rest.get(2).is_none_or(|word| word.parse::<usize>().is_ok()) =>
         {
             spatial_coverage(sizes(rest, [100, 1]).unwrap_or_default(), rest.get(2).and_then(|word| word.parse().ok()))
+        }
+        ["spatial-placement", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [100, 1]).is_some() => {
+            let [machines, seed] = sizes(rest, [100, 1]).unwrap_or_default();
+            spatial_placement(machines, seed)
         }
         ["surface", pipeline, picture] => surface(pipeline, picture),
         ["component-errors", pipeline, picture] => {
@@ -215,6 +220,12 @@ fn value_coverage(campaigns: u64, seed: u64, only: Option<Layout>) -> Result<()>
 fn spatial_coverage([machines, seed]: [u64; 2], places: Option<usize>) -> Result<()> {
     println!("{machines} machines from seed {seed}, simulated\n");
     println!("{}", spatial::table(&[spatial::coverage(machines as usize, seed, places)?]));
+    Ok(())
+}
+
+fn spatial_placement(machines: u64, seed: u64) -> Result<()> {
+    println!("{machines} machines from seed {seed}, simulated\n");
+    println!("{}", spatial::placement::table(&spatial::placement::placements(machines, seed)?));
     Ok(())
 }
 

@@ -1,9 +1,12 @@
 //! Measured points that belong to no turn: a coordinate measuring machine's circles, an R-test's ball positions.
 
-use std::{ops::Range, path::PathBuf};
+use std::{collections::HashMap, ops::Range, path::PathBuf};
 
 use runout_error::{Error, Result};
 use runout_turning::{input_file::InputFile, provenance::Input};
+
+/// Numbers of a row without time and repeat from which on equal rows are no chance.
+const FEWEST_FOR_COPIES: usize = 4;
 
 /// Points in named columns, grouped into traces.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -132,5 +135,55 @@ impl Points {
     #[must_use]
     pub fn labels(&self, name: &str) -> Option<&[String]> {
         self.labels.iter().find(|labels| labels.name == name).map(|labels| labels.values.as_slice())
+    }
+
+    /// Rows that are equal to an earlier one in every column, in words. A row of few numbers without time and repeat may be equal to
+    /// another one by the resolution alone.
+    #[must_use]
+    pub fn copies(&self) -> Option<String> {
+        let has_key = self.columns.iter().any(|column| ["time_s", "repeat"].contains(&column.name.as_str()));
+        if !has_key && self.columns.len() < FEWEST_FOR_COPIES {
+            return None;
+        }
+        let count = self.columns.first().map_or(0, |column| column.values.len());
+        let mut known: HashMap<(Vec<u64>, Vec<&str>), usize> = HashMap::with_capacity(count);
+        let mut first = None;
+        let mut copies = 0;
+        for row in 0..count {
+            let numbers = self.columns.iter().filter_map(|column| column.values.get(row)).map(|value| value.to_bits());
+            let texts = self.labels.iter().filter_map(|labels| labels.values.get(row)).map(String::as_str);
+            let earlier = *known.entry((numbers.collect(), texts.collect())).or_insert(row);
+            if earlier < row {
+                copies += 1;
+                first.get_or_insert([earlier + 1, row + 1]);
+            }
+        }
+        let [earlier, later] = first?;
+        Some(format!(
+            "{copies} of {count} rows are equal to another row in every column, row {later} to row {earlier} first: are they copies? Each \
+             counts as a reading of its own, which makes noise and standard uncertainties too small"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(columns: &[(&str, &[f64])], ball: &[&str]) -> Points {
+        let columns = columns.iter().map(|(name, values)| Column { name: (*name).into(), values: values.to_vec() });
+        let labels = Labels { name: "ball".into(), values: ball.iter().map(|id| (*id).into()).collect() };
+        Points { columns: columns.collect(), labels: vec![labels], ..Points::default() }
+    }
+
+    #[test]
+    fn copies_are_equal_in_every_column() {
+        let readings = [0.5, 0.5, 0.5, 0.5];
+        let of = |repeat: &[f64], ball: &[&str]| points(&[("repeat", repeat), ("dx_mm", &readings)], ball).copies();
+        let found = of(&[1.0, 1.0, 2.0, 1.0], &["P1", "P2", "P1", "P1"]).unwrap_or_default();
+        assert!(found.starts_with("1 of 4 rows") && found.contains("row 4 to row 1"), "{found}");
+        assert_eq!(of(&[1.0, 1.0, 2.0, 2.0], &["P1", "P2", "P1", "P2"]), None);
+        // Two numbers that a coarse resolution makes equal.
+        assert_eq!(points(&[("radius_mm", &readings), ("direction_deg", &readings)], &["a"; 4]).copies(), None);
     }
 }

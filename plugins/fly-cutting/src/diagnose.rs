@@ -1,9 +1,9 @@
 //! The closed loop on a surface.
 
 use runout_core::{
-    Result,
+    Error, Result,
     model::{
-        Effect, Model,
+        Effect, Fit as _, Model,
         closed_loop::{self, Closed, Settings},
         diagnosis::{Diagnosis, Estimated, Moved, Unexplained, Verdict},
     },
@@ -15,7 +15,7 @@ use crate::{
     aliases::{self, Aliases, named},
     effects::{MISSING, SPINDLE_LINE},
     model::{CutFit, CutModel},
-    separate::{FlyCutting, Measured, left_of},
+    separate::{FlyCutting, Measured, left_of, smaller, too_smooth},
     strangers::{self, Stranger},
 };
 
@@ -36,6 +36,10 @@ impl PointModel for FlyCutting {
 
     fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
         let measured = self.measured(points)?;
+        if let Some(problem) = too_smooth(&measured.heights, &self.0) {
+            let help = "`run` shows the map all the same; the key `feed_um_per_rev` and the unit of the heights are worth a look";
+            return Err(Error::new("diagnose", points.input.display().to_string(), problem).help(help));
+        }
         let mut taken = vec![false; measured.heights.len()];
         let mut strangers: Vec<Stranger> = Vec::new();
         let mut round = 0;
@@ -87,6 +91,17 @@ impl FlyCutting {
                 }
             ));
         }
+        let left = last.remainder();
+        let below = smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof);
+        if below.is_some() {
+            // The noise or the unit of the heights is wrong: nothing says what noise is.
+            diagnosis.verdict = match diagnosis.verdict {
+                Verdict::Explained => Verdict::Improved,
+                Verdict::AtNoiseFloor => Verdict::NothingFound,
+                other => other,
+            };
+        }
+        diagnosis.warnings.extend(below);
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after })
     }
@@ -103,7 +118,12 @@ fn refresh(model: &CutModel, closed: &mut Closed<CutFit>, settings: &Settings) {
         if effect.id != SPINDLE_LINE || added.parameters.len() < setting.values.len() {
             continue;
         }
-        let parameters = effect.parameters.iter().zip(&setting.values).zip(&added.parameters);
+        let mut values = setting.values.clone();
+        if let [ratio, _, phase_deg] = &mut values[..] {
+            // At the pass nearest to x = 0, which need not be the pass 0 of the fit.
+            *phase_deg -= 360.0 * *ratio * closed.after.feeds_off();
+        }
+        let parameters = effect.parameters.iter().zip(&values).zip(&added.parameters);
         let estimated = parameters.map(|((parameter, value), known)| Estimated {
             name: parameter.name.clone(),
             value: *value,

@@ -10,6 +10,7 @@ mod config;
 mod diagnose;
 mod effects;
 mod heights;
+mod lines;
 mod model;
 mod outcome;
 mod passes;

@@ -1,9 +1,6 @@
 //! A cut with its effects, as a model for the closed loop.
 
-use std::{
-    f64::consts::TAU,
-    sync::{Arc, OnceLock},
-};
+use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Error, Result,
@@ -20,7 +17,7 @@ use crate::{
     heights::Heights,
     passes::{Cut, Line},
     phase::{self, Phased, dot, without_mean},
-    search::Left,
+    search::{FEWEST_PERIODS, Left},
 };
 
 /// Points that the search looks at, and those of the final fit.
@@ -30,27 +27,19 @@ const FITTED: usize = 640_000;
 const SAMPLED: usize = 4_000;
 /// Every so many rows one is held out.
 const HELD_OUT: usize = 5;
-/// Δχ² below which a line is not tried: less is no evidence for its three parameters in any map.
-const LEAST_GAIN: f64 = 25.0;
-/// Factors of the amplitude that a spectrum shows, where passes bury others.
-const ENLARGED: [f64; 3] = [1.0, 2.0, 4.0];
-/// Lines that look alike, of which a refit decides.
-const ALIKE: usize = 4;
-/// Harmonics of a line that passes which bury others may show instead of it.
-const HARMONICS: usize = 3;
-/// A line is taken as its spectrum shows it where its amplitude is below this share of the height that buries a pass.
-const LINEAR: f64 = 0.2;
+/// A nose radius of less than this share of the declared one, or of more than its inverse, is none.
+const LEAST_RADIUS: f64 = 0.1;
 /// Parts of the map that have to agree on an effect where the noise is not known.
 const PARTS: usize = 8;
 
 /// The data of a model.
 #[derive(Debug)]
-struct Data {
-    config: FlyCuttingConfig,
-    fitted: Heights,
+pub(crate) struct Data {
+    pub config: FlyCuttingConfig,
+    pub fitted: Heights,
     held_out: Heights,
-    sample: Heights,
-    extent_mm: [[f64; 2]; 2],
+    pub sample: Heights,
+    pub extent_mm: [[f64; 2]; 2],
     /// Effects that are declared with their values.
     known: Vec<usize>,
 }
@@ -149,7 +138,17 @@ impl Model for CutModel {
 
     fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
         match (MISSING.get(effect).map(|missing| missing.line()), values) {
-            (Some(Some(_)), [ratio, ..]) => *ratio > 0.0 && *ratio <= self.data.config.max_frequency_ratio as f64 + 0.5,
+            (Some(None), [change]) if MISSING.get(effect) == Some(&Missing::NoseRadius) => {
+                let share = 1.0 + change / self.data.config.nose_radius_mm;
+                (LEAST_RADIUS..=1.0 / LEAST_RADIUS).contains(&share)
+            }
+            (Some(Some(_)), [ratio, ..]) => {
+                // Nearer to a whole ratio it is a shape that all passes have, or a bend of the table.
+                let [from, to] = self.data.extent_mm[0];
+                let periods = (ratio - ratio.round()).abs() * (to - from) / (1e-3 * self.data.config.feed_um_per_rev);
+                let most = self.data.config.max_frequency_ratio as f64 + 0.5;
+                *ratio > 0.0 && *ratio <= most && periods >= 0.5 * FEWEST_PERIODS
+            }
             _ => true,
         }
     }
@@ -197,7 +196,7 @@ impl Model for CutModel {
 /// A fitted cut.
 #[derive(Debug)]
 pub(crate) struct CutFit {
-    data: Arc<Data>,
+    pub data: Arc<Data>,
     pub cut: Cut,
     pub phased: Phased,
     settings: Vec<Setting>,
@@ -259,6 +258,11 @@ impl CutFit {
         self.starts[usize::from(tilts)].get_or_init(|| self.best_lines(tilts).into_iter().map(values).collect())
     }
 
+    /// Feeds from the pass nearest to x = 0 to the pass 0 of the fit: the same surface has every whole number of them.
+    pub fn feeds_off(&self) -> f64 {
+        (self.phased.phase_mm / self.cut.feed_mm).round()
+    }
+
     /// Phase of the scallops and its standard uncertainty, in µm, where it shows.
     pub fn phase_um(&self) -> Option<[f64; 2]> {
         let norm = self.phased.norm_nm_per_mm?;
@@ -267,73 +271,8 @@ impl CutFit {
             Some(std_nm) => std_nm * level.max(1.0).sqrt(),
             None => 1e3 * level.sqrt(),
         };
-        Some([1e3 * self.phased.phase_mm, 1e3 * noise_nm / norm])
-    }
-
-    /// Whether a line may earn its place, by what its spectrum shows: a refit beside it may gain for other reasons.
-    fn promises(&self, line: &Line) -> bool {
-        let weight: f64 =
-            self.data.fitted.rows.iter().map(|row| line.lever(row).powi(2) * row.points.len() as f64).sum();
-        let left = dot(&self.phased.residual_nm, &self.phased.residual_nm) / self.data.fitted.len().max(1) as f64;
-        0.5 * weight * line.amplitude * line.amplitude >= LEAST_GAIN * left
-    }
-
-    /// The lines with which least is left, the best first: one, or a few that look alike. Peaks of a spectrum are in proportion to what they explain only while each pass leaves
-    /// something: a pass that is buried by its neighbours adds harmonics, and hides a part of the amplitude.
-    fn best_lines(&self, tilts: bool) -> Vec<Line> {
-        let highest = self.data.config.max_frequency_ratio;
-        let left = self.left();
-        let lines = left.lines(tilts, highest);
-        let Some(first) = lines.first().copied().filter(|first| self.promises(first)) else { return Vec::new() };
-        let buried_nm = 1e6 * self.cut.feed_mm * self.cut.feed_mm / (2.0 * self.cut.nose_mm);
-        let lever =
-            if tilts { self.data.fitted.rows.iter().map(|row| row.y_mm.abs()).fold(0.0, f64::max) } else { 1.0 };
-        if first.amplitude * lever < LINEAR * buried_nm {
-            return vec![first];
-        }
-        let left_with = |line: &Line| {
-            let mut applied = self.cut.applied.clone();
-            applied.lines.push(*line);
-            let cut = Cut::new(&self.data.config, self.data.extent_mm, applied)?;
-            let residual_nm = phase::fit(&cut, &self.data.sample, &self.data.sample).residual_nm;
-            Some((dot(&residual_nm, &residual_nm), *line))
-        };
-        let sorted = |lines: Vec<Line>| -> Vec<Line> {
-            let mut all: Vec<(f64, Line)> = lines.iter().filter_map(left_with).collect();
-            all.sort_by(|one, other| one.0.total_cmp(&other.0));
-            all.into_iter().map(|(_, line)| line).collect()
-        };
-        let least = |lines: Vec<Line>| sorted(lines).first().copied().unwrap_or(first);
-        // Buried passes show a line by its harmonics: the line itself may be at a half or a third of what the spectrum shows.
-        let parts = lines.iter().flat_map(|line| {
-            (1..=HARMONICS)
-                .flat_map(move |part| (0..part).map(move |turn| (line.ratio.fract() + turn as f64) / part as f64))
-        });
-        let strongest = |fraction: f64| {
-            let all = left.aliases(fraction, tilts, highest, 1e-3).into_iter();
-            let (ratio, size) = all.max_by(|one, other| one.1.norm_sqr().total_cmp(&other.1.norm_sqr()))?;
-            Some(Line { ratio, amplitude: first.amplitude, phase: size.arg(), tilts })
-        };
-        let around = |line: Line, sizes: [f64; 3], turns: &[f64]| -> Vec<Line> {
-            let turned = |turn: &f64| {
-                sizes.map(|size| Line { amplitude: size * line.amplitude, phase: line.phase + turn, ..line })
-            };
-            turns.iter().flat_map(turned).collect()
-        };
-        let quarter = 0.25 * TAU;
-        let tried = parts
-            .filter_map(strongest)
-            .flat_map(|line| around(line, ENLARGED, &[0.0, quarter, 2.0 * quarter, -quarter]));
-        let best = least(tried.collect());
-        let best = least(around(
-            best,
-            [0.75, 1.0, 1.4],
-            &[-0.5 * quarter, -0.25 * quarter, 0.0, 0.25 * quarter, 0.5 * quarter],
-        ));
-        let others = left.others(best, highest).into_iter().map(|line| Line { amplitude: best.amplitude, ..line });
-        let mut alike = sorted(others.chain([best]).collect());
-        alike.truncate(ALIKE);
-        alike
+        let nearest_mm = self.phased.phase_mm - self.cut.feed_mm * self.feeds_off();
+        Some([1e3 * nearest_mm, 1e3 * noise_nm / norm])
     }
 
     /// Points that were fitted.

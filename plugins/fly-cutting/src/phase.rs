@@ -7,6 +7,8 @@ use crate::{
 
 /// Phases that are tried first, over one feed.
 const TRIED: usize = 8;
+/// Phases by which lines are ranked.
+const NEAR: usize = 4;
 /// Steps of a fit at most.
 const MAX_STEPS: usize = 8;
 /// A fit has settled when a step is below this share of the feed.
@@ -114,6 +116,12 @@ pub(crate) fn fit(cut: &Cut, heights: &Heights, sample: &Heights) -> Phased {
     direction.iter_mut().for_each(|entry| *entry /= norm);
     let Trial { phase_mm, level_nm, surface, residual_nm, .. } = trial;
     Phased { phase_mm, level_nm, surface, residual_nm, direction, norm_nm_per_mm: shows.then_some(norm) }
+}
+
+/// Squares that the best of some phases leaves of a part of the points: that phase and others evenly over one feed.
+pub(crate) fn squares_near(cut: &Cut, sample: &Heights, phase_mm: f64) -> f64 {
+    let at = |index: usize| phase_mm + index as f64 / NEAR as f64 * cut.feed_mm;
+    (0..NEAR).map(|index| Trial::new(cut, sample, at(index)).squares).fold(f64::INFINITY, f64::min)
 }
 
 pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {

@@ -21,7 +21,7 @@ const LONGEST: usize = 1 << 18;
 /// Angle over the rows between whole parts that are summed apart, in radians.
 const RESOLVED: f64 = 1.5;
 /// A line has at least so many periods, counted from the next whole ratio, over the map: with fewer it is a bend.
-const FEWEST_PERIODS: f64 = 0.8;
+pub(crate) const FEWEST_PERIODS: f64 = 0.8;
 /// Peaks of the spectrum that are tried, and the least of them beside the strongest.
 const PEAKS: usize = 4;
 const LEAST_PEAK: f64 = 0.1;

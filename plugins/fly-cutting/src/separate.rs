@@ -8,7 +8,7 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     points::{PointColumn, PointKind::Number, Points},
-    stage::{Outcome, PointModel, PointSeparator, Separator},
+    stage::{Outcome, PointModel, PointSeparator, Separator, points::far_below_noise},
     table::TableSpec,
 };
 
@@ -19,8 +19,11 @@ use crate::{
     model::{CutFit, CutModel},
     outcome::{Known, tables},
     passes::{Applied, Cut},
+    phase::dot,
 };
 
+/// Share of the root mean square of the scallops below which a map is too smooth for its cut.
+const TOO_SMOOTH: f64 = 0.3;
 /// χ² per degree of freedom from which more is left than noise.
 const MORE_THAN_NOISE: f64 = 1.5;
 
@@ -85,6 +88,7 @@ impl PointSeparator for FlyCutting {
                 left.chi2_per_dof()
             ));
         }
+        remarks.extend(smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof));
         self.concluded(&measured, (&fit, &fit), &[], remarks)
     }
 
@@ -122,6 +126,7 @@ impl FlyCutting {
                 "the map is shorter than two feeds: is the feed in µm per revolution, and are the steps in mm?".into(),
             );
         }
+        remarks.extend(too_smooth(&heights, &self.0));
         Ok(Measured { heights, grid, remarks })
     }
 
@@ -168,6 +173,39 @@ impl FlyCutting {
         };
         known.outcome(remarks)
     }
+}
+
+/// Says that less is left than the stated noise.
+pub(crate) fn smaller(noise_is_known: bool, chi2_per_dof: f64, dof: usize) -> Option<String> {
+    noise_is_known.then(|| far_below_noise(chi2_per_dof, dof)).flatten()
+}
+
+/// Says that a map is smoother than the scallops of its cut: they are the least that a tool leaves.
+pub(crate) fn too_smooth(heights: &Heights, config: &FlyCuttingConfig) -> Option<String> {
+    let half_mm = 0.5e-3 * config.feed_um_per_rev;
+    let scallop_nm = 1e6 * half_mm * half_mm / (2.0 * config.nose_radius_mm) * (4.0_f64 / 45.0).sqrt();
+    let mut columns = [vec![1.0; heights.len()], heights.x_mm.clone(), heights.y_mm().collect()];
+    for place in 0..columns.len() {
+        let (known, rest) = columns.split_at_mut(place);
+        for column in known.iter() {
+            let share = dot(column, &rest[0]);
+            rest[0].iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
+        }
+        let size = dot(&rest[0], &rest[0]).sqrt().max(f64::MIN_POSITIVE);
+        rest[0].iter_mut().for_each(|entry| *entry /= size);
+    }
+    let mut left = heights.height_nm.clone();
+    for column in &columns {
+        let share = dot(column, &left);
+        left.iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
+    }
+    let sq_nm = (dot(&left, &left) / heights.len().max(1) as f64).sqrt();
+    (sq_nm < TOO_SMOOTH * scallop_nm).then(|| {
+        format!(
+            "Sq of the map is {sq_nm:.2e} nm, and the scallops of the declared cut alone have {scallop_nm:.2e} nm: no tool leaves a smoother \
+             surface. Is `height_nm` in µm or mm, or is the feed smaller?"
+        )
+    })
 }
 
 /// What a fit leaves of all points, in nm.

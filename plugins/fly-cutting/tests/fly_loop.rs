@@ -144,3 +144,43 @@ fn a_run_gives_the_surface_and_its_values() {
     assert_eq!(rows, [("surface", SIDE * SIDE), ("residual", SIDE * SIDE)]);
     assert!(value(&outcome, "scallop_phase", None).abs() < 0.1);
 }
+
+/// Noise of twice the line: the phases of line and scallops are that of the pass nearest to x = 0, whichever pass the fit counts from.
+#[test]
+fn the_phase_of_a_line_in_noise_counts_from_the_pass_at_the_origin() {
+    for seed in 0..3 {
+        let line = format!(
+            "noise_nm = 8.0\nseed = {seed}\n[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 30.0\nphase_deg = 60.0\n"
+        );
+        let found = diagnose(scenario(90, &line).heights().unwrap(), &separator(CUT));
+        let added = &found.diagnosis.added[0];
+        let [ratio, _] = parameter(added, "frequency_ratio");
+        let [phase, std] = parameter(added, "phase");
+        println!("{seed}: {ratio} {phase} ± {std}");
+        let turn = |angle: f64| angle - 360.0 * (angle / 360.0).round();
+        let is_own = (ratio - 5.6235 / 6.5).abs() < 1e-3;
+        assert!(!is_own || turn(phase - 60.0).abs() < if std.is_finite() { 4.0 * std } else { 20.0 }, "{phase} ± {std}");
+        assert!(value(&found.after, "scallop_phase", None).abs() <= 0.5 * 8.3 + 1e-9);
+    }
+}
+
+#[test]
+fn heights_in_another_unit_and_too_large_a_noise_are_never_explained() {
+    let line = "noise_nm = 0.1\n[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 4.0\n";
+    let mut in_um = scenario(90, line).heights().unwrap();
+    in_um.height_nm.iter_mut().for_each(|height| *height *= 1e-3);
+    in_um.std_nm = Some(0.1);
+    let outcome = run(in_um.clone(), &separator(CUT));
+    assert!(outcome.remarks.iter().any(|remark| remark.contains("Is `height_nm` in µm")), "{:?}", outcome.remarks);
+    assert!(outcome.remarks.iter().any(|remark| remark.contains("far below 1")), "{:?}", outcome.remarks);
+    let settings = runout_core::model::closed_loop::Settings::default();
+    let fly = separator(CUT);
+    let model = runout_core::stage::PointSeparator::model(&fly).unwrap();
+    let error = model.diagnose(&in_um.points("map.h5".into()), &settings).unwrap_err();
+    assert!(error.to_string().contains("no tool leaves a smoother surface"), "{error}");
+    let mut loud = scenario(90, line).heights().unwrap();
+    loud.std_nm = Some(1.0);
+    let found = diagnose(loud, &fly).diagnosis;
+    assert_eq!(found.verdict, Verdict::Improved, "{}", told(&found));
+    assert!(found.warnings.iter().any(|warning| warning.contains("far below 1")), "{:?}", found.warnings);
+}

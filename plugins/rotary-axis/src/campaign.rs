@@ -103,6 +103,7 @@ impl Campaign {
             warnings.push(format!("no point is of {}", absent.join(", ")));
         }
         warnings.extend(looks_wrong(config.axis, command, deviations));
+        warnings.extend(points.copies());
         let order = time_order(optional("time_s").map(|column| column.values.as_slice()), command.len());
         let repeat = optional("repeat").map_or_else(|| vec![0.0; command.len()], |column| column.values.clone());
         let direction = match optional("direction") {

@@ -8,9 +8,9 @@ use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
     model::{
-        Effect, Setting,
+        Effect, Fit as _, Setting,
         closed_loop::{self, Settings},
-        diagnosis::{BiasPerUnit, Blind, Diagnosis, Moved},
+        diagnosis::{Diagnosis, Moved, Unexplained, Verdict},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
     numerics::least_squares::dot,
@@ -22,7 +22,9 @@ use crate::{
     campaign::Campaign,
     config::RotaryAxis,
     effects::{CANDIDATES, Candidate, TIME_CONSTANTS, USUAL_TIME_CONSTANT},
+    nest::{self, Nest},
     noise::Noise,
+    scale::scale,
     solve::{Column, Redundant, fit, redundant},
 };
 
@@ -31,8 +33,6 @@ const TRIED: usize = 24;
 /// Runs of the loop in which time constants settle, and the share of a change at which they are settled.
 const MOST_RUNS: usize = 5;
 const SETTLED: f64 = 0.01;
-/// Smallest change of a result per usual size of an effect that is worth reporting, mm or rad times lever arm.
-const NO_BIAS: f64 = 1e-9;
 
 /// Place of a candidate among all.
 fn index_of(candidate: Candidate) -> usize {
@@ -82,6 +82,7 @@ struct Assembled {
     data: Redundant,
     first: Vec<usize>,
     tried: [usize; 3],
+    nest: usize,
 }
 
 /// One run of the loop at fixed time constants.
@@ -95,9 +96,30 @@ struct Run {
     first: Vec<usize>,
     /// And that of the first time constant tried, of each coordinate.
     tried: [usize; 3],
+    /// And those of errors of the nest.
+    nest: usize,
+    /// Where most is left.
+    left: Vec<Unexplained>,
 }
 
 impl Run {
+    /// Errors of the nest that explain as much as scale and squareness that were added.
+    fn nests(&self) -> Vec<Nest> {
+        let columns_of = |setting: &Setting| {
+            self.data.effects[self.first[setting.effect]..].iter().take(setting.values.len()).cloned().collect()
+        };
+        let added: Vec<(bool, Vec<Vec<f64>>)> = self
+            .added
+            .iter()
+            .map(|setting| {
+                let of_axes =
+                    matches!(CANDIDATES.get(setting.effect), Some(Candidate::Scale(_) | Candidate::Squareness(..)));
+                (of_axes, columns_of(setting))
+            })
+            .collect();
+        nest::instead(&self.data, &added, self.nest)
+    }
+
     /// Time constants for the next run: of a drift that was added, its own; else the one that explains most of what is left.
     fn next_constants(&self, grid: &[f64]) -> [f64; 3] {
         let [low, high] = TIME_CONSTANTS;
@@ -160,11 +182,12 @@ impl RotaryAxis {
         constants: [f64; 3],
         grid: &[f64],
     ) -> std::result::Result<Run, String> {
-        let Assembled { terms, data, first, tried } = self.assembled(campaign, constants, grid)?;
+        let Assembled { terms, data, first, tried, nest } = self.assembled(campaign, constants, grid)?;
         let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
         let closed = closed_loop::diagnose(&terms, settings).map_err(|error| error.to_string())?;
         let added = closed.settings.into_iter().skip(settings.known.len()).collect();
-        Ok(Run { diagnosis: closed.diagnosis, added, constants, data, first, tried })
+        let left = closed.after.unexplained();
+        Ok(Run { diagnosis: closed.diagnosis, added, constants, data, first, tried, nest, left })
     }
 
     /// The terms of the loop at the usual time constants.
@@ -192,6 +215,8 @@ impl RotaryAxis {
             columns.extend(grid.iter().filter_map(|tried| drift.columns(axis, campaign, *tried).into_iter().next()));
             start
         });
+        let nest = columns.len();
+        columns.extend(nest::columns(self.0.axis, campaign)?);
         let data = redundant(&campaign.layout, &campaign.readings, &columns)?;
         if data.rows.len() <= data.declared.len() {
             return Err(
@@ -225,7 +250,7 @@ impl RotaryAxis {
             .told_apart_by(
                 "a calibration of the linear axes on their own, or a campaign with the balls in another order of time",
             );
-        Ok(Assembled { terms: model, data, first, tried })
+        Ok(Assembled { terms: model, data, first, tried, nest })
     }
 
     /// Columns of effects that were added.
@@ -243,7 +268,8 @@ impl RotaryAxis {
         settings: &Settings,
         run: Run,
     ) -> Result<PointDiagnosis> {
-        let Run { mut diagnosis, added, constants, .. } = run;
+        let instead = run.nests();
+        let Run { mut diagnosis, added, constants, left, .. } = run;
         let names: Vec<String> = CANDIDATES.iter().map(|candidate| name(&candidate.effect())).collect();
         let effects: Vec<usize> = added.iter().map(|setting| setting.effect).collect();
         // Members of confounded sets: the results with each of them.
@@ -258,8 +284,25 @@ impl RotaryAxis {
                 alternatives.push(self.columns_of(campaign, &chosen, constants));
             }
         }
+        // Errors of the nest that explain as much as errors of the linear axes.
+        let of_nest = nest::columns(self.0.axis, campaign).unwrap_or_default();
+        for Nest { index, replaced } in &instead {
+            let kept: Vec<usize> =
+                (0..effects.len()).filter(|place| !replaced.contains(place)).map(|place| effects[place]).collect();
+            let mut columns = self.columns_of(campaign, &kept, constants);
+            columns.extend(of_nest.get(*index).cloned());
+            alternatives.push(columns);
+        }
+        nest::confound(&mut diagnosis, &instead);
         let columns = self.columns_of(campaign, &effects, constants);
         let mut after = self.conclude(points, campaign, &columns, before, &alternatives)?;
+        let last = fit(&campaign.layout, &campaign.readings, &columns)
+            .map_err(|problem| Error::new("fit", points.input.display().to_string(), problem))?;
+        if scale(&last, campaign.noise).is_more && diagnosis.verdict != Verdict::Unexplained {
+            // As the warning says.
+            diagnosis.verdict = Verdict::Unexplained;
+            diagnosis.unexplained.extend(left);
+        }
         for (found, setting) in diagnosis.added.iter_mut().zip(&added) {
             if let (Some(Candidate::Exponential(coordinate)), [drift, ..]) =
                 (CANDIDATES.get(setting.effect), &setting.values[..])
@@ -276,6 +319,9 @@ impl RotaryAxis {
                 blind.bias_per_unit = bias;
             }
         }
+        if instead.is_empty() {
+            diagnosis.blind_to.extend(nest::blind(self.0.axis, &last));
+        }
         if !settings.known.is_empty() {
             after.remarks.push("effects that are declared as known are taken out of the readings".into());
         }
@@ -289,48 +335,13 @@ impl RotaryAxis {
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after })
     }
-
-    /// What an effect that is not visible does to the results all the same.
-    fn bias(&self, campaign: &Campaign, blind: &Blind, names: &[String], constants: [f64; 3]) -> Option<BiasPerUnit> {
-        let own = blind.targets.iter().fold(blind.effect.clone(), |name, target| format!("{name} {target}"));
-        let candidate = CANDIDATES.get(names.iter().position(|name| *name == own)?)?;
-        let effect = candidate.effect();
-        let parameter = effect.parameters.first()?;
-        let column = candidate.columns(self.0.axis, campaign, constant_of(*candidate, constants)).into_iter().next()?;
-        let mut readings = campaign.readings.clone();
-        let plain = fit(&campaign.layout, &readings, &[]).ok()?;
-        readings.iter_mut().zip(&column).for_each(|(reading, column)| reading.value += column * parameter.tolerance);
-        let moved = fit(&campaign.layout, &readings, &[]).ok()?;
-        let symbols = self.0.axis.location_symbols();
-        let lever = campaign.layout.balls.iter().map(Vector3::norm).fold(1.0, f64::max);
-        let mut changes: Vec<(f64, f64, &str, String)> = Vec::new();
-        for (index, (one, other)) in plain.location().into_iter().zip(moved.location()).enumerate() {
-            let change = (other.value - one.value).abs() / parameter.tolerance;
-            let (reach, scale, unit) = if index < 2 { (1.0, 1e3, "um") } else { (lever, 1e6, "urad") };
-            changes.push((change * reach, scale * change, unit, symbols[index].clone()));
-        }
-        for (ball, id) in campaign.balls.iter().enumerate() {
-            for (one, other) in plain.placement(ball).into_iter().zip(moved.placement(ball)) {
-                let change = (other.value - one.value).abs() / parameter.tolerance;
-                changes.push((change, 1e3 * change, "um", format!("placement of {id}")));
-            }
-        }
-        let known =
-            |change: &&(f64, f64, &str, String)| change.0.is_finite() && change.0 > NO_BIAS / parameter.tolerance;
-        let (location, placement) = changes.split_at(4);
-        let largest = |changes: &[(f64, f64, &'static str, String)]| {
-            changes.iter().filter(|change| known(change)).max_by(|a, b| a.0.total_cmp(&b.0)).cloned()
-        };
-        let (_, value, unit, on) = largest(location).or_else(|| largest(placement))?;
-        Some(BiasPerUnit { value, unit: format!("{unit}/{}", per(&parameter.unit)), on })
-    }
 }
 
 fn name(effect: &Effect) -> String {
     effect.targets.iter().fold(effect.id.clone(), |name, target| format!("{name} {target}"))
 }
 
-fn constant_of(candidate: Candidate, constants: [f64; 3]) -> f64 {
+pub(crate) fn constant_of(candidate: Candidate, constants: [f64; 3]) -> f64 {
     if let Candidate::Exponential(coordinate) = candidate { constants[coordinate] } else { USUAL_TIME_CONSTANT }
 }
 
@@ -357,9 +368,4 @@ fn moved(before: &[NamedValue], after: &[NamedValue]) -> Vec<Moved> {
         })
     });
     both.collect()
-}
-
-/// A unit in a denominator.
-fn per(unit: &str) -> String {
-    if unit.contains('/') { format!("({unit})") } else { unit.to_owned() }
 }

@@ -6,18 +6,23 @@
 //! the C axis and the ball are installed, and, by the closed loop, what turns more often than once.
 
 mod axis;
+mod bias;
 mod campaign;
 mod config;
 mod diagnose;
 mod effects;
 mod kinematics;
+mod left_out;
 mod model;
+mod nest;
 mod noise;
 mod paper;
 mod plan;
+mod scale;
 mod separate;
 pub mod simulate;
 mod solve;
+mod tables;
 
 use runout_core::pipeline::{
     effects::EffectEntry,

@@ -25,8 +25,9 @@ use crate::{
     config::{Ball, RotaryAxisConfig},
     kinematics::turn,
     noise::Noise,
-    separate::{component_table, location_values, machine_order},
+    separate::{location_values, machine_order},
     solve::{Estimate, GAUGE, gauge},
+    tables::component_table,
 };
 
 /// `[separate] plugin = "rotary-axis-circle-fit"`.

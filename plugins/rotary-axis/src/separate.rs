@@ -3,30 +3,25 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
-    numerics::statistics::upper_median,
     points::{PointColumn, Points},
     stage::{
         NamedValue, Outcome, PointModel, PointPlan, PointSeparator,
-        points::{residual_table, value},
+        points::{far_below_noise, residual_table, value},
     },
-    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
+    table::{TableRows, TableSpec, numbers, numbers_or_null, texts},
 };
 
 use crate::{
     axis::Axis,
-    campaign::{Campaign, FEWEST_COMMANDS, columns, steps},
+    campaign::{Campaign, columns},
     config::RotaryAxis,
-    kinematics::Errors,
+    left_out::left_out,
     noise::Noise,
+    scale::{noise_remark, scale},
     solve::{Column, Estimate, Fit, Layout, Reading, fit},
+    tables::{compensation_table, component_table, residual_rows},
 };
 
-/// Commands are left out in at most so many fits.
-const MOST_LEFT_OUT: usize = 40;
-/// A command left out is predicted where its neighbours are at most this many median steps apart.
-const WIDEST_STEPS: f64 = 3.5;
-/// Few degrees of freedom of the noise.
-const FEW_DEGREES: usize = 30;
 /// Commands of the full turn by which `check` finds what the balls observe.
 const CHECKED_COMMANDS: usize = 12;
 
@@ -69,6 +64,8 @@ impl PointSeparator for RotaryAxis {
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![
             "the zero error of the sensor nest enters the two offsets of the axis one to one: not observable".to_owned(),
+            "a gain error or cross-talk of the sensor nest acts as scale and squareness of the linear axes do: no ball separates them"
+                .to_owned(),
             "component errors have mean 0 over the distinct commands and no part that turns with the table (1/rev): those are \
              location of the axis and placement of the balls"
                 .to_owned(),
@@ -193,6 +190,9 @@ impl RotaryAxis {
         remarks.extend(self.lost(&found, campaign));
         let notes = noise_remark(campaign.noise).into_iter().collect();
         remarks.extend(scale.remark.clone());
+        if campaign.noise != Noise::Unknown {
+            remarks.extend(far_below_noise(found.chi2_per_dof(), found.dof));
+        }
         if left_out.iter().any(Option::is_none) {
             remarks.push(
                 "commands beside a gap are not predicted when they are left out: the ranges after compensation lack them"
@@ -371,196 +371,4 @@ pub(crate) fn machine_order(axis: Axis, along_z: [Estimate; 6]) -> [Estimate; 6]
         machine[3 + coordinate] = along_z[3 + place];
     }
     machine
-}
-
-pub(crate) fn component_table(axis: Axis) -> TableSpec {
-    let symbols = axis.component_symbols();
-    let units = ["um", "um", "um", "urad", "urad", "urad"];
-    let name = |index: usize| format!("{}_{}", symbols[index].to_lowercase(), units[index]);
-    let mut columns = vec![ColumnSpec::number(axis.command(), "deg", "command of the axis").repeating()];
-    columns.extend((0..6).map(|index| {
-        let about = format!("component error {} (ISO 230-1)", symbols[index]);
-        ColumnSpec::number(name(index), units[index], about).or_null()
-    }));
-    columns.extend((0..6).map(|index| {
-        let about = format!("standard uncertainty of {}", name(index));
-        ColumnSpec::number(format!("std_{}", name(index)), units[index], about).or_null()
-    }));
-    let about = "component errors at each distinct command: mean 0 over these, and no part that turns with the table (1/rev); \
-                 null where not observable";
-    let measures = |indices: std::ops::Range<usize>| {
-        let measure = |index| Measure::new(name(index)).with_std(format!("std_{}", name(index)));
-        indices.map(|index| measure(index).with_symbol(symbols[index].clone())).collect::<Vec<_>>()
-    };
-    TableSpec::new("component_errors", about, columns)
-        .figure(Figure::lines("component-errors-um", "Component errors", axis.command(), measures(0..3)))
-        .figure(Figure::lines("component-errors-urad", "Component errors", axis.command(), measures(3..6)))
-}
-
-fn compensation_table(axis: Axis) -> TableSpec {
-    let mut columns = vec![
-        ColumnSpec::number(axis.command(), "deg", "command of the axis").repeating(),
-        ColumnSpec::name("point", "the ball, or the point of `tool_points`"),
-    ];
-    for name in ["dx_mm", "dy_mm", "dz_mm"] {
-        let about = "what location and component errors do to the point: add it to the command of the linear axis";
-        columns.push(ColumnSpec::number(name, "mm", about).or_null());
-    }
-    for name in ["dx_mm", "dy_mm", "dz_mm"] {
-        let about = format!("standard uncertainty of {name}");
-        columns.push(ColumnSpec::number(format!("std_{name}"), "mm", about).or_null());
-    }
-    for name in ["dx", "dy", "dz"] {
-        let about = "mean deviation that remains, the ball's placement taken out, where the fit has not seen this command and \
-                     its component errors are interpolated";
-        columns.push(ColumnSpec::number(format!("remains_{name}_um"), "um", about).or_null());
-    }
-    TableSpec::new("compensation", "compensation of the balls and of tool points at each distinct command", columns)
-}
-
-fn residual_rows(
-    axis: Axis,
-    campaign: &Campaign,
-    before: &[Vector3<f64>],
-    after: &[Vector3<f64>],
-) -> Result<TableRows> {
-    let spec = residual_table("um");
-    let machine = |values: Vec<&Vector3<f64>>| -> Vec<f64> {
-        values.into_iter().flat_map(|value| axis.outward(value).map(|entry| 1e3 * entry)).collect()
-    };
-    let readings = machine(campaign.readings.iter().map(|reading| &reading.value).collect());
-    let groups = campaign.readings.iter().flat_map(|reading| {
-        let at = format!(
-            "{}, {} = {}°",
-            campaign.balls[reading.ball],
-            axis.letter(),
-            campaign.commands_deg[reading.command]
-        );
-        ["x", "y", "z"].map(|coordinate| format!("{at}, {coordinate}"))
-    });
-    let groups: Vec<String> = groups.collect();
-    let rows = spec.rows(vec![
-        counts(0..readings.len()),
-        texts(groups),
-        numbers(readings),
-        numbers(machine(before.iter().collect())),
-        numbers(machine(after.iter().collect())),
-    ])?;
-    Ok(TableRows { table: spec.name, rows })
-}
-
-/// What is left of each reading (mm) by a fit that has not seen its command, with component errors interpolated linearly between
-/// the commands beside it; nothing beside a gap.
-fn left_out(campaign: &Campaign, effects: &[Column], whole: &Fit) -> Vec<Option<Vector3<f64>>> {
-    let Campaign { layout, readings, commands_deg, .. } = campaign;
-    let commands = commands_deg.len();
-    let mut left = vec![None; readings.len()];
-    if commands <= FEWEST_COMMANDS {
-        return left;
-    }
-    let values: Vec<f64> =
-        whole.effects().iter().map(|one| if one.value.is_finite() { one.value } else { 0.0 }).collect();
-    // Effects keep the values of the whole: a fit without a command would hardly change them.
-    let corrected = |row: usize| {
-        effects.iter().zip(&values).fold(readings[row].value, |sum, (column, value)| sum - column[row] * *value)
-    };
-    let mut widths = steps(commands_deg);
-    let widest = WIDEST_STEPS * upper_median(&mut widths).unwrap_or(0.0);
-    let folds = commands.min(MOST_LEFT_OUT);
-    for fold in 0..folds {
-        let kept: Vec<usize> = (0..commands).filter(|command| command % folds != fold).collect();
-        let place = |command: usize| kept.iter().position(|own| *own == command);
-        let seen: Vec<Reading> = (0..readings.len())
-            .filter_map(|row| {
-                let command = place(readings[row].command)?;
-                Some(Reading { command, value: corrected(row), ..readings[row] })
-            })
-            .collect();
-        let reduced = Layout { phi: kept.iter().map(|command| layout.phi[*command]).collect(), ..layout.clone() };
-        let Ok(found) = fit(&reduced, &seen, &[]) else { continue };
-        for row in 0..readings.len() {
-            let reading = &readings[row];
-            if reading.command % folds != fold {
-                continue;
-            }
-            let errors = if layout.component_errors {
-                between(&kept, commands_deg, reading.command, widest, &found)
-            } else {
-                Some(found.errors(0))
-            };
-            if let Some(errors) = errors {
-                let expected = found.expected(&errors, layout.phi[reading.command], reading.ball);
-                left[row] = Some(corrected(row) - expected);
-            }
-        }
-    }
-    left
-}
-
-/// Errors at a command that a fit has not seen, from its neighbours around the turn.
-fn between(kept: &[usize], commands_deg: &[f64], command: usize, widest: f64, found: &Fit) -> Option<Errors> {
-    let ahead = |from: f64, to: f64| (to - from).rem_euclid(360.0);
-    let at = commands_deg[command];
-    let by = |distance: &dyn Fn(f64) -> f64| {
-        let all = kept.iter().enumerate().map(|(place, own)| (place, distance(commands_deg[*own])));
-        all.min_by(|a, b| a.1.total_cmp(&b.1))
-    };
-    let (before, back) = by(&|own| ahead(own, at))?;
-    let (after, forth) = by(&|own| ahead(at, own))?;
-    if back + forth > widest {
-        return None;
-    }
-    let share = back / (back + forth);
-    let [one, other] = [before, after].map(|place| found.errors(place));
-    let mean = |a: Vector3<f64>, b: Vector3<f64>| a * (1.0 - share) + b * share;
-    Some(Errors { shift: mean(one.shift, other.shift), angle: mean(one.angle, other.angle), ..one })
-}
-
-/// By how much standard uncertainties are larger than the noise makes them.
-pub(crate) struct Scale {
-    pub factor: f64,
-    pub remark: Option<String>,
-}
-
-/// Where the noise is not known, the residual gives it; where more is left than the noise explains, uncertainties grow with it.
-pub(crate) fn scale(found: &Fit, noise: Noise) -> Scale {
-    let left = found.chi2_per_dof();
-    if noise == Noise::Unknown {
-        let remark = if found.dof == 0 {
-            "neither `std_um` nor repeats give the noise, and no degrees of freedom are left: there are no standard \
-             uncertainties"
-                .to_owned()
-        } else {
-            format!(
-                "neither `std_um` nor repeats give the noise: standard uncertainties are from what the fit leaves, {:.2} µm \
-                 with {} degrees of freedom",
-                left.sqrt(),
-                found.dof
-            )
-        };
-        return Scale { factor: left.sqrt(), remark: Some(remark) };
-    }
-    let chance = 1.0 + 3.0 * (2.0 / found.dof.max(1) as f64).sqrt();
-    if left > chance {
-        let remark = format!(
-            "the fit leaves more than the noise: χ² per degree of freedom is {left:.2}, where chance makes up to {chance:.2}. \
-             The standard uncertainties are {:.2} times as large as the noise makes them; `diagnose` looks for the cause",
-            left.sqrt()
-        );
-        return Scale { factor: left.sqrt(), remark: Some(remark) };
-    }
-    Scale { factor: 1.0, remark: None }
-}
-
-fn noise_remark(noise: Noise) -> Option<String> {
-    match noise {
-        Noise::Repeats { std_um, dof } => {
-            let few = if dof < FEW_DEGREES { ": few" } else { "" };
-            Some(format!(
-                "the standard uncertainty of one coordinate of a row is the scatter of repeats after a common smooth drift: \
-                 {std_um:.2} µm with {dof} degrees of freedom{few}"
-            ))
-        }
-        _ => None,
-    }
 }

@@ -2,6 +2,8 @@
 //!
 //! Everything is in the machine's frame: errors are named as they act there, and places follow from isometries composed one after
 //! the other. Nothing is shared with the separator's equations.
+//!
+//! Long because what can be simulated, its check and the chain of bodies name the same errors.
 
 use std::collections::BTreeMap;
 

@@ -7,6 +7,8 @@
 //!
 //! Rotations are full: Gauss-Newton steps until they are below 10⁻⁶ µm. Angles count times a lever arm, so that all unknowns are mm.
 //! What the layout cannot observe is found once, at the nominal places and with unit weights.
+//!
+//! Long because all unknowns are of one system, and observability, solution and covariance are of its blocks.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 

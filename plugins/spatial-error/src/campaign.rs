@@ -26,6 +26,11 @@ const LARGE_UM: f64 = 2000.0;
 /// The largest deviation below this, in µm, looks like another unit.
 const SMALL_UM: f64 = 0.02;
 
+/// The same as a share of the extent of the places.
+const SMALL_SHARE: f64 = 2e-6;
+/// Share of the other components below which the largest deviation of one looks like another unit.
+const UNLIKE: f64 = 0.01;
+
 /// Columns of a campaign.
 pub const COLUMNS: [PointColumn; 9] = [
     PointColumn::needed("x_mm", Number, "mm", "command of X"),
@@ -110,6 +115,7 @@ impl Campaign {
             return Err(refuse(format!("row {} of the column `std_um` must be above 0 µm", row + 1)));
         }
         let mut remarks = looks_wrong(&rows, &readings_um);
+        remarks.extend(points.copies());
         let noise = match (stated, std_um) {
             (Some(stated), _) => Noise::Column(stated.to_vec()),
             (None, Some(std_um)) => Noise::Stated(std_um),
@@ -269,15 +275,31 @@ fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]]) -> Vec<String> {
             "the median deviation is {median:.0} µm: are `dx_um`, `dy_um`, `dz_um` in nm or places themselves?"
         ));
     }
-    if largest > 0.0 && largest < SMALL_UM {
-        remarks.push(format!("the largest deviation is {largest:.2e} µm: are `dx_um`, `dy_um`, `dz_um` in mm?"));
-    }
     let extent = (0..3)
         .map(|axis| {
             let each = || places.iter().map(|place| place[axis]);
             each().fold(f64::NEG_INFINITY, f64::max) - each().fold(f64::INFINITY, f64::min)
         })
         .fold(0.0, f64::max);
+    // No machine is as good as that over its travel, and a tracker is not placed so well.
+    let small_um = SMALL_UM.max(SMALL_SHARE * extent * 1e3);
+    let of_column = [0, 1, 2].map(|axis| readings_um.iter().map(|reading| reading[axis].abs()).fold(0.0, f64::max));
+    if largest > 0.0 && largest < small_um {
+        remarks.push(format!(
+            "the largest deviation is {largest:.2e} µm over {extent:.0} mm: are `dx_um`, `dy_um`, `dz_um` in mm?"
+        ));
+    } else {
+        for (axis, own) in of_column.into_iter().enumerate() {
+            let others =
+                (0..3).filter(|other| *other != axis).map(|other| of_column[other]).fold(f64::INFINITY, f64::min);
+            if own > 0.0 && own < small_um && own < UNLIKE * others {
+                remarks.push(format!(
+                    "`{}_um` is {own:.2e} µm at most, and the other components are {others:.1} µm or more: is it in mm?",
+                    COMPONENTS[axis]
+                ));
+            }
+        }
+    }
     if extent > 0.0 && extent < 10.0 && largest > 1.0 {
         remarks.push(format!("all places are within {extent:.3} mm: are `x_mm`, `y_mm`, `z_mm` in m?"));
     }

@@ -18,10 +18,11 @@ use crate::{
     conclusion::Conclusion,
     config::SpatialError,
     effects::{Candidate, candidates, jumps, missing},
+    level::level,
     likelihood::Prior,
     noise::Noise,
-    outcome::residual_um,
     solve::{Solution, families, prior, solve},
+    suspects::{Group, groups},
     terms::Term,
     trace::{Found, Tracing, is_observable},
 };
@@ -87,11 +88,15 @@ impl PointModel for SpatialError {
             Conclusion { separator: self, campaign: &campaign, solution: &before, names: &[] }.outcome()?;
         let mut outcome =
             Conclusion { separator: self, campaign: &campaign, solution: &after, names: &names }.outcome()?;
-        let unexplained: Vec<Unexplained> = strangers
+        let mut unexplained: Vec<Unexplained> = strangers
             .iter()
             .map(|found| self.unexplained(&campaign, &terms, &jumps[found.members[0]]))
             .collect::<Result<_>>()?;
+        if unexplained.is_empty() {
+            unexplained.extend(groups(&campaign, &after).iter().map(|group| together(&campaign, group)));
+        }
         let levels = [&before, &after].map(|solution| level(&campaign, solution));
+        let trend_std = after.trend_std(&campaign);
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
         let mut diagnosis = Diagnosis {
             verdict: verdict(&campaign, added.is_empty(), unexplained.is_empty()),
@@ -112,7 +117,12 @@ impl PointModel for SpatialError {
                         targets: effect.targets.clone(),
                         told_apart_by: (!alone).then(|| TOLD_APART_BY.to_owned()),
                         confounded_with,
-                        parameters: parameters(&candidates[found.members[0]], effect, &after, alone),
+                        parameters: parameters(
+                            &candidates[found.members[0]],
+                            effect,
+                            &after,
+                            alone.then_some(&trend_std),
+                        ),
                         change: None,
                         residual_rms_um: Step {
                             before: Some(pair[0].residual_rms_um),
@@ -217,6 +227,18 @@ impl SpatialError {
     }
 }
 
+/// Neighbouring places that err together.
+fn together(campaign: &Campaign, group: &Group) -> Unexplained {
+    let squares: f64 = group.by_um.iter().flatten().map(|by| by * by).sum();
+    Unexplained {
+        sensor: None,
+        setup: None,
+        orders: [0, 0],
+        rms_um: (squares / (3 * campaign.places_mm.len()) as f64).sqrt(),
+        place: format!("neighbouring places: {}", group.named(campaign)),
+    }
+}
+
 /// Takes effects that are declared with their values out of the readings.
 fn subtract_known(campaign: &mut Campaign, settings: &Settings) -> Result<()> {
     let kinds = missing();
@@ -250,7 +272,12 @@ fn subtract_known(campaign: &mut Campaign, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone: bool) -> Vec<Estimated> {
+fn parameters(
+    candidate: &Candidate,
+    effect: &Effect,
+    solution: &Solution,
+    trend_std: Option<&Vec<f64>>,
+) -> Vec<Estimated> {
     let names = &effect.parameters;
     let mut all = Vec::new();
     if let Some(order) = candidate.order {
@@ -261,64 +288,17 @@ fn parameters(candidate: &Candidate, effect: &Effect, solution: &Solution, alone
             unit: names[0].unit.clone(),
         });
     }
-    let trend_std = solution.trend_std();
     let rest = &names[usize::from(candidate.order.is_some())..];
     for (parameter, wanted) in rest.iter().zip(&candidate.terms) {
         let Some(column) = solution.terms.iter().position(|term| term == wanted) else { continue };
         all.push(Estimated {
             name: parameter.name.clone(),
             value: solution.joint.trend[column],
-            std: alone.then_some(trend_std[column]),
+            std: trend_std.map(|std| std[column]),
             unit: parameter.unit.clone(),
         });
     }
     all
-}
-
-/// How far a fit is from its readings.
-fn level(campaign: &Campaign, solution: &Solution) -> Level {
-    let residual = residual_um(campaign, solution);
-    let readings = (3 * residual.len()) as f64;
-    let squares: f64 = residual.iter().flatten().map(|left| left * left).sum();
-    let left_out = solution.left_out();
-    let each = || left_out.iter().flatten().filter(|one| one.std_um.is_finite());
-    let count = each().count().max(1) as f64;
-    let known = campaign.noise != Noise::Unknown;
-    let expected = known.then(|| expected_squares(campaign, solution)).flatten();
-    let finite = |value: f64| value.is_finite().then_some(value);
-    Level {
-        residual_rms_um: (squares / readings).sqrt(),
-        degrees_of_freedom: (3 * residual.len()).saturating_sub(solution.terms.len()),
-        noise_floor_um: expected.and_then(|expected| finite((expected / readings).sqrt())),
-        chi2_per_dof: expected.and_then(|expected| finite(squares / expected)),
-        held_out_rms_um: finite((each().map(|one| one.residual_um.powi(2)).sum::<f64>() / count).sqrt()),
-        held_out_expected_rms_um: known
-            .then(|| (each().map(|one| one.std_um.powi(2)).sum::<f64>() / count).sqrt())
-            .and_then(finite),
-        unit: None,
-        orders: None,
-    }
-}
-
-/// What the noise lets the squares of the residual be: of the mean at a place v²·P, of its repeats their scatter. `None` where
-/// predictions use neighbours.
-fn expected_squares(campaign: &Campaign, solution: &Solution) -> Option<f64> {
-    if solution.fitted.is_some() {
-        return None;
-    }
-    let projections = solution.projections();
-    let mut repeats = vec![0.0; campaign.places_mm.len()];
-    campaign.place_of.iter().for_each(|place| repeats[*place] += 1.0);
-    let mut expected = 0.0;
-    for axis in 0..3 {
-        for (place, projection) in projections.iter().enumerate() {
-            let noise = solution.noise_um2(campaign, place, axis);
-            expected += repeats[place] * noise * noise * projection[(axis, axis)];
-            // Scatter within a place: (n − 1)·σ², and σ² is n times the variance of the mean.
-            expected += (repeats[place] - 1.0) * repeats[place] * noise;
-        }
-    }
-    Some(expected)
 }
 
 fn verdict(campaign: &Campaign, nothing_added: bool, nothing_strange: bool) -> Verdict {

@@ -3,6 +3,8 @@
 //! y_c = X_c·b + f_c + noise, with f_c of covariance s²R(d) + n²·1 and one b for all fields c. b, its covariance and the weights
 //! of the prediction follow from the Cholesky factors of the fields' covariance matrices (Rasmussen, Williams, *Gaussian Processes
 //! for Machine Learning* (2006), section 2.7; Chilès, Delfiner, *Geostatistics* (2012), section 3.4).
+//!
+//! Long because fit and prediction share the factors of the covariance matrices.
 
 use faer::{
     Accum, Mat, MatRef, Par, Side,
@@ -83,7 +85,6 @@ pub struct Field {
     pub(crate) factor: Mat<f64>,
     /// L⁻¹X.
     pub(crate) white: Mat<f64>,
-    pub(crate) ln_determinant: f64,
 }
 
 /// A fit of all fields.
@@ -124,50 +125,94 @@ pub(crate) fn matrix(covariance: &Covariance, cloud: &Scaled, observed: &Observe
     all
 }
 
-impl Joint {
-    /// Fits the trend. `None` where a covariance matrix is not positive definite or the trend is not determined.
-    #[must_use]
-    pub fn new(data: &Data, covariances: &[Covariance]) -> Option<Self> {
+/// What one field adds to the equations of the trend.
+#[derive(Debug, Clone)]
+pub(crate) struct Sums {
+    /// XᵀK⁻¹X.
+    pub normal: DMatrix<f64>,
+    /// XᵀK⁻¹y.
+    pub right: DVector<f64>,
+    /// yᵀK⁻¹y.
+    pub squares: f64,
+    /// ln |K|.
+    pub ln_determinant: f64,
+}
+
+impl Sums {
+    /// Nothing but the scatter of repeats.
+    pub fn within(data: &Data) -> Self {
         let columns = data.columns();
-        let mut normal = DMatrix::<f64>::zeros(columns, columns);
-        let mut right = DVector::<f64>::zeros(columns);
-        let mut squares = 0.0;
-        let mut fields = Vec::with_capacity(covariances.len());
-        let mut white_readings = Vec::with_capacity(covariances.len());
-        for ((covariance, observed), design) in covariances.iter().zip(&data.observed).zip(&data.design) {
-            let cloud = Scaled::of(&data.places, covariance.range_mm);
-            let factor = factor(&matrix(covariance, &cloud, observed))?;
-            let count = data.places.len();
-            let mut white = Mat::<f64>::zeros(count, columns + 1);
-            for row in 0..count {
-                for column in 0..columns {
-                    white[(row, column)] = design[(row, column)];
-                }
-                white[(row, columns)] = observed.mean_um[row];
-            }
-            factor.as_ref().solve_lower_triangular_in_place(white.as_mut());
-            let mut products = Mat::<f64>::zeros(columns + 1, columns + 1);
-            matmul(products.as_mut(), Accum::Replace, white.transpose(), white.as_ref(), 1.0, Par::Seq);
-            for row in 0..columns {
-                for column in 0..columns {
-                    normal[(row, column)] += products[(row, column)];
-                }
-                right[row] += products[(row, columns)];
-            }
-            squares += products[(columns, columns)];
-            let ln_determinant = 2.0 * (0..count).map(|row| factor[(row, row)].ln()).sum::<f64>();
-            white_readings.push((0..count).map(|row| white[(row, columns)]).collect::<Vec<f64>>());
-            white.resize_with(count, columns, |_, _| 0.0);
-            fields.push(Field { covariance: *covariance, alpha: Vec::new(), cloud, factor, white, ln_determinant });
-        }
+        let (mut normal, mut right, mut squares) = (DMatrix::zeros(columns, columns), DVector::zeros(columns), 0.0);
         if let Some(within) = &data.within {
             normal += &within.design;
             right += &within.readings;
             squares += within.squares;
         }
-        let (trend, trend_covariance, ln_trend) = solve(&normal, &right)?;
-        squares -= trend.dot(&right);
-        let mut ln_determinant = 0.0;
+        Self { normal, right, squares, ln_determinant: 0.0 }
+    }
+
+    /// Adds those of a field.
+    pub fn add(&mut self, other: &Self) {
+        self.normal += &other.normal;
+        self.right += &other.right;
+        self.squares += other.squares;
+        self.ln_determinant += other.ln_determinant;
+    }
+
+    /// Trend, its covariance, ln of the restricted likelihood.
+    pub fn trend(&self) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
+        let (trend, covariance, ln_trend) = solve(&self.normal, &self.right)?;
+        let squares = self.squares - trend.dot(&self.right);
+        Some((trend, covariance, -0.5 * (self.ln_determinant + ln_trend + squares)))
+    }
+}
+
+impl Field {
+    /// A field of `data` before the trend is known, L⁻¹y, and its sums. `None` where its covariance matrix is not positive definite.
+    pub(crate) fn new(data: &Data, index: usize, covariance: &Covariance) -> Option<(Self, Vec<f64>, Sums)> {
+        let (observed, design) = (&data.observed[index], &data.design[index]);
+        let (columns, count) = (data.columns(), data.places.len());
+        let cloud = Scaled::of(&data.places, covariance.range_mm);
+        let factor = factor(&matrix(covariance, &cloud, observed))?;
+        let mut white = Mat::<f64>::zeros(count, columns + 1);
+        for row in 0..count {
+            for column in 0..columns {
+                white[(row, column)] = design[(row, column)];
+            }
+            white[(row, columns)] = observed.mean_um[row];
+        }
+        factor.as_ref().solve_lower_triangular_in_place(white.as_mut());
+        let mut products = Mat::<f64>::zeros(columns + 1, columns + 1);
+        matmul(products.as_mut(), Accum::Replace, white.transpose(), white.as_ref(), 1.0, Par::Seq);
+        let ln_determinant = 2.0 * (0..count).map(|row| factor[(row, row)].ln()).sum::<f64>();
+        let sums = Sums {
+            normal: DMatrix::from_fn(columns, columns, |row, column| products[(row, column)]),
+            right: DVector::from_fn(columns, |row, _| products[(row, columns)]),
+            squares: products[(columns, columns)],
+            ln_determinant,
+        };
+        let readings = (0..count).map(|row| white[(row, columns)]).collect();
+        white.resize_with(count, columns, |_, _| 0.0);
+        Some((Self { covariance: *covariance, alpha: Vec::new(), cloud, factor, white }, readings, sums))
+    }
+}
+
+impl Joint {
+    /// Fits the trend. `None` where a covariance matrix is not positive definite or the trend is not determined.
+    #[must_use]
+    pub fn new(data: &Data, covariances: &[Covariance]) -> Option<Self> {
+        let columns = data.columns();
+        let mut sums = Sums::within(data);
+        let mut fields = Vec::with_capacity(covariances.len());
+        let mut white_readings = Vec::with_capacity(covariances.len());
+        for (index, covariance) in covariances.iter().enumerate() {
+            let (field, readings, of_field) = Field::new(data, index, covariance)?;
+            sums.add(&of_field);
+            fields.push(field);
+            white_readings.push(readings);
+        }
+        let (trend, trend_covariance, ln_trend) = solve(&sums.normal, &sums.right)?;
+        let squares = sums.squares - trend.dot(&sums.right);
         for (field, readings) in fields.iter_mut().zip(white_readings) {
             let left = |row: usize| {
                 readings[row] - (0..columns).map(|column| field.white[(row, column)] * trend[column]).sum::<f64>()
@@ -175,9 +220,8 @@ impl Joint {
             let mut alpha = Mat::from_fn(readings.len(), 1, |row, _| left(row));
             field.factor.transpose().solve_upper_triangular_in_place(alpha.as_mut());
             field.alpha = (0..readings.len()).map(|row| alpha[(row, 0)]).collect();
-            ln_determinant += field.ln_determinant;
         }
-        Some(Self { fields, trend, trend_covariance, ln_determinant, ln_trend, squares })
+        Some(Self { fields, trend, trend_covariance, ln_determinant: sums.ln_determinant, ln_trend, squares })
     }
 }
 

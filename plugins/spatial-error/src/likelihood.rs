@@ -58,6 +58,12 @@ impl Prior {
         at.iter().zip(&self.centre).zip(&self.precision).map(term).sum()
     }
 
+    /// The same of one field's parameters.
+    pub(crate) fn ln_of(&self, field: usize, at: &DVector<f64>) -> f64 {
+        let part = |all: &DVector<f64>| all.rows(field * PARAMETERS, PARAMETERS).into_owned();
+        Self { centre: part(&self.centre), precision: part(&self.precision) }.ln(at)
+    }
+
     fn is_free(&self, parameter: usize) -> bool {
         self.precision[parameter].is_finite()
     }

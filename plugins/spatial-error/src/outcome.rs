@@ -176,7 +176,7 @@ impl Conclusion<'_> {
     fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]]) -> Vec<NamedValue> {
         let (campaign, solution) = (self.campaign, self.solution);
         let mut values = Vec::new();
-        let trend_std = solution.trend_std();
+        let trend_std = solution.trend_std(campaign);
         let fitted = |wanted: Term| {
             let column = solution.terms.iter().position(|term| *term == wanted);
             column.map_or([f64::NAN; 2], |column| [solution.joint.trend[column], trend_std[column]])

@@ -10,6 +10,7 @@ use crate::{
     neighbours::{NEAREST, Neighbours},
     noise::Noise,
     solve::{Solution, estimated_from},
+    suspects::{drift, groups},
     terms::Term,
 };
 
@@ -32,6 +33,13 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
         ));
     }
     all.extend(far_readings(campaign, left_out));
+    all.extend(groups(campaign, solution).iter().map(|group| {
+        format!(
+            "neighbouring places are far from what all others predict: {}; displaced points or bad readings, or an error that is not smooth",
+            group.named(campaign)
+        )
+    }));
+    all.extend(drift(campaign, solution));
     all
 }
 

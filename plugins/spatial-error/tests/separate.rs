@@ -289,3 +289,49 @@ fn nearest_neighbours_predict_what_all_places_do() {
     }
     assert!(near.notes.iter().any(|note| note.contains("beside the full solution")), "{:?}", near.notes);
 }
+
+#[test]
+fn displaced_neighbours_drifts_and_units_are_remarked() {
+    let remarks = |points: &runout_core::points::Points| {
+        let outcome = separator("query = { grid_mm = [300, 200, 175] }").separate(points).unwrap();
+        outcome.remarks.join("\n")
+    };
+    let made = scenario(21).simulate();
+    let clean = remarks(&made.points());
+    for text in ["neighbouring places", "readings drift", "in mm?", "copies"] {
+        assert!(!clean.contains(text), "{clean}");
+    }
+    // The corner of least x, y, z and its neighbours along x and y.
+    let mut all: Vec<[f64; 3]> = made.commands_mm.clone();
+    all.sort_by(|one, other| one.iter().sum::<f64>().total_cmp(&other.iter().sum()));
+    let corner = all[0];
+    let next = |axis: usize| {
+        let on = made.commands_mm.iter().filter(|place| {
+            (0..3).all(|other| (other == axis) != ((place[other] - corner[other]).abs() < 1e-9))
+        });
+        *on.min_by(|one, other| one[axis].total_cmp(&other[axis])).unwrap()
+    };
+    let displaced = [corner, next(0), next(1)];
+    let mut points = made.points();
+    for (row, place) in made.commands_mm.iter().enumerate() {
+        if displaced.contains(place) {
+            for (name, by) in [("dx_um", 30.0), ("dy_um", 25.0), ("dz_um", -30.0)] {
+                points.columns.iter_mut().find(|column| column.name == name).unwrap().values[row] += by;
+            }
+        }
+    }
+    let found = remarks(&points);
+    for [x, y, z] in displaced {
+        assert!(found.contains(&format!("({x}, {y}, {z}) mm by")), "{found}");
+    }
+    let mut drifts = made.points();
+    let count = made.commands_mm.len() as f64;
+    let dx = drifts.columns.iter_mut().find(|column| column.name == "dx_um").unwrap();
+    dx.values.iter_mut().enumerate().for_each(|(row, value)| *value += 20.0 * row as f64 / count);
+    assert!(remarks(&drifts).contains("readings drift from the first to the last: dx by"));
+    let mut in_mm = made.points();
+    for column in in_mm.columns.iter_mut().filter(|column| ["dx_um", "dy_um", "dz_um"].contains(&column.name.as_str())) {
+        column.values.iter_mut().for_each(|value| *value *= 1e-3);
+    }
+    assert!(remarks(&in_mm).contains("in mm?"));
+}

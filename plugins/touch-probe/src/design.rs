@@ -7,6 +7,7 @@ use runout_core::numerics::least_squares::{LeastNorm, SINGULAR, least_norm};
 
 use crate::{
     config::TouchProbeConfig,
+    correlation,
     effects::Missing,
     touches::{Touch, Touches},
     waves::{Part, angles, wave},
@@ -50,13 +51,16 @@ impl Content {
 pub(crate) struct Design {
     pub parameters: Vec<Parameter>,
     pub columns: Vec<Vec<f64>>,
+    /// Time of each touch.
+    time: Vec<f64>,
 }
 
 impl Design {
     /// The model of touches.
     pub fn new(config: &TouchProbeConfig, touches: &Touches, missing: &[Missing], content: &Content) -> Self {
         let Touches { all, setups, .. } = touches;
-        let mut design = Self { parameters: Vec::new(), columns: Vec::new() };
+        let mut design =
+            Self { parameters: Vec::new(), columns: Vec::new(), time: all.iter().map(|touch| touch.time).collect() };
         design.add(Parameter::Mean, all.iter().map(|_| 1.0).collect());
         for setup in setups.iter().copied() {
             for (axis, part) in [Part::Cosine, Part::Sine].into_iter().enumerate() {
@@ -143,6 +147,8 @@ pub(crate) struct Fitted {
     pub chi2_per_dof: f64,
     /// What is left of each touch, in µm.
     pub residual_um: Vec<f64>,
+    /// Correlation of touches that follow one another, where it is more than chance.
+    pub correlation: Option<f64>,
 }
 
 /// Standard deviation of each touch in µm, and where it is known from.
@@ -166,7 +172,7 @@ impl Design {
             |column: &Vec<f64>| used.iter().map(|row| column[*row] / weights.std_um[*row]).collect::<Vec<f64>>();
         let columns: Vec<Vec<f64>> = self.columns.iter().map(weigh).collect();
         let values: Vec<f64> = used.iter().map(|row| readings_um[*row] / weights.std_um[*row]).collect();
-        let solved = least_norm(&columns, &values, SINGULAR);
+        let mut solved = least_norm(&columns, &values, SINGULAR);
         let chi2: f64 = solved.residual.iter().map(|value| value * value).sum();
         let level = if solved.dof > 0 { chi2 / solved.dof as f64 } else { f64::NAN };
         let variance = match weights.noise {
@@ -175,9 +181,23 @@ impl Design {
             _ if solved.dof == 0 => 1.0,
             _ => level.max(1.0),
         };
+        let correlation = if solved.dof > 0 { self.correlate(&columns, &mut solved, used) } else { None };
         let residual_um = solved.residual.iter().zip(used).map(|(value, row)| value * weights.std_um[*row]).collect();
         let chi2_per_dof = if weights.noise == Noise::Residual { f64::NAN } else { level };
-        Fitted { design: self.clone(), solved, variance, chi2_per_dof, residual_um }
+        Fitted { design: self.clone(), solved, variance, chi2_per_dof, residual_um, correlation }
+    }
+}
+
+impl Design {
+    /// The correlation of the noise, and its part of the covariance.
+    fn correlate(&self, columns: &[Vec<f64>], solved: &mut LeastNorm, used: &[usize]) -> Option<f64> {
+        let mut order: Vec<usize> = (0..used.len()).collect();
+        order.sort_by(|one, other| self.time[used[*one]].total_cmp(&self.time[used[*other]]));
+        let matrix = DMatrix::from_fn(order.len(), columns.len(), |row, column| columns[column][order[row]]);
+        let residual: Vec<f64> = order.iter().map(|row| solved.residual[*row]).collect();
+        let found = correlation::of(&matrix, &solved.covariance, &residual, solved.dof)?;
+        solved.covariance = found.covariance;
+        Some(found.lag_one)
     }
 }
 

@@ -5,7 +5,7 @@ use runout_core::{
     model::{
         Effect, Fit, Setting,
         closed_loop::{self, Closed, Settings},
-        diagnosis::{Diagnosis, Moved, Unexplained, Verdict},
+        diagnosis::{BiasPerUnit, Blind, Diagnosis, Moved, Unexplained, Verdict},
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
@@ -180,6 +180,7 @@ impl TouchProbe {
         let (_, declared) = self.conclude(prepared, missing, &Content::declared(), &readings)?;
         let (_, mut after) = self.conclude(prepared, missing, &content(missing, &diagnosis), &readings)?;
         diagnosis.moved = moved(&declared, &after);
+        self.of_mean(&mut diagnosis, &after);
         if let Noise::Repeats(dof) = prepared.weights.noise {
             more_than_repeats(&mut diagnosis, &fit, dof);
         }
@@ -193,6 +194,40 @@ impl TouchProbe {
         after.tables.push(residual_rows(&self.0, &prepared.touches, &before, &left)?);
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after })
+    }
+
+    /// What the mean pre-travel holds besides: scales of the axes, and the time that it is of.
+    fn of_mean(&self, diagnosis: &mut Diagnosis, after: &Outcome) {
+        let arm = 1e-3 * self.0.ring_radius_mm;
+        diagnosis.blind_to.push(Blind {
+            effect: "axis-scale".into(),
+            targets: vec!["X and Y in common".into()],
+            bias_per_unit: BiasPerUnit { value: arm, unit: "um/(um/m)".into(), on: "mean pre-travel".into() },
+        });
+        let size = |id: &str, target: Option<&str>, parameter: &str| {
+            let found = diagnosis.added.iter().find(|added| {
+                added.effect == id && target.is_none_or(|target| added.targets.iter().any(|own| own == target))
+            })?;
+            found.parameters.iter().find(|one| one.name == parameter).map(|one| one.value)
+        };
+        let scale = size("axis-scale", None, "scale");
+        let drift = size("thermal-drift", Some("radius"), "change");
+        if let Some(scale) = scale {
+            diagnosis.warnings.push(format!(
+                "axis-scale is the difference of X and Y: `pretravel_mean` holds their mean. If only one of them has it, the mean is \
+                 wrong by {:.2} µm",
+                (0.5 * arm * scale).abs()
+            ));
+        }
+        let mean = after.values.iter().find(|value| value.symbol == "pretravel_mean").and_then(|value| value.value);
+        if let (Some(change), Some(mean)) = (drift, mean) {
+            diagnosis.warnings.push(format!(
+                "`pretravel_mean` is the mean of those at the first and the last touch; with the drift of the radius by {change:.2} µm it is \
+                 {:.2} µm at the first touch and {:.2} µm at the last",
+                mean - 0.5 * change,
+                mean + 0.5 * change
+            ));
+        }
     }
 
     fn name_place(&self, unexplained: &mut Unexplained, (setup, text): &(Option<usize>, String)) {

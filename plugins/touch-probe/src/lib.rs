@@ -6,6 +6,7 @@
 //! of a probe on three seats.
 
 mod config;
+mod correlation;
 mod design;
 mod diagnose;
 mod effects;

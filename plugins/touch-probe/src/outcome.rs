@@ -1,4 +1,6 @@
 //! From a fit to lobes, tables and values.
+//!
+//! Long because each table and value is declared beside what fills it, from one fit.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +8,10 @@ use runout_core::{
     Complex64, Result,
     model::diagnosis::LostOrders,
     separation::{Quantity, Residual, SectionAt, Separation},
-    stage::{Form, NamedValue, Outcome, points::value},
+    stage::{
+        Form, NamedValue, Outcome,
+        points::{far_below_noise, value},
+    },
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers, texts},
 };
 
@@ -236,8 +241,8 @@ impl Found<'_> {
 
     fn values(&self, lobes: &[Lobe]) -> Vec<NamedValue> {
         let [mean, std] = self.mean().unwrap_or([f64::NAN; 2]);
-        let about =
-            "mean pre-travel and stylus: reading less ring radius; holds the error of the ring's radius one to one";
+        let about = "mean pre-travel and stylus, over the time of the campaign: reading less ring radius; holds the error of the ring's radius, \
+             and a scale error common to X and Y, one to one";
         let mut values = vec![value("pretravel_mean", mean, std, "um", about)];
         let Ranges { before, after, without_form, by_repeats, .. } = self.ranges;
         let held = if by_repeats { "a repeat" } else { "touches" };
@@ -391,6 +396,16 @@ impl Found<'_> {
         }
         if self.fit.solved.dof == 0 {
             remarks.push("as many parameters as touches: nothing is left for a residual".into());
+        }
+        if let Some(correlation) = self.fit.correlation {
+            remarks.push(format!(
+                "touches that follow one another are correlated by {correlation:.2}: noise that varies slowly, a drift, or an order above \
+                 those declared. The stated uncertainties include a correlation of this size that decays with the touches between; evidence \
+                 of effects that vary slowly does not"
+            ));
+        }
+        if self.weights.noise != Noise::Residual {
+            remarks.extend(far_below_noise(self.fit.chi2_per_dof, self.fit.solved.dof));
         }
         let dof = self.fit.solved.dof.max(1) as f64;
         if self.fit.chi2_per_dof > 1.0 + 4.0 * (2.0 / dof).sqrt() {

@@ -120,7 +120,11 @@ impl PointSeparator for TouchProbe {
         let lost_lobing: &[usize] = if config.ring_form_um.is_some() { &[] } else { &lost };
         let mut notes = vec![lost_orders(&with_first(lost_lobing), &with_first(&lost))];
         notes.push("order 1 of lobing is centring of the ring: it is lost with any setups".into());
-        notes.push("the error of `ring_radius_mm` goes into the mean pre-travel one to one".into());
+        notes.push(format!(
+            "the error of `ring_radius_mm`, and a scale error common to X and Y (10 µm/m are {:.2} µm), go into the mean pre-travel one to \
+             one; with a drift of the radius it is the mean over the campaign, not that of the first touch",
+            1e-2 * config.ring_radius_mm
+        ));
         match (config.ring_form_um, lost.is_empty()) {
             (Some(bound), false) => notes.push(format!(
                 "lobing of orders {} is what is read, the form of the ring with it; its uncertainty includes the bound of {bound} µm",

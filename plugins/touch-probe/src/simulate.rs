@@ -4,6 +4,8 @@
 //! spring; its force tilts a plate that a preload presses on three seats. The seats' forces follow from the balance of forces and
 //! moments, and the electrical resistance of each seat grows as its force falls (F^(−1/3), Hertz). The probe triggers where the sum
 //! reaches a limit. All points are found by bisection. Nothing here is a harmonic of lobing, and nothing is shared with the solver.
+//!
+//! Long because what can be simulated, its check and the statics of the probe name the same parts.
 
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};

@@ -113,6 +113,7 @@ impl Touches {
         };
         touches.recentre(&vec![[0.0; 2]; config.setups.len()]);
         touches.suspect(&commanded, config)?;
+        touches.remarks.extend(points.copies());
         Ok(touches)
     }
 

@@ -78,3 +78,42 @@ fn the_range_after_compensation_beats_a_table() {
     assert!((14.0..20.0).contains(&before));
     assert!(after < 0.6 * 8.1, "{after}");
 }
+
+/// Noise of correlation 0.7 beside noise of the same size that is not correlated: the mean is within its stated uncertainty in both.
+#[test]
+fn correlated_touches_are_remarked_and_widen() {
+    let layout = setups(&[(0.0, 0.0), (100.0, 0.0), (217.0, 0.0)]);
+    let (mut squares, mut warned) = ([0.0; 2], [0; 2]);
+    const CAMPAIGNS: u64 = 12;
+    for seed in 0..CAMPAIGNS {
+        let mut scenario = scenario(seed, &layout);
+        scenario.std_um = 0.0;
+        scenario.repeats = 4;
+        let exact = scenario.touched().points();
+        let truth = lobing(&scenario).mean_um;
+        for (kind, rho) in [0.0_f64, 0.7].into_iter().enumerate() {
+            let mut points = exact.clone();
+            let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+            let mut uniform = || {
+                state ^= state << 13;
+                state ^= state >> 7;
+                state ^= state << 17;
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            let mut noise_um = 0.0;
+            for radius in &mut points.columns.iter_mut().find(|column| column.name == "radius_mm").unwrap().values {
+                let normal: f64 = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+                noise_um = rho * noise_um + (1.0 - rho * rho).sqrt() * 0.9 * normal;
+                *radius += 1e-3 * noise_um;
+            }
+            let outcome = config(&scenario, 15, None).separate(&points).unwrap();
+            warned[kind] += usize::from(outcome.remarks.iter().any(|remark| remark.contains("are correlated by")));
+            let mean = outcome.values.iter().find(|value| value.symbol == "pretravel_mean").unwrap();
+            squares[kind] += ((mean.value.unwrap() - truth) / mean.std.unwrap()).powi(2);
+        }
+    }
+    let chi2 = squares.map(|sum| sum / CAMPAIGNS as f64);
+    println!("{chi2:.2?} {warned:?}");
+    assert_eq!(warned, [0, CAMPAIGNS as usize]);
+    assert!(chi2.iter().all(|chi2| *chi2 < 2.5), "{chi2:?}");
+}

@@ -63,7 +63,7 @@ pub fn campaigns(count: u64, seed: u64, only: Option<Layout>) -> Result<Vec<Judg
 }
 
 /// The same of each campaign, in their order, on as many threads as there are processors.
-fn each<T: Send>(count: u64, seed: u64, judge: impl Fn(u64) -> Result<T> + Sync) -> Result<Vec<T>> {
+pub(crate) fn each<T: Send>(count: u64, seed: u64, judge: impl Fn(u64) -> Result<T> + Sync) -> Result<Vec<T>> {
     let workers = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let next = AtomicU64::new(0);
     let judged = Mutex::new(Vec::new());

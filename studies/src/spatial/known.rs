@@ -61,6 +61,12 @@ impl Known {
         Some(Self { places, field, inverse, mean, trend, normal_inverse })
     }
 
+    /// Displacements (µm) and rotations (µrad) of the placement, with standard uncertainty.
+    #[must_use]
+    pub fn placement(&self) -> [[f64; 2]; 6] {
+        [0, 1, 2, 3, 4, 5].map(|index| [self.trend[index], self.normal_inverse[(index, index)].sqrt()])
+    }
+
     /// Predictions, in µm.
     #[must_use]
     pub fn predict(&self, queries: &[[f64; 3]]) -> Vec<Vector3<f64>> {

@@ -2,6 +2,7 @@
 
 pub mod known;
 pub mod machine;
+pub mod placement;
 
 use std::fmt::Write as _;
 

@@ -16,6 +16,23 @@ use runout_error::Result;
 use runout_table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts};
 use runout_turning::{separation::Separation, surface::Surface};
 
+/// χ² per degree of freedom below which, and standard deviations of chance by which, a residual is far below its noise.
+const FAR_BELOW: [f64; 2] = [0.5, 5.0];
+
+/// Says that a residual is far below the noise that is stated or was found; nothing where it is not.
+#[must_use]
+pub fn far_below_noise(chi2_per_dof: f64, dof: usize) -> Option<String> {
+    let [share, deviations] = FAR_BELOW;
+    let chance = 1.0 - deviations * (2.0 / dof.max(1) as f64).sqrt();
+    (dof > 0 && chi2_per_dof < share.min(chance)).then(|| {
+        format!(
+            "χ² per degree of freedom is {chi2_per_dof:.2e}, far below 1: the residual is {:.2e} times the noise. The noise is stated too \
+             large, or noise or readings have another unit, or readings were smoothed or copied; standard uncertainties are not valid",
+            chi2_per_dof.max(0.0).sqrt()
+        )
+    })
+}
+
 /// Separates measured points as a whole.
 pub trait PointSeparator: Send + Sync {
     /// The columns that it needs of the points, and those that it can use.
