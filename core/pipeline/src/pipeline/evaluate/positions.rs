@@ -6,13 +6,19 @@ use super::{
 };
 use runout_standards::{
     Value,
-    cylindricity::{Generatrices, MedianLine, Points, Reference},
+    cylindricity::{Generatrices, MedianLine, Points, Reference, Section},
     position::{Axis, Positions},
-    uncertainty::Uncertainty,
+    uncertainty::{Errors, LARGEST, Uncertainty},
 };
 
 /// Draws of what is fitted to each of a wall's generatrices.
 const DRAWS_OF_LINES: usize = 200;
+/// Values of lines, in their order.
+const LINES: [&str; 5] = ["CYLtt", "STRsg", "STRsa", "coaxiality", "parallelism"];
+/// Those of them that are the largest size of what is linear in the form.
+const SIZES: [&str; 3] = ["CYLtt", "STRsg", "parallelism"];
+/// More times the largest error than any of these is.
+const LARGEST_SIZE: f64 = 6.0;
 
 impl Wall {
     /// Positions about the datum of the sections that are not in it, or why there are none.
@@ -99,27 +105,60 @@ impl Wall {
         let median_line = "ISO 12180-1:2011, straightness deviation of the extracted median line: a diameter";
         let parallelism = "ISO 1101:2017, parallelism: the largest of the generatrices";
         let labels = vec![
-            Label::new("CYLtt", "µm", "ISO 12180-1:2011, cylinder taper", "LSCY"),
-            Label::new("STRsg", "µm", generatrices, "LSLI of generatrices"),
-            Label::new("STRsa", "µm", median_line, "LSLI of the median line"),
-            Label::new("coaxiality", "µm", coaxiality, "LSCY"),
-            Label::new("parallelism", "µm", parallelism, "LSLI of the opposite generatrix"),
+            Label::new(LINES[0], "µm", "ISO 12180-1:2011, cylinder taper", "LSCY"),
+            Label::new(LINES[1], "µm", generatrices, "LSLI of generatrices"),
+            Label::new(LINES[2], "µm", median_line, "LSLI of the median line"),
+            Label::new(LINES[3], "µm", coaxiality, "LSCY"),
+            Label::new(LINES[4], "µm", parallelism, "LSLI of the opposite generatrix"),
         ];
-        let draws = (DRAWS_OF_LINES, DecidedBy::OneSection);
+        let work = (DRAWS_OF_LINES, DecidedBy::OneSection);
         let filter = Filter::low_pass(None);
-        let mut values = self.evaluate(&filter, labels, draws, About::Form, |sections, _, found| {
-            let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
-            let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
-            let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
-            found.push(lines.as_ref().map_or(f64::NAN, Generatrices::cyltt_um));
-            found.push(lines.as_ref().map_or(f64::NAN, Generatrices::largest_strt_um));
-            found.push(median.as_ref().map_or(f64::NAN, |median| median.straightness_um));
-            let coaxiality = median.iter().flat_map(|median| &median.coaxiality_um);
-            found.push(coaxiality.copied().fold(f64::NAN, f64::max));
-            found.push(lines.as_ref().map_or(f64::NAN, Generatrices::largest_parallelism_um));
-        });
+        let look = |sections: &[Section], _, found: &mut Vec<f64>| found.extend(self.of_lines(sections));
+        let mut values = self.evaluate(&filter, labels, work, About::Form, look);
         let all: Vec<usize> = (0..self.rings.len()).collect();
         self.diameters(&mut values, &filter, &all, &all);
+        self.sizes(&mut values, &filter);
         values
+    }
+
+    /// The values of [`LINES`]; NaN where there is none.
+    fn of_lines(&self, sections: &[Section]) -> [f64; 5] {
+        let lscy = Points::of_sections(self.radius_mm, sections).reference(Reference::LeastSquares);
+        let lines = lscy.as_ref().and_then(|lscy| Generatrices::of(sections, self.radius_mm, lscy));
+        let median = lscy.as_ref().map(|lscy| MedianLine::of(sections, self.radius_mm, lscy));
+        let coaxiality = median.iter().flat_map(|median| &median.coaxiality_um).copied().fold(f64::NAN, f64::max);
+        [
+            lines.as_ref().map_or(f64::NAN, Generatrices::cyltt_um),
+            lines.as_ref().map_or(f64::NAN, Generatrices::largest_strt_um),
+            median.as_ref().map_or(f64::NAN, |median| median.straightness_um),
+            coaxiality,
+            lines.as_ref().map_or(f64::NAN, Generatrices::largest_parallelism_um),
+        ]
+    }
+
+    /// Gives the largest sizes of lines an interval that holds near 0 too.
+    fn sizes(&self, values: &mut [Value], filter: &Filter) {
+        let errors = self.errors(filter).unwrap_or_default();
+        let most_um = LARGEST_SIZE * LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max);
+        let is_size =
+            |value: &&mut Value| SIZES.contains(&value.symbol.as_str()) && !centres::is_clear(value.value, most_um);
+        let mut values: Vec<&mut Value> = values.iter_mut().filter(is_size).collect();
+        if values.is_empty() || errors.is_empty() {
+            return;
+        }
+        let mut of_noise: Vec<[f64; 5]> = Vec::new();
+        let work = (DRAWS_OF_LINES, DecidedBy::OneSection);
+        self.on_angles(&self.angles, filter, work, About::Nothing, |sections, largest_um, found| {
+            let all = self.of_lines(sections);
+            found.extend(all);
+            if largest_um.is_some() {
+                of_noise.push(all);
+            }
+        });
+        for value in &mut values {
+            let Some(place) = LINES.iter().position(|symbol| *symbol == value.symbol) else { continue };
+            let of_noise = of_noise.iter().map(|all| all[place]).collect();
+            value.uncertainty = value.uncertainty.take().map(|known| centres::of_size(known, value.value, of_noise));
+        }
     }
 }

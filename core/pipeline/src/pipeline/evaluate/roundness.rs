@@ -137,7 +137,9 @@ impl Form {
             }
             let mut errors = ErrorsAt::new(&covariance, circle.points(), &self.noise);
             let mut certain = true;
-            let mut values = monte_carlo_of(DRAWS, DRAWS, |disturbed, found| {
+            // As wide as from whole profiles: draws about a form that holds its noise scatter too little.
+            let transforms = DRAWS.div_ceil(TURNS_OF_A_DRAW);
+            let mut values = monte_carlo_of(DRAWS, transforms, |disturbed, found| {
                 let values = if disturbed { circle.values_at(errors.draw(), largest_um) } else { Some(circle.about()) };
                 certain &= values.is_some();
                 add_values(values, *reference, found);

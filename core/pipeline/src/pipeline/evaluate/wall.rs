@@ -40,6 +40,8 @@ pub(super) enum About {
     Form,
     /// The form found, less the noise that it holds.
     WithoutNoise,
+    /// No form: the errors alone.
+    Nothing,
 }
 
 /// How many sections' errors a value depends on.
@@ -149,7 +151,7 @@ impl Wall {
         let found = found.map(|((value, _), (drawn, known))| {
             let known = known.map(|known| match about {
                 About::Form => known.moved(value - drawn),
-                About::WithoutNoise => known.of_value_with_noise(drawn, value),
+                About::WithoutNoise | About::Nothing => known.of_value_with_noise(drawn, value),
             });
             (value, known)
         });
@@ -157,7 +159,7 @@ impl Wall {
     }
 
     /// The same on these angles only.
-    fn on_angles(
+    pub(super) fn on_angles(
         &self,
         angles: &Angles,
         filter: &Filter,
@@ -170,6 +172,7 @@ impl Wall {
             let harmonics = match about {
                 About::Form => filter.harmonics(&ring.harmonics),
                 About::WithoutNoise => filter.harmonics(&without_noise(&ring.harmonics, &ring.variance)),
+                About::Nothing => Vec::new(),
             };
             let mut form_um = fourier.synthesise(harmonics).to_vec();
             ring.gaps.blank(&mut form_um);
