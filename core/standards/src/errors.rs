@@ -36,7 +36,7 @@ fn bits(seed: u64, number: u64) -> u64 {
 
 /// Draws of normal numbers from one seed, a stretch of the table each.
 #[derive(Debug, Clone, Copy)]
-struct Draws {
+pub(crate) struct Draws {
     seed: u64,
     /// Numbers that each draw has to itself.
     stride: usize,
@@ -45,8 +45,13 @@ struct Draws {
 }
 
 impl Draws {
+    /// From the seed of some noise, each draw of so many numbers.
+    pub(crate) fn new(noise: &Noise, stride: usize) -> Self {
+        Self { seed: noise.seed, stride, taken: 0 }
+    }
+
     /// The next so many numbers, in stretches of the table: from its end on they are those of its beginning.
-    fn next(&mut self, count: usize) -> impl Iterator<Item = &'static [Complex64]> + use<> {
+    pub(crate) fn next(&mut self, count: usize) -> impl Iterator<Item = &'static [Complex64]> + use<> {
         let first = bits(self.seed, 0) as usize % TABLE;
         let (mut from, mut left) = ((first + self.taken * self.stride) % TABLE, count);
         self.taken += 1;

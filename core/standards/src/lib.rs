@@ -5,6 +5,7 @@ pub mod control_chart;
 pub mod cylindricity;
 pub mod drawn;
 mod errors;
+mod errors_at;
 pub mod gaps;
 pub mod mean_deviation;
 mod near;

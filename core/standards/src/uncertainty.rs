@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
+pub use crate::errors_at::{Covariance, ErrorsAt};
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 
@@ -11,6 +12,8 @@ use runout_numerics::{Complex64, fourier::Fourier};
 pub const DRAWS: usize = 400;
 /// The largest error of a few hundred drawn profiles is about so many standard deviations.
 pub const LARGEST: f64 = 5.0;
+/// Share of errors in a mean square below which they are small.
+const SMALL_SHARE: f64 = 0.05;
 /// Share of the draws below the interval, and above it.
 const TAIL: f64 = 0.025;
 /// Amplitude of noise that 5 % of all are above, in standard deviations of its real part as they are known from so many real
@@ -173,6 +176,28 @@ pub fn monte_carlo<const N: usize>(
     });
     let all: Option<Vec<Uncertainty>> = found.into_iter().map(|(_, uncertainty)| uncertainty).collect();
     all?.try_into().ok()
+}
+
+/// The uncertainty of a root mean square about a centre that errors do not move, in closed form, from the harmonics and the variance
+/// E|δ|² of each by order from 0; those below 2 are taken as exact. `None` where no variance is known, or errors are more than a
+/// twentieth of the mean square.
+///
+/// q² = ½ Σ |cₙ|². With errors its mean is q² + ½ Σ σₙ² and its variance ½ Σ |cₙ|²σₙ² + ¼ Σ σₙ⁴; as one of many orders it is normal.
+#[must_use]
+pub fn of_rms(harmonics: &[Complex64], variance: &[f64], rms: f64) -> Option<Uncertainty> {
+    let (mut shift, mut spread) = (0.0, 0.0);
+    for (harmonic, variance) in harmonics.iter().zip(variance).skip(2).filter(|(_, variance)| **variance > 0.0) {
+        shift += 0.5 * variance;
+        spread += 0.5 * harmonic.norm_sqr() * variance + 0.25 * variance * variance;
+    }
+    let square = rms * rms;
+    if !(shift > 0.0 && shift < SMALL_SHARE * square) {
+        return None;
+    }
+    let reach = NORMAL_95 * spread.sqrt();
+    let [low, high] = [-reach, reach].map(|reach| (square + shift + reach).max(0.0).sqrt());
+    let interval_95 = [(2.0 * rms - high).max(0.0), 2.0 * rms - low];
+    Some(Uncertainty { std: (high - low) / (2.0 * NORMAL_95), interval_95, draws: 0 })
 }
 
 fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {

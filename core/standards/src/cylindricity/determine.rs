@@ -1,6 +1,6 @@
 //! Which reference cylinder of a wall is found how.
 
-use super::{Cylinder, Points, Reference, Undetermined, least_squares, search};
+use super::{Cylinder, Points, Reference, Undetermined, columns::Axis, least_squares, search};
 
 impl Points {
     /// The reference cylinder as [`determine`](Self::determine) finds it, without the reason where there is none.
@@ -39,12 +39,17 @@ impl Points {
         }
     }
 
+    /// The axis of a cylinder at the middle of these points, and its lean; `None` where they lie at one height.
+    pub(super) fn axis_of(&self, cylinder: &Cylinder) -> Option<Axis> {
+        let lean = [cylinder.slope_x_urad, cylinder.slope_y_urad].map(|slope| 1e-6 * slope * self.half_um);
+        let up = 1e-3 * (self.middle_mm - cylinder.z_mm);
+        let at = [cylinder.x_um + cylinder.slope_x_urad * up, cylinder.y_um + cylinder.slope_y_urad * up];
+        let determined = self.half_um > 0.0 && self.half_um.is_finite();
+        determined.then_some([at[0], at[1], lean[0], lean[1]])
+    }
+
     /// MZCY, MICY or MCCY, reached downhill from the axis of a cylinder nearby.
     pub(super) fn reference_near(&self, reference: Reference, near: &Cylinder) -> Option<Cylinder> {
-        let lean = [near.slope_x_urad, near.slope_y_urad].map(|slope| 1e-6 * slope * self.half_um);
-        let up = 1e-3 * (self.middle_mm - near.z_mm);
-        let at = [near.x_um + near.slope_x_urad * up, near.y_um + near.slope_y_urad * up];
-        let determined = self.half_um > 0.0 && self.half_um.is_finite();
-        determined.then(|| search::search(self, [at[0], at[1], lean[0], lean[1]], reference).ok())?
+        search::search(self, self.axis_of(near)?, reference).ok()
     }
 }

@@ -1,6 +1,6 @@
 //! A wall whose errors are drawn again and again.
 
-use super::{Cylinder, Points, Reference, Section, Values};
+use super::{Cylinder, Points, Reference, Section, Values, zone::Zone};
 use crate::near::{Course, Near};
 
 /// A wall about one reference cylinder. Only points that may come to touch it are looked at, where that is certain.
@@ -17,6 +17,7 @@ pub struct Disturbed {
     heights_mm: [f64; 2],
     /// Of each section, what the form is above its deviations about LSCY; empty where errors move LSCY.
     offset_um: Vec<Vec<f64>>,
+    zone: Option<Zone>,
 }
 
 impl Disturbed {
@@ -50,9 +51,12 @@ impl Disturbed {
             }
         }
         let heights = || sections.iter().map(|section| section.z_mm);
+        let forms = sections.iter().flat_map(|section| section.form_um).copied();
+        let is_zone = reference == Reference::MinimumZone;
+        let zone = if is_zone { Zone::new(points, forms, &cylinder, &near) } else { None };
         let at = near.points.iter().map(|point| all[*point]).collect();
         let heights_mm = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
-        Some(Self { reference, radius_mm, near, at, cylinder, about, heights_mm, offset_um })
+        Some(Self { reference, radius_mm, near, at, cylinder, about, heights_mm, offset_um, zone })
     }
 
     /// Values of the wall itself.
@@ -62,9 +66,9 @@ impl Disturbed {
     }
 
     /// Values of the wall with errors of at most `largest_um` in it. About other cylinders than LSCY, CYLq is that of the
-    /// points looked at.
+    /// points looked at, or NaN.
     #[must_use]
-    pub fn values(&self, drawn: &[Section], largest_um: f64) -> Option<Values> {
+    pub fn values(&mut self, drawn: &[Section], largest_um: f64) -> Option<Values> {
         match self.reference {
             Reference::LeastSquares if !self.offset_um.is_empty() => {
                 let each = drawn.iter().zip(&self.offset_um);
@@ -72,6 +76,9 @@ impl Disturbed {
                 each.reduce(Course::and).map(Values::from)
             }
             Reference::LeastSquares => self.of_all(drawn),
+            Reference::MinimumZone if self.zone.is_some() => {
+                self.zone.as_mut().and_then(|zone| zone.values(drawn)).or_else(|| self.of_all(drawn))
+            }
             _ => self.of_near(drawn, largest_um).or_else(|| self.of_all(drawn)),
         }
     }
@@ -148,7 +155,7 @@ mod tests {
             for reference in Reference::ALL {
                 let wall = sections(&rings, &angles);
                 let points = Points::of_sections(30.0, &wall);
-                let disturbed = Disturbed::new(reference, &wall, &points, 30.0, 8.0 * size, true).unwrap();
+                let mut disturbed = Disturbed::new(reference, &wall, &points, 30.0, 8.0 * size, true).unwrap();
                 for _ in 0..10 {
                     let errors = wall_of(size);
                     let largest = errors.iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
@@ -158,8 +165,9 @@ mod tests {
                     let quick = disturbed.values(&sections(&drawn, &angles), largest).unwrap();
                     let points = Points::of_sections(30.0, &sections(&drawn, &angles));
                     let slow = points.values(&points.reference(reference).unwrap());
-                    // Form²/R is neglected about LSCY.
-                    let exact = if reference == Reference::LeastSquares { 2e-3 * size } else { 1e-8 };
+                    // Errors times the form, over R, are neglected about LSCY and MZCY.
+                    let is_linear = [Reference::LeastSquares, Reference::MinimumZone].contains(&reference);
+                    let exact = if is_linear { 2e-3 * size } else { 1e-8 };
                     assert!((quick.cylt_um - slow.cylt_um).abs() < exact, "{reference:?} {size} {quick:?} {slow:?}");
                     if reference == Reference::LeastSquares {
                         assert!((quick.cylq_um - slow.cylq_um).abs() < exact, "{size} {quick:?} {slow:?}");

@@ -9,6 +9,7 @@ mod least_squares;
 mod lines;
 mod points;
 mod search;
+mod zone;
 
 use super::near::Course;
 pub use super::reference::{Reference, Undetermined};

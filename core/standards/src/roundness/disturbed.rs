@@ -74,27 +74,53 @@ impl<'a> Disturbed<'a> {
         match (self.reference, &self.fixed) {
             (Reference::LeastSquares, Some(fixed)) => Some(fixed.values(drawn)),
             (Reference::LeastSquares, None) => self.of_all(drawn),
-            _ => self.of_near(drawn).or_else(|| self.anew(drawn)).or_else(|| self.of_all(drawn)),
+            _ => self.of_near(drawn).or_else(|| self.anew(drawn.largest_um())).or_else(|| self.of_all(drawn)),
         }
+    }
+
+    /// The points that may come to touch.
+    #[must_use]
+    pub fn points(&self) -> &[usize] {
+        &self.near.points
+    }
+
+    /// Values of the profile with these errors at its [`points`](Self::points), where no error is above `largest_um`; RONq is NaN.
+    /// `None` where other points could touch, or about LSCI of an interrupted profile.
+    pub fn values_at(&mut self, errors_um: &[f64], largest_um: f64) -> Option<Values> {
+        if let Some(fixed) = &self.fixed {
+            return Some(fixed.values_at(&self.near.points, errors_um));
+        }
+        self.drawn_um.clear();
+        let errors = self.near.points.iter().zip(errors_um);
+        self.drawn_um.extend(errors.map(|(point, error)| self.form_um[*point] + error));
+        if self.reference == Reference::LeastSquares {
+            return None;
+        }
+        self.touching(largest_um).or_else(|| self.anew(largest_um))
     }
 
     /// From the points looked at; `None` where others could touch.
     fn of_near(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         self.drawn_um.clear();
         self.drawn_um.extend(self.near.points.iter().map(|point| self.form_um[*point] + drawn.at(*point)));
+        self.touching(drawn.largest_um())
+    }
+
+    /// From the contacts of the last draw.
+    fn touching(&mut self, largest_um: f64) -> Option<Values> {
         self.points.set_profile(&self.near_angles, &self.drawn_um, self.radius_mm);
         let Found { values, place, ends_um } = self.search.as_mut()?.values(&self.points, self.centre_um)?;
         let moved = (place[0] - self.centre_um[0]).hypot(place[1] - self.centre_um[1]);
-        self.near.suffice(ends_um, moved, drawn.largest_um()).then_some(values)
+        self.near.suffice(ends_um, moved, largest_um).then_some(values)
     }
 
     /// The same, sought anew.
-    fn anew(&mut self, drawn: &DrawnErrors) -> Option<Values> {
+    fn anew(&mut self, largest_um: f64) -> Option<Values> {
         let circle = self.points.reference(self.reference)?;
         let values = self.points.values(&circle);
         let ends_um = [circle.deviation_um - values.ronv_um, circle.deviation_um + values.ronp_um];
         let moved = (circle.x_um - self.centre_um[0]).hypot(circle.y_um - self.centre_um[1]);
-        self.near.suffice(ends_um, moved, drawn.largest_um()).then_some(values)
+        self.near.suffice(ends_um, moved, largest_um).then_some(values)
     }
 
     fn of_all(&mut self, drawn: &DrawnErrors) -> Option<Values> {
@@ -142,7 +168,13 @@ mod tests {
                     for _ in 0..20 {
                         let errors = wave(size);
                         let drawn: Vec<f64> = form.iter().zip(&errors).map(|(form, error)| form + error).collect();
-                        let quick = disturbed.values(&DrawnErrors::new(&errors)).unwrap();
+                        let drawn_errors = DrawnErrors::new(&errors);
+                        let quick = disturbed.values(&drawn_errors).unwrap();
+                        let near: Vec<f64> = disturbed.points().iter().map(|point| errors[*point]).collect();
+                        if let Some(at) = disturbed.values_at(&near, drawn_errors.largest_um()) {
+                            assert!((at.ront_um - quick.ront_um).abs() < 1e-9, "{reference:?} {size} {at:?} {quick:?}");
+                            assert!((at.ronp_um - quick.ronp_um).abs() < 1e-9, "{reference:?} {size} {at:?} {quick:?}");
+                        }
                         let mut points = Points::default();
                         points.set_profile(&angles, &drawn, 30.0);
                         let slow = points.values(&points.reference(reference).unwrap());

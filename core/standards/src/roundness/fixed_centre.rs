@@ -34,6 +34,14 @@ impl FixedCentre {
         Course::of(self.deviations.iter().copied()).into()
     }
 
+    /// Values of the deviations with errors added at these points, where the ends lie; RONq is NaN.
+    #[must_use]
+    pub fn values_at(&self, points: &[usize], errors: &[f64]) -> Values {
+        let disturbed = points.iter().zip(errors).map(|(point, error)| self.deviations[*point] + error);
+        let Course { low, high, .. } = Course::of(disturbed);
+        Course { low, high, squares: f64::NAN, points: self.deviations.len() }.into()
+    }
+
     /// Values of the deviations with errors added.
     #[must_use]
     pub fn values(&self, drawn: &DrawnErrors) -> Values {

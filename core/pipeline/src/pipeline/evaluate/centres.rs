@@ -3,11 +3,16 @@
 //! A distance of centres grows with noise, and draws about a wall that has it say little of one near 0. Centres are linear in the
 //! errors of order 1, so that no draw is needed: an error along x or y is known, and the distance is an amplitude. The largest of
 //! several distances changes by no more than the largest error of a centre.
+//!
+//! Taper, straightness of generatrices and parallelism are largest sizes of what is linear in the form: f(t + e) differs from
+//! f(t) by f(e) at most, which draws of the errors alone tell.
 
 use runout_standards::uncertainty::Uncertainty;
 
 /// Share of noise that the largest error of several centres exceeds.
 const BEYOND: f64 = 0.05;
+/// The same share of draws; fewer, as the quantile is known from some hundred of them.
+const OF_DRAWS_BEYOND: f64 = 0.025;
 /// From so many times the largest error on, draws tell the interval.
 const CLEAR: f64 = 4.0;
 
@@ -33,13 +38,31 @@ pub(super) fn std_um(z_mm: &[f64], variance: &[f64], place: usize, datums: &[usi
 /// it less to it plus the largest error that noise alone makes of so many centres. `std_um` is the largest of theirs.
 pub(super) fn of_diameter(known: Uncertainty, value_um: f64, std_um: f64, centres: usize) -> Uncertainty {
     let noise_um = 2.0 * std_um * (2.0 * (centres.max(1) as f64 / BEYOND).ln()).sqrt();
-    if value_um > CLEAR * noise_um {
+    near_noise(known, value_um, noise_um, 2.0 * std_um)
+}
+
+/// Of a value that errors change by no more than they make of a wall without form, from what draws of them alone make of it.
+pub(super) fn of_size(known: Uncertainty, value_um: f64, mut of_noise_um: Vec<f64>) -> Uncertainty {
+    of_noise_um.sort_by(f64::total_cmp);
+    let beyond = ((1.0 - OF_DRAWS_BEYOND) * of_noise_um.len() as f64) as usize;
+    let Some(noise_um) = of_noise_um.get(beyond).copied().filter(|noise_um| noise_um.is_finite()) else { return known };
+    let rms_um = (of_noise_um.iter().map(|noise| noise * noise).sum::<f64>() / of_noise_um.len() as f64).sqrt();
+    near_noise(known, value_um, noise_um, rms_um)
+}
+
+/// Whether a value is so far above such a noise that draws about the form tell its interval.
+pub(super) fn is_clear(value_um: f64, noise_um: f64) -> bool {
+    value_um > CLEAR * noise_um
+}
+
+fn near_noise(known: Uncertainty, value_um: f64, noise_um: f64, std_um: f64) -> Uncertainty {
+    if is_clear(value_um, noise_um) {
         return known;
     }
     Uncertainty {
-        std: known.std.max(2.0 * std_um),
+        std: known.std.max(std_um),
         interval_95: [(value_um - noise_um).max(0.0), value_um + noise_um],
-        draws: 0,
+        draws: known.draws,
     }
 }
 

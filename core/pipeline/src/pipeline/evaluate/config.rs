@@ -62,12 +62,27 @@ pub struct EvaluateConfig {
     /// Places of a face at which face error motion is evaluated, besides those of the rig's axial sensors off the axis: where
     /// a tool stands.
     pub faces: Option<Vec<FacePlaceConfig>>,
+    /// How the errors of a profile become those of its roundness values; without it `linear`.
+    pub uncertainty: Option<Propagation>,
     /// What texture values are of, besides λs and λc.
     #[serde(default)]
     pub texture: TextureConfig,
     /// How areal and twist values are made of the surface, besides λs and λc.
     #[serde(default)]
     pub areal: ArealConfig,
+}
+
+/// How the errors of a profile become those of its roundness values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Propagation {
+    /// RONq in closed form, extremes from errors drawn at the points that may come to touch; whole profiles are drawn where this is not
+    /// exact enough (an interruption, large errors, many such points).
+    #[default]
+    Linear,
+    /// Whole profiles are drawn for all of them (JCGM 101:2008).
+    MonteCarlo,
 }
 
 /// A place of a face.
@@ -398,6 +413,7 @@ pub struct Evaluate {
     pub(super) robust_filter_upr: Vec<f64>,
     pub(super) slope_window_deg: Option<f64>,
     pub(super) harmonics_upr: usize,
+    pub(super) propagation: Propagation,
     pub(super) datum: Vec<String>,
     pub(super) lambda_c_mm: Option<f64>,
     pub(super) lambda_s_mm: Option<f64>,
@@ -421,6 +437,7 @@ impl Default for Evaluate {
             robust_filter_upr: Vec::new(),
             slope_window_deg: None,
             harmonics_upr: 15,
+            propagation: Propagation::default(),
             datum: Vec::new(),
             lambda_c_mm: None,
             lambda_s_mm: None,
@@ -548,6 +565,7 @@ impl EvaluateConfig {
             robust_filter_upr: once_each(self.robust_filter_upr.unwrap_or_default()),
             slope_window_deg: self.slope_window_deg,
             harmonics_upr: self.harmonics_upr.unwrap_or(usual.harmonics_upr),
+            propagation: self.uncertainty.unwrap_or_default(),
             datum: once_each(self.datum.unwrap_or_default()),
             lambda_c_mm: self.lambda_c_mm,
             lambda_s_mm: self.lambda_s_mm,

@@ -3,17 +3,22 @@
 mod areal;
 mod centres;
 mod config;
+mod cylindricity;
 mod filter;
 mod generatrix;
 mod limit;
 mod limit_check;
 mod part;
+mod positions;
+mod roundness;
 mod section;
 mod texture;
+mod wall;
 
 pub(super) use areal::add_areal;
 pub use config::{
-    ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FacePlaceConfig, FormRemoval, Group, Groups, TextureConfig,
+    ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FacePlaceConfig, FormRemoval, Group, Groups, Propagation,
+    TextureConfig,
 };
 pub(super) use generatrix::add_generatrices;
 pub(super) use limit::decide;

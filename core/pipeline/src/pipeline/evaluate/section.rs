@@ -1,20 +1,12 @@
-//! Values of one section: roundness around the part.
-
-use std::borrow::Cow;
+//! Values of one section around the part.
 
 use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
-use runout_numerics::{
-    Complex64,
-    filter::{Degree, Smoother, robust_gaussian},
-    fourier::Fourier,
-};
+use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
-    roundness::{Angles, Disturbed, Points, Reference, Series, Values},
-    slope::{Drawn, steepest_um_per_rad},
+    roundness::{Angles, Points, Reference},
     uncertainty::{
-        DRAWS, Errors, LARGEST, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, extreme, monte_carlo_of, noise_95,
-        seed, stand_in, student_95,
+        DRAWS, Errors, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, monte_carlo_of, noise_95, seed, student_95,
     },
 };
 use runout_turning::{
@@ -89,7 +81,7 @@ pub(super) struct Form {
     pub(super) radius_mm: f64,
     pub(super) at: SectionAt,
     /// What its errors are drawn from, for all of its values.
-    noise: Noise,
+    pub(super) noise: Noise,
 }
 
 impl Form {
@@ -132,7 +124,7 @@ impl Form {
         let mut values = Vec::new();
         for cutoff in evaluate.cutoffs_upr(self.held.highest) {
             let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
-            values.extend(self.round(&evaluate.low_pass(cutoff), references));
+            values.extend(self.round(&evaluate.low_pass(cutoff), references, evaluate.propagation));
             if cutoff.is_none() && evaluate.has(Group::Texture) {
                 values.extend(self.papers_ra());
             }
@@ -148,26 +140,6 @@ impl Form {
         }
         values.extend(self.texture(evaluate));
         values
-    }
-
-    /// Roundness behind the robust Gaussian (ISO 16610-31), which is applied to each drawn profile.
-    fn robust(&self, cutoff_upr: f64, references: &[Reference]) -> Vec<Value> {
-        let filter = Filter::robust(cutoff_upr);
-        let labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
-        let smoother = Smoother::closed(self.angles, cutoff_upr, Degree::Two);
-        let (angles, mut points) = (Angles::equal(self.angles), Points::default());
-        let found = self.evaluate(&Filter::low_pass(None), self.angles, DRAWS_OF_ROBUST, |profile_um, found| {
-            points.set_profile(&angles, &robust_gaussian(&smoother, profile_um).low_pass, self.radius_mm);
-            for reference in references {
-                let about = points.reference(*reference).map(|circle| points.values(&circle));
-                add_values(about, *reference, found);
-            }
-        });
-        let found = found.into_iter().zip(&labels).map(|((value, known), label)| {
-            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
-        });
-        let found = found.collect();
-        self.labelled(labels, found, &filter)
     }
 
     /// The largest change of the profile over a window of angles, r(α + w) − r(α): a profile of its own, with the harmonics
@@ -229,7 +201,7 @@ impl Form {
 
     /// Everything that is computed from one filtered profile on equal angles, with what so many draws of its errors make of
     /// it.
-    fn evaluate(
+    pub(super) fn evaluate(
         &self,
         filter: &Filter,
         angles: usize,
@@ -268,131 +240,12 @@ impl Form {
         Errors::sharing(&self.widened(filter), 2, &self.noise)
     }
 
-    fn labelled(&self, labels: Vec<Label>, found: Vec<(f64, Option<Uncertainty>)>, filter: &Filter) -> Vec<Value> {
+    pub(super) fn labelled(
+        &self,
+        labels: Vec<Label>,
+        found: Vec<(f64, Option<Uncertainty>)>,
+        filter: &Filter,
+    ) -> Vec<Value> {
         labelled(labels, found, filter, &self.held, self.at.coverage(self.angles))
-    }
-
-    fn round(&self, filter: &Filter, references: &[Reference]) -> Vec<Value> {
-        let mut labels: Vec<Label> = references.iter().flat_map(|reference| roundness_labels(*reference)).collect();
-        if labels.is_empty() {
-            return Vec::new();
-        }
-        let drawn = self.drawn_about(filter, references);
-        let drawn = drawn.into_iter().map(Some).chain(std::iter::repeat(None));
-        let found = self.about(filter, references).into_iter().zip(drawn);
-        let found = found.zip(&labels).map(|((value, drawn), label)| {
-            let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
-            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
-        });
-        let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
-        if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
-            let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
-            let reference = Reference::LeastSquares.symbol();
-            labels.insert(last + 1, Label::new("dr/dtheta", "µm/°", steepest, reference));
-            found.insert(last + 1, self.steepest(filter));
-        }
-        self.labelled(labels, found, filter)
-    }
-
-    /// Values about reference circles, of the profile between the angles too.
-    fn about(&self, filter: &Filter, references: &[Reference]) -> Vec<f64> {
-        let waves = filter.highest(self.held.highest);
-        // The given angles and others between them, so that no crest is far from one.
-        let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
-        let harmonics = filter.harmonics(&self.harmonics);
-        let mut fourier = Fourier::new(angles);
-        let mut profile_um = Cow::Borrowed(fourier.synthesise(harmonics.iter().copied()));
-        if !self.at.gaps.is_empty() {
-            self.at.gaps.blank(profile_um.to_mut());
-        }
-        let mut series = Series::new(&harmonics, &profile_um, self.radius_mm);
-        let mut found = Vec::new();
-        for reference in references {
-            let about = series.about(*reference).ok().map(|found| found.1);
-            add_values(about, *reference, &mut found);
-        }
-        found
-    }
-
-    /// The same of the profile at fewer angles, with what draws of its errors make of them; nothing without known errors.
-    fn drawn_about(&self, filter: &Filter, references: &[Reference]) -> Vec<(f64, Option<Uncertainty>)> {
-        let Some(mut errors) = self.errors(filter) else { return Vec::new() };
-        let waves = filter.highest(self.held.highest);
-        let angles = Angles::shared((DRAWN_POINTS_A_WAVE * waves).next_power_of_two().min(self.angles));
-        let mut fourier = Fourier::new(angles.len());
-        let profile_um = self.profile(filter, &mut fourier);
-        let usual_um = LARGEST * errors.std_um();
-        let about = |reference: &Reference| {
-            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um))
-        };
-        let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
-        monte_carlo_of(DRAWS, DRAWS.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
-            let drawn = disturbed.then(|| errors.turned(&mut fourier));
-            for (reference, circle) in &mut circles {
-                let values = match (circle, &drawn) {
-                    (Some(circle), Some(drawn)) => circle.values(drawn),
-                    (Some(circle), None) => Some(circle.about()),
-                    (None, _) => None,
-                };
-                add_values(values, *reference, found);
-            }
-        })
-    }
-
-    /// The steepest slope, µm/°, from the harmonics. High orders count by their number, and noise with them: it is drawn
-    /// about a profile that stands for the truth.
-    fn steepest(&self, filter: &Filter) -> (f64, Option<Uncertainty>) {
-        let harmonics = filter.harmonics(&self.harmonics);
-        let value = steepest_um_per_rad(&harmonics, &self.at.gaps).to_radians();
-        let variance = filter.variance(&self.variance);
-        let of_slopes: Vec<f64> = (variance.iter().enumerate())
-            .map(|(order, variance)| variance * (order as f64).to_radians().powi(2))
-            .collect();
-        let Some(mut errors) = Errors::sharing(&of_slopes, 2, &self.noise) else { return (value, None) };
-        let weights = stand_in(&harmonics, &variance, 2);
-        let likely = harmonics.iter().zip(weights).enumerate();
-        let likely = likely.map(|(order, (value, weight))| Complex64::I * (order as f64).to_radians() * value * weight);
-        let waves = filter.highest(self.held.highest).max(2);
-        let mut fourier = Fourier::new((DRAWN_POINTS_A_WAVE * waves).next_power_of_two());
-        let mut likely = fourier.synthesise(likely).to_vec();
-        self.at.gaps.blank(&mut likely);
-        let about = Drawn::about(&likely);
-        let draws = (0..DRAWS).map(|_| about.steepest(&errors.turned(&mut fourier)));
-        let known = extreme(value, about.undisturbed(), draws.collect()).map(|(_, known)| known);
-        (value, known)
-    }
-}
-
-/// Draws of what is filtered robustly, point by point and some times over.
-const DRAWS_OF_ROBUST: usize = 64;
-
-/// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
-const DRAWN_POINTS_A_WAVE: usize = 6;
-
-/// RONt, and about LSCI RONp, RONv and RONq.
-fn roundness_labels(reference: Reference) -> Vec<Label> {
-    let ron = |symbol, meaning: &str| {
-        Label::new(symbol, "µm", format!("ISO 12181-1:2011, {meaning} roundness deviation"), reference.symbol())
-    };
-    let mut labels = vec![ron("RONt", "peak-to-valley")];
-    if reference == Reference::LeastSquares {
-        labels.extend([ron("RONp", "peak-to-reference"), ron("RONv", "reference-to-valley")]);
-        labels.push(ron("RONq", "root mean square"));
-    }
-    labels
-}
-
-/// Whether errors change which contacts hold the circle that a value is about, and with them the value's slopes.
-fn has_kinks(label: &Label) -> bool {
-    let about = [Reference::MaximumInscribed, Reference::MinimumCircumscribed];
-    label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
-}
-
-/// The values of [`roundness_labels`]; NaN where there is no such circle.
-fn add_values(about: Option<Values>, reference: Reference, found: &mut Vec<f64>) {
-    let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
-    found.push(of(|values| values.ront_um));
-    if reference == Reference::LeastSquares {
-        found.extend([of(|values| values.ronp_um), of(|values| values.ronv_um), of(|values| values.ronq_um)]);
     }
 }

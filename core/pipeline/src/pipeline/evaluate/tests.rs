@@ -611,6 +611,57 @@ fn intervals_of_positions_hold_the_truth() {
     assert!(inside.iter().all(|(_, inside)| *inside >= 50), "{inside:?}");
 }
 
+/// Walls that are straight and parallel, and walls that are less and less so: the values grow with noise, and their intervals
+/// hold the truth.
+#[test]
+fn intervals_of_lines_hold_from_zero_on() {
+    const TRIALS: u64 = 40;
+    let variance = 4e-4;
+    for form_um in [0.0, 0.005, 0.03, 0.3] {
+        let mut inside: Vec<(String, usize)> = Vec::new();
+        for trial in 0..TRIALS {
+            let mut random = ChaCha8Rng::seed_from_u64(trial);
+            let mut waves = |size: f64| -> Vec<Complex64> {
+                let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+                let level = Complex64::from(size * 2.0_f64.sqrt() * normal());
+                std::iter::once(level).chain((1..=6).map(|_| size * Complex64::new(normal(), normal()))).collect()
+            };
+            let truth: Vec<Vec<Complex64>> = (0..5).map(|_| waves(form_um)).collect();
+            let found: Vec<Vec<Complex64>> = truth
+                .iter()
+                .map(|ring| ring.iter().zip(waves((0.5_f64 * variance).sqrt())).map(|(a, b)| a + b).collect())
+                .collect();
+            let of = |rings: &[Vec<Complex64>], variance| {
+                let stations: Vec<StationResult> = (rings.iter().zip([0.0, 10.0, 20.0, 30.0, 40.0]))
+                    .map(|(waves, z)| {
+                        let waves: Vec<(usize, Complex64)> = waves.iter().copied().enumerate().collect();
+                        let mut station = station(z, &waves, 6, variance, &[]);
+                        (station.station, station.angles) = (format!("{z} {trial}"), 24);
+                        station
+                    })
+                    .collect();
+                let mut builder = SurfaceBuilder::new(&SurfaceConfig { angles: 36, step_mm: None });
+                stations.iter().for_each(|station| builder.add(station));
+                let evaluate = evaluate("references = ['LSCI']\nfilter_upr = []").unwrap();
+                let values = part_summary(builder.sections(), 36, &evaluate, RADIUS_MM, true).unwrap().values;
+                values.into_iter().filter(|value| ["CYLtt", "STRsg", "parallelism"].contains(&&*value.symbol))
+            };
+            let (exact, found): (Vec<Value>, Vec<Value>) =
+                (of(&truth, f64::NAN).collect(), of(&found, variance).collect());
+            inside.resize(exact.len(), (String::new(), 0));
+            for ((name, inside), (exact, found)) in inside.iter_mut().zip(exact.iter().zip(&found)) {
+                let [low, high] = found.uncertainty.as_ref().unwrap().interval_95;
+                name.clone_from(&exact.symbol);
+                // A form of nothing has rounding.
+                *inside += usize::from((low - 1e-9..=high).contains(&exact.value));
+            }
+        }
+        println!("{form_um} µm: {inside:?} of {TRIALS}");
+        // 95 % of 40 are 38 ± 1.4.
+        assert!(inside.len() == 3 && inside.iter().all(|(_, inside)| *inside >= 34), "{form_um}: {inside:?}");
+    }
+}
+
 #[allow(clippy::type_complexity, reason = "taken apart at once by the test")]
 fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
     let uncertainty =
