@@ -2,7 +2,6 @@
 
 use super::{Evaluate, Group, PartSummary, wall::Wall};
 use runout_numerics::threads;
-use runout_standards::Value;
 use runout_turning::surface;
 
 /// Angles at which a wall is looked at, at most: a surface's usual ones.
