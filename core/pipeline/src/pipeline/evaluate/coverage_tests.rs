@@ -1,4 +1,6 @@
-//! How often stated intervals of texture and areal values hold the truth.
+//! How often stated intervals of roundness, texture and areal values hold the truth.
+//!
+//! Long because all of them simulate the same spectra.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; some print tables for the documentation")]
 
 use std::f64::consts::{PI, SQRT_2, TAU};
