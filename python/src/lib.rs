@@ -1,7 +1,7 @@
 //! `runout._native`: the pipeline for the Python package, which gives it names and types.
 //!
 //! Documents cross the border as JSON, which both sides read and print to the last bit; samples, tables and surfaces cross it as
-//! memory. Every piece of work runs beside the interpreter ([`work`]), so that other threads of Python go on.
+//! memory. Every piece of work runs beside the interpreter (`work`), so that other threads of Python go on.
 
 mod arrays;
 mod calls;

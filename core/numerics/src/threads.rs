@@ -24,8 +24,7 @@ pub fn alone<T>(work: impl FnOnce() -> T) -> T {
 }
 
 /// Whether this thread does all its work alone.
-#[must_use]
-pub fn is_alone() -> bool {
+fn is_alone() -> bool {
     ALONE.get()
 }
 

@@ -1,8 +1,8 @@
 //! A look at every sample before anything else touches it: what is not a number, clipped or dead is found here.
 //!
 //! - A value that is not finite is replaced by the channel's last good one (0 before the first), so that recursive
-//!   filters stay finite, and marked as [`DefectKind::NotFinite`]; so is one beyond [`FARTHEST_UM`], as
-//!   [`DefectKind::OutOfReach`].
+//!   filters stay finite, and marked as [`DefectKind::NotFinite`](crate::measurement::DefectKind::NotFinite); so is one beyond [`FARTHEST_UM`], as
+//!   [`DefectKind::OutOfReach`](crate::measurement::DefectKind::OutOfReach).
 //! - Integer data is clipped where at least [`LIMIT_RUN`] samples in a row stand at the converter's limit.
 //! - Other data gives no limit. There, a run of equal samples at the channel's extreme so far is clipped if it is at least
 //!   [`FLAT_RUN`] samples and [`FLAT_RUN_TURN`] of a turn long *and* the signal came to it steeply. A quantised signal

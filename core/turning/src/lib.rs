@@ -40,7 +40,7 @@ pub mod provenance;
 pub mod reading;
 pub mod rig;
 pub mod separation;
-pub mod smoothing;
+mod smoothing;
 pub mod spread;
 pub mod station;
 pub mod surface;

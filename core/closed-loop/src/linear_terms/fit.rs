@@ -13,7 +13,7 @@ use runout_numerics::{
     least_squares::{Basis, dot},
 };
 
-/// A fit of [`LinearTerms`].
+/// A fit of [`LinearTerms`](super::LinearTerms).
 #[derive(Debug, Clone)]
 pub struct LinearFit {
     data: Arc<Data>,

@@ -16,8 +16,7 @@ use crate::Complex64;
 
 /// Transmission of the Gaussian low-pass of a closed profile (ISO 16610-21) at a frequency f: H = exp(−π (α f/f_c)²) with
 /// α = √(ln 2/π), which is 2^−(f/f_c)². Both in undulations per revolution, the cut-off above 0.
-#[must_use]
-pub fn transmission(order_upr: f64, cutoff_upr: f64) -> f64 {
+fn transmission(order_upr: f64, cutoff_upr: f64) -> f64 {
     (-(order_upr / cutoff_upr).powi(2)).exp2()
 }
 

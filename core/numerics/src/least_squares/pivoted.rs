@@ -5,7 +5,7 @@ use crate::Complex64;
 /// A x ≈ b for a small dense A, factored once: A·S·Π = Q·R with columns scaled to norm 1 (S) and pivoted (Π).
 ///
 /// Golub, Van Loan, *Matrix Computations*, 4th ed., algorithm 5.4.1 (QR with column pivoting); where the rank is less
-/// than the number of columns, [`solve`](Self::solve) gives the basic solution: unknowns beyond the rank are 0.
+/// than the number of columns, [`operator`](Self::operator) gives the basic solution: unknowns beyond the rank are 0.
 #[derive(Debug, Clone)]
 pub struct PivotedQr {
     rows: usize,

@@ -14,7 +14,7 @@ mod point_run;
 mod read_ahead;
 mod record_reader;
 pub mod registry;
-pub mod result;
+mod result;
 mod result_writer;
 pub mod run;
 mod station_summary;

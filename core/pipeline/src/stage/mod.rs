@@ -1,14 +1,14 @@
 //! The stages of a pipeline: one trait a file. A plugin implements one of them.
 
 pub mod check;
-pub mod exporter;
-pub mod loader;
-pub mod overview;
-pub mod plan;
+mod exporter;
+mod loader;
+mod overview;
+mod plan;
 pub mod points;
 pub mod preprocessor;
 pub mod separator;
-pub mod simulator;
+mod simulator;
 
 pub use crate::summary::NamedValue;
 pub use check::{Check, Planned};

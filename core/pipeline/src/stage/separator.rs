@@ -104,9 +104,8 @@ pub struct Station {
     pub profiles: Vec<Profile>,
 }
 
-/// What a separator is built with besides its own configuration.
-#[must_use]
-pub fn rig_needed() -> Fault {
+/// The fault of a separator without its rig.
+fn rig_needed() -> Fault {
     Fault::at("plugin", "this separator needs a [rig]").help("describe sensors and setups in [rig]")
 }
 

@@ -1,5 +1,5 @@
 //! Separators: each gives one linear operator an order; solving, second-order geometry and uncertainty are those of
-//! [`solve`](crate::solve).
+//! `solve`.
 
 pub mod closed_form;
 pub mod donaldson_reversal;
