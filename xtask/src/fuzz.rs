@@ -19,7 +19,7 @@ use worker::{Answer, Worker};
 /// Longer is a hang, where it is that again: other programs may have had the processor.
 const LONGEST: Duration = Duration::from_secs(5);
 /// No answer comes after this time.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 /// Memory that is allowed beyond four times the input.
 const ALLOWANCE_KB: u64 = 100_000;
 /// A process does so many inputs, and the next one the next.

@@ -1,6 +1,6 @@
 //! Channels whose readings are a thousand times larger or smaller than those of the others: numbers in another unit.
 
-use runout_core::rig::Rig;
+use runout_core::{Complex64, rig::Rig};
 
 use crate::solve::Readings;
 
@@ -17,11 +17,7 @@ pub fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
     let sensors = rig.sensors.len();
     let size = |sensor: usize| {
         let orders = readings.mean.chunks_exact(readings.count).skip(1);
-        orders
-            .flat_map(|order| order.iter().skip(sensor).step_by(sensors))
-            .map(|value| value.norm_sqr())
-            .sum::<f64>()
-            .sqrt()
+        orders.flat_map(|order| order.iter().skip(sensor).step_by(sensors)).map(Complex64::norm_sqr).sum::<f64>().sqrt()
     };
     let sizes: Vec<f64> = (0..sensors).map(size).collect();
     let looks_along = |sensor: usize| rig.sensors[sensor].axial_radius_mm.is_some();

@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn smearing_is_the_product_with_all_powers() {
         let columns = DMatrix::from_fn(9, 2, |row, column| ((row * row + 3 * column) as f64).sin());
-        let whole = DMatrix::from_fn(9, 9, |one, other| 0.6_f64.powi(one.abs_diff(other) as i32));
+        let whole = DMatrix::from_fn(9, 9, |one, other| 0.6_f64.powf(one.abs_diff(other) as f64));
         assert!((smeared(&columns, 0.6) - whole * &columns).norm() < 1e-12);
     }
 
@@ -98,7 +98,7 @@ mod tests {
     fn what_a_fit_leaves_is_that_of_the_dense_matrices() {
         let columns = DMatrix::from_fn(12, 3, |row, column| ((row * (column + 1)) as f64 * 0.7).cos());
         let covariance = (columns.transpose() * &columns).try_inverse().unwrap_or_default();
-        let whole = DMatrix::from_fn(12, 12, |one, other| 0.5_f64.powi(one.abs_diff(other) as i32));
+        let whole = DMatrix::from_fn(12, 12, |one, other| 0.5_f64.powf(one.abs_diff(other) as f64));
         let left = DMatrix::identity(12, 12) - &columns * &covariance * columns.transpose();
         let noise = &left * whole * &left;
         let lag_one: f64 = (1..12).map(|row| noise[(row - 1, row)]).sum();
