@@ -159,7 +159,10 @@ fn the_phase_of_a_line_in_noise_counts_from_the_pass_at_the_origin() {
         println!("{seed}: {ratio} {phase} ± {std}");
         let turn = |angle: f64| angle - 360.0 * (angle / 360.0).round();
         let is_own = (ratio - 5.6235 / 6.5).abs() < 1e-3;
-        assert!(!is_own || turn(phase - 60.0).abs() < if std.is_finite() { 4.0 * std } else { 20.0 }, "{phase} ± {std}");
+        assert!(
+            !is_own || turn(phase - 60.0).abs() < if std.is_finite() { 4.0 * std } else { 20.0 },
+            "{phase} ± {std}"
+        );
         assert!(value(&found.after, "scallop_phase", None).abs() <= 0.5 * 8.3 + 1e-9);
     }
 }

@@ -306,9 +306,10 @@ fn displaced_neighbours_drifts_and_units_are_remarked() {
     all.sort_by(|one, other| one.iter().sum::<f64>().total_cmp(&other.iter().sum()));
     let corner = all[0];
     let next = |axis: usize| {
-        let on = made.commands_mm.iter().filter(|place| {
-            (0..3).all(|other| (other == axis) != ((place[other] - corner[other]).abs() < 1e-9))
-        });
+        let on = made
+            .commands_mm
+            .iter()
+            .filter(|place| (0..3).all(|other| (other == axis) != ((place[other] - corner[other]).abs() < 1e-9)));
         *on.min_by(|one, other| one[axis].total_cmp(&other[axis])).unwrap()
     };
     let displaced = [corner, next(0), next(1)];
@@ -330,7 +331,8 @@ fn displaced_neighbours_drifts_and_units_are_remarked() {
     dx.values.iter_mut().enumerate().for_each(|(row, value)| *value += 20.0 * row as f64 / count);
     assert!(remarks(&drifts).contains("readings drift from the first to the last: dx by"));
     let mut in_mm = made.points();
-    for column in in_mm.columns.iter_mut().filter(|column| ["dx_um", "dy_um", "dz_um"].contains(&column.name.as_str())) {
+    for column in in_mm.columns.iter_mut().filter(|column| ["dx_um", "dy_um", "dz_um"].contains(&column.name.as_str()))
+    {
         column.values.iter_mut().for_each(|value| *value *= 1e-3);
     }
     assert!(remarks(&in_mm).contains("in mm?"));
