@@ -6,6 +6,7 @@ pub mod blind;
 pub mod campaign;
 pub mod chance;
 pub mod coverage;
+pub mod each;
 pub mod eccentricity;
 pub mod flat;
 pub mod minimum_zone_cylinder;

@@ -151,7 +151,7 @@ fn draws(data: &Data, prior: &Prior, guess: &Guess, field: usize, random: &mut C
         let (_, _, sums) = Field::new(data, field, &covariance)?;
         // Density of the mixture of all spreads.
         let square = moved.norm_squared();
-        let parts = SPREADS.map(|spread| (-0.5 * square / (spread * spread)).exp() / spread.powi(free as i32));
+        let parts = SPREADS.map(|spread| (-0.5 * square / (spread * spread)).exp() / spread.powf(free as f64));
         Some((sums, prior.ln_of(field, &at) - parts.iter().sum::<f64>().ln() + ln_size))
     };
     (0..DRAWS).filter_map(one).collect()

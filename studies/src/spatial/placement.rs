@@ -13,7 +13,7 @@ use super::{
     known::Known,
     machine::{self, TRAVEL_MM},
 };
-use crate::{blind::each, chance::Chance};
+use crate::{chance::Chance, each::each};
 
 /// Coarse: predictions are not judged here.
 const GRID_MM: [f64; 3] = [300.0, 200.0, 175.0];

@@ -5,8 +5,8 @@ pub mod report;
 
 use runout_core::{Result, points::Points, stage::PointSeparator};
 
-use super::{Kind, each, turn};
-use crate::chance::Chance;
+use super::{Kind, turn};
+use crate::{chance::Chance, each::each};
 use judge::Judged;
 
 /// A domain of measured points.
