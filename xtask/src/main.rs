@@ -32,9 +32,8 @@ cargo xtask COMMAND
   test [--ci]   check-house, format, lints, tests, and the demo with the tests' build; the last line counts tests
                 skipped for want of measured data. With --ci none may be, files are also read by Python and Node, which it
                 installs below target/, and the tests of the Python package run with the library of the tests' build
-  check-house [--strict]
-                print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, and
-                on a cycle of modules; with --strict also on long files without a reason
+  check-house   print the graphs of crates and of their modules; fail on an arrow that ARCHITECTURE.md does not have, on a
+                cycle of modules, and on a long file without a reason
   fuzz [--inputs N] [--minutes M] [--seed S] [--folder DIR] [WORKER]
                 give mutated configurations, tables, HDF5 files and overrides to the program, many in one process; 2 minutes
                 without more; with a folder in memory (DIR) no file is synced to a disk

@@ -38,6 +38,7 @@ pub mod neighbours;
 pub mod profile;
 pub mod provenance;
 pub mod reading;
+mod residual;
 pub mod rig;
 pub mod separation;
 mod smoothing;

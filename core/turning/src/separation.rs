@@ -2,6 +2,7 @@
 
 mod quantity;
 
+pub use crate::residual::{ReadingResidual, Residual};
 use crate::{azimuth::Azimuth, smoothing::orders_beside};
 pub use quantity::{ALONG_COLUMN, MotionColumn, Quantity, motion_columns};
 use runout_numerics::Complex64;
@@ -164,33 +165,6 @@ impl SectionAt {
     pub fn coverage(&self, angles: usize) -> f64 {
         self.gaps.coverage(angles).min(self.used)
     }
-}
-
-/// What a fit leaves of the averaged readings.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Residual {
-    /// Root mean square over all readings and angles, in µm; NaN where nothing is redundant.
-    pub rms_um: f64,
-    /// What the covariance of the averages lets expect of it, in µm; NaN without a covariance.
-    pub expected_rms_um: f64,
-    /// Weighted sum of squares per degree of freedom; NaN where not known.
-    pub chi2_per_dof: f64,
-    /// Real degrees of freedom.
-    pub dof: usize,
-    /// Lowest and highest order at which a reading is redundant; `None` where the fit is not one of single orders, and where
-    /// none is.
-    pub orders: Option<[usize; 2]>,
-    /// What is left of each reading at the redundant orders; none where the fit is not one of single orders.
-    pub by_reading: Vec<ReadingResidual>,
-}
-
-/// What a fit leaves of one averaged reading.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReadingResidual {
-    /// Place of the reading among the channels of all profiles of the station.
-    pub place: usize,
-    /// Order and coefficient c in µm, Re Σ c e^{−inΦ} over the spindle's angle Φ.
-    pub harmonics: Vec<(usize, Complex64)>,
 }
 
 impl Separation {

@@ -25,19 +25,17 @@ const REASON: &str = "//! Long because";
 
 /// Prints the graphs; fails on what the picture does not have.
 pub fn check(words: &[&str]) -> Outcome {
-    let strict = match words {
-        [] => false,
-        ["--strict"] => true,
-        _ => return Err("check-house takes --strict or nothing".into()),
-    };
+    if !words.is_empty() {
+        return Err("check-house takes nothing".into());
+    }
     let findings = Findings::of(&root())?;
     say(&findings.report());
-    findings.verdict(strict)
+    findings.verdict()
 }
 
 /// The same without the graphs, for a longer list of checks.
 pub fn check_quietly() -> Outcome {
-    Findings::of(&root())?.verdict(false)
+    Findings::of(&root())?.verdict()
 }
 
 #[derive(Default)]
@@ -46,8 +44,6 @@ struct Findings {
     /// Where modules depend on each other in a cycle: a crate's folder, and the module that holds them.
     cycles: Vec<String>,
     faults: Vec<String>,
-    /// Faults for `--strict` only.
-    remarks: Vec<String>,
 }
 
 impl Findings {
@@ -63,12 +59,12 @@ impl Findings {
         }
         for (place, _) in &picture.cycles {
             if !findings.cycles.contains(place) {
-                findings.remarks.push(format!("ARCHITECTURE.md: `cycle {place}`, but there is none"));
+                findings.faults.push(format!("ARCHITECTURE.md: `cycle {place}`, but there is none"));
             }
         }
         for (path, lines) in long_files(root, &members) {
             let name = path.strip_prefix(root).unwrap_or(&path).display();
-            findings.remarks.push(format!("{name}: {lines} lines and no `{REASON} …` in the first {HEAD_LINES}"));
+            findings.faults.push(format!("{name}: {lines} lines and no `{REASON} …` in the first {HEAD_LINES}"));
         }
         Ok(findings)
     }
@@ -89,7 +85,7 @@ impl Findings {
         }
         let unused =
             picture.unused(&arrows).map(|arrow| format!("ARCHITECTURE.md: no crate needs the arrow `{arrow}`"));
-        self.remarks.extend(unused);
+        self.faults.extend(unused);
     }
 
     fn modules(&mut self, root: &Path, member: &Member, picture: &Picture) {
@@ -103,7 +99,7 @@ impl Findings {
             for (from, to) in [(one, other), (other, one)] {
                 match top.get(from) {
                     None => {
-                        self.remarks.push(format!("ARCHITECTURE.md: `apart {folder}`, but it has no module `{from}`"));
+                        self.faults.push(format!("ARCHITECTURE.md: `apart {folder}`, but it has no module `{from}`"));
                     }
                     Some(uses) if uses.contains(to) => {
                         self.faults.push(format!("{folder}: {from} -> {to}, which are to share nothing"));
@@ -133,17 +129,11 @@ impl Findings {
     }
 
     fn report(&self) -> String {
-        let mut lines = self.graph.clone();
-        if !self.remarks.is_empty() {
-            lines.push("To mend (an error with --strict)".into());
-            lines.extend(self.remarks.iter().map(|remark| format!("  {remark}")));
-        }
-        lines.join("\n")
+        self.graph.join("\n")
     }
 
-    fn verdict(&self, strict: bool) -> Outcome {
-        let strict = if strict { &self.remarks[..] } else { &[] };
-        let faults: Vec<String> = self.faults.iter().chain(strict).map(|fault| format!("  {fault}")).collect();
+    fn verdict(&self) -> Outcome {
+        let faults: Vec<String> = self.faults.iter().map(|fault| format!("  {fault}")).collect();
         if faults.is_empty() {
             return Ok(());
         }
@@ -252,7 +242,7 @@ pub mod tests {
         let faults =
             ["plugins/b -> plugins/a: a plugin imports a plugin", "formats/c -> plugins/b: a format knows a domain"];
         assert_eq!(found.faults, faults);
-        assert!(found.verdict(false).unwrap_err().contains("imports a plugin"));
+        assert!(found.verdict().unwrap_err().contains("imports a plugin"));
         let drawn = house("plugins/* -> core\nplugins/b -> plugins/a\nformats/c -> plugins/b\nformats/c -> core", &[]);
         assert!(drawn.verdict(false).is_ok());
         assert!(drawn.verdict(true).unwrap_err().contains("no crate needs the arrow `formats/c -> core`"));
@@ -294,7 +284,7 @@ pub mod tests {
         let long = "// line\n".repeat(401);
         let reason = format!("//! A module.\n//!\n//! Long because one table cannot be cut.\n{long}");
         let found = house(arrows, &[("core/src/lib.rs", &long), ("core/tests/whole.rs", &reason)]);
-        assert!(found.verdict(false).is_ok());
+        assert!(found.verdict().is_ok());
         let fault = found.verdict(true).unwrap_err();
         assert!(fault.contains("core/src/lib.rs: 401 lines") && !fault.contains("whole.rs"), "{fault}");
     }

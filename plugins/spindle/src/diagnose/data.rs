@@ -19,7 +19,7 @@ use crate::{
     effects::{Alterations, SpindleEffect, TurnEvidence},
     layout::Layout,
     selection::Selection,
-    solve::{Blocks, Operators, Propagation, Readings, Scatter, apply, leak, smooth_by_order, whitening},
+    solve::{Blocks, Operators, Propagation, Readings, Scatter, leak, smooth_by_order, whitening},
 };
 
 /// Orders to each side over which the noise in the residual's space is averaged, beyond what covariances are.
@@ -380,34 +380,4 @@ fn floor(layout: &Layout, readings: &Readings, weights: &[Blocks]) -> Vec<f64> {
         })
         .map(|square| if square > 0.0 { square } else { 1.0 })
         .collect()
-}
-
-/// The same where some readings are 0 at all orders: those that an effect leaves alone.
-pub fn project_some(
-    matrices: &[Vec<Complex64>],
-    harmonics: &[Complex64],
-    count: usize,
-    mut take: impl FnMut(Complex64),
-) {
-    let changes =
-        |reading: &usize| harmonics.iter().skip(*reading).step_by(count).any(|value| *value != Complex64::ZERO);
-    let changed: Vec<usize> = (0..count).filter(changes).collect();
-    for (matrix, readings) in matrices.iter().zip(harmonics.chunks_exact(count).skip(1)) {
-        for row in matrix.chunks_exact(count) {
-            take(changed.iter().map(|reading| row[*reading] * readings[*reading]).sum());
-        }
-    }
-}
-
-/// Matrix (`[row][column]`) times each order's readings, into a harmonic array of the same shape.
-pub fn project(
-    matrices: &[Vec<Complex64>],
-    harmonics: &[Complex64],
-    count: usize,
-    mut take: impl FnMut(usize, &[Complex64]),
-) {
-    for (index, matrix) in matrices.iter().enumerate() {
-        let order = index + 1;
-        take(order, &apply(matrix, &harmonics[order * count..(order + 1) * count]));
-    }
 }

@@ -14,7 +14,8 @@ use runout_core::{
 };
 
 use super::{
-    data::{self, Shared, project_some},
+    data::{self, Shared},
+    projection::project_some,
     remainder::remainder,
     solved::Solved,
     strangers,

@@ -7,6 +7,7 @@ mod drift;
 mod fit;
 mod lines;
 mod mistakes;
+mod projection;
 mod remainder;
 mod rig_keys;
 mod said;

@@ -3,8 +3,9 @@
 use runout_core::{Complex64, model::Remainder};
 
 use super::{
-    data::{Shared, StationData, project},
+    data::{Shared, StationData},
     drift::Part,
+    projection::project,
     solved::Solved,
 };
 use crate::{

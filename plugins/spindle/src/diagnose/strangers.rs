@@ -9,7 +9,7 @@ use runout_core::{
     rig::Rig,
 };
 
-use super::{data::project, solved::Solved};
+use super::{projection::project, solved::Solved};
 use crate::layout::Layout;
 
 /// A reading is where it comes from when letting that reading be anything takes away this share of the residual.

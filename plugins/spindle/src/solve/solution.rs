@@ -1,7 +1,9 @@
 //! One station solved: the operators of all orders, what exact geometry adds, and passes until both agree.
 
+mod far_off;
+
 use runout_core::{
-    Complex64, Error, ErrorKind, Result,
+    Complex64, Result,
     profile::Profile,
     separation::{Quantity, Sensitivity, Separation},
     stage::Station,
@@ -45,11 +47,6 @@ const CANCELLING: f64 = 30.0;
 /// No result is given of a solution that still moves more than this, rms.
 const UNSETTLED_UM: f64 = 5e-4;
 
-/// From this eccentricity on, as a share of the radius, stated uncertainties lack what badly determined orders carry into others.
-const LARGE: f64 = 0.015;
-/// No part is clamped so far off centre, as a share of its radius.
-const FAR_OFF: f64 = 0.1;
-
 /// Solves one station.
 pub struct Solver<'a> {
     pub selection: &'a Selection,
@@ -74,7 +71,7 @@ impl Solver<'_> {
         }
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
-        let beyond = self.eccentricity_um(&readings) > FAR_OFF * 1e3 * self.selection.rig.part_radius_mm;
+        let beyond = self.eccentricity_um(&readings) > far_off::FAR_OFF * 1e3 * self.selection.rig.part_radius_mm;
         if self.second_order && beyond || self.couples(&readings) && is_above(estimate.moved_um, UNSETTLED_UM) {
             return Err(self.unsettled(station, &readings, &estimate));
         }
@@ -93,43 +90,6 @@ impl Solver<'_> {
         separation.warnings.extend(carried);
         separation.warnings.extend(self.far_off_centre(&readings));
         Ok((separation, readings))
-    }
-
-    /// Where exact geometry does not settle.
-    fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
-        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
-        let ratio = format!("an eccentricity of {eccentricity_um:.0} µm on a radius of {radius_mm} mm");
-        let check = "check part_radius_mm and the unit of the readings";
-        let (problem, help) = if eccentricity_um > FAR_OFF * 1e3 * radius_mm {
-            (format!("{ratio} is more than exact geometry is solved for"), check)
-        } else if estimate.moved_um.is_finite() {
-            let moved_um = estimate.moved_um;
-            let problem = format!(
-                "{ratio} couples the orders so strongly that no solution settles: the last pass still moves the readings \
-                 by {moved_um:.2e} µm rms"
-            );
-            let help = "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the order";
-            (problem, help)
-        } else {
-            let problem = format!("{ratio}: sensors' lines do not meet the part, and the result is no number");
-            (problem, check)
-        };
-        Error::new("separate", format!("station {}", station.name), problem).of(ErrorKind::Numerical).help(help)
-    }
-
-    /// What the stated uncertainty of order by order lacks where the eccentricity is large.
-    fn far_off_centre(&self, readings: &Readings) -> Option<String> {
-        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
-        let is_large = self.second_order && eccentricity_um > LARGE * 1e3 * radius_mm;
-        is_large.then(|| {
-            // Stations that are alike are to say the same.
-            let share = 100.0 * LARGE;
-            format!(
-                "the eccentricity is above {share} % of the radius of {radius_mm} mm and couples neighbouring orders: an order that the layout \
-                 determines badly carries its error into those beside it, and their stated uncertainties do not include that; centre \
-                 the part better"
-            )
-        })
     }
 
     /// What a large eccentricity carries into orders that are told, of what is not: a surface that goes sideways by e turns
