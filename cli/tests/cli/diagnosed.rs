@@ -90,6 +90,7 @@ fn corrected_results_are_recognisable() {
         "harmonics.parquet",
         "motion.parquet",
         "report.html",
+        "residual_harmonics.parquet",
         "spectrum.parquet",
         "summary.json",
         "tilt_spectrum.parquet",
