@@ -237,7 +237,7 @@ def _values(summary: dict[str, Any]) -> Iterator[Value]:
 def _value(entry: dict[str, Any], where: dict[str, str]) -> Value:
     known = entry.get("uncertainty") or {}
     number = float("nan") if entry["value"] is None else float(entry["value"])
-    interval = known.get("interval_95")
+    interval = known.get("interval_95", entry.get("interval_95"))
     std = known.get("std", entry.get("std"))
     return Value(entry["symbol"], number, entry["unit"], std, None if interval is None else tuple(interval), where, entry)
 

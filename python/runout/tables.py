@@ -87,7 +87,8 @@ class Evaluate:
     """λs, the shortest, in mm."""
 
     references: Union[Sequence[Union[Literal['LSCI'], Literal['MZCI'], Literal['MICI'], Literal['MCCI']]], None] = None
-    """Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY). Without it LSCI and MZCI."""
+    """Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY), and the lines of straightness
+    those two that there are (LSLI, MZLI). Without it LSCI and MZCI."""
 
     robust_filter_upr: Union[Sequence[float], None] = None
     """Cut-offs of robust Gaussian low-passes (ISO 16610-31) for roundness, in undulations per revolution, besides `filter_upr`."""
@@ -101,9 +102,10 @@ class Evaluate:
     uncertainty: Union[Union[Literal['linear'], Literal['monte-carlo']], None] = None
     """How the errors of a profile become those of its roundness values; without it `linear`."""
 
-    values: Union[Union[Literal['all'], Sequence[Union[Literal['roundness'], Literal['harmonics'], Literal['texture'], Literal['cylindricity'], Literal['areal'], Literal['twist'], Literal['error-motion']]]], None] = None
-    """Groups of values, or "all"; without it `roundness`, `texture`, `cylindricity` and `error-motion`. Of "all", what a run
-    cannot give (areal values and twist of a single section) is left out."""
+    values: Union[Union[Literal['all'], Sequence[Union[Literal['roundness'], Literal['harmonics'], Literal['straightness'], Literal['texture'], Literal['cylindricity'], Literal['areal'], Literal['twist'], Literal['error-motion']]]], None] = None
+    """Groups of values, or "all"; without it `roundness`, `straightness`, `texture`, `cylindricity` and `error-motion`, as far as
+    what the separator offers gives them. Of "all", what a run cannot give (areal values and twist of a single section) is left
+    out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

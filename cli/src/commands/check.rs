@@ -9,7 +9,7 @@ use runout_core::{
         document::{Document, Sources},
     },
     rig::Rig,
-    stage::{Planned, PointSeparator, Source, check},
+    stage::{EvaluableKind, Planned, PointSeparator, Source, check},
 };
 use toml::{Spanned, de::DeValue};
 
@@ -75,6 +75,7 @@ pub fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue)
         of_points: separator.and_then(PointSeparator::lost_orders).map(|lost_orders| OfPoints { lost_orders }),
         foresight,
         columns: pipeline.request().columns.iter().map(TakenColumn::from).collect(),
+        evaluables: pipeline.route.evaluables().into_iter().map(EvaluableKind::name).collect(),
         tables: pipeline.tables.iter().map(|table| table.name.clone()).collect(),
         notes,
     })

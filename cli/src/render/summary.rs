@@ -31,6 +31,7 @@ pub fn text(summary: &Summary) -> String {
     page.line(&summary.title);
     if stations.is_empty() {
         named::section(&mut page, &summary.values);
+        values::limits(&mut page, summary);
     } else {
         page.line(count(stations.len(), "station"));
         turns(&mut page, stations);

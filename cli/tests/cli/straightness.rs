@@ -79,6 +79,83 @@ fn from_traces_to_tables() {
     assert!(!shown.stdout.contains("station") && !shown.stdout.contains("Residual"), "{}", shown.stdout);
 }
 
+/// The same with three traces a setup and noise of some 0.007 µm.
+fn repeated_traces() -> String {
+    let mut text = String::from("trace;setup;z_mm;reading_um\n");
+    for (setup, sign) in [("initial", 1.0), ("reversed", -1.0)] {
+        for repeat in 1..=3 {
+            for index in 0..=20 {
+                let z = 5.0 * f64::from(index);
+                let bend = (z - 50.0).powi(2) / 2500.0;
+                let noise = 0.01 * (f64::from(1000 * repeat + 37 * index) * (1.7 + sign)).sin();
+                let reading = 2.0 * bend - sign * bend + 7.0 + noise;
+                writeln!(text, "{setup}-{repeat};{setup};{z};{reading}").unwrap();
+            }
+        }
+    }
+    text
+}
+
+const LIMITS: &str = r#"
+[[limit]]
+symbol = "STRt"
+section = "part"
+reference = "MZLI"
+upper = 2.2
+unit = "um"
+
+[[limit]]
+symbol = "STRt"
+section = "slide"
+upper = 0.9
+unit = "um"
+"#;
+
+#[test]
+fn standards_values_of_both_profiles_have_intervals_and_limits() {
+    let text = format!("{PIPELINE}{LIMITS}");
+    let folder = Folder::with(&[("pipeline.toml", text.as_str()), ("traces.csv", &repeated_traces())]);
+    let checked: Value = serde_json::from_str(&folder.run(&["check", "pipeline.toml", "--json"]).stdout).unwrap();
+    assert_eq!(checked["evaluables"], serde_json::json!(["open-profile"]));
+
+    let ran = folder.run(&["run", "pipeline.toml", "--json"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
+    for (of, truth) in [("part", 2.0), ("slide", 1.0)] {
+        for reference in ["LSLI", "MZLI"] {
+            let found = summary["values"].as_array().unwrap().iter().find(|one| {
+                (&one["symbol"], &one["of"], &one["reference"]) == (&"STRt".into(), &of.into(), &reference.into())
+            });
+            let interval: Vec<f64> = serde_json::from_value(found.unwrap()["interval_95"].clone()).unwrap();
+            assert!(interval[0] <= truth && truth <= interval[1] && interval[1] - interval[0] < 0.1, "{found:?}");
+        }
+    }
+    let decisions =
+        |summary: &Value| [0, 1].map(|limit| summary["limits"][limit]["decision"].as_str().unwrap().to_owned());
+    assert_eq!(decisions(&summary), ["conforms", "does-not-conform"]);
+    assert_eq!(summary["limits"][1]["values"].as_array().unwrap().len(), 2, "about LSLI and about MZLI");
+    assert_eq!(folder.run(&["run", "pipeline.toml", "--fail-on-limit"]).status, 1);
+    let shown = folder.run(&["run", "pipeline.toml"]).stdout;
+    assert!(shown.contains("STRt MZLI, unfiltered µm") && shown.contains("does not conform"), "{shown}");
+
+    // After the closed loop by the same way.
+    assert_eq!(folder.run(&["diagnose", "pipeline.toml"]).status, 0);
+    let diagnosed = std::fs::read(folder.path().join("out/diagnosed/summary.json")).unwrap();
+    let diagnosed: Value = serde_json::from_slice(&diagnosed).unwrap();
+    assert_eq!(decisions(&diagnosed), ["conforms", "does-not-conform"]);
+
+    let refused = folder.run(&["check", "pipeline.toml", "--set", "evaluate.values=[\"straightness\", \"roundness\"]"]);
+    assert_eq!(refused.status, 2);
+    let said: String = refused.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        said.contains("nothing here gives values of `roundness`") && said.contains("offers open-profile"),
+        "{said}"
+    );
+    let textured = ["run", "pipeline.toml", "--json", "--set", "evaluate.lambda_c_mm=20"];
+    let summary: Value = serde_json::from_str(&folder.run(&textured).stdout).unwrap();
+    assert!(summary["values"].as_array().unwrap().iter().any(|one| one["symbol"] == "Rq" && one["of"] == "slide"));
+}
+
 #[test]
 fn what_does_not_go_with_straightness_is_refused_before_the_run() {
     let folder = Folder::with(&[("pipeline.toml", PIPELINE), ("traces.csv", &traces())]);

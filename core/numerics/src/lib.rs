@@ -8,6 +8,7 @@ pub mod height_map;
 pub mod interpolation;
 pub mod lanes;
 pub mod least_squares;
+pub mod moderated;
 pub mod side_by_side;
 pub mod statistics;
 pub mod threads;

@@ -144,6 +144,12 @@ impl Drawn {
         self
     }
 
+    /// Mean square of the errors over the variance of what the values are taken from.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
     /// Takes a value that comes round again after `period` in every draw where it is nearest to that of the form.
     pub fn unwrap_period(&mut self, index: usize, period: f64) {
         if let (Some(about), Some(draws)) = (self.about.get(index), self.draws.get_mut(index)) {

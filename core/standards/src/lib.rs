@@ -9,6 +9,7 @@ mod errors_at;
 pub mod gaps;
 pub mod mean_deviation;
 mod near;
+pub mod open_errors;
 pub mod parameter;
 pub mod position;
 pub mod reference;

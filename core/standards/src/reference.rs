@@ -38,6 +38,16 @@ impl Reference {
         }
     }
 
+    /// The standard's symbol of the lines of an open profile (ISO 12780-1); a circle inside or around has none.
+    #[must_use]
+    pub fn line_symbol(self) -> Option<&'static str> {
+        match self {
+            Self::LeastSquares => Some("LSLI"),
+            Self::MinimumZone => Some("MZLI"),
+            Self::MaximumInscribed | Self::MinimumCircumscribed => None,
+        }
+    }
+
     /// The standard's symbol of the cylinder.
     #[must_use]
     pub fn cylinder_symbol(self) -> &'static str {

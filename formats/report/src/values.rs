@@ -112,10 +112,7 @@ fn rows(summary: &Summary) -> Vec<Row> {
             value: finite(value.value),
             std,
             unit: symbol(&value.unit),
-            interval: uncertainty.map_or_else(String::new, |known| {
-                let [low, high] = known.interval_95.map(|end| as_precise(end, known.std));
-                format!("{low} … {high}")
-            }),
+            interval: uncertainty.map_or_else(String::new, |known| interval((known.interval_95, known.std))),
             refers: [value.reference.as_str(), value.filter.as_str()].join(", "),
             about: format!("{}; {} to {} UPR{lacks}", value.source, value.band_upr[0], value.band_upr[1]),
         }
@@ -127,8 +124,8 @@ fn rows(summary: &Summary) -> Vec<Row> {
         value: value.value.and_then(finite),
         std: value.std,
         unit: symbol(&value.unit),
-        interval: String::new(),
-        refers: String::new(),
+        interval: value.interval_95.zip(value.std).map_or_else(String::new, interval),
+        refers: [&value.reference, &value.filter].into_iter().flatten().cloned().collect::<Vec<_>>().join(", "),
         about: value.about.clone(),
     });
     of_form.chain(named).collect()
@@ -136,6 +133,12 @@ fn rows(summary: &Summary) -> Vec<Row> {
 
 fn finite(number: f64) -> Option<f64> {
     number.is_finite().then_some(number)
+}
+
+/// A 95 % interval as it is shown.
+fn interval((ends, std): ([f64; 2], f64)) -> String {
+    let [low, high] = ends.map(|end| as_precise(end, std));
+    format!("{low} … {high}")
 }
 
 /// A number with two digits of its standard uncertainty.

@@ -17,7 +17,7 @@ use runout_core::{
     },
     points::Points,
     separation::{Quantity, Residual, Separation},
-    stage::{Form, LinearModel, Outcome},
+    stage::{Evaluable, Form, LinearModel, Outcome},
 };
 
 use crate::{
@@ -210,7 +210,7 @@ impl LinearModel for LeastSquaresCylinder {
             remarks.push("the circles are at one height: tilt, taper and barrel are not observable".into());
         }
         let form = Form { sections, radius_mm: self.nominal_mm() + 1e-3 * offset_um };
-        Ok(Outcome { form: Some(form), remarks, ..Outcome::default() })
+        Ok(Outcome { evaluables: vec![Evaluable::ClosedProfiles(form)], remarks, ..Outcome::default() })
     }
 }
 

@@ -17,7 +17,7 @@ use runout_core::{
         Points, Trace,
     },
     separation::{Quantity, Residual, Separation},
-    stage::{Form, Outcome, PointModel, PointSeparator, Separator, points::residual_table},
+    stage::{Evaluable, EvaluableKind, Form, Outcome, PointModel, PointSeparator, Separator, points::residual_table},
     surface::Surface,
     table::TableSpec,
 };
@@ -86,12 +86,12 @@ impl PointSeparator for LeastSquaresCylinder {
         vec![residual_table("um").optional()]
     }
 
-    fn gives_form(&self) -> bool {
-        true
+    fn evaluables(&self) -> Vec<EvaluableKind> {
+        vec![EvaluableKind::ClosedProfiles]
     }
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
-        Ok(Outcome { form: Some(self.form(points)?), ..Outcome::default() })
+        Ok(Outcome { evaluables: vec![Evaluable::ClosedProfiles(self.form(points)?)], ..Outcome::default() })
     }
 
     fn needs_surface(&self) -> bool {

@@ -46,11 +46,17 @@ pub(crate) struct Grid {
 impl Grid {
     /// Values of points as a map in µm, NaN where there is no point.
     pub fn map_um(&self, values_nm: impl Iterator<Item = f64>) -> Result<HeightMap<'static>> {
-        let mut all = vec![f64::NAN; self.rows * self.columns];
-        for (node, value) in self.node.iter().zip(values_nm) {
-            all[*node as usize] = 1e-3 * value;
-        }
+        let all = self.laid(values_nm.map(|value| 1e-3 * value));
         HeightMap::new(all, self.columns, self.step_x_mm, self.step_y_mm, false)
+    }
+
+    /// Values of points at their nodes, row by row, NaN where there is no point.
+    pub fn laid(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut all = vec![f64::NAN; self.rows * self.columns];
+        for (node, value) in self.node.iter().zip(values) {
+            all[*node as usize] = value;
+        }
+        all
     }
 
     /// Nodes without a point.

@@ -4,7 +4,7 @@ use runout_core::{
     Result,
     evaluate::areal::{self, HeightMap},
     height_grid::HeightGrid,
-    stage::{NamedValue, Outcome, points::value},
+    stage::{Evaluable, NamedValue, Outcome, PlaneMap, points::value},
     table::{ColumnSpec, Figure, TableRows, TableSpec, numbers},
 };
 
@@ -83,17 +83,22 @@ impl Known<'_> {
         }
         values.extend(self.areal("residual", self.after_nm.iter().copied())?);
         values.extend(self.of_cut());
-        let heights = Some(self.drawn(corrected())?);
-        Ok(Outcome { convention: CONVENTION.into(), tables: rows, values, heights, remarks, ..Outcome::default() })
+        // Meshes are drawn of the first.
+        let mut evaluables = Vec::new();
+        if self.corrected {
+            evaluables.push(self.plane("corrected", corrected()));
+        }
+        evaluables.push(self.plane("measured", self.heights.height_nm.iter().copied()));
+        evaluables.push(self.plane("residual", self.after_nm.iter().copied()));
+        Ok(Outcome { convention: CONVENTION.into(), tables: rows, values, evaluables, remarks, ..Outcome::default() })
     }
 
-    /// Heights above their least-squares plane, as meshes draw them.
-    fn drawn(&self, heights_nm: impl Iterator<Item = f64>) -> Result<HeightGrid> {
-        let map = areal::without_polynomial(&self.grid.map_um(heights_nm)?, 1)?;
+    /// Heights on the whole grid.
+    fn plane(&self, of: &str, heights_nm: impl Iterator<Item = f64>) -> Evaluable {
         let Grid { columns, step_x_mm, step_y_mm, origin_mm: [origin_x_mm, origin_y_mm], .. } = *self.grid;
-        let height_nm = map.heights_um().iter().map(|height| 1e3 * height).collect();
-        let std_nm = self.heights.std_nm;
-        Ok(HeightGrid { columns, step_x_mm, step_y_mm, origin_x_mm, origin_y_mm, std_nm, height_nm })
+        let (height_nm, std_nm) = (self.grid.laid(heights_nm), self.heights.std_nm);
+        let grid = HeightGrid { columns, step_x_mm, step_y_mm, origin_x_mm, origin_y_mm, std_nm, height_nm };
+        Evaluable::HeightMap(PlaneMap { of: of.into(), grid })
     }
 
     /// Height parameters after removal of the least-squares plane.

@@ -8,7 +8,7 @@ use runout_core::{
         registry::{Context, StageConfig},
     },
     points::{PointColumn, PointKind::Number, Points},
-    stage::{Outcome, PointModel, PointSeparator, Separator, points::far_below_noise},
+    stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator, points::far_below_noise},
     table::TableSpec,
 };
 
@@ -92,8 +92,8 @@ impl PointSeparator for FlyCutting {
         self.concluded(&measured, (&fit, &fit), &[], remarks)
     }
 
-    fn gives_heights(&self) -> bool {
-        true
+    fn evaluables(&self) -> Vec<EvaluableKind> {
+        vec![EvaluableKind::HeightMap]
     }
 
     fn notes(&self) -> Vec<String> {

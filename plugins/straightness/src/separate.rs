@@ -11,7 +11,7 @@ use runout_core::{
         PointKind::{Flag, Number, Trace, TraceKind},
         Points,
     },
-    stage::{Outcome, PointModel, PointSeparator, Separator},
+    stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator},
     table::TableSpec,
 };
 use schemars::JsonSchema;
@@ -23,7 +23,7 @@ use crate::{
     positions::{coarsest_mm, common_range, positions},
     straightness::{self, LIMIT, Straightness},
     trace::AxialTrace,
-    value_std::ProfileErrors,
+    value_std::{ProfileErrors, correlation_of},
 };
 
 /// `[separate] plugin = "axial-reversal"`.
@@ -173,6 +173,10 @@ impl PointSeparator for AxialReversal {
         vec![straightness::table()]
     }
 
+    fn evaluables(&self) -> Vec<EvaluableKind> {
+        vec![EvaluableKind::OpenProfile]
+    }
+
     fn separate(&self, points: &Points) -> Result<Outcome> {
         self.separated(points)?.outcome()
     }
@@ -251,9 +255,11 @@ impl AxialReversal {
         }
         let repeated = split.variance.iter().sum::<f64>() / split.variance.len() as f64;
         let [part_std_um, slide_std_um] = split.std_um.clone();
-        let errors = split.std_um.clone().map(|noise_um| ProfileErrors {
-            noise_um,
-            correlation: split.correlation.clone(),
+        let of_slide = grid.smooth.as_ref().map(|smooth| correlation_of(smooth, grid.z_mm.len()));
+        let correlations = [split.correlation.clone(), of_slide.unwrap_or_else(|| split.correlation.clone())];
+        let errors = [0, 1].map(|which| ProfileErrors {
+            noise_um: split.std_um[which].clone(),
+            correlation: correlations[which].clone(),
             common_um: Vec::new(),
         });
         let result = Straightness {

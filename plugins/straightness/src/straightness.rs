@@ -2,8 +2,8 @@
 
 use runout_core::{
     Result,
-    evaluate::straightness::strt_lsli_um,
-    stage::{NamedValue, Outcome, points::value},
+    evaluate::open_errors::OpenErrors,
+    stage::{Evaluable, NamedValue, OpenProfile, Outcome, points::value},
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 
@@ -18,6 +18,9 @@ pub const CONVENTION: &str = "Straightness along z about the least-squares line 
 /// What the readings cannot tell, whatever the data.
 pub const LIMIT: &str = "each trace has an offset and a slope of its own, so only the straightness about the \
     least-squares line is known: neither taper, nor parallelism, nor the angle between slide and part";
+
+/// Why values have no uncertainty.
+const NO_REPEATS: &str = "one trace in each setup: nothing tells the errors";
 
 /// Straightness of part and slide on common positions.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,22 +86,40 @@ impl Straightness {
         let table = table();
         let tables = vec![TableRows { rows: table.rows(columns.into())?, table: table.name }];
         let values = self.values();
-        Ok(Outcome { convention: CONVENTION.into(), tables, values, remarks: self.warnings, ..Outcome::default() })
+        let evaluables = self.evaluables().into();
+        let remarks = self.warnings;
+        Ok(Outcome { convention: CONVENTION.into(), tables, values, evaluables, remarks, ..Outcome::default() })
+    }
+
+    /// Both profiles with their errors, for the standards' values.
+    fn evaluables(&self) -> [Evaluable; 2] {
+        let [part, slide] = [0, 1].map(|which| {
+            let errors = &self.errors[which];
+            if errors.noise_um.iter().all(|std| std.is_finite()) {
+                Ok(OpenErrors {
+                    std_um: errors.noise_um.clone(),
+                    freedom: self.degrees_of_freedom as f64,
+                    correlation: errors.correlation.clone(),
+                    common_um: errors.common_um.clone(),
+                })
+            } else {
+                Err(NO_REPEATS.to_owned())
+            }
+        });
+        let profile = |of: &str, deviation_um: &[f64], errors| {
+            let (of, z_mm, deviation_um) = (of.to_owned(), self.z_mm.clone(), deviation_um.to_vec());
+            Evaluable::OpenProfile(OpenProfile { of, z_mm, deviation_um, errors })
+        };
+        [profile("part", &self.part_um, part), profile("slide", &self.slide_um, slide)]
     }
 
     fn values(&self) -> Vec<NamedValue> {
-        let of = |name: &str, deviation_um: &[f64], std_um: &[f64]| {
-            let strt = "peak-to-valley straightness deviation about LSLI, unfiltered (ISO 12780-1)";
+        let of = |name: &str, std_um: &[f64]| {
             let each = "standard uncertainty of the deviation at one position, rms over the positions";
-            [
-                value("STRt", strt_lsli_um(&self.z_mm, deviation_um), f64::NAN, "um", strt).of(name),
-                value("STRq", rms(deviation_um), f64::NAN, "um", "rms straightness deviation about LSLI").of(name),
-                value("std", rms(std_um), f64::NAN, "um", each).of(name),
-            ]
+            value("std", rms(std_um), f64::NAN, "um", each).of(name)
         };
         let repeatability = "standard deviation of one trace at one position, rms over the positions";
-        let mut values = Vec::from(of("part", &self.part_um, &self.part_std_um));
-        values.extend(of("slide", &self.slide_um, &self.slide_std_um));
+        let mut values = vec![of("part", &self.part_std_um), of("slide", &self.slide_std_um)];
         values.push(value("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
         let end = |z_mm: Option<&f64>| z_mm.copied().unwrap_or(f64::NAN);
         values.push(value("first-position", end(self.z_mm.first()), f64::NAN, "mm", "first position along the axis"));

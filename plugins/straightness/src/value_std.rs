@@ -1,5 +1,7 @@
 //! How uncertain a value of a whole profile is: less than a value at one position, where errors average out along it.
 
+use runout_core::numerics::least_squares::Basis;
+
 use crate::grid::Grid;
 
 /// Correlations along the profile below this are none.
@@ -65,6 +67,19 @@ impl ProfileErrors {
             common_um: self.common_um.iter().map(select).collect(),
         }
     }
+}
+
+/// Correlation of the errors of a fit by some deviations, over 0, 1, … of so many positions: what a single error in the middle becomes.
+pub fn correlation_of(smooth: &Basis, positions: usize) -> Vec<f64> {
+    let middle = positions / 2;
+    let mut left = vec![0.0; positions];
+    left[middle] = 1.0;
+    smooth.remove_from(&mut left);
+    let own = 1.0 - left[middle];
+    if own <= 0.0 {
+        return vec![1.0];
+    }
+    std::iter::once(1.0).chain(left[middle + 1..].iter().map(|left| -left / own)).collect()
 }
 
 impl Grid {

@@ -7,7 +7,11 @@ use std::f64::consts::TAU;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use runout_core::points::{Column, Points, Trace};
+use runout_core::{
+    evaluate::{drawn::Sensitivity, straightness::Straightness as Values},
+    points::{Column, Points, Trace},
+    stage::{Evaluable, PointSeparator},
+};
 use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 
 fn config(step_mm: Option<f64>) -> AxialReversalConfig {
@@ -180,6 +184,70 @@ fn the_stated_uncertainty_covers_the_truth() {
         // there are fewest degrees of freedom, 600·23.
         assert!((variance.sqrt() / (0.1 * (23.0_f64 / 25.0).sqrt()) - 1.0).abs() < 0.025, "{}", variance.sqrt());
     }
+}
+
+/// The errors that the domain offers with both profiles are those that the profiles have: of straightness values, at little and at much
+/// noise, from four degrees of freedom a position.
+#[test]
+fn intervals_of_the_standards_values_hold_the_truth() {
+    let z = even(0.0, 1.0, 121);
+    let look = |deviation_um: &[f64]| {
+        let found = Values::of(&z, deviation_um);
+        vec![found.strt_lsli_um, found.strt_mzli_um, found.strq_um]
+    };
+    for noise_um in [0.004, 0.04] {
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        let noise = Normal::new(0.0, noise_um).unwrap();
+        let (mut held, campaigns) = ([[0; 3]; 2], 100);
+        for campaign in 0..campaigns {
+            let mut traces = Vec::new();
+            for (setup, repeat) in
+                ["initial", "reversed"].into_iter().flat_map(|setup| (0..3).map(move |one| (setup, one)))
+            {
+                let line = [f64::from(repeat) * 10.0, 0.1 * f64::from(repeat)];
+                let mut one = trace(&format!("{setup}{repeat}"), setup, &z, line);
+                one.2.iter_mut().for_each(|row| row.1 += noise.sample(&mut random));
+                traces.push(one);
+            }
+            let outcome = separator(None).separate(&File(traces).points()).unwrap();
+            for (evaluable, (held, truth)) in outcome.evaluables.iter().zip(held.iter_mut().zip([part, slide])) {
+                let Evaluable::OpenProfile(profile) = evaluable else { panic!("{evaluable:?}") };
+                let errors = profile.errors.as_ref().unwrap();
+                let drawn = errors.drawn(&profile.deviation_um, 64, campaign, look).unwrap();
+                let (found, truth) = (look(&profile.deviation_um), look(&without_line(&z, truth)));
+                for (value, sensitivity) in
+                    [Sensitivity::Extreme, Sensitivity::Extreme, Sensitivity::Mean].into_iter().enumerate()
+                {
+                    let [low, high] = drawn.uncertainty(value, found[value], sensitivity).unwrap().interval_95;
+                    held[value] += usize::from(low <= truth[value] && truth[value] <= high);
+                }
+            }
+        }
+        println!(
+            "{noise_um} µm: STRt LSLI, STRt MZLI, STRq of part and slide hold the truth in {held:?} of {campaigns}"
+        );
+        // 95 % of 100 are 95 ± 2.2; four of those below it.
+        assert!(held.iter().flatten().all(|held| *held >= 86), "{noise_um}: {held:?}");
+    }
+}
+
+#[test]
+fn without_repeats_the_profiles_say_why_they_have_no_errors() {
+    let z = even(0.0, 1.0, 60);
+    let file = File(vec![trace("1", "initial", &z, [0.0, 0.0]), trace("2", "reversed", &z, [0.0, 0.0])]);
+    let outcome = separator(None).separate(&file.points()).unwrap();
+    let names: Vec<&str> = outcome
+        .evaluables
+        .iter()
+        .map(|one| match one {
+            Evaluable::OpenProfile(profile) => {
+                assert!(profile.errors.as_ref().unwrap_err().contains("one trace in each setup"));
+                profile.of.as_str()
+            }
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(names, ["part", "slide"]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use runout_core::{
     model::diagnosis::LostOrders,
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{
-        Form, NamedValue, Outcome,
+        Evaluable, Form, NamedValue, Outcome,
         points::{far_below_noise, value},
     },
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers, texts},
@@ -157,8 +157,7 @@ impl Found<'_> {
                 .into(),
             tables,
             values: self.values(&lobes),
-            form: self.form(&lobes),
-            heights: None,
+            evaluables: self.form(&lobes).map(Evaluable::ClosedProfiles).into_iter().collect(),
             lost_orders: Some(LostOrders::of([("lobing", lobing), ("form", form)])),
             remarks: self.remarks(&lobes),
             notes: self.notes(&lobes),

@@ -12,7 +12,7 @@ use runout_core::{
         PointKind::{Label, Number},
         Points,
     },
-    stage::{Outcome, PointModel, PointPlan, PointSeparator, Separator},
+    stage::{EvaluableKind, Outcome, PointModel, PointPlan, PointSeparator, Separator},
     table::TableSpec,
 };
 
@@ -107,9 +107,10 @@ impl PointSeparator for TouchProbe {
         Ok(outcome)
     }
 
-    fn gives_form(&self) -> bool {
+    fn evaluables(&self) -> Vec<EvaluableKind> {
         let all: Vec<usize> = (0..self.0.setups.len()).collect();
-        (2..=self.0.max_order).any(|order| self.0.separates(&all, order))
+        let of_ring = (2..=self.0.max_order).any(|order| self.0.separates(&all, order));
+        of_ring.then_some(EvaluableKind::ClosedProfiles).into_iter().collect()
     }
 
     fn notes(&self) -> Vec<String> {

@@ -30,7 +30,7 @@ fn orders_that_the_setups_do_not_separate_are_null() {
         assert_eq!(column(&rows, "amplitude_um")[index].is_nan(), order % 3 == 0);
         assert_eq!(column(&rows, "form_amplitude_um")[index].is_nan(), order % 3 == 0);
     }
-    let form = outcome.form.unwrap();
+    let form = outcome.form().unwrap();
     assert_eq!(form.sections[0].lost_orders(0), [3, 6, 9, 12]);
 }
 
@@ -63,7 +63,7 @@ fn the_bound_of_the_ring_goes_into_the_uncertainty() {
         let form: Vec<f64> = (0..720).map(|index| scenario.form_um(f64::from(index).to_radians() / 2.0)).collect();
         let bound = support::range(&form);
         let outcome = config(&scenario, 15, Some(bound)).separate(&scenario.touched().points()).unwrap();
-        assert!(outcome.form.is_none());
+        assert!(outcome.evaluables.is_empty());
         let rows = table(&outcome, "pretravel");
         let truth = lobing(&scenario);
         let found = column(&rows, "pretravel_um");

@@ -35,7 +35,9 @@ fn name(value: &ValueComparison) -> String {
     let of = value.of.as_ref().map(|of| format!(" {of}")).unwrap_or_default();
     let unit = value.unit.replace("um", "µm").replace("urad", "µrad").replace("deg", "°");
     let unit = if unit.is_empty() { unit } else { format!(", {unit}") };
-    format!("{}{of}{unit}", value.symbol)
+    let referred = [&value.reference, &value.filter].into_iter().flatten().map(String::as_str);
+    let referred = referred.filter(|name| *name != "none").fold(String::new(), |all, name| all + ", " + name);
+    format!("{}{of}{referred}{unit}", value.symbol)
 }
 
 /// Values that more than one method gives.

@@ -2,7 +2,7 @@
 
 use runout_core::stage::NamedValue;
 
-use super::unit;
+use super::{described, unit};
 use crate::render::{
     number::{significant, with_std},
     page::Page,
@@ -12,40 +12,78 @@ use crate::render::{
 /// Digits of a value without a standard uncertainty.
 const DIGITS: usize = 4;
 
+/// Values that are columns, at most; more are rows.
+const MOST_COLUMNS: usize = 8;
+
 /// Values that several things have (a part and a slide) side by side, then the others, one below the other.
 pub(super) fn section(page: &mut Page, values: &[NamedValue]) {
-    let mut things: Vec<&str> = values.iter().filter_map(|value| value.of.as_deref()).collect();
-    things.dedup();
-    let shared = |value: &&NamedValue| {
-        value.of.is_some() && values.iter().filter(|other| other.symbol == value.symbol).count() > 1
+    let mut things: Vec<&str> = Vec::new();
+    for thing in values.iter().filter_map(|value| value.of.as_deref()) {
+        if !things.contains(&thing) {
+            things.push(thing);
+        }
+    }
+    // Values of one quantity are side by side: symbol, reference and filter.
+    let same = |one: &NamedValue, other: &NamedValue| {
+        (&one.symbol, &one.reference, &one.filter) == (&other.symbol, &other.reference, &other.filter)
     };
+    let shared =
+        |value: &&NamedValue| value.of.is_some() && values.iter().filter(|other| same(other, value)).count() > 1;
     let mut symbols: Vec<&NamedValue> = Vec::new();
     for value in values.iter().filter(shared) {
-        if symbols.iter().all(|known| known.symbol != value.symbol) {
+        if symbols.iter().all(|known| !same(known, value)) {
             symbols.push(value);
         }
     }
-    if !symbols.is_empty() {
-        let header = symbols.iter().map(|value| format!("{} {}", value.symbol, unit(&value.unit)));
-        let mut table = Table::new(1, std::iter::once(String::new()).chain(header));
-        for thing in things {
-            let of = |symbol: &str| {
-                let found = values.iter().find(|value| value.of.as_deref() == Some(thing) && value.symbol == symbol);
-                found.map_or_else(String::new, number)
-            };
-            table.row(std::iter::once(thing.to_owned()).chain(symbols.iter().map(|value| of(&value.symbol))));
+    let of = |thing: &str, like: &NamedValue| {
+        let found = values.iter().find(|value| value.of.as_deref() == Some(thing) && same(value, like));
+        found.map_or_else(String::new, number)
+    };
+    if symbols.len() > MOST_COLUMNS {
+        let header = std::iter::once("").chain(things.iter().copied()).chain(["what it is"]);
+        let mut table = Table::new(1, header);
+        for value in symbols {
+            let numbers = things.iter().map(|thing| of(thing, value));
+            table.row(std::iter::once(label(value)).chain(numbers).chain([value.about.clone()]));
         }
         page.headed_table("Values", &table);
+    } else if !symbols.is_empty() {
+        let header = symbols.iter().map(|value| label(value));
+        let mut table = Table::new(1, std::iter::once(String::new()).chain(header));
+        for thing in things {
+            table.row(std::iter::once(thing.to_owned()).chain(symbols.iter().map(|value| of(thing, value))));
+        }
+        page.headed_table("Values", &table);
+        let mut said: Vec<&str> = Vec::new();
         for value in symbols {
-            page.line(format_args!("  {}: {}", value.symbol, value.about));
+            if !said.contains(&value.symbol.as_str()) {
+                page.line(format_args!("  {}: {}", value.symbol, value.about));
+                said.push(&value.symbol);
+            }
         }
     }
     let mut table = Table::new(2, ["value", "of", "number ± std", "unit", "what it is"]);
     for value in values.iter().filter(|value| !shared(value)) {
         let of = value.of.clone().unwrap_or_default();
-        table.row([value.symbol.clone(), of, number(value), unit(&value.unit), value.about.clone()]);
+        table.row([name(value), of, number(value), unit(&value.unit), value.about.clone()]);
     }
     page.headed_table("Values of the whole", &table);
+}
+
+/// "STRt LSLI, unfiltered µm"; of a domain's own values symbol and unit.
+fn label(value: &NamedValue) -> String {
+    match (&value.reference, &value.filter) {
+        (Some(reference), Some(filter)) => described(&value.symbol, reference, filter, &value.unit),
+        _ => format!("{} {}", value.symbol, unit(&value.unit)),
+    }
+}
+
+/// The same without the unit.
+fn name(value: &NamedValue) -> String {
+    match (&value.reference, &value.filter) {
+        (Some(reference), Some(filter)) => described(&value.symbol, reference, filter, "").trim_end().to_owned(),
+        _ => value.symbol.clone(),
+    }
 }
 
 fn number(value: &NamedValue) -> String {

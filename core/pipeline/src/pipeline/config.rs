@@ -291,21 +291,28 @@ fn named_files(root: &Table, folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// What is evaluated of a form, and the limits of it.
+/// What is evaluated of a result, and the limits of it.
 fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, Fault> {
     let configured = table(root, "evaluate")?;
     let limits = tables(root, "limit")?;
-    if let (false, Some(table)) = (route.gives_form(), configured.as_ref().or(limits.first())) {
-        return Err(Fault::span(table.span(), "there is no form here whose values could be chosen or limited"));
+    let given = route.evaluables();
+    if let (true, Some(table)) = (given.is_empty(), configured.as_ref().or(limits.first())) {
+        let fault = Fault::span(
+            table.span(),
+            "there is no form here, nor another profile or height map, whose values could be chosen or limited",
+        );
+        return Err(fault.help("leave it out; the values are those of the separator"));
     }
     let measures = rig.filter(|_| matches!(route, Route::Turns { .. }));
     let check = |config: EvaluateConfig| {
         // Sections of measured points are those of their files.
         measures.map_or(Ok(()), |rig| config.check_datum(rig))?;
+        config.check_given(&given)?;
         config.check()
     };
     let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, check)).transpose()?;
     let mut evaluate = configured.unwrap_or_default();
+    evaluate.keep_given(&given);
     if let Some(rig) = measures {
         evaluate.add_faces(rig);
     }

@@ -2,17 +2,21 @@
 
 use super::{
     config::{Pipeline, exports::spare_inputs},
+    evaluate::Evaluated,
     observer::Observer,
     result::{Evaluation, complete},
     result_writer::{Finished, ResultWriter},
 };
 use crate::{
+    height_grid::HeightGrid,
     points::Points,
-    stage::{Exporter, Form, Outcome, PointSeparator},
+    stage::{Evaluable, EvaluableKind, Exporter, Form, Outcome, PlaneMap, PointSeparator},
     summary::Summary,
 };
 use runout_closed_loop::diagnosis::{Correction, Diagnosis};
-use runout_error::Result;
+use runout_error::{Error, Result};
+use runout_numerics::height_map::HeightMap;
+use runout_standards::areal::without_polynomial;
 
 pub(super) fn run(
     pipeline: &Pipeline,
@@ -45,19 +49,21 @@ impl PointResult<'_> {
         points: &Points,
         observer: &dyn Observer,
     ) -> Result<Finished> {
-        let Outcome { convention, tables, values, form, heights, lost_orders, mut remarks, notes } = self.outcome;
+        let Outcome { convention, tables, values, evaluables, lost_orders, mut remarks, notes } = self.outcome;
+        check_declared(&evaluables, &pipeline.route.evaluables())?;
+        let evaluated = Evaluated::of(&evaluables, &pipeline.evaluate)?;
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
         if let Some(diagnosis) = self.diagnosis {
             writer.diagnosed(diagnosis);
         }
-        writer.take_values(values, convention);
+        writer.take_values(values, evaluated, convention);
         writer.lost_orders(lost_orders);
         writer.note(notes);
-        writer.take_heights(heights);
+        writer.take_heights(evaluables.iter().find_map(Evaluable::plane_map).map(above_plane).transpose()?);
         writer.write(&tables)?;
         let mut surface = None;
-        if let Some(Form { sections, radius_mm }) = form {
+        if let Some(Form { sections, radius_mm }) = evaluables.into_iter().find_map(Evaluable::into_form) {
             observer.begin(sections.len());
             let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None };
             for separation in sections {
@@ -78,4 +84,23 @@ impl PointResult<'_> {
         remarks.extend(points.remarks.iter().cloned());
         writer.finish(points.provenance()?, remarks, surface.as_ref())
     }
+}
+
+/// Refuses an outcome that holds what its separator did not declare: `check` and the exporters rely on that.
+fn check_declared(evaluables: &[Evaluable], declared: &[EvaluableKind]) -> Result<()> {
+    match evaluables.iter().map(Evaluable::kind).find(|kind| !declared.contains(kind)) {
+        Some(kind) => {
+            let problem = "the separator offers it and did not declare it in `evaluables`";
+            Err(Error::new("evaluate", format!("the {}", kind.name()), problem))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Heights above their least-squares plane, as meshes draw them.
+fn above_plane(plane: &PlaneMap) -> Result<HeightGrid> {
+    let HeightGrid { columns, step_x_mm, step_y_mm, .. } = plane.grid;
+    let map = HeightMap::new(&plane.grid.height_nm[..], columns, step_x_mm, step_y_mm, false)?;
+    let height_nm = without_polynomial(&map, 1)?.heights_um().to_vec();
+    Ok(HeightGrid { height_nm, ..plane.grid })
 }

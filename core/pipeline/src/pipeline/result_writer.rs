@@ -7,7 +7,7 @@ use super::{
         Pipeline,
         exports::{summary_path, written},
     },
-    evaluate::{Evaluate, Group, add_areal, add_generatrices, decide, part_summary},
+    evaluate::{Evaluate, Evaluated, Group, add_areal, add_generatrices, decide, part_summary},
     station_summary::summarise,
     steadiness::inflated,
     tables::{StationTables, correction_rows, named_value_rows},
@@ -63,6 +63,8 @@ pub(super) struct ResultWriter {
     convention: String,
     /// Heights on a plane.
     heights: Option<HeightGrid>,
+    /// Values of open profiles and height maps, for limits.
+    evaluated: Evaluated,
     summary: Summary,
     /// What the closed loop found.
     diagnosis: Option<Diagnosis>,
@@ -111,6 +113,7 @@ impl ResultWriter {
             interrupted: false,
             convention: String::new(),
             heights: None,
+            evaluated: Evaluated::default(),
             summary: begun(pipeline),
             diagnosis: None,
             summary_path: summary_path(exporters, &pipeline.tables),
@@ -144,9 +147,11 @@ impl ResultWriter {
         Ok(())
     }
 
-    /// Takes a domain's own values, and the convention of its tables.
-    pub(super) fn take_values(&mut self, values: Vec<NamedValue>, convention: String) {
-        self.summary.values = values;
+    /// Takes a domain's own values, those of the standards of what it offers beside form, and the convention of its tables.
+    pub(super) fn take_values(&mut self, values: Vec<NamedValue>, evaluated: Evaluated, convention: String) {
+        self.summary.values = evaluated.named().chain(values).collect();
+        self.note(evaluated.remarks.clone());
+        self.evaluated = evaluated;
         self.convention = convention;
     }
 
@@ -223,7 +228,9 @@ impl ResultWriter {
         self.summary.warnings.extend(left_out);
         self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
         self.summary.warnings.extend(inflated(&self.summary.stations));
-        let (limits, unmatched) = decide(self.evaluate.limits(), &self.summary.placed_values());
+        let mut placed = self.summary.placed_values();
+        placed.extend(self.evaluated.placed());
+        let (limits, unmatched) = decide(self.evaluate.limits(), &placed);
         self.summary.limits = limits;
         self.summary.warnings.extend(unmatched);
         let values = if self.of_form {

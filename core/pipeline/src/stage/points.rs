@@ -1,8 +1,10 @@
 //! Separation of measured points, of any domain: points in; tables, values and form out.
 
-use super::plan::PointPlan;
+use super::{
+    evaluable::{Evaluable, EvaluableKind, Form},
+    plan::PointPlan,
+};
 use crate::{
-    height_grid::HeightGrid,
     points::{PointColumn, Points},
     summary::NamedValue,
 };
@@ -14,7 +16,7 @@ use runout_closed_loop::{
 };
 use runout_error::Result;
 use runout_table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts};
-use runout_turning::{separation::Separation, surface::Surface};
+use runout_turning::surface::Surface;
 
 /// χ² per degree of freedom below which, and standard deviations of chance by which, a residual is far below its noise.
 const FAR_BELOW: [f64; 2] = [0.5, 5.0];
@@ -47,14 +49,9 @@ pub trait PointSeparator: Send + Sync {
     /// When they do not hold what the method needs.
     fn separate(&self, points: &Points) -> Result<Outcome>;
 
-    /// Whether its result has form: closed profiles, from which the standards' values and a surface are computed.
-    fn gives_form(&self) -> bool {
-        false
-    }
-
-    /// Whether its result has heights on a plane, of which meshes are drawn.
-    fn gives_heights(&self) -> bool {
-        false
+    /// What its outcomes may hold that the standards' values are computed from. What is not named here is no part of an outcome.
+    fn evaluables(&self) -> Vec<EvaluableKind> {
+        Vec::new()
     }
 
     /// Whether [`remarks`](Self::remarks) needs the surface.
@@ -138,10 +135,8 @@ pub struct Outcome {
     pub tables: Vec<TableRows>,
     /// Values.
     pub values: Vec<NamedValue>,
-    /// Form, where there is one.
-    pub form: Option<Form>,
-    /// Heights on a plane above their least-squares plane, where there are any.
-    pub heights: Option<HeightGrid>,
+    /// What the standards' values are computed from.
+    pub evaluables: Vec<Evaluable>,
     /// Orders that the points do not separate; nothing where the domain has no orders.
     pub lost_orders: Option<LostOrders>,
     /// What the user should know, as something may be wrong.
@@ -150,13 +145,15 @@ pub struct Outcome {
     pub notes: Vec<String>,
 }
 
-/// Closed profiles of a part.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Form {
-    /// One separation a section, in the order of z, named by the section's id.
-    pub sections: Vec<Separation>,
-    /// Radius of the cylinder that deviations count from, in mm.
-    pub radius_mm: f64,
+impl Outcome {
+    /// Its closed profiles, where it has some.
+    #[must_use]
+    pub fn form(&self) -> Option<&Form> {
+        self.evaluables.iter().find_map(|one| match one {
+            Evaluable::ClosedProfiles(form) => Some(form),
+            _ => None,
+        })
+    }
 }
 
 /// A domain whose declared model and effects are linear in their parameters.
@@ -252,5 +249,9 @@ pub fn value(symbol: &str, value: f64, std: f64, unit: &str, about: &str) -> Nam
         std: known(std),
         unit: unit.into(),
         about: about.into(),
+        interval_95: None,
+        reference: None,
+        filter: None,
+        no_uncertainty: None,
     }
 }

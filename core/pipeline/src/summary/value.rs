@@ -35,6 +35,18 @@ pub struct NamedValue {
     pub unit: String,
     /// What it is, with standard and clause.
     pub about: String,
+    /// Where the truth lies with 95 % probability; absent where no interval is stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_95: Option<[f64; 2]>,
+    /// What it was referred to, where it is a standard's value of an open profile or a height map: "LSLI", "mean line".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<String>,
+    /// The filter applied, as limits name it; absent as `reference` is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<String>,
+    /// Why no uncertainty is stated of a standard's value; absent where one is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_uncertainty: Option<String>,
 }
 
 impl NamedValue {
@@ -42,5 +54,29 @@ impl NamedValue {
     #[must_use]
     pub fn of(self, of: impl Into<String>) -> Self {
         Self { of: Some(of.into()), ..self }
+    }
+
+    /// A standard's value of an open profile or a height map.
+    pub(crate) fn standard(of: &str, value: &Value) -> Self {
+        let known = value.uncertainty.as_ref();
+        Self {
+            symbol: value.symbol.clone(),
+            of: Some(of.to_owned()),
+            value: Some(value.value),
+            std: known.map(|known| known.std),
+            unit: value.unit.clone(),
+            about: value.source.clone(),
+            interval_95: known.map(|known| known.interval_95),
+            reference: Some(value.reference.clone()),
+            filter: Some(value.filter.clone()),
+            no_uncertainty: value.no_uncertainty.clone(),
+        }
+    }
+
+    /// Whether both are the same quantity: symbol, what it is of, reference and filter.
+    #[must_use]
+    pub fn is_same_quantity(&self, other: &Self) -> bool {
+        let key = |one: &'_ Self| (one.symbol.clone(), one.of.clone(), one.reference.clone(), one.filter.clone());
+        key(self) == key(other)
     }
 }

@@ -16,6 +16,7 @@ use crate::{
         config::{Route, exports::spare_inputs},
         document::{Document, Sources},
         error::Fault,
+        evaluate::Evaluated,
         registry::Context,
     },
     points::PointColumn,
@@ -104,10 +105,16 @@ impl<'a> ComparingPoints<'a> {
             return Err(Error::new("compare", &pipeline.title, "the loader gave what it did not declare"));
         };
         spare_inputs(&outputs, std::slice::from_ref(&points.input))?;
-        let mut outcomes = vec![(self.names[0].clone(), self.reference, self.reference.separate(&points)?)];
+        let separate = |separator: &dyn PointSeparator| {
+            let mut outcome = separator.separate(&points)?;
+            let evaluated = Evaluated::of(&outcome.evaluables, &pipeline.evaluate)?;
+            outcome.values = evaluated.named().chain(outcome.values).collect();
+            Ok::<Outcome, Error>(outcome)
+        };
+        let mut outcomes = vec![(self.names[0].clone(), self.reference, separate(self.reference)?)];
         let mut refused = self.refused.clone();
         for (name, method) in self.names[1..].iter().zip(&self.methods) {
-            match method.separator.separate(&points) {
+            match separate(&*method.separator) {
                 Ok(outcome) => outcomes.push((name.clone(), &*method.separator, outcome)),
                 Err(error) => refused.push(Refusal {
                     method: name.clone(),
@@ -164,7 +171,7 @@ fn normalised(difference: f64, stds: [Option<f64>; 2]) -> Option<f64> {
 
 /// Every value that any method gives, in the order of the first that gives it.
 fn values(outcomes: &[(&str, &Outcome)]) -> Vec<ValueComparison> {
-    let same = |one: &NamedValue, other: &NamedValue| one.symbol == other.symbol && one.of == other.of;
+    let same = NamedValue::is_same_quantity;
     let mut kinds: Vec<&NamedValue> = Vec::new();
     for value in outcomes.iter().flat_map(|(_, outcome)| &outcome.values) {
         if !kinds.iter().any(|known| same(known, value)) {
@@ -195,6 +202,8 @@ fn values(outcomes: &[(&str, &Outcome)]) -> Vec<ValueComparison> {
             of: kind.of.clone(),
             unit: kind.unit.clone(),
             about: kind.about.clone(),
+            reference: kind.reference.clone(),
+            filter: kind.filter.clone(),
             differences: differences.collect(),
             values: all
                 .iter()

@@ -182,6 +182,12 @@ pub struct ValueComparison {
     pub unit: String,
     /// What it is.
     pub about: String,
+    /// What it was referred to, where it is a standard's value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<String>,
+    /// The filter applied, where it is a standard's value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<String>,
     /// By method.
     pub values: Vec<ValueOf>,
     /// Each other method minus the reference, where both give a number.

@@ -9,7 +9,8 @@ use crate::{
     },
     points::PointColumn,
     stage::{
-        Averager, Conditioner, PointModel, PointSeparator, Preprocessor, Separator, StationModel, StationSeparator,
+        Averager, Conditioner, EvaluableKind, PointModel, PointSeparator, Preprocessor, Separator, StationModel,
+        StationSeparator,
     },
 };
 use runout_closed_loop::Effect;
@@ -51,15 +52,24 @@ impl Route {
         }
     }
 
+    /// What its result may hold that the standards' values are computed from.
+    #[must_use]
+    pub fn evaluables(&self) -> Vec<EvaluableKind> {
+        match self {
+            Self::Turns { .. } => vec![EvaluableKind::ClosedProfiles, EvaluableKind::AxisMotion],
+            Self::Points { separator, .. } => separator.evaluables(),
+        }
+    }
+
     /// Whether its result has form.
     #[must_use]
     pub fn gives_form(&self) -> bool {
-        self.point_separator().is_none_or(PointSeparator::gives_form)
+        self.evaluables().contains(&EvaluableKind::ClosedProfiles)
     }
 
     /// Whether its result has a surface: form, or heights on a plane.
     pub(super) fn gives_surface(&self) -> bool {
-        self.gives_form() || self.point_separator().is_some_and(PointSeparator::gives_heights)
+        self.gives_form() || self.evaluables().contains(&EvaluableKind::HeightMap)
     }
 
     /// Whether there is a model for the closed loop.
@@ -106,7 +116,7 @@ impl Route {
 pub(super) fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<Route, Fault> {
     match separator {
         Separator::Points(separator) => match table(root, "surface")? {
-            Some(table) if !separator.gives_form() => {
+            Some(table) if !separator.evaluables().contains(&EvaluableKind::ClosedProfiles) => {
                 Err(Fault::span(table.span(), "this separator gives no form: it makes no surface"))
             }
             _ => Ok(Route::Points { columns: separator.columns(), separator }),

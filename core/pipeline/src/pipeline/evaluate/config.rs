@@ -12,6 +12,7 @@ use super::{
     Limit,
     filter::{Filter, between_name, robust_name, waviness_name},
 };
+use crate::stage::EvaluableKind;
 use runout_error::fault::{Fault, Place, known_names};
 use runout_numerics::filter::Kind as FilterKind;
 use runout_standards::{areal, roundness::Reference, texture::Kind, twist};
@@ -26,12 +27,12 @@ use runout_turning::{
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct EvaluateConfig {
-    /// Groups of values, or "all"; without it `roundness`, `texture`, `cylindricity` and `error-motion`. Of "all", what a run
-    /// cannot give (areal values and twist of a single section) is left out.
+    /// Groups of values, or "all"; without it `roundness`, `straightness`, `texture`, `cylindricity` and `error-motion`, as far as what
+    /// the separator offers gives them. Of "all", what a run cannot give (areal values and twist of a single section) is left out.
     #[schemars(with = "Option<GroupsSchema>")]
     pub values: Option<Groups>,
-    /// Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY). Without it LSCI and
-    /// MZCI.
+    /// Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY), and the lines of straightness those
+    /// two that there are (LSLI, MZLI). Without it LSCI and MZCI.
     pub references: Option<Vec<Reference>>,
     /// Cut-offs of the Gaussian low-pass (ISO 16610-21) for roundness and cylindricity, in undulations per revolution, as
     /// 15, 50, 150, 500, 1500. Unfiltered values are always there besides. Without it 50, where the orders reach it.
@@ -150,13 +151,13 @@ pub struct ArealConfig {
 pub enum FormRemoval {
     /// Nothing but the mean.
     None,
-    /// A line along the axis, the same all around: radius and taper.
+    /// A line along the axis, the same all around: radius and taper. Of a height map its plane, without the key.
     Plane,
     /// A cylinder: radius, place and tilt of its axis.
     Cylinder,
     /// A cone: a cylinder and its taper.
     Cone,
-    /// A body whose radius and centre are polynomials along the axis.
+    /// A body whose radius and centre are polynomials along the axis. Of a height map a polynomial in x and y of a total degree.
     Polynomial,
 }
 
@@ -321,7 +322,10 @@ pub enum Group {
     Roundness,
     /// Amplitude and phase of each order from 2 on of each section's form.
     Harmonics,
+    /// STRt about LSLI and MZLI; STRp, STRv and STRq about LSLI; of open profiles.
+    Straightness,
     /// Ra of each section's unfiltered profile; with λc the values of ISO 21920-2, of the profiles in [evaluate.texture].
+    /// Of open profiles the latter.
     Texture,
     /// CYLt about each reference, CYLp, CYLv, CYLq about LSCY, of all sections together.
     Cylindricity,
@@ -335,15 +339,30 @@ pub enum Group {
 
 impl Group {
     /// All of them.
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Roundness,
         Self::Harmonics,
+        Self::Straightness,
         Self::Texture,
         Self::Cylindricity,
         Self::Areal,
         Self::Twist,
         Self::ErrorMotion,
     ];
+
+    /// Its name in a file.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Roundness => "roundness",
+            Self::Harmonics => "harmonics",
+            Self::Straightness => "straightness",
+            Self::Texture => "texture",
+            Self::Cylindricity => "cylindricity",
+            Self::Areal => "areal",
+            Self::Twist => "twist",
+            Self::ErrorMotion => "error-motion",
+        }
+    }
 }
 
 /// Groups of values as they stand in a file.
@@ -404,6 +423,8 @@ impl<'de> Deserialize<'de> for Groups {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluate {
     groups: Vec<Group>,
+    /// Whether there are closed profiles to evaluate.
+    of_closed: bool,
     /// Whether all groups were asked for, and none by its name.
     pub(crate) all: bool,
     pub(super) references: Vec<Reference>,
@@ -428,7 +449,14 @@ pub struct Evaluate {
 impl Default for Evaluate {
     fn default() -> Self {
         Self {
-            groups: vec![Group::Roundness, Group::Texture, Group::Cylindricity, Group::ErrorMotion],
+            groups: vec![
+                Group::Roundness,
+                Group::Straightness,
+                Group::Texture,
+                Group::Cylindricity,
+                Group::ErrorMotion,
+            ],
+            of_closed: true,
             all: false,
             references: vec![Reference::LeastSquares, Reference::MinimumZone],
             filter_upr: None,
@@ -472,6 +500,28 @@ impl EvaluateConfig {
             }
             None => Ok(()),
         }
+    }
+
+    /// Refuses groups by name that nothing gives of what a separator offers, and forms that its height maps do not have.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub(crate) fn check_given(&self, given: &[EvaluableKind]) -> Result<(), Fault> {
+        let names = |kinds: &[EvaluableKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
+        if let Some(Groups::Listed(groups)) = &self.values
+            && let Some((index, group)) = groups.iter().enumerate().find(|(_, group)| !group.is_given_by(given))
+        {
+            let message = format!("nothing here gives values of `{}`", group.name());
+            let help =
+                format!("they are computed from {}; the separator offers {}", names(group.sources()), names(given));
+            return Err(Fault::here(message).help(help).under_item("values", index));
+        }
+        let of_maps = given.contains(&EvaluableKind::HeightMap) && !given.contains(&EvaluableKind::ClosedProfiles);
+        if of_maps && matches!(self.areal.form, Some(FormRemoval::Cylinder | FormRemoval::Cone)) {
+            let fault = Fault::at("form", "a height map on a plane is no wall of a cylinder");
+            return Err(fault.help("none, plane or polynomial").under("areal"));
+        }
+        Ok(())
     }
 
     /// Checks the values.
@@ -553,6 +603,7 @@ impl EvaluateConfig {
         let usual = Evaluate::default();
         Ok(Evaluate {
             all: self.values == Some(Groups::All),
+            of_closed: usual.of_closed,
             groups: match self.values {
                 Some(Groups::All) => Group::ALL.to_vec(),
                 Some(Groups::Listed(groups)) => groups,
@@ -629,6 +680,15 @@ impl Evaluate {
         self.faces = once_each(std::mem::take(&mut self.faces));
     }
 
+    /// Leaves only what is computed from these.
+    pub(crate) fn keep_given(&mut self, given: &[EvaluableKind]) {
+        self.groups.retain(|group| group.is_given_by(given));
+        self.of_closed = given.contains(&EvaluableKind::ClosedProfiles);
+        if !self.of_closed && self.areal.form == FormRemoval::Cylinder {
+            self.areal.form = FormRemoval::Plane;
+        }
+    }
+
     pub(crate) fn add_limit(&mut self, limit: Limit) {
         self.limits.push(limit);
     }
@@ -688,8 +748,13 @@ impl Evaluate {
         if self.has(Group::Harmonics) {
             symbols.extend([("amplitude", "µm"), ("phase", "°")]);
         }
+        if self.has(Group::Straightness) {
+            symbols.extend(["STRt", "STRp", "STRv", "STRq"].map(|symbol| (symbol, "µm")));
+        }
         if self.has(Group::Texture) {
-            symbols.push(("Ra", "µm"));
+            if self.of_closed {
+                symbols.push(("Ra", "µm"));
+            }
             for kind in &self.texture.profiles {
                 if *kind == Kind::P || self.lambda_c_mm.is_some() {
                     symbols.extend(kind.parameters().iter().map(|(symbol, unit, _)| (*symbol, *unit)));

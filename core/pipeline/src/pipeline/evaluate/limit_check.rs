@@ -43,6 +43,10 @@ impl Limit {
             "RONt" | "RONp" | "RONv" | "RONq" | "dr/dtheta" => {
                 known("reference", &self.reference, symbols(&|one| one.symbol()))?;
             }
+            "STRt" | "STRp" | "STRv" | "STRq" => {
+                let lines = evaluate.references.iter().filter_map(|reference| reference.line_symbol());
+                known("reference", &self.reference, lines.map(str::to_owned).collect())?;
+            }
             "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
                 known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;
             }

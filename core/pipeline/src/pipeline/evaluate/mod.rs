@@ -4,11 +4,14 @@ mod areal;
 mod centres;
 mod config;
 mod cylindricity;
+mod evaluables;
 mod filter;
 mod generatrix;
 mod limit;
 mod limit_check;
+mod open_profile;
 mod part;
+mod plane_map;
 mod positions;
 mod roundness;
 mod section;
@@ -20,6 +23,7 @@ pub use config::{
     ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FacePlaceConfig, FormRemoval, Group, Groups, Propagation,
     TextureConfig,
 };
+pub(super) use evaluables::Evaluated;
 pub(super) use generatrix::add_generatrices;
 pub(super) use limit::decide;
 pub(super) use part::part_summary;
@@ -129,5 +133,7 @@ fn labelled_with_reasons(
 mod cost_tests;
 #[cfg(test)]
 mod coverage_tests;
+#[cfg(test)]
+mod evaluable_tests;
 #[cfg(test)]
 mod tests;

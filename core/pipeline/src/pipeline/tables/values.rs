@@ -108,6 +108,9 @@ pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
 /// The table of a domain's own values; `of_form` where the result has form, whose values are in the table `values`.
 #[must_use]
 pub fn named_values(of_form: bool) -> TableSpec {
+    let interval = |name: &str, about: &str| {
+        ColumnSpec::number(name, "the column unit", format!("{about}; null where none is stated")).or_null()
+    };
     TableSpec::new(
         // Beside those that are computed from form.
         if of_form { NAMED_VALUES } else { VALUES },
@@ -120,6 +123,12 @@ pub fn named_values(of_form: bool) -> TableSpec {
                 .or_null(),
             ColumnSpec::text("unit", "its unit; empty for a number without one"),
             ColumnSpec::text("about", "what it is, with standard and clause"),
+            interval("low_95", "lower end of the 95 % interval"),
+            interval("high_95", "upper end of the 95 % interval"),
+            ColumnSpec::text("reference", "what it was referred to; null but for a standard's value").or_null(),
+            ColumnSpec::text("filter", "the filter applied; null but for a standard's value").or_null(),
+            ColumnSpec::text("no_uncertainty", "why no uncertainty is stated of a standard's value; null otherwise")
+                .or_null(),
         ],
     )
 }
@@ -137,6 +146,11 @@ pub fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRow
         numbers_or_null(values.iter().map(|value| value.std)),
         texts(values.iter().map(|value| &value.unit)),
         texts(values.iter().map(|value| &value.about)),
+        numbers_or_null(values.iter().map(|value| value.interval_95.map(|[low, _]| low))),
+        numbers_or_null(values.iter().map(|value| value.interval_95.map(|[_, high]| high))),
+        texts_or_null(values.iter().map(|value| value.reference.as_ref())),
+        texts_or_null(values.iter().map(|value| value.filter.as_ref())),
+        texts_or_null(values.iter().map(|value| value.no_uncertainty.as_ref())),
     ])?;
     Ok(TableRows { table: spec.name, rows })
 }
