@@ -12,7 +12,7 @@ use runout_core::{
         diagnose::diagnose as find_effects,
         document::{Document, Sources},
         registry::Plugin,
-        run::{Observer, run as separate},
+        run::{Observer, run as separate, run_alone as separate_alone},
     },
     stage::Exporter,
 };
@@ -80,7 +80,11 @@ pub fn run(
 ) -> PyResult<Answer> {
     answer(py, job, progress, surface, move |mut pipeline, collector, watch| {
         pipeline.exporters.push(collector);
-        json(&separate(&pipeline, threads, watch)?)
+        json(&match threads {
+            // A processor is then left for another process.
+            Some(NonZeroUsize::MIN) => separate_alone(&pipeline, watch)?,
+            _ => separate(&pipeline, threads, watch)?,
+        })
     })
 }
 

@@ -65,13 +65,18 @@ pub fn batch(words: &[&str]) -> Outcome {
     let recordings = simulate(&wanted, &program)?;
     let mut times = vec![Vec::new(); wanted.jobs.len()];
     let mut peaks = vec![0; wanted.jobs.len()];
-    for _ in 0..wanted.rounds {
+    // Each batch has a folder of its own, and all go at the end: some file systems slow down after a removal of many files.
+    let outs = wanted.scratch.join("out");
+    remove(&outs)?;
+    for round in 0..wanted.rounds {
         for (at, jobs) in wanted.jobs.iter().enumerate() {
-            let (seconds, peak_kb) = timed(&wanted, &program, &recordings, *jobs)?;
+            let out = outs.join(format!("{round}-{jobs}"));
+            let (seconds, peak_kb) = timed(&program, &recordings, &out, *jobs)?;
             times[at].push(seconds);
             peaks[at] = peak_kb.max(peaks[at]);
         }
     }
+    remove(&outs)?;
     let median = |times: &mut Vec<f64>| {
         times.sort_by(f64::total_cmp);
         times[times.len() / 2]
@@ -121,15 +126,18 @@ fn simulate(wanted: &Wanted, program: &Path) -> Outcome<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// Seconds from start to end of one batch into an empty folder, and its peak memory in kB where the system tells it.
-fn timed(wanted: &Wanted, program: &Path, recordings: &[PathBuf], jobs: usize) -> Outcome<(f64, u64)> {
-    let out = wanted.scratch.join("out");
-    if out.exists() {
-        fs::remove_dir_all(&out).map_err(|error| format!("{}: {error}", out.display()))?;
+fn remove(folder: &Path) -> Outcome {
+    if folder.exists() {
+        fs::remove_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     }
+    Ok(())
+}
+
+/// Seconds from start to end of one batch into a new folder, and its peak memory in kB where the system tells it.
+fn timed(program: &Path, recordings: &[PathBuf], out: &Path, jobs: usize) -> Outcome<(f64, u64)> {
     let mut batch = Command::new(program);
     batch.arg("batch").arg(root().join("benchmarks/batch/pipeline.toml")).args(recordings);
-    batch.arg("--out").arg(&out).args(["--jobs", &jobs.to_string()]).stdout(Stdio::null());
+    batch.arg("--out").arg(out).args(["--jobs", &jobs.to_string()]).stdout(Stdio::null());
     let start = Instant::now();
     let mut running = batch.spawn().map_err(|error| format!("cannot start {}: {error}", program.display()))?;
     let status_of = format!("/proc/{}/status", running.id());

@@ -172,6 +172,42 @@ fn what_is_killed_is_completed_by_the_next_call() {
     }
 }
 
+/// At steps over all of a recording's publication: the summary says that its files are complete, and the next call leaves what a call does
+/// that nobody killed.
+#[test]
+fn a_kill_at_any_step_leaves_no_summary_without_its_tables() {
+    let folder = recorded(&["a.h5"]);
+    assert_eq!(batch(&folder, "whole", &["a.h5"], &[]).0, 0);
+    let whole = tables(&folder.path().join("whole"));
+    let parts = |tables: &BTreeMap<PathBuf, Vec<u8>>| tables.keys().filter(|path| path.starts_with("form") || path.starts_with("values")).count();
+    let (mut with, mut without) = (0, 0);
+    for step in (1..).step_by(4) {
+        let out = folder.path().join("out");
+        let killed = Command::new(env!("CARGO_BIN_EXE_runout"))
+            .current_dir(folder.path())
+            .args(["batch", "pipeline.toml", "a.h5", "--out", "out", "--jobs", "1"])
+            .env("RUNOUT_TEST_FAULT", format!("kill:{step}"))
+            .output()
+            .unwrap();
+        if killed.status.success() {
+            break;
+        }
+        if out.join("summaries/recording=a/summary.json").is_file() {
+            with += 1;
+            let found = tables(&out);
+            assert!(parts(&found) >= 2 && found.iter().all(|(path, bytes)| whole[path] == *bytes), "step {step}");
+        } else {
+            without += 1;
+        }
+        let (status, _, said) = batch(&folder, "out", &["a.h5"], &[]);
+        assert!(status == 0 && tables(&out) == whole, "step {step}: {said}");
+        let summary = fs::read_dir(out.join("summaries/recording=a")).unwrap().count();
+        assert_eq!((summary, out.join(".runout.lock").exists()), (1, false), "step {step}");
+        fs::remove_dir_all(&out).unwrap();
+    }
+    assert!(with >= 2 && without >= 5, "{with} with a summary, {without} without");
+}
+
 #[test]
 fn what_cannot_be_told_apart_is_refused_before_the_work() {
     let folder = recorded(&["a.h5"]);

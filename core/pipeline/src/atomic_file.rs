@@ -7,7 +7,7 @@ mod under_way;
 
 use std::{
     fs,
-    io::Write,
+    io::{ErrorKind as ErrorKindOfSystem, Write},
     path::{Component, Path, PathBuf},
 };
 
@@ -45,8 +45,10 @@ impl PendingFile {
             .to_string_lossy()
             .into_owned();
         let folder = folder_of(&destination);
-        make(folder).map_err(|error| no_folder(folder, error))?;
-        remove_stale(folder, &name);
+        let is_new = make(folder).map_err(|error| no_folder(folder, error))?;
+        if !is_new {
+            remove_stale(folder, &name);
+        }
         let temporary = folder.join(format!(".{name}.{}{PARTIAL}", unpredictable()));
         let mut under_way = UnderWay::now();
         if under_way.abandoning > 0 {
@@ -168,13 +170,23 @@ fn no_folder(folder: &Path, error: std::io::Error) -> Error {
     }
 }
 
-/// Makes a folder, and remembers which of those on the way to it are new.
-fn make(folder: &Path) -> std::io::Result<()> {
+/// Makes a folder, and remembers which of those on the way to it are new. Whether it is new itself.
+fn make(folder: &Path) -> std::io::Result<bool> {
+    // Most often the folder is there, or the one above it.
+    match fs::create_dir(folder) {
+        Ok(()) => {
+            UnderWay::now().folders.insert(folder.to_path_buf());
+            return Ok(true);
+        }
+        Err(error) if error.kind() == ErrorKindOfSystem::AlreadyExists && folder.is_dir() => return Ok(false),
+        Err(_) => {}
+    }
     let missing = folder.ancestors().take_while(|above| !above.as_os_str().is_empty() && !above.exists());
     let missing: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
     fs::create_dir_all(folder)?;
+    let is_new = !missing.is_empty();
     UnderWay::now().folders.extend(missing);
-    Ok(())
+    Ok(is_new)
 }
 
 /// Removes what runs that were killed left of the same file: temporary files of processes that are no more. Where the
@@ -198,14 +210,31 @@ fn remove_stale(folder: &Path, name: &str) {
 ///
 /// # Errors
 /// When the file system refuses a rename; those before it are taken back.
-pub fn commit_all(mut files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
+pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
+    commit(files, publication::publish)
+}
+
+/// Gives finished files their names, the last of them when all others have theirs and these last: whoever finds the last file finds all.
+/// There is no journal. A part of a data set is published so: nothing else is at its place, and without its last file it is
+/// incomplete.
+///
+/// # Errors
+/// When the file system refuses a rename; those before it are taken back.
+pub fn commit_last_after_others(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
+    commit(files, publication::publish_last_after_others)
+}
+
+fn commit(
+    mut files: Vec<PendingFile>,
+    publish: impl FnOnce(&[(&Path, &Path)]) -> Result<()>,
+) -> Result<Vec<PathBuf>> {
     let _publishing = UnderWay::now().publish(&files)?;
     files.iter().try_for_each(PendingFile::sync)?;
     let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();
-    publication::publish(&names)?;
+    publish(&names)?;
     let mut under_way = UnderWay::now();
     for file in &mut files {
-        under_way.files.retain(|pending| *pending != file.temporary);
+        under_way.committed(&file.temporary);
         file.committed = true;
     }
     Ok(files.iter().map(|file| file.destination.clone()).collect())

@@ -54,6 +54,17 @@ impl FolderLock {
     }
 }
 
+impl FolderLock {
+    /// Takes none of the folders of these files: a lock that is held already covers them. What killed runs left there is cleaned up.
+    ///
+    /// # Errors
+    /// When the publication of a killed run cannot be completed.
+    pub fn covering<'a>(files: impl IntoIterator<Item = &'a Path>) -> Result<Self> {
+        files.into_iter().try_for_each(|file| publication::recover(super::folder_of(file), true))?;
+        Ok(Self { held: Vec::new() })
+    }
+}
+
 impl Drop for FolderLock {
     fn drop(&mut self) {
         for (path, file) in self.held.drain(..) {

@@ -109,6 +109,33 @@ pub(super) fn publish(files: &[(&Path, &Path)]) -> Result<()> {
     }
 }
 
+/// Gives synced temporary files their names without a journal: the last one when all others have theirs and these last.
+pub(super) fn publish_last_after_others(files: &[(&Path, &Path)]) -> Result<()> {
+    let Some((last, others)) = files.split_last() else { return Ok(()) };
+    let named = |(temporary, destination): &(&Path, &Path)| {
+        let outcome = faults::step().and_then(|()| fs::rename(temporary, destination));
+        outcome.map_err(|error| failed(destination, error))
+    };
+    let sync = |files: &[(&Path, &Path)]| {
+        let failed = |folder: &Path, error| Error::caused("write to", folder.display().to_string(), error);
+        folders(files).into_iter().try_for_each(|folder| sync_folder(folder).map_err(|error| failed(folder, error)))
+    };
+    let mut renamed = 0;
+    let outcome = others.iter().try_for_each(|file| {
+        named(file)?;
+        renamed += 1;
+        Ok(())
+    });
+    if let Err(error) = outcome.and_then(|()| sync(others)).and_then(|()| named(last)) {
+        for (temporary, destination) in others[..renamed].iter().rev() {
+            // What cannot be taken back stays, without the last file.
+            let _ = fs::rename(destination, temporary);
+        }
+        return Err(error);
+    }
+    sync(&[*last])
+}
+
 fn failed(destination: &Path, error: io::Error) -> Error {
     Error::caused("write", destination.display().to_string(), error)
 }

@@ -1,6 +1,7 @@
 //! What this process has begun to write and not finished.
 
 use std::{
+    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
@@ -11,7 +12,7 @@ use runout_error::{ErrorKind, Result};
 
 /// What this process has begun and not finished.
 static UNDER_WAY: Mutex<UnderWay> =
-    Mutex::new(UnderWay { files: Vec::new(), folders: Vec::new(), locks: Vec::new(), abandoning: 0, publishing: 0 });
+    Mutex::new(UnderWay { files: Vec::new(), folders: BTreeSet::new(), locks: Vec::new(), abandoning: 0, publishing: 0 });
 
 /// That a publication has ended.
 static PUBLISHED: Condvar = Condvar::new();
@@ -19,8 +20,8 @@ static PUBLISHED: Condvar = Condvar::new();
 pub(super) struct UnderWay {
     /// Temporary files.
     pub files: Vec<PathBuf>,
-    /// Folders that were made.
-    pub folders: Vec<PathBuf>,
+    /// Folders that were made, and in which no file has its name yet.
+    pub folders: BTreeSet<PathBuf>,
     /// Locks that are held.
     pub locks: Vec<PathBuf>,
     /// How many [`Abandoned`] there are.
@@ -44,9 +45,23 @@ impl UnderWay {
 
     /// Removes the folders that were made for a file, where nothing else came into them.
     pub fn remove_made_folders(&mut self, file: &Path) {
-        let made = file.ancestors().skip(1).take_while(|folder| self.folders.iter().any(|made| made == folder));
-        // Folders with something in them do not go.
-        let _ = made.map(fs::remove_dir).take_while(std::result::Result::is_ok).count();
+        for folder in file.ancestors().skip(1) {
+            // Folders with something in them do not go.
+            if !self.folders.contains(folder) || fs::remove_dir(folder).is_err() {
+                break;
+            }
+            self.folders.remove(folder);
+        }
+    }
+
+    /// Forgets a temporary file that has its name, and the folders above it: they stay.
+    pub fn committed(&mut self, temporary: &Path) {
+        self.files.retain(|file| file != temporary);
+        for folder in temporary.ancestors().skip(1) {
+            if !self.folders.remove(folder) {
+                break;
+            }
+        }
     }
 
     /// Begins to give files their final names, which nothing can abandon from here on.

@@ -73,6 +73,9 @@ pub struct Pipeline {
     pub named_files: Vec<PathBuf>,
     /// The configuration with includes and overrides in their places, for provenance: it runs again as it is.
     pub configuration: String,
+    /// Whether its result is a part of a data set: a [batch](super::batch) holds the lock on the folder above its files, and its summary,
+    /// which comes last, says that it is complete.
+    pub(super) in_data_set: bool,
 }
 
 const KEYS: [&str; 12] = [
@@ -216,6 +219,7 @@ impl Pipeline {
             assessment,
             named_files: named_files(root, sources.folder()),
             configuration: document::resolved_text(root, sources)?,
+            in_data_set: false,
         })
     }
 }

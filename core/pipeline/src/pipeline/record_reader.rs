@@ -58,7 +58,7 @@ impl RecordReader<'_> {
     ) -> Result<Vec<Input>> {
         let stations = self.recording.stations();
         observer.begin(stations.len());
-        let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let processors = if self.alone { 1 } else { std::thread::available_parallelism().map_or(1, NonZeroUsize::get) };
         let threads = threads.map_or(processors, NonZeroUsize::get);
         let workers = threads.clamp(1, stations.len().max(1));
         // Where there are fewer stations than threads, some can help to read.
@@ -93,7 +93,7 @@ impl RecordReader<'_> {
                     }
                 }
             };
-            if workers < processors && !self.alone {
+            if workers < processors {
                 read_ahead(captures, work_on);
             } else {
                 read_along(captures, work_on);

@@ -13,7 +13,7 @@ use super::{
     tables::{StationTables, correction_rows, named_value_rows},
 };
 use crate::{
-    atomic_file::{FolderLock, PendingFile, commit_all},
+    atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
     height_grid::HeightGrid,
     stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
     summary::{LostOrders, PartSummary, StationSummary, Summary, SurfaceSummary},
@@ -71,6 +71,8 @@ pub(super) struct ResultWriter {
     summary_path: Option<PathBuf>,
     /// Inputs besides what is loaded.
     named_files: Vec<PathBuf>,
+    /// Whether the result is a part of a data set.
+    in_data_set: bool,
     /// Given back last.
     lock: FolderLock,
 }
@@ -86,7 +88,8 @@ impl ResultWriter {
                 .filter(|_| pipeline.evaluate.directions.is_empty()),
         };
         let outputs = written(exporters, &pipeline.tables);
-        let lock = FolderLock::of(outputs.iter().map(PathBuf::as_path))?;
+        let files = outputs.iter().map(PathBuf::as_path);
+        let lock = if pipeline.in_data_set { FolderLock::covering(files) } else { FolderLock::of(files) }?;
         let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(&info)).collect();
         let tested = pipeline.route.point_separator().is_some_and(PointSeparator::needs_surface);
         let takes = |takes: Takes| exporters.iter().any(|exporter| exporter.takes() == takes);
@@ -118,6 +121,7 @@ impl ResultWriter {
             diagnosis: None,
             summary_path: summary_path(exporters, &pipeline.tables),
             named_files: pipeline.named_files.clone(),
+            in_data_set: pipeline.in_data_set,
             lock,
         })
     }
@@ -261,7 +265,8 @@ impl ResultWriter {
         for export in self.exports {
             complete.extend(export.finish(&completed)?);
         }
-        Ok(Finished { summary: self.summary, complete, summary_path: self.summary_path, lock: self.lock })
+        let Self { summary, summary_path, in_data_set, lock, .. } = self;
+        Ok(Finished { summary, complete, summary_path, in_data_set, lock })
     }
 }
 
@@ -279,6 +284,7 @@ pub(super) struct Finished {
     summary: Summary,
     complete: Vec<PendingFile>,
     summary_path: Option<PathBuf>,
+    in_data_set: bool,
     /// Given back last.
     lock: FolderLock,
 }
@@ -305,7 +311,8 @@ impl Finished {
             file.write(&text)?;
             self.complete.push(file);
         }
-        commit_all(self.complete)?;
+        // The summary is the last file: it says that the part is complete.
+        if self.in_data_set { commit_last_after_others(self.complete) } else { commit_all(self.complete) }?;
         drop(self.lock);
         Ok(self.summary)
     }

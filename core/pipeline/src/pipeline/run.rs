@@ -54,9 +54,12 @@ pub fn run(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
     run_with(pipeline, threads, false, observer)
 }
 
-/// Runs a pipeline on one thread, which also reads and writes: other threads have recordings of their own.
-pub(super) fn run_alone(pipeline: &Pipeline) -> Result<Summary> {
-    threads::alone(|| run_with(pipeline, Some(NonZeroUsize::MIN), true, &Silent))
+/// Runs a pipeline on one thread, which also reads and writes: other threads or processes have recordings of their own.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn run_alone(pipeline: &Pipeline, observer: &dyn Observer) -> Result<Summary> {
+    threads::alone(|| run_with(pipeline, Some(NonZeroUsize::MIN), true, observer))
 }
 
 fn run_with(

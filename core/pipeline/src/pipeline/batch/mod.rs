@@ -8,7 +8,7 @@ mod report;
 mod trend;
 
 use std::{
-    collections::HashSet,
+    collections::{BTreeSet, HashSet},
     fs,
     num::NonZeroUsize,
     path::Path,
@@ -25,7 +25,7 @@ pub use trend::{RECORDING, Series, Signals, recording_column};
 use super::{
     config::Pipeline,
     document::{ConfigError, Document, Sources},
-    observer::Observer,
+    observer::{Observer, Silent},
     registry::Registry,
     run::run_alone,
     tables,
@@ -135,7 +135,9 @@ impl<'a> Batch<'a> {
     /// names it.
     pub fn run(&self, recordings: &[Recording], jobs: NonZeroUsize, observer: &dyn Observer) -> Result<BatchReport> {
         let _lock = FolderLock::of([self.store.folder().join(REPORT).as_path()])?;
-        let outcomes = self.work(recordings, jobs, observer);
+        // Nobody else changes it: the folder is locked.
+        let kept: BTreeSet<String> = self.store.recordings()?.into_iter().collect();
+        let outcomes = self.work(recordings, &kept, jobs, observer);
         let mut report = BatchReport::begun(&self.pipeline, self.store.folder());
         let (mut complete, mut given) = (Vec::new(), HashSet::new());
         for (recording, outcome) in recordings.iter().zip(outcomes) {
@@ -157,7 +159,7 @@ impl<'a> Batch<'a> {
             report.count(&recording.name, found);
             complete.push(recording.name.clone());
         }
-        for name in self.store.recordings()?.into_iter().filter(|name| !given.contains(name.as_str())) {
+        for name in kept.into_iter().filter(|name| !given.contains(name.as_str())) {
             match self.summary(&name).filter(|summary| self.is_of_configuration(summary)) {
                 Some(summary) => {
                     report.count(&name, Found::of(&summary));
@@ -172,7 +174,13 @@ impl<'a> Batch<'a> {
         self.conclude(&complete, report)
     }
 
-    fn work(&self, recordings: &[Recording], jobs: NonZeroUsize, observer: &dyn Observer) -> Vec<Outcome> {
+    fn work(
+        &self,
+        recordings: &[Recording],
+        kept: &BTreeSet<String>,
+        jobs: NonZeroUsize,
+        observer: &dyn Observer,
+    ) -> Vec<Outcome> {
         let next = AtomicUsize::new(0);
         let outcomes: Mutex<Vec<Option<Outcome>>> = Mutex::new(recordings.iter().map(|_| None).collect());
         observer.begin(recordings.len());
@@ -180,7 +188,7 @@ impl<'a> Batch<'a> {
             while let Some((index, recording)) =
                 Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|index| Some((index, recordings.get(index)?)))
             {
-                let outcome = self.one(recording).unwrap_or_else(Outcome::Failed);
+                let outcome = self.one(recording, kept.contains(&recording.name)).unwrap_or_else(Outcome::Failed);
                 outcomes.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(outcome);
                 observer.station(&recording.name);
             }
@@ -195,7 +203,8 @@ impl<'a> Batch<'a> {
         outcomes.into_iter().map(|outcome| outcome.unwrap_or_else(|| Outcome::Failed(stopped()))).collect()
     }
 
-    fn one(&self, recording: &Recording) -> Result<Outcome> {
+    /// Works on a recording, of which something is kept or nothing.
+    fn one(&self, recording: &Recording, is_kept: bool) -> Result<Outcome> {
         let named = |error: ConfigError| match error {
             ConfigError::File(error) => error,
             ConfigError::Text(mistake) => {
@@ -204,17 +213,21 @@ impl<'a> Batch<'a> {
         };
         let sources = of_recording(self.sources, &recording.path).map_err(named)?;
         let mut pipeline = Pipeline::from_sources(&sources, self.registry).map_err(named)?;
-        if let Some(summary) = self.summary(&recording.name)
+        if is_kept
+            && let Some(summary) = self.summary(&recording.name)
             && self.is_of_configuration(&summary)
             // What cannot be read now is not up to date; the run says why.
             && is_of_inputs(&summary, &pipeline).unwrap_or(false)
         {
             return Ok(Outcome::Skipped(Found::of(&summary)));
         }
-        self.store.remove(&recording.name)?;
+        if is_kept {
+            self.store.remove(&recording.name)?;
+        }
+        pipeline.in_data_set = true;
         pipeline.exporters = vec![self.store.exporter(&recording.name)];
         pipeline.diagnosed.clear();
-        let summary = run_alone(&pipeline)?;
+        let summary = run_alone(&pipeline, &Silent)?;
         Ok(Outcome::Done(Found::of(&summary)))
     }
 

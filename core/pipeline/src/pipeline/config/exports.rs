@@ -45,7 +45,8 @@ pub(crate) fn written(exporters: &[Box<dyn Exporter>], tables: &[TableSpec]) -> 
 pub(crate) fn spare_inputs(outputs: &[PathBuf], inputs: &[PathBuf]) -> runout_error::Result<()> {
     let read: Vec<PathBuf> = inputs.iter().map(|input| resolved(input)).collect();
     for output in outputs {
-        if read.contains(&resolved(output)) {
+        // What is read is there.
+        if output.exists() && read.contains(&resolved(output)) {
             let problem = "it is what the run reads";
             return Err(Error::new("write", output.display().to_string(), problem)
                 .of(ErrorKind::Configuration)
