@@ -179,7 +179,9 @@ fn a_kill_at_any_step_leaves_no_summary_without_its_tables() {
     let folder = recorded(&["a.h5"]);
     assert_eq!(batch(&folder, "whole", &["a.h5"], &[]).0, 0);
     let whole = tables(&folder.path().join("whole"));
-    let parts = |tables: &BTreeMap<PathBuf, Vec<u8>>| tables.keys().filter(|path| path.starts_with("form") || path.starts_with("values")).count();
+    let parts = |tables: &BTreeMap<PathBuf, Vec<u8>>| {
+        tables.keys().filter(|path| path.starts_with("form") || path.starts_with("values")).count()
+    };
     let (mut with, mut without) = (0, 0);
     for step in (1..).step_by(4) {
         let out = folder.path().join("out");

@@ -224,10 +224,7 @@ pub fn commit_last_after_others(files: Vec<PendingFile>) -> Result<Vec<PathBuf>>
     commit(files, publication::publish_last_after_others)
 }
 
-fn commit(
-    mut files: Vec<PendingFile>,
-    publish: impl FnOnce(&[(&Path, &Path)]) -> Result<()>,
-) -> Result<Vec<PathBuf>> {
+fn commit(mut files: Vec<PendingFile>, publish: impl FnOnce(&[(&Path, &Path)]) -> Result<()>) -> Result<Vec<PathBuf>> {
     let _publishing = UnderWay::now().publish(&files)?;
     files.iter().try_for_each(PendingFile::sync)?;
     let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();

@@ -11,8 +11,13 @@ use super::PendingFile;
 use runout_error::{ErrorKind, Result};
 
 /// What this process has begun and not finished.
-static UNDER_WAY: Mutex<UnderWay> =
-    Mutex::new(UnderWay { files: Vec::new(), folders: BTreeSet::new(), locks: Vec::new(), abandoning: 0, publishing: 0 });
+static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay {
+    files: Vec::new(),
+    folders: BTreeSet::new(),
+    locks: Vec::new(),
+    abandoning: 0,
+    publishing: 0,
+});
 
 /// That a publication has ended.
 static PUBLISHED: Condvar = Condvar::new();
