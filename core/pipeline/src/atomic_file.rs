@@ -147,9 +147,19 @@ fn unpredictable() -> String {
     format!("{}-{:016x}", std::process::id(), rand::random::<u64>())
 }
 
-/// Whether there is a process of this number; where the system does not say (no /proc), there may be.
+/// Whether there is a process of this number that has not ended; where the system does not say (no /proc), there may be.
 fn is_alive(process: u32) -> bool {
-    !Path::new("/proc/self").exists() || Path::new(&format!("/proc/{process}")).exists()
+    if !Path::new("/proc/self").exists() {
+        return true;
+    }
+    match fs::read(format!("/proc/{process}/stat")) {
+        // A process that has ended keeps its number until its parent asks for it: state Z behind the name, which may hold brackets.
+        Ok(about) => {
+            let state = about.rsplit(|byte| *byte == b')').next().and_then(|rest| rest.trim_ascii_start().first());
+            !matches!(state, Some(b'Z' | b'X'))
+        }
+        Err(error) => error.kind() != ErrorKindOfSystem::NotFound,
+    }
 }
 
 /// The folder that a file lies in.
@@ -290,6 +300,25 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
+
+    /// A process that was killed, and that its parent has not asked for yet, holds no temporary files.
+    #[test]
+    fn a_process_that_has_ended_is_not_alive() {
+        if !Path::new("/proc/self").exists() {
+            return;
+        }
+        assert!(is_alive(std::process::id()) && !is_alive(u32::MAX));
+        let mut child = std::process::Command::new("sleep").arg("60").spawn().unwrap();
+        assert!(is_alive(child.id()));
+        child.kill().unwrap();
+        // The system may take a moment to end it.
+        let ended = (0..200).any(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+            !is_alive(child.id())
+        });
+        assert!(ended && Path::new(&format!("/proc/{}", child.id())).exists(), "it was not asked for");
+        child.wait().unwrap();
+    }
 
     #[test]
     fn what_cannot_fit_is_refused_and_a_file_in_a_folder_s_place_is_named() {

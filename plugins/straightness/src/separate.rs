@@ -133,6 +133,10 @@ pub struct AxialReversal(pub(crate) AxialReversalConfig);
 /// Positions closer than this share of the coarsest spacing are worth a word.
 const FINER: f64 = 0.75;
 
+/// Repeatability below that of any displacement sensor along a slide, 0.1 nm; and what rounding makes of equal traces, in µm.
+const FINEST_UM: f64 = 1e-4;
+const ROUNDING_UM: f64 = 1e-9;
+
 /// A position or length as warnings say it: to 0.1 µm, without zeros at the end.
 fn said(mm: f64) -> f64 {
     (mm * 1e4).round() / 1e4
@@ -254,6 +258,14 @@ impl AxialReversal {
             warnings.push(format!("{lacking} of {} positions are left out: a setup has no readings there", z_mm.len()));
         }
         let repeated = split.variance.iter().sum::<f64>() / split.variance.len() as f64;
+        let repeatability_um = repeated.sqrt();
+        if counts != [1, 1] && repeatability_um > ROUNDING_UM && repeatability_um < FINEST_UM {
+            warnings.push(format!(
+                "repeated traces differ by {:.1e} nm: no displacement sensor repeats so well; `reading_um` may be in mm, or traces are copies \
+                 of one",
+                1e3 * repeatability_um
+            ));
+        }
         let [part_std_um, slide_std_um] = split.std_um.clone();
         let of_slide = grid.smooth.as_ref().map(|smooth| correlation_of(smooth, grid.z_mm.len()));
         let correlations = [split.correlation.clone(), of_slide.unwrap_or_else(|| split.correlation.clone())];
@@ -269,7 +281,7 @@ impl AxialReversal {
             slide_um: split.slide_um.clone(),
             part_std_um,
             slide_std_um,
-            repeatability_um: if counts == [1, 1] { f64::NAN } else { repeated.sqrt() },
+            repeatability_um: if counts == [1, 1] { f64::NAN } else { repeatability_um },
             degrees_of_freedom: counts[0] + counts[1] - 2,
             warnings,
         };

@@ -231,6 +231,23 @@ fn intervals_of_the_standards_values_hold_the_truth() {
     }
 }
 
+/// Readings in mm, of a probe that repeats to 0.05 µm, look like those of one that repeats to 0.05 nm.
+#[test]
+fn readings_in_millimetres_are_named() {
+    let z = even(0.0, 1.0, 121);
+    let noise = Normal::new(0.0, 0.05).unwrap();
+    for (unit, is_named) in [(1.0, false), (1e-3, true)] {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let traces = ["initial", "initial", "reversed", "reversed"].iter().enumerate().map(|(number, setup)| {
+            let mut one = trace(&number.to_string(), setup, &z, [0.0, 0.0]);
+            one.2.iter_mut().for_each(|row| row.1 = unit * (row.1 + noise.sample(&mut random)));
+            one
+        });
+        let warnings = File(traces.collect()).separate(None).warnings;
+        assert_eq!(warnings.iter().any(|warning| warning.contains("may be in mm")), is_named, "{warnings:?}");
+    }
+}
+
 #[test]
 fn without_repeats_the_profiles_say_why_they_have_no_errors() {
     let z = even(0.0, 1.0, 60);

@@ -516,6 +516,16 @@ impl EvaluateConfig {
                 format!("they are computed from {}; the separator offers {}", names(group.sources()), names(given));
             return Err(Fault::here(message).help(help).under_item("values", index));
         }
+        let asked = match &self.values {
+            Some(Groups::Listed(groups)) => groups.contains(&Group::Straightness),
+            Some(Groups::All) | None => true,
+        };
+        let lines = |references: &Vec<Reference>| references.iter().any(|one| one.line_symbol().is_some());
+        let only_profiles = given == [EvaluableKind::OpenProfile];
+        if asked && only_profiles && self.references.as_ref().is_some_and(|references| !lines(references)) {
+            let fault = Fault::at("references", "an open profile has no reference line of these");
+            return Err(fault.help("LSCI for the least-squares line LSLI, MZCI for the minimum-zone line MZLI"));
+        }
         let of_maps = given.contains(&EvaluableKind::HeightMap) && !given.contains(&EvaluableKind::ClosedProfiles);
         if of_maps && matches!(self.areal.form, Some(FormRemoval::Cylinder | FormRemoval::Cone)) {
             let fault = Fault::at("form", "a height map on a plane is no wall of a cylinder");

@@ -256,6 +256,23 @@ fn what_is_asked_for_is_given_and_nothing_else() {
     assert_eq!(found.remarks, ["part: texture needs 7 points or more, found 3"]);
 }
 
+/// Two values by name, and a number of them in the place of many names; nothing of values that have one.
+#[test]
+fn what_has_no_uncertainty_is_said_with_the_reason() {
+    let profile = |errors| {
+        let (z_mm, deviation_um) = (z_mm(), truth(Shape::Waves, 1));
+        Evaluable::OpenProfile(OpenProfile { of: "guideway".into(), z_mm, deviation_um, errors })
+    };
+    let said = |errors, text: &str| Evaluated::of(&[profile(errors)], &evaluate(text).unwrap()).unwrap().remarks;
+    let unknown = || Err("one trace only".to_owned());
+    let mzli = said(unknown(), "values = ['straightness']\nreferences = ['MZCI']");
+    assert_eq!(mzli, ["guideway: no uncertainty of STRt about MZLI: one trace only"]);
+    let texture = said(unknown(), "values = ['texture']\nlambda_c_mm = 40.0");
+    assert!(texture[0].ends_with(" values: one trace only") && texture.len() == 1, "{texture:?}");
+    let known = OpenErrors { std_um: vec![1e-3; POINTS], ..OpenErrors::default() };
+    assert_eq!(said(Ok(known), "values = ['straightness']"), Vec::<String>::new());
+}
+
 fn plane(heights_nm: impl Fn(f64, f64) -> f64) -> PlaneMap {
     let (columns, rows) = (60_usize, 50_usize);
     let nodes = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
@@ -344,6 +361,12 @@ fn groups_that_nothing_gives_are_refused_by_name_and_left_out_of_all() {
     let symbols: Vec<String> = all.symbols().into_iter().map(|(symbol, _)| symbol).collect();
     assert!(symbols.contains(&"STRt".to_owned()) && !symbols.contains(&"RONt".to_owned()), "{symbols:?}");
     assert!(!symbols.contains(&"Ra".to_owned()), "without λc an open profile has none");
+    // Circles inside and around have no line: nothing would be left of straightness.
+    let circles = config("references = ['MICI']");
+    assert!(format!("{:?}", circles.check_given(&open).unwrap_err()).contains("no reference line"));
+    assert!(config("references = ['MICI', 'MZCI']").check_given(&open).is_ok());
+    assert!(config("values = ['texture']\nreferences = ['MICI']").check_given(&open).is_ok());
+    assert!(circles.check_given(&[EvaluableKind::ClosedProfiles]).is_ok());
     let maps = [EvaluableKind::HeightMap];
     let wall = config("values = ['areal']\nareal = { form = 'cone' }").check_given(&maps).unwrap_err();
     assert!(format!("{wall:?}").contains("no wall of a cylinder"));

@@ -33,8 +33,9 @@ impl Evaluated {
     }
 
     fn add(&mut self, of: &str, (values, remarks): (Vec<Value>, Vec<String>)) {
-        self.values.extend(values.into_iter().map(|value| (of.to_owned(), value)));
         self.remarks.extend(remarks.into_iter().map(|remark| format!("{of}: {remark}")));
+        self.remarks.extend(unknown(of, &values));
+        self.values.extend(values.into_iter().map(|value| (of.to_owned(), value)));
     }
 
     /// As values of a result.
@@ -46,6 +47,27 @@ impl Evaluated {
     pub fn placed(&self) -> impl Iterator<Item = PlacedValue<'_>> {
         self.values.iter().map(|(of, value)| PlacedValue { station: None, section: Some(of), z_mm: None, value })
     }
+}
+
+/// Values that one sentence names, at most.
+const MOST_NAMED: usize = 8;
+
+/// Says of which values no uncertainty is stated, and why: a sentence for each reason.
+fn unknown(of: &str, values: &[Value]) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for value in values {
+        let Some(reason) = value.no_uncertainty.as_deref() else { continue };
+        let name = format!("{} about {}", value.symbol, value.reference);
+        match reasons.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, names)) => names.push(name),
+            None => reasons.push((reason, vec![name])),
+        }
+    }
+    let sentence = |(reason, names): (&str, Vec<String>)| {
+        let which = if names.len() > MOST_NAMED { format!("{} values", names.len()) } else { names.join(", ") };
+        format!("{of}: no uncertainty of {which}: {reason}")
+    };
+    reasons.into_iter().map(sentence).collect()
 }
 
 impl Group {
