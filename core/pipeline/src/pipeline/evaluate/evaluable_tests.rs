@@ -253,7 +253,11 @@ fn what_is_asked_for_is_given_and_nothing_else() {
         errors: Err("why".into()),
     };
     let found = Evaluated::of(&[Evaluable::OpenProfile(short)], &evaluate(ALL).unwrap()).unwrap();
-    assert_eq!(found.remarks, ["part: texture needs 7 points or more, found 3"]);
+    let unknown = "STRt about LSLI, STRp about LSLI, STRv about LSLI, STRq about LSLI, STRt about MZLI: why";
+    assert_eq!(
+        found.remarks,
+        ["part: texture needs 7 points or more, found 3".to_owned(), format!("part: no uncertainty of {unknown}")]
+    );
 }
 
 /// Two values by name, and a number of them in the place of many names; nothing of values that have one.
