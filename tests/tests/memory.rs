@@ -218,6 +218,15 @@ fn resident_peak() -> Option<usize> {
 
 #[test]
 fn peak_memory_does_not_grow_with_stations() {
+    // The C library gives each thread memory of its own, and how much of what they give back stays with the process is chance: resident memory grew by
+    // 10 to 42 MB. With one arena for all of them it grows by 8 to 10. Such a setting is read when a process starts.
+    const ARENAS: &str = "MALLOC_ARENA_MAX";
+    if std::env::var_os(ARENAS).is_none() {
+        let mut again = std::process::Command::new(std::env::current_exe().unwrap());
+        let again = again.args(["--exact", "peak_memory_does_not_grow_with_stations", "--nocapture"]).env(ARENAS, "1");
+        assert!(again.status().unwrap().success(), "with one arena");
+        return;
+    }
     let folder = tempfile::tempdir().unwrap();
     // What is made once in a process shall not count for the first of the runs.
     measure(2, folder.path());
@@ -232,8 +241,7 @@ fn peak_memory_does_not_grow_with_stations() {
     if let (Some(few), Some(many)) = (few.resident, many.resident) {
         println!("resident: {few} bytes with {FEW} stations, {many} with {MANY}");
         let grown = many.saturating_sub(few);
-        // libhdf5's caches and free lists fill up meanwhile, and memory that threads have given back stays with the process
-        // as chance has it: 10 to 23 MB were seen, on a busy machine more than on a quiet one. All samples would be 50 MB.
+        // libhdf5's caches and free lists fill up meanwhile: 8 to 10 MB were seen. All samples would be 50 MB.
         assert!(grown < more * STATION_BYTES * 2 / 3, "{grown} bytes more resident with {more} stations more");
         assert!(many < RESIDENT_BYTES, "{many} bytes resident");
     }
