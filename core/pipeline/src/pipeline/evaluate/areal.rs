@@ -77,7 +77,7 @@ pub fn add_areal(
     let used = sections.iter().map(|section| section.used).sum::<f64>() / sections.len().max(1) as f64;
     let there = 1.0 - map.missing() as f64 / map.heights_um().len() as f64;
     let add = |values: &mut Vec<Value>, (labels, numbers): (Vec<Label>, Vec<Found>)| {
-        let filter = prepared.filter(surface.radius_mm);
+        let filter = filter(evaluate, surface.radius_mm);
         values.extend(labelled_with_reasons(labels, numbers, &filter, &held, there.min(used)));
     };
     if evaluate.has(Group::Areal) {
@@ -176,27 +176,8 @@ impl<'a> Prepared<'a> {
             FormRemoval::Cone => areal::without_turned_body(&map, 1)?,
             FormRemoval::Polynomial => areal::without_turned_body(&map, options.degree)?,
         };
-        let low_pass = |map: &HeightMap, cutoff_mm: f64| match options.filter {
-            ArealFilter::Gaussian => areal_gaussian(map, cutoff_mm),
-            ArealFilter::RobustGaussian => robust_areal_gaussian(map, cutoff_mm).low_pass,
-        };
-        if let Some(shortest) = self.evaluate.lambda_s_mm {
-            map = map.with(low_pass(&map, shortest));
-        }
-        if let Some(longest) = self.evaluate.lambda_c_mm {
-            let mut rest = map.heights_um().to_vec();
-            rest.iter_mut().zip(low_pass(&map, longest)).for_each(|(height, waviness)| *height -= waviness);
-            map = map.with(rest);
-        }
+        map = filtered(map, self.evaluate);
         Ok(if self.ends > 0 { map.without_ends(self.ends) } else { map })
-    }
-
-    fn filter(&self, radius_mm: f64) -> Filter {
-        let mut filter = Filter::between(self.evaluate.lambda_s_mm, self.evaluate.lambda_c_mm, radius_mm);
-        if self.evaluate.areal.filter == ArealFilter::RobustGaussian && filter.name != "none" {
-            filter.name = format!("robust {}", filter.name);
-        }
-        filter
     }
 
     fn reference(&self) -> Cow<'static, str> {
@@ -335,6 +316,32 @@ const NOT_DRAWN: &str = "no errors are drawn for it";
 /// A number without uncertainty.
 fn without(value: f64, why: &str) -> Found {
     Found { value, uncertainty: None, no_uncertainty: Some(why.to_owned()) }
+}
+
+/// A map without the wavelengths below λs and above λc.
+pub(super) fn filtered(mut map: HeightMap<'static>, evaluate: &Evaluate) -> HeightMap<'static> {
+    let low_pass = |map: &HeightMap, cutoff_mm: f64| match evaluate.areal.filter {
+        ArealFilter::Gaussian => areal_gaussian(map, cutoff_mm),
+        ArealFilter::RobustGaussian => robust_areal_gaussian(map, cutoff_mm).low_pass,
+    };
+    if let Some(shortest) = evaluate.lambda_s_mm {
+        map = map.with(low_pass(&map, shortest));
+    }
+    if let Some(longest) = evaluate.lambda_c_mm {
+        let mut rest = map.heights_um().to_vec();
+        rest.iter_mut().zip(low_pass(&map, longest)).for_each(|(height, waviness)| *height -= waviness);
+        map = map.with(rest);
+    }
+    map
+}
+
+/// What [`filtered`] is, of a wall of this radius.
+pub(super) fn filter(evaluate: &Evaluate, radius_mm: f64) -> Filter {
+    let mut filter = Filter::between(evaluate.lambda_s_mm, evaluate.lambda_c_mm, radius_mm);
+    if evaluate.areal.filter == ArealFilter::RobustGaussian && filter.name != "none" {
+        filter.name = format!("robust {}", filter.name);
+    }
+    filter
 }
 
 /// Half-width of the Gaussian in cut-offs, beyond which it is nothing.

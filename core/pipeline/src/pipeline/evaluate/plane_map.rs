@@ -1,12 +1,13 @@
 //! Areal values of heights on a plane.
 
-use super::{ArealFilter, Evaluate, Filter, FormRemoval, Group, Label, ascii_unit};
+use super::{
+    Evaluate, FormRemoval, Group, Label,
+    areal::{filter, filtered},
+    ascii_unit,
+};
 use crate::stage::PlaneMap;
 use runout_error::Result;
-use runout_numerics::{
-    filter::{areal_gaussian, robust_areal_gaussian},
-    height_map::HeightMap,
-};
+use runout_numerics::height_map::HeightMap;
 use runout_standards::{
     Value,
     areal::{self, MaterialRatio},
@@ -49,7 +50,8 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
             (Label::new("Smc(p)", "µm", standard("4.5.2"), at), curve.smc_um(*ratio))
         }));
     }
-    let filter = filter_name(evaluate);
+    // On a plane a filter has no orders, its name alone is of use.
+    let filter = filter(evaluate, 1.0).name;
     let known = labelled.into_iter().filter(|(_, value)| value.is_finite());
     let values = known.map(|(label, value)| Value {
         symbol: label.symbol.into(),
@@ -75,22 +77,14 @@ fn prepared(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(HeightMap<'static>
     let heights_um: Vec<f64> = grid.height_nm.iter().map(|height_nm| 1e-3 * height_nm).collect();
     let map = HeightMap::new(heights_um, grid.columns, grid.step_x_mm, grid.step_y_mm, false)?;
     let options = &evaluate.areal;
-    let mut map = match options.form {
+    let map = match options.form {
         FormRemoval::None => map,
         FormRemoval::Polynomial => areal::without_polynomial(&map, options.degree)?,
         _ => areal::without_polynomial(&map, 1)?,
     };
-    let low_pass = |map: &HeightMap, cutoff_mm: f64| match options.filter {
-        ArealFilter::Gaussian => areal_gaussian(map, cutoff_mm),
-        ArealFilter::RobustGaussian => robust_areal_gaussian(map, cutoff_mm).low_pass,
-    };
-    if let Some(shortest) = evaluate.lambda_s_mm {
-        map = map.with(low_pass(&map, shortest));
-    }
+    let map = filtered(map, evaluate);
     let Some(longest) = evaluate.lambda_c_mm else { return Ok((map, None)) };
-    let mut rest = map.heights_um().to_vec();
-    rest.iter_mut().zip(low_pass(&map, longest)).for_each(|(height, waviness)| *height -= waviness);
-    without_edges(&map.with(rest), longest)
+    without_edges(&map, longest)
 }
 
 /// The map without half a cut-off at each edge (ISO 16610-28), where it is as long as two cut-offs that way.
@@ -123,11 +117,4 @@ fn without_edges(map: &HeightMap, longest_mm: f64) -> Result<(HeightMap<'static>
         )
     };
     Ok((cropped, Some(remark)))
-}
-
-/// The filter as limits name it.
-fn filter_name(evaluate: &Evaluate) -> String {
-    let name = Filter::between(evaluate.lambda_s_mm, evaluate.lambda_c_mm, 1.0).name;
-    let robust = evaluate.areal.filter == ArealFilter::RobustGaussian && name != "none";
-    if robust { format!("robust {name}") } else { name }
 }
