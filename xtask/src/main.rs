@@ -13,6 +13,7 @@ mod kill_test;
 mod process;
 mod python;
 mod random;
+mod readmes;
 mod report_check;
 mod results;
 mod setup;
@@ -63,6 +64,8 @@ cargo xtask COMMAND
                 print areal and profile values of one surface beside surfalize's, with both times
   record-results FOLDER [PROGRAM]
                 run the commands of all examples' READMEs in a copy of the examples below FOLDER
+  check-readmes FOLDER PROGRAM
+                run the same commands, and name each line that a README shows as printed and no command prints
   compare-results A B [RELATIVE]
                 compare every number in two such folders (Parquet, HDF5, JSON), to 1e-12 or RELATIVE
 
@@ -110,6 +113,7 @@ fn main() -> ExitCode {
         ["wheel", ref rest @ ..] => python::wheel(rest),
         ["areal-peers", ref rest @ ..] => areal::peers(rest),
         ["record-results", ref rest @ ..] => results::record(rest),
+        ["check-readmes", ref rest @ ..] => readmes::check(rest),
         ["compare-results", ref rest @ ..] => results::compare(rest),
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
         ["bench-peers", ref rest @ ..] => bench::all_peers(rest),
