@@ -14,7 +14,6 @@ import dataclasses
 import hashlib
 import json
 import os
-import shutil
 import tempfile
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -158,7 +157,7 @@ class Task:
                 target, root = _filesystem(self.out, self.storage)
                 if target.exists(f"{root}/{DONE}/{name}.json"):
                     return entry | {"status": "skipped"}
-                self.write(self.result(row, folder), row, name, folder, target, root)
+                self.write(self.result(row, folder), row, name, target, root)
             except (Error, OSError, ValueError) as error:
                 return entry | {"error": str(error)}
         return entry | {"status": "done"}
@@ -199,22 +198,19 @@ class Task:
         Path(file).write_text(self.text, "utf-8")
         return command(file, set=self.overrides | {self.key: os.path.abspath(local), "export": []}, threads=1)
 
-    def write(self, result: Result | Diagnosis, row: dict[str, Any], name: str, folder: str, target: Any, root: str) -> None:
+    def write(self, result: Result | Diagnosis, row: dict[str, Any], name: str, target: Any, root: str) -> None:
         """Writes the tables, the summary, and then that the recording is done."""
         import pyarrow
         import pyarrow.parquet
 
         partition = "recording=" + quote(Path(str(row["recording"])).stem, safe="")
         for table in result.tables.values():
-            file = os.path.join(folder, f"{table.name}.parquet")
+            # In memory, for each file that is made on the way takes time.
+            file = pyarrow.BufferOutputStream()
             pyarrow.parquet.write_table(pyarrow.table(table), file, compression="zstd")
-            _put(target, file, f"{root}/{table.name}/{partition}/{name}.parquet")
-        summary = os.path.join(folder, "summary.json")
-        Path(summary).write_text(json.dumps(result.facts), "utf-8")
-        _put(target, summary, f"{root}/summary/{name}.json")
-        done = os.path.join(folder, "done.json")
-        Path(done).write_text(json.dumps(row | {"key": name}), "utf-8")
-        _put(target, done, f"{root}/{DONE}/{name}.json")
+            _put(target, file.getvalue().to_pybytes(), f"{root}/{table.name}/{partition}/{name}.parquet")
+        _put(target, json.dumps(result.facts).encode(), f"{root}/summary/{name}.json")
+        _put(target, json.dumps(row | {"key": name}).encode(), f"{root}/{DONE}/{name}.json")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -280,15 +276,15 @@ def _is_local(filesystem: Any) -> bool:
     return "file" in ((protocol,) if isinstance(protocol, str) else protocol)
 
 
-def _put(target: Any, file: str, path: str) -> None:
+def _put(target: Any, data: bytes, path: str) -> None:
     """Writes a file whole or not at all: object storage shows an object when it is complete, a folder shows a name when it is given."""
     if not _is_local(target):
-        target.put_file(file, path)
+        target.pipe_file(path, data)
         return
     os.makedirs(os.path.dirname(path), exist_ok=True)
     partial = os.path.join(os.path.dirname(path), f".{os.path.basename(path)}.{uuid.uuid4().hex}.partial")
     try:
-        shutil.copyfile(file, partial)
+        Path(partial).write_bytes(data)
         os.replace(partial, path)
     finally:
         if os.path.exists(partial):

@@ -71,12 +71,12 @@ def test_one_task_a_recording_and_nothing_twice(cluster: None, folder: Path, tmp
 class Killed(batches.Task):
     """A task whose worker is killed once for each recording, after its tables and before it is done."""
 
-    def write(self, result: Any, row: dict[str, Any], name: str, folder: str, target: Any, root: str) -> None:
+    def write(self, result: Any, row: dict[str, Any], name: str, target: Any, root: str) -> None:
         mark = Path(root).parent / f"killed-{name}"
         if not mark.exists():
             mark.touch()
-            super().write(result, row, name, folder, Halfway(target), root)
-        super().write(result, row, name, folder, target, root)
+            super().write(result, row, name, Halfway(target), root)
+        super().write(result, row, name, target, root)
 
 
 class Halfway:
@@ -85,11 +85,11 @@ class Halfway:
     def __init__(self, target: Any) -> None:
         self.target, self.protocol, self.written = target, "memory", 0
 
-    def put_file(self, file: str, path: str) -> None:
+    def pipe_file(self, path: str, data: bytes) -> None:
         self.written += 1
         if self.written == 2:
             os.kill(os.getpid(), signal.SIGKILL)
-        batches._put(self.target, file, path)
+        batches._put(self.target, data, path)
 
 
 def test_a_killed_worker_loses_and_doubles_nothing(cluster: None, folder: Path, tmp_path: Path) -> None:

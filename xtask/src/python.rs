@@ -47,7 +47,7 @@ pub fn wheel(words: &[&str]) -> Outcome {
     let wheels = target().join("wheels");
     let mut build = Command::new(environment.join("bin/maturin"));
     build.args(["build", "--profile", profile, "--manifest-path"]).arg(root().join("python/Cargo.toml"));
-    build.env("CARGO_TARGET_DIR", target());
+    build.env("CARGO_TARGET_DIR", target()).env("CMAKE", setup::ready()?);
     run(build.arg("--interpreter").arg(environment.join("bin/python")).arg("--out").arg(&wheels))?;
     say(&format!("pip install {}/runout-*.whl", wheels.display()));
     Ok(())
