@@ -152,3 +152,13 @@ def test_simulated_campaigns_are_a_blind_benchmark(cluster: None, tmp_path: Path
     assert bad["error"]
     with pytest.raises(ValueError, match="seed"):
         batches.campaigns(scenario, PIPELINE, [], tmp_path / "out")
+
+
+def test_dask_runs_the_same_task(folder: Path, tmp_path: Path) -> None:
+    bag = pytest.importorskip("dask.bag", reason="dask is not installed")
+    task = batches.Task.of(PIPELINE, None, "load.path", str(tmp_path / "out"), {})
+    paths = sorted(map(str, folder.iterdir()))
+    tasks = bag.from_sequence([{"recording": path} for path in paths], npartitions=len(paths)).map(task)
+    statuses = [[entry["status"] for entry in tasks.compute(scheduler="processes", num_workers=2)] for _ in range(2)]
+    assert statuses == [["failed", "done", "done", "done"], ["failed", "skipped", "skipped", "skipped"]]
+    assert rows(tmp_path / "out") > 0
