@@ -68,6 +68,15 @@ def test_one_task_a_recording_and_nothing_twice(cluster: None, folder: Path, tmp
     assert {one["key"] for one in changed.of("done")}.isdisjoint(one["key"] for one in report.of("done"))
 
 
+def test_a_task_takes_several_of_many_recordings(cluster: None, folder: Path, tmp_path: Path) -> None:
+    assert [batches._blocks(rows, None) for rows in (1, 4, 31, 32, 1000)] == [1, 4, 31, 16, 63]
+    (folder / "bad.h5").unlink()
+    made = batches.recordings(folder, per_task=2)
+    assert made.materialize().num_blocks() == 2
+    report = batches.run(PIPELINE, made, tmp_path / "out")
+    assert len(report.of("done")) == 3
+
+
 class Killed(batches.Task):
     """A task whose worker is killed once for each recording, after its tables and before it is done."""
 
