@@ -6,12 +6,39 @@
 Samples are in µm, geometry is in mm, angles in a configuration are in degrees.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from ._commands import check, compare, diagnose, inspect, plan, run, simulate
 from ._native import Layout, Surface, Table, __version__
 from .errors import CommandError, ConfigurationError, DataError, Error
 from .pipeline import Pipeline
 from .recording import Capture, Recording
 from .result import Added, Diagnosis, Level, Parameter, Result, Value
+
+if TYPE_CHECKING:
+    from . import checks as checks
+    from . import exporters as exporters
+    from . import loaders as loaders
+    from . import preprocessors as preprocessors
+    from . import separators as separators
+    from . import tables as tables
+
+_STAGES = ("checks", "exporters", "loaders", "preprocessors", "separators", "tables")
+
+
+def __getattr__(name: str) -> Any:
+    """The classes of stages, `runout.loaders` and the like, are imported when they are first used."""
+    if name in _STAGES:
+        return import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module `{__name__}` has no attribute `{name}`")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_STAGES})
+
 
 __all__ = [
     "Added",

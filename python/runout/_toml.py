@@ -31,6 +31,8 @@ def value(item: Any, place: str) -> str:
         return "{ " + ", ".join(pairs) + " }"
     if isinstance(item, Iterable) and not isinstance(item, (bytes, bytearray)):
         return "[" + ", ".join(value(of, f"{place}.{index}") for index, of in enumerate(item)) + "]"
+    if isinstance(item, type):
+        raise TypeError(f"{place}: expected an object, found the class {item.__name__}: write {item.__name__}(…)")
     raise TypeError(f"{place}: expected a string, number, boolean, list or dictionary, found {type(item).__name__}")
 
 

@@ -42,7 +42,7 @@ class Value:
         return f"{self.symbol} = {self.value:.6g}{std} {self.unit}{at}"
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class _Outcome:
     """What a run and a diagnosis have in common: their document, and the tables and the surface of the final model."""
 
@@ -96,6 +96,10 @@ class Result(_Outcome):
     def summary(self) -> dict[str, Any]:
         """The whole document."""
         return self.facts
+
+    def __repr__(self) -> str:
+        counts = ((len(self.summary["stations"]), "stations"), (len(self.values), "values"), (len(self.warnings), "warnings"))
+        return f"<runout.Result {self.title!r}: {', '.join(f'{count} {what}' for count, what in counts)}; tables {', '.join(self.tables)}>"
 
     @property
     def title(self) -> str:
@@ -180,6 +184,10 @@ class Level:
 
 class Diagnosis(_Outcome):
     """What the closed loop found. `facts` is the document of `diagnosis.schema.json`; tables are those of the final model."""
+
+    def __repr__(self) -> str:
+        added = ", ".join(f"{one.effect} {' '.join(one.targets)}" for one in self.added) or "nothing"
+        return f"<runout.Diagnosis: {self.verdict}; added: {added}; tables {', '.join(self.tables)}>"
 
     @property
     def verdict(self) -> str:

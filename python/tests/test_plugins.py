@@ -176,6 +176,8 @@ def test_names_and_kinds_are_checked() -> None:
     for odd in (FourSensors, 3, "x", {}, object()):
         with pytest.raises(TypeError):
             runout.run(small_pipeline(), small_recording(), plugins=[odd])  # type: ignore[list-item]
+    with pytest.raises(TypeError, match=r"found the class FourSensors: write FourSensors\(…\)"):
+        runout.run(small_pipeline(separate=FourSensors), small_recording())
     with pytest.raises(TypeError):
         runout.run(small_pipeline(), small_recording(), plugins=3)  # type: ignore[arg-type]
 

@@ -68,15 +68,24 @@ def test_one_task_a_recording_and_nothing_twice(cluster: None, folder: Path, tmp
     assert {one["key"] for one in changed.of("done")}.isdisjoint(one["key"] for one in report.of("done"))
 
 
+def test_a_task_takes_several_of_many_recordings(cluster: None, folder: Path, tmp_path: Path) -> None:
+    assert [batches._blocks(rows, None) for rows in (1, 4, 31, 32, 1000)] == [1, 4, 31, 16, 63]
+    (folder / "bad.h5").unlink()
+    made = batches.recordings(folder, per_task=2)
+    assert made.materialize().num_blocks() == 2
+    report = batches.run(PIPELINE, made, tmp_path / "out")
+    assert len(report.of("done")) == 3
+
+
 class Killed(batches.Task):
     """A task whose worker is killed once for each recording, after its tables and before it is done."""
 
-    def write(self, result: Any, row: dict[str, Any], name: str, folder: str, target: Any, root: str) -> None:
+    def write(self, result: Any, row: dict[str, Any], name: str, target: Any, root: str) -> None:
         mark = Path(root).parent / f"killed-{name}"
         if not mark.exists():
             mark.touch()
-            super().write(result, row, name, folder, Halfway(target), root)
-        super().write(result, row, name, folder, target, root)
+            super().write(result, row, name, Halfway(target), root)
+        super().write(result, row, name, target, root)
 
 
 class Halfway:
@@ -85,11 +94,11 @@ class Halfway:
     def __init__(self, target: Any) -> None:
         self.target, self.protocol, self.written = target, "memory", 0
 
-    def put_file(self, file: str, path: str) -> None:
+    def pipe_file(self, path: str, data: bytes) -> None:
         self.written += 1
         if self.written == 2:
             os.kill(os.getpid(), signal.SIGKILL)
-        batches._put(self.target, file, path)
+        batches._put(self.target, data, path)
 
 
 def test_a_killed_worker_loses_and_doubles_nothing(cluster: None, folder: Path, tmp_path: Path) -> None:
@@ -152,3 +161,13 @@ def test_simulated_campaigns_are_a_blind_benchmark(cluster: None, tmp_path: Path
     assert bad["error"]
     with pytest.raises(ValueError, match="seed"):
         batches.campaigns(scenario, PIPELINE, [], tmp_path / "out")
+
+
+def test_dask_runs_the_same_task(folder: Path, tmp_path: Path) -> None:
+    bag = pytest.importorskip("dask.bag", reason="dask is not installed")
+    task = batches.Task.of(PIPELINE, None, "load.path", str(tmp_path / "out"), {})
+    paths = sorted(map(str, folder.iterdir()))
+    tasks = bag.from_sequence([{"recording": path} for path in paths], npartitions=len(paths)).map(task)
+    statuses = [[entry["status"] for entry in tasks.compute(scheduler="processes", num_workers=2)] for _ in range(2)]
+    assert statuses == [["failed", "done", "done", "done"], ["failed", "skipped", "skipped", "skipped"]]
+    assert rows(tmp_path / "out") > 0

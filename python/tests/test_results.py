@@ -83,6 +83,11 @@ def test_values_have_units_and_places(result: runout.Result) -> None:
         result.value("nothing")
 
 
+def test_it_prints_in_one_line(result: runout.Result) -> None:
+    line = repr(result)
+    assert line.startswith("<runout.Result 'Turned shaft': 3 stations, ") and "tables form, " in line and "\n" not in line
+
+
 def test_a_notebook_shows_it(result: runout.Result) -> None:
     page = result._repr_html_()
     assert page.count("<img") >= 2 and "data:image/svg+xml;base64," in page

@@ -68,6 +68,14 @@ def test_a_pipeline_in_code_is_the_same_as_one_in_toml(campaign: Path, arrays: r
     assert np.array_equal(form[0], form[1]) and np.array_equal(form[0], form[2])
 
 
+def test_modules_of_stages_need_no_import_of_their_own() -> None:
+    script = "import runout; print(runout.loaders.Hdf5.__name__, runout.separators.FourSensorReversal.__name__, 'tables' in dir(runout))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.split() == ["Hdf5", "FourSensorReversal", "True"], done.stderr
+    with pytest.raises(AttributeError, match="no attribute `loader`"):
+        runout.loader  # type: ignore[attr-defined]
+
+
 def test_contiguous_samples_are_not_copied() -> None:
     samples, marks = turns(count=4000)
     assert samples.nbytes > 16e6

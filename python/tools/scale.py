@@ -1,7 +1,8 @@
 """Times batches on Ray beside `runout batch`: `python python/tools/scale.py [--recordings N] [--campaigns N] [--rounds N]`.
 
 Prints recordings a second of `runout batch` with one and two jobs and of `runout.ray.run` with one and two tasks at a time, in turns, on recordings of 2 MB; and
-campaigns a second of `runout.ray.campaigns`, where asked for. Workers are started before the clock.
+campaigns a second of `runout.ray.campaigns`, where asked for. Workers are started before the clock. Processor time is user and system time of all processors of the
+machine, less what it had to do for other work: on a machine that others use it says nothing.
 """
 
 from __future__ import annotations
@@ -42,11 +43,20 @@ def recordings(folder: Path, count: int) -> list[str]:
     return [str(path) for path in sorted(source.iterdir())]
 
 
-def timed(work: Callable[[], object]) -> float:
-    """Seconds of some work."""
-    start = time.perf_counter()
+def busy() -> float:
+    """Processor seconds of this machine so far; 0 where the system does not say it."""
+    try:
+        user, nice, system = map(int, Path("/proc/stat").read_text().split()[1:4])
+    except OSError:
+        return 0.0
+    return (user + nice + system) / os.sysconf("SC_CLK_TCK")
+
+
+def timed(work: Callable[[], object]) -> tuple[float, float]:
+    """Seconds of some work, and processor seconds of the machine meanwhile."""
+    start, before = time.perf_counter(), busy()
     work()
-    return time.perf_counter() - start
+    return time.perf_counter() - start, busy() - before
 
 
 def batch(paths: list[str], out: Path, jobs: int) -> None:
@@ -73,22 +83,24 @@ def main() -> None:
         paths = recordings(folder, asked.recordings)
         on_ray(paths[: 2 * max(JOBS)], folder / "warm", max(JOBS))
         ways = [(f"{name}, {jobs}", way, jobs) for name, way in (("batch", batch), ("Ray", on_ray)) for jobs in JOBS]
-        found: dict[str, list[float]] = {name: [] for name, _, _ in ways}
+        found: dict[str, list[tuple[float, float]]] = {name: [] for name, _, _ in ways}
         for round in range(asked.rounds):
-            for name, way, jobs in ways:
-                out = folder / f"out-{round}"
+            for number, (name, way, jobs) in enumerate(ways):
+                # All go at the end: some file systems slow down after a removal of many files.
+                out = folder / f"out-{round}-{number}"
                 found[name].append(timed(lambda: way(paths, out, jobs)))  # noqa: B023
-                shutil.rmtree(out)
         print(f"{len(paths)} recordings of {Path(paths[0]).stat().st_size / 1e6:.1f} MB, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}\n")
-        print("| jobs or tasks | time, s | recordings a second |\n| --- | --- | --- |")
-        for name, times in found.items():
-            seconds = statistics.median(times)
-            print(f"| {name} | {seconds:.1f} | {len(paths) / seconds:.2f} |")
+        print("| jobs or tasks | time, s | processor time, s | recordings a second | times one job or task | time over that of `batch` |\n| --- | --- | --- | --- | --- | --- |")
+        seconds = {name: [statistics.median(column) for column in zip(*times)] for name, times in found.items()}
+        for name, (elapsed, spent) in seconds.items():
+            way, jobs = name.split(", ")
+            one, of_batch = seconds[f"{way}, {JOBS[0]}"][0], seconds[f"batch, {jobs}"][0]
+            print(f"| {name} | {elapsed:.1f} | {spent:.1f} | {len(paths) / elapsed:.2f} | {one / elapsed:.2f} | {elapsed / of_batch:.2f} |")
         if asked.campaigns:
             few = {"recording.revolutions": 24}
-            seconds = timed(lambda: runout.ray.campaigns(
+            elapsed, _ = timed(lambda: runout.ray.campaigns(
                 BENCHMARK / "scenario.toml", PIPELINE, range(asked.campaigns), folder / "campaigns", vary=lambda seed: few))
-            print(f"\n{asked.campaigns} campaigns in {seconds:.1f} s: {asked.campaigns / seconds:.2f} a second")
+            print(f"\n{asked.campaigns} campaigns in {elapsed:.1f} s: {asked.campaigns / elapsed:.2f} a second")
     finally:
         ray.shutdown()
         shutil.rmtree(folder)

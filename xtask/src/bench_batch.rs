@@ -64,6 +64,7 @@ pub fn batch(words: &[&str]) -> Outcome {
     };
     let recordings = simulate(&wanted, &program)?;
     let mut times = vec![Vec::new(); wanted.jobs.len()];
+    let mut busy = vec![Vec::new(); wanted.jobs.len()];
     let mut peaks = vec![0; wanted.jobs.len()];
     // Each batch has a folder of its own, and all go at the end: some file systems slow down after a removal of many files.
     let outs = wanted.scratch.join("out");
@@ -71,9 +72,10 @@ pub fn batch(words: &[&str]) -> Outcome {
     for round in 0..wanted.rounds {
         for (at, jobs) in wanted.jobs.iter().enumerate() {
             let out = outs.join(format!("{round}-{jobs}"));
-            let (seconds, peak_kb) = timed(&program, &recordings, &out, *jobs)?;
-            times[at].push(seconds);
-            peaks[at] = peak_kb.max(peaks[at]);
+            let spent = timed(&program, &recordings, &out, *jobs)?;
+            times[at].push(spent.seconds);
+            busy[at].push(spent.processor_seconds);
+            peaks[at] = spent.peak_kb.max(peaks[at]);
         }
     }
     remove(&outs)?;
@@ -84,14 +86,15 @@ pub fn batch(words: &[&str]) -> Outcome {
     let medians: Vec<f64> = times.iter_mut().map(median).collect();
     let processors = thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     say(&format!(
-        "{} recordings, {processors} processors, median of {}\n\n| jobs | time, s | recordings a second | times the first | peak memory, MiB |\n\
-         | --- | --- | --- | --- | --- |",
+        "{} recordings, {processors} processors, median of {}\n\n| jobs | time, s | processor time, s | recordings a second | times the first | peak memory, MiB |\n\
+         | --- | --- | --- | --- | --- | --- |",
         wanted.recordings, wanted.rounds
     ));
-    for ((jobs, seconds), peak_kb) in wanted.jobs.iter().zip(&medians).zip(&peaks) {
-        let (rate, gain) = (wanted.recordings as f64 / seconds, medians[0] / seconds);
-        let peak = if *peak_kb == 0 { "-".to_owned() } else { (peak_kb / 1024).to_string() };
-        say(&format!("| {jobs} | {seconds:.2} | {rate:.1} | {gain:.2} | {peak} |"));
+    for (at, (jobs, seconds)) in wanted.jobs.iter().zip(&medians).enumerate() {
+        let (rate, gain, busy) = (wanted.recordings as f64 / seconds, medians[0] / seconds, median(&mut busy[at]));
+        let [busy, peak] = [(busy > 0.0, format!("{busy:.2}")), (peaks[at] > 0, (peaks[at] / 1024).to_string())]
+            .map(|(is_known, text)| if is_known { text } else { "-".to_owned() });
+        say(&format!("| {jobs} | {seconds:.2} | {busy} | {rate:.1} | {gain:.2} | {peak} |"));
     }
     Ok(())
 }
@@ -133,23 +136,34 @@ fn remove(folder: &Path) -> Outcome {
     Ok(())
 }
 
-/// Seconds from start to end of one batch into a new folder, and its peak memory in kB where the system tells it.
-fn timed(program: &Path, recordings: &[PathBuf], out: &Path, jobs: usize) -> Outcome<(f64, u64)> {
+/// What one batch took. Where the system does not tell the last two, they are 0.
+struct Spent {
+    seconds: f64,
+    peak_kb: u64,
+    /// User and system time of all threads.
+    processor_seconds: f64,
+}
+
+/// One batch into a new folder, from start to end.
+fn timed(program: &Path, recordings: &[PathBuf], out: &Path, jobs: usize) -> Outcome<Spent> {
     let mut batch = Command::new(program);
     batch.arg("batch").arg(root().join("benchmarks/batch/pipeline.toml")).args(recordings);
     batch.arg("--out").arg(out).args(["--jobs", &jobs.to_string()]).stdout(Stdio::null());
     let start = Instant::now();
     let mut running = batch.spawn().map_err(|error| format!("cannot start {}: {error}", program.display()))?;
-    let status_of = format!("/proc/{}/status", running.id());
-    let mut peak_kb = 0;
+    let [status_of, times_of] = ["status", "stat"].map(|file| format!("/proc/{}/{file}", running.id()));
+    let (mut peak_kb, mut processor_seconds) = (0, 0.0);
     loop {
         let ended = running.try_wait().map_err(|error| format!("cannot wait for the batch: {error}"))?;
         if let Some(status) = ended {
             let seconds = start.elapsed().as_secs_f64();
             say(&format!("{jobs} jobs: {seconds:.2} s"));
-            return if status.success() { Ok((seconds, peak_kb)) } else { Err(format!("the batch failed ({status})")) };
+            let spent = Spent { seconds, peak_kb, processor_seconds };
+            return if status.success() { Ok(spent) } else { Err(format!("the batch failed ({status})")) };
         }
         peak_kb = fs::read_to_string(&status_of).ok().and_then(|text| peak(&text)).unwrap_or(peak_kb);
+        let busy = fs::read_to_string(&times_of).ok().and_then(|text| processor_time(&text));
+        processor_seconds = busy.unwrap_or(processor_seconds);
         thread::sleep(Duration::from_millis(10));
     }
 }
@@ -158,4 +172,24 @@ fn timed(program: &Path, recordings: &[PathBuf], out: &Path, jobs: usize) -> Out
 fn peak(status: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.trim().strip_suffix("kB")?.trim().parse().ok()
+}
+
+/// User and system time of a process, in seconds: fields 14 and 15, which Linux counts in hundredths of a second.
+fn processor_time(stat: &str) -> Option<f64> {
+    // The program's name, in brackets, may hold blanks.
+    let (_, fields) = stat.rsplit_once(')')?;
+    let ticks: Vec<f64> = fields.split_whitespace().skip(11).take(2).filter_map(|ticks| ticks.parse().ok()).collect();
+    (ticks.len() == 2).then(|| ticks.iter().sum::<f64>() / 100.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::processor_time;
+
+    #[test]
+    fn user_and_system_time_are_read_behind_any_name() {
+        let stat = "4242 (a ) b) R 1 4242 1 0 -1 4194560 500 0 0 0 321 54 0 0 20 0 3 0 100 1 1";
+        assert_eq!(processor_time(stat), Some(3.75));
+        assert_eq!(processor_time("4242 (a"), None);
+    }
 }

@@ -14,7 +14,8 @@ use crate::{
 
 /// What builds the package, and what its tests take.
 const BUILD: &str = "maturin>=1.9,<2";
-const TEST_PACKAGES: [&str; 14] = [
+const TEST_PACKAGES: [&str; 15] = [
+    "dask",
     "duckdb",
     "h5py",
     "ipykernel",
@@ -31,7 +32,7 @@ const TEST_PACKAGES: [&str; 14] = [
     "s3fs",
 ];
 /// One module of each of them: all are there, or they are installed.
-const TEST_MODULES: &str = "import duckdb, h5py, ipykernel, moto.server, mypy, nbclient, numpy, pandas, polars, pyarrow, pytest, ray.data, s3fs";
+const TEST_MODULES: &str = "import dask.bag, duckdb, h5py, ipykernel, moto.server, mypy, nbclient, numpy, pandas, polars, pyarrow, pytest, ray.data, s3fs";
 
 /// Builds the wheel into target/wheels, in the release profile or in that of the tests.
 pub fn wheel(words: &[&str]) -> Outcome {
@@ -47,7 +48,7 @@ pub fn wheel(words: &[&str]) -> Outcome {
     let wheels = target().join("wheels");
     let mut build = Command::new(environment.join("bin/maturin"));
     build.args(["build", "--profile", profile, "--manifest-path"]).arg(root().join("python/Cargo.toml"));
-    build.env("CARGO_TARGET_DIR", target());
+    build.env("CARGO_TARGET_DIR", target()).env("CMAKE", setup::ready()?);
     run(build.arg("--interpreter").arg(environment.join("bin/python")).arg("--out").arg(&wheels))?;
     say(&format!("pip install {}/runout-*.whl", wheels.display()));
     Ok(())

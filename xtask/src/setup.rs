@@ -28,7 +28,7 @@ pub fn cargo(arguments: &[&str]) -> Outcome<Command> {
 }
 
 /// The CMake to use, with the rest in place.
-fn ready() -> Outcome<PathBuf> {
+pub fn ready() -> Outcome<PathBuf> {
     compiler()?;
     cmake()
 }

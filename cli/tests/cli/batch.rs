@@ -98,8 +98,10 @@ fn one_job_and_two_give_the_same_and_what_is_done_is_skipped() {
     let (count, before) = mean(&report, "RONq");
     assert!(count == 3 && (before - 2.1).abs() < 0.1, "{before}");
 
+    let first = report;
     let (status, report, _) = batch(&folder, "one", &names, &[]);
     assert_eq!((status, counts(&report)), (0, [0, 3, 0, 0]));
+    assert_eq!([&report["warned"], &report["warnings"]], [&first["warned"], &first["warnings"]], "notes are none");
     assert_eq!(tables(&folder.path().join("one")), one);
     // A recording that changes, and one that is not given again.
     fs::copy(folder.path().join("part-10.h5"), folder.path().join("part-2.h5")).unwrap();
@@ -151,7 +153,12 @@ fn what_is_killed_is_completed_by_the_next_call() {
         .spawn()
         .unwrap();
     let start = Instant::now();
-    while fs::read_dir(&summaries).map_or(0, Iterator::count) < 3 && start.elapsed() < Duration::from_mins(1) {
+    // Folders are made before their recordings are complete.
+    let complete = || {
+        let folders = fs::read_dir(&summaries).into_iter().flatten().flatten();
+        folders.filter(|folder| folder.path().join("summary.json").is_file()).count()
+    };
+    while complete() < 2 && start.elapsed() < Duration::from_mins(1) {
         std::thread::sleep(Duration::from_millis(1));
     }
     killed.kill().unwrap();

@@ -45,7 +45,7 @@ pub struct Summary {
     /// What the user should know.
     pub warnings: Vec<String>,
     /// Those of `warnings` that say nothing wrong: what the layout cannot separate, what the result is made of.
-    #[serde(skip)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
 }
 

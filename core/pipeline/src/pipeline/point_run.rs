@@ -11,7 +11,6 @@ use crate::{
     height_grid::HeightGrid,
     points::Points,
     stage::{Evaluable, EvaluableKind, Exporter, Form, Outcome, PlaneMap, PointSeparator},
-    summary::Summary,
 };
 use runout_closed_loop::diagnosis::{Correction, Diagnosis};
 use runout_error::{Error, Result};
@@ -23,11 +22,11 @@ pub(super) fn run(
     points: &Points,
     separator: &dyn PointSeparator,
     observer: &dyn Observer,
-) -> Result<Summary> {
+) -> Result<Finished> {
     spare_inputs(&pipeline.outputs(), &points.inputs())?;
     let outcome = separator.separate(points)?;
     let result = PointResult { outcome, remarks: Some(separator), effects: Vec::new(), diagnosis: None };
-    result.write(pipeline, &pipeline.exporters, points, observer)?.commit(None)
+    result.write(pipeline, &pipeline.exporters, points, observer)
 }
 
 /// A result of points, to be written.

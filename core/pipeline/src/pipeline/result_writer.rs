@@ -302,19 +302,42 @@ impl Finished {
     }
 
     /// Writes the summary and gives all files their names, one more among them where there is one.
-    pub(super) fn commit(mut self, besides: Option<PendingFile>) -> Result<Summary> {
+    pub(super) fn commit(self, besides: Option<PendingFile>) -> Result<Summary> {
+        self.complete(besides)?.publish()
+    }
+
+    /// Writes the summary, the last of the files.
+    pub(super) fn complete(mut self, besides: Option<PendingFile>) -> Result<CompleteFiles> {
         self.complete.extend(besides);
         self.summary.outputs = self.outputs();
-        if let Some(path) = self.summary_path {
+        let Self { summary, complete: mut files, summary_path, in_data_set, lock } = self;
+        if let Some(path) = summary_path {
             let file = PendingFile::new(path)?;
-            let text = serde_json::to_vec_pretty(&self.summary).map_err(|error| file.caused(error))?;
+            let text = serde_json::to_vec_pretty(&summary).map_err(|error| file.caused(error))?;
             file.write(&text)?;
-            self.complete.push(file);
+            files.push(file);
         }
+        Ok(CompleteFiles { summary, files, in_data_set, lock })
+    }
+}
+
+/// All files of a result, complete under temporary names.
+pub(super) struct CompleteFiles {
+    summary: Summary,
+    files: Vec<PendingFile>,
+    in_data_set: bool,
+    /// Given back last.
+    lock: FolderLock,
+}
+
+impl CompleteFiles {
+    /// Gives all files their names. This waits for the disk.
+    pub(super) fn publish(self) -> Result<Summary> {
+        let Self { summary, files, in_data_set, lock } = self;
         // The summary is the last file: it says that the part is complete.
-        if self.in_data_set { commit_last_after_others(self.complete) } else { commit_all(self.complete) }?;
-        drop(self.lock);
-        Ok(self.summary)
+        if in_data_set { commit_last_after_others(files) } else { commit_all(files) }?;
+        drop(lock);
+        Ok(summary)
     }
 }
 

@@ -9,7 +9,7 @@ use super::{
     read_ahead::write_behind,
     record_reader::{RecordReader, separate},
     result::{Evaluation, complete},
-    result_writer::ResultWriter,
+    result_writer::{CompleteFiles, Finished, ResultWriter},
     steadiness::Steadiness,
     undeclared::Undeclared,
 };
@@ -62,24 +62,41 @@ pub fn run_alone(pipeline: &Pipeline, observer: &dyn Observer) -> Result<Summary
     threads::alone(|| run_with(pipeline, Some(NonZeroUsize::MIN), true, observer))
 }
 
+/// Runs a pipeline on one thread up to files that are complete and wait for their names.
+///
+/// # Errors
+/// Those of [`run`].
+pub(super) fn run_alone_to_files(pipeline: &Pipeline) -> Result<CompleteFiles> {
+    threads::alone(|| finished(pipeline, Some(NonZeroUsize::MIN), true, &Silent)?.complete(None))
+}
+
 fn run_with(
     pipeline: &Pipeline,
     threads: Option<NonZeroUsize>,
     alone: bool,
     observer: &dyn Observer,
 ) -> Result<Summary> {
-    let source = pipeline.loader.open(&pipeline.request())?;
-    let summary = match (&source, &pipeline.route) {
-        (Source::Turns(recording), Route::Turns { conditioners, averager, separator, .. }) => {
-            run_turns(pipeline, &**recording, (conditioners, &**averager, &**separator), (threads, alone), observer)?
-        }
-        (Source::Points(points), Route::Points { separator, .. }) => {
-            point_run::run(pipeline, points, &**separator, observer)?
-        }
-        _ => return Err(Error::new("run", &pipeline.title, "the loader gave what it did not declare")),
-    };
+    let summary = finished(pipeline, threads, alone, observer)?.commit(None)?;
     outdated::remove(pipeline)?;
     Ok(summary)
+}
+
+fn finished(
+    pipeline: &Pipeline,
+    threads: Option<NonZeroUsize>,
+    alone: bool,
+    observer: &dyn Observer,
+) -> Result<Finished> {
+    let source = pipeline.loader.open(&pipeline.request())?;
+    match (&source, &pipeline.route) {
+        (Source::Turns(recording), Route::Turns { conditioners, averager, separator, .. }) => {
+            run_turns(pipeline, &**recording, (conditioners, &**averager, &**separator), (threads, alone), observer)
+        }
+        (Source::Points(points), Route::Points { separator, .. }) => {
+            point_run::run(pipeline, points, &**separator, observer)
+        }
+        _ => Err(Error::new("run", &pipeline.title, "the loader gave what it did not declare")),
+    }
 }
 
 fn run_turns(
@@ -88,7 +105,7 @@ fn run_turns(
     (conditioners, averager, separator): (&[Box<dyn Conditioner>], &dyn Averager, &dyn StationSeparator),
     (threads, alone): (Option<NonZeroUsize>, bool),
     observer: &dyn Observer,
-) -> Result<Summary> {
+) -> Result<Finished> {
     spare_inputs(&pipeline.outputs(), &recording.inputs())?;
     let rig = pipeline.rig.as_ref().ok_or_else(|| {
         Error::new("run", &pipeline.title, "recorded turns need a [rig]").of(ErrorKind::Configuration)
@@ -134,7 +151,7 @@ fn run_turns(
         .collect();
     writer.note(mains::whole_orders(&speeds));
     let surface = writer.build_surface(rig.part_radius_mm)?;
-    writer.finish(inputs, remarks, surface.as_ref())?.commit(None)
+    writer.finish(inputs, remarks, surface.as_ref())
 }
 
 /// Speed, in rpm, and turns used of captures whose speed is known.

@@ -25,9 +25,11 @@ pub use trend::{RECORDING, Series, Signals, recording_column};
 use super::{
     config::Pipeline,
     document::{ConfigError, Document, Sources},
-    observer::{Observer, Silent},
+    observer::Observer,
+    read_ahead::write_behind,
     registry::Registry,
-    run::run_alone,
+    result_writer::CompleteFiles,
+    run::run_alone_to_files,
     tables,
 };
 use crate::{
@@ -107,6 +109,22 @@ enum Outcome {
     Failed(Error),
 }
 
+/// A recording whose computation is over.
+enum Computed {
+    UpToDate(Found),
+    /// Its files wait for their names.
+    Files(Box<CompleteFiles>),
+}
+
+impl Computed {
+    fn publish(self) -> Result<Outcome> {
+        match self {
+            Self::UpToDate(found) => Ok(Outcome::Skipped(found)),
+            Self::Files(files) => Ok(Outcome::Done(Found::of(&files.publish()?))),
+        }
+    }
+}
+
 impl<'a> Batch<'a> {
     /// Checks a pipeline for these recordings.
     ///
@@ -184,14 +202,26 @@ impl<'a> Batch<'a> {
         let next = AtomicUsize::new(0);
         let outcomes: Mutex<Vec<Option<Outcome>>> = Mutex::new(recordings.iter().map(|_| None).collect());
         observer.begin(recordings.len());
+        let claimed = || {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            Some((index, recordings.get(index)?))
+        };
+        let publish = |(index, computed): (usize, Result<Computed>)| {
+            let outcome = computed.and_then(Computed::publish).unwrap_or_else(Outcome::Failed);
+            outcomes.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(outcome);
+            observer.station(&recordings[index].name);
+            Ok(())
+        };
         let work = || {
-            while let Some((index, recording)) =
-                Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|index| Some((index, recordings.get(index)?)))
-            {
-                let outcome = self.one(recording, kept.contains(&recording.name)).unwrap_or_else(Outcome::Failed);
-                outcomes.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(outcome);
-                observer.station(&recording.name);
-            }
+            // While the files of a recording are synced, which takes no processor, the next one is computed.
+            let outcome = write_behind(publish, |hand_on| {
+                while let Some((index, recording)) = claimed() {
+                    hand_on((index, self.one(recording, kept.contains(&recording.name))))?;
+                }
+                Ok(())
+            });
+            // Where the thread that publishes has stopped, recordings have no outcome, which is said below.
+            drop(outcome);
         };
         std::thread::scope(|scope| {
             let others = jobs.get().min(recordings.len()).saturating_sub(1);
@@ -203,8 +233,8 @@ impl<'a> Batch<'a> {
         outcomes.into_iter().map(|outcome| outcome.unwrap_or_else(|| Outcome::Failed(stopped()))).collect()
     }
 
-    /// Works on a recording, of which something is kept or nothing.
-    fn one(&self, recording: &Recording, is_kept: bool) -> Result<Outcome> {
+    /// Computes the result of a recording, of which something is kept or nothing.
+    fn one(&self, recording: &Recording, is_kept: bool) -> Result<Computed> {
         let named = |error: ConfigError| match error {
             ConfigError::File(error) => error,
             ConfigError::Text(mistake) => {
@@ -219,7 +249,7 @@ impl<'a> Batch<'a> {
             // What cannot be read now is not up to date; the run says why.
             && is_of_inputs(&summary, &pipeline).unwrap_or(false)
         {
-            return Ok(Outcome::Skipped(Found::of(&summary)));
+            return Ok(Computed::UpToDate(Found::of(&summary)));
         }
         if is_kept {
             self.store.remove(&recording.name)?;
@@ -227,8 +257,8 @@ impl<'a> Batch<'a> {
         pipeline.in_data_set = true;
         pipeline.exporters = vec![self.store.exporter(&recording.name)];
         pipeline.diagnosed.clear();
-        let summary = run_alone(&pipeline, &Silent)?;
-        Ok(Outcome::Done(Found::of(&summary)))
+        let files = run_alone_to_files(&pipeline).map_err(|error| recording.explained(error))?;
+        Ok(Computed::Files(Box::new(files)))
     }
 
     /// The summary of a complete result; nothing where there is none that can be read.

@@ -21,6 +21,19 @@ pub struct Recording {
     pub path: PathBuf,
 }
 
+impl Recording {
+    /// An error of its run. Where a file is missing in a folder, the folder may have been meant as a collection of recordings.
+    pub(super) fn explained(&self, error: Error) -> Error {
+        if error.kind() != ErrorKind::MissingFile || error.advice().is_some() || !self.path.is_dir() {
+            return error;
+        }
+        let folder = self.path.display();
+        error.help(format!(
+            "a folder is one recording, in which the files of [load] are looked up; to take each of its files as a recording, give {folder}/*"
+        ))
+    }
+}
+
 /// The recordings of these paths in the order of their names; a file that is given twice is one recording. The last `folders`
 /// folders of a path belong to the name.
 ///
@@ -189,6 +202,21 @@ mod tests {
         assert_eq!(both.iter().map(|one| one.name.as_str()).collect::<Vec<_>>(), ["a/x.1", "b/x.1"]);
         assert_eq!(recordings(&[path("a"), path("b")], 0).unwrap()[1].name, "b");
         assert!(recordings(&[PathBuf::from("/")], 0).is_err());
+    }
+
+    #[test]
+    fn a_folder_that_lacks_the_file_of_the_loader_says_how_to_take_its_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = || Error::new("open", "it", "missing").of(ErrorKind::MissingFile);
+        let advice = |path: &Path, error: Error| {
+            let recording = Recording { name: "it".into(), path: path.to_owned() };
+            recording.explained(error).advice().map(str::to_owned)
+        };
+        let said = advice(folder.path(), missing()).unwrap();
+        assert!(said.contains(&format!("{}/*", folder.path().display())), "{said}");
+        assert_eq!(advice(&folder.path().join("x.h5"), missing()), None);
+        assert_eq!(advice(folder.path(), missing().help("its own")).as_deref(), Some("its own"));
+        assert_eq!(advice(folder.path(), Error::new("open", "it", "damaged")), None);
     }
 
     #[test]
