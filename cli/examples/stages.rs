@@ -17,14 +17,12 @@ use runout_cli::builtin::registry;
 use runout_core::{
     atomic_file::commit_all,
     measurement::{Block, MemoryStream, Recording, SampleStream},
-    pipeline::{
-        config::{INCLUDE_KEY, Pipeline, Route},
-        document::Sources,
-        run::{StationResult, StationTables, Summary},
-    },
+    pipeline::{INCLUDE_KEY, Pipeline, Route, document::Sources, run::StationTables},
     profile::Profile,
     separation::Separation,
     stage::{AverageRequest, Averager, Conditioner, ResultInfo, Source, Station, StationSeparator},
+    station::StationResult,
+    summary::Summary,
 };
 
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;

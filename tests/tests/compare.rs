@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 
 use runout_core::{
     Result,
+    fault::Fault,
     pipeline::{
-        Pipeline, Registry,
+        Context, Pipeline, Plugin, Registry, StageConfig,
         compare::{Comparing, Comparison, QuantityComparison},
         document::Sources,
-        error::Fault,
-        registry::{Context, Plugin, StageConfig},
         run::Silent,
     },
     rig::RigConfig,

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use runout_core::{
     Error, Result,
     atomic_file::{self, resolved},
+    fault::known_names,
     pipeline::{
         Pipeline, Registry,
         compare::{Comparing, ComparingPoints, Comparison, StationComparison},
         document::{Document, Sources},
-        error::known_names,
     },
 };
 use runout_parquet::{ComparisonTable, comparison_figures, comparison_rows};

@@ -13,7 +13,7 @@ pub mod run;
 pub mod schema;
 pub mod simulate;
 
-use runout_core::pipeline::{Pipeline, Registry, config::INCLUDE_KEY, document::Sources};
+use runout_core::pipeline::{INCLUDE_KEY, Pipeline, Registry, document::Sources};
 use serde::Serialize;
 
 use crate::{

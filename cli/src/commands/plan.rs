@@ -8,10 +8,10 @@ pub mod points;
 use std::ops::RangeInclusive;
 
 use runout_core::{
+    fault::Fault,
     pipeline::{
         Registry,
         document::{self, Document, Sources},
-        error::Fault,
     },
     rig::{Rig, RigConfig},
 };
@@ -135,7 +135,7 @@ fn across(rig: &Rig) -> Rig {
 
 /// What to know of axial sensors and declared forms.
 fn notes(rig: &Rig, orders: &RangeInclusive<usize>) -> Vec<String> {
-    face_notes::notes(rig, &Layout::new(rig, false).assess(*orders.end()))
+    face_notes(rig, &Layout::new(rig, false).assess(*orders.end()))
 }
 
 /// What a rig can and cannot separate at these orders.

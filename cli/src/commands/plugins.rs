@@ -1,7 +1,9 @@
 //! `runout plugins`: what is on board, and the keys of each.
 
-use runout_core::pipeline::{
-    Registry, config::plain_tables, effects::EffectEntry, error::known_names, registry::Catalogue,
+use runout_core::{
+    effects::EffectEntry,
+    fault::known_names,
+    pipeline::{Catalogue, Registry, plain_tables},
 };
 use serde::Serialize;
 use serde_json::{Map, Value, json};

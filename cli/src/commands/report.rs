@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use runout_core::{
     Result,
     atomic_file::{self, resolved},
-    pipeline::{document::Sources, summary::Summary},
+    pipeline::document::Sources,
     provenance::Provenance,
     stage::{About, Completed, Export, Exporter, Overview, ResultInfo},
+    summary::Summary,
     table::{RecordBatch, TableSpec},
 };
 use runout_hdf5::read_result;

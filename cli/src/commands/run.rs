@@ -1,8 +1,8 @@
 //! `runout run`.
 
-use runout_core::pipeline::{
-    Registry,
-    run::{self, Decision},
+use runout_core::{
+    pipeline::{Registry, run},
+    summary::Decision,
 };
 
 use super::{pipeline, print};

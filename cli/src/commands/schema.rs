@@ -5,14 +5,9 @@ use std::path::Path;
 use runout_core::{
     Error, atomic_file,
     model::diagnosis::Diagnosis,
-    pipeline::{
-        Registry,
-        batch::BatchReport,
-        compare::Comparison,
-        config::{choice, pipeline_schema},
-        run::Summary,
-    },
+    pipeline::{Registry, batch::BatchReport, choice, compare::Comparison, pipeline_schema},
     rig::RigConfig,
+    summary::Summary,
 };
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value, json};

@@ -5,13 +5,11 @@ use std::path::PathBuf;
 use runout_core::{
     Error,
     atomic_file::resolved,
+    fault::Fault,
     measurement::Recording,
     pipeline::{
-        Registry,
-        config::INCLUDE_KEY,
+        Context, INCLUDE_KEY, Registry,
         document::{Document, Sources, Table},
-        error::Fault,
-        registry::Context,
     },
     rig::Rig,
     stage::{Simulation, Simulator},

@@ -3,7 +3,7 @@
 use std::{borrow::Cow, fmt};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
-use runout_core::pipeline::error::Diagnostic;
+use runout_core::fault::Diagnostic;
 
 use textwrap::WordSplitter;
 

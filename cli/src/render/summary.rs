@@ -6,8 +6,8 @@ mod reading;
 mod values;
 
 use runout_core::{
-    evaluate::Value,
-    pipeline::run::{CaptureSummary, SectionSummary, StationSummary, Summary},
+    standards::Value,
+    summary::{CaptureSummary, SectionSummary, StationSummary, Summary},
 };
 
 use super::{

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64,
-    pipeline::{Registry, registry::Plugin},
+    pipeline::{Plugin, Registry},
 };
 use runout_spindle::effects::{self, About, ActsOn, Alterations, Predicted, SpindleEffect, Transfer, parameter};
 
@@ -60,7 +60,7 @@ mod tests {
         inspection::Inspection,
         measurement::Recording,
         model::{Effect, Fit, Model, Setting, closed_loop::Settings, diagnosis::Verdict},
-        pipeline::registry::{Context, StageConfig},
+        pipeline::{Context, StageConfig},
         rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
         stage::{AverageRequest, Preprocessor, Station},
     };

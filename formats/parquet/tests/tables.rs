@@ -9,13 +9,12 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use runout_core::{
     Complex64,
     atomic_file::commit_all,
-    evaluate::{Value, uncertainty::Uncertainty},
-    pipeline::{
-        registry::{Context, StageConfig},
-        run::{LostOrders, PartSummary, SectionSummary, StationResult, StationSummary, StationTables, Summary},
-    },
+    pipeline::{Context, StageConfig, run::StationTables},
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
+    standards::{Value, uncertainty::Uncertainty},
+    station::StationResult,
+    summary::{LostOrders, PartSummary, SectionSummary, StationSummary, Summary},
 };
 use runout_parquet::ParquetConfig;
 

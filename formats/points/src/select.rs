@@ -4,8 +4,8 @@ use std::path::Path;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::known_names,
     input_file::InputFile,
-    pipeline::error::known_names,
     points::{Column, Labels, PointColumn, PointKind, Points, Trace},
 };
 

@@ -12,7 +12,7 @@ mod scan;
 mod separate;
 mod shape;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 pub use config::LeastSquaresCylinderConfig;
 pub use predict::Prediction;

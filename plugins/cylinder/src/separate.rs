@@ -6,18 +6,16 @@ use std::f64::consts::PI;
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
+    fault::Fault,
     numerics::statistics::median,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{
         PointColumn,
         PointKind::{Number, Trace as TraceId, TraceKind},
         Points, Trace,
     },
     separation::{Quantity, Residual, Separation},
-    stage::{Evaluable, EvaluableKind, Form, Outcome, PointModel, PointSeparator, Separator, points::residual_table},
+    stage::{Evaluable, EvaluableKind, Form, Outcome, PointModel, PointSeparator, Separator, residual_table},
     surface::Surface,
     table::TableSpec,
 };

@@ -16,10 +16,12 @@ use runout_core::{
         Pipeline, Registry,
         diagnose::diagnose,
         document::Sources,
-        run::{Silent, StationResult, Summary, run},
+        run::{Silent, run},
     },
     points::Points,
     stage::{LinearModel, PointSeparator},
+    station::StationResult,
+    summary::Summary,
     surface::{Surface, SurfaceBuilder, SurfaceConfig},
 };
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};

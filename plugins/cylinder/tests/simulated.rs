@@ -12,9 +12,10 @@ use runout_core::{
         Pipeline, Registry,
         diagnose::diagnose,
         document::Sources,
-        run::{Silent, Summary, run},
+        run::{Silent, run},
     },
     points::Points,
+    summary::Summary,
 };
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
 use simulator::{Part, Recording, around};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use runout_core::{Error, Result, evaluate::areal::HeightMap, points::Points};
+use runout_core::{Error, Result, numerics::height_map::HeightMap, points::Points};
 
 use crate::config::FlyCuttingConfig;
 

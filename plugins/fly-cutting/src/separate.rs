@@ -2,13 +2,11 @@
 
 use runout_core::{
     Result,
+    fault::Fault,
     model::{Fit, Model, Setting},
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
-    stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator, points::far_below_noise},
+    stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator, far_below_noise},
     table::TableSpec,
 };
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, Result,
-    pipeline::error::known_names,
+    fault::known_names,
     points::{
         PointColumn,
         PointKind::{Label, Number},

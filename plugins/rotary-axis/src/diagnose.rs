@@ -15,7 +15,8 @@ use runout_core::{
     },
     numerics::least_squares::dot,
     points::Points,
-    stage::{NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator},
+    stage::{Outcome, PointDiagnosis, PointModel, PointSeparator},
+    summary::NamedValue,
 };
 
 use crate::{

@@ -9,19 +9,15 @@
 
 use runout_core::{
     Error, Result,
+    fault::{Fault, within},
     model::{
         Effect, Fit, Parameter, Remainder,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
-    pipeline::{
-        error::{Fault, within},
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
-    stage::{
-        LinearModel, Outcome, PointModel, PointSeparator, Separator,
-        points::{residual_table, separate_declared, value},
-    },
+    stage::{LinearModel, Outcome, PointModel, PointSeparator, Separator, residual_table, separate_declared},
+    summary::NamedValue,
     table::TableSpec,
 };
 use schemars::JsonSchema;
@@ -204,8 +200,10 @@ impl LinearModel for RTest {
             ));
         }
         let about = "level or first harmonic of C of the ball's deviation: installation of the axis and of the ball";
-        let values =
-            fit.values().into_iter().map(|found| value(&found.value, found.number, found.std, &found.unit, about));
+        let values = fit
+            .values()
+            .into_iter()
+            .map(|found| NamedValue::new(&found.value, found.number, found.std, &found.unit, about));
         let convention = "actual less nominal place of the ball, in machine coordinates".into();
         Ok(Outcome { convention, values: values.collect(), remarks, ..Outcome::default() })
     }

@@ -13,10 +13,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use runout_core::{
     Result,
-    pipeline::{
-        error::{Fault, known_names},
-        registry::{Context, StageConfig},
-    },
+    fault::{Fault, known_names},
+    pipeline::{Context, StageConfig},
     points::{Column, Labels, Points, Trace},
     stage::{Simulation, Simulator},
     table::{ColumnSpec, TableSpec, numbers, texts},

@@ -1,6 +1,6 @@
 //! Speeds at which a mode is near a multiple of the speed.
 
-use runout_core::{Result, pipeline::error::Fault};
+use runout_core::{Result, fault::Fault};
 
 use crate::crossings::Search;
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use runout_core::pipeline::error::{Fault, known_names};
+use runout_core::fault::{Fault, known_names};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

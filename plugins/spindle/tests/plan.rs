@@ -14,7 +14,7 @@ use runout_core::{
 };
 use runout_spindle::{
     layout::Layout,
-    plan::{Addition, Criterion, FormGain, Search, optimise, spacing::distance_deg, suggest},
+    plan::{Addition, Criterion, FormGain, Search, distance_deg, optimise, suggest},
 };
 
 const ONE_SETUP: [(f64, f64); 1] = [(0.0, 0.0)];

@@ -1,6 +1,6 @@
 //! Part and slide on common positions, from traces that were brought to them.
 
-use runout_core::{evaluate::straightness::about_lsli_um, numerics::least_squares::Basis};
+use runout_core::{numerics::least_squares::Basis, standards::straightness::about_lsli_um};
 
 use crate::spline::Knots;
 

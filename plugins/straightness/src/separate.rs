@@ -2,10 +2,8 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
-    pipeline::{
-        error::{Fault, known_names},
-        registry::{Context, StageConfig},
-    },
+    fault::{Fault, known_names},
+    pipeline::{Context, StageConfig},
     points::{
         PointColumn,
         PointKind::{Flag, Number, Trace, TraceKind},

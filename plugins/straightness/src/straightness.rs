@@ -2,8 +2,9 @@
 
 use runout_core::{
     Result,
-    evaluate::open_errors::OpenErrors,
-    stage::{Evaluable, NamedValue, OpenProfile, Outcome, points::value},
+    stage::{Evaluable, OpenProfile, Outcome},
+    standards::open_errors::OpenErrors,
+    summary::NamedValue,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 
@@ -116,15 +117,27 @@ impl Straightness {
     fn values(&self) -> Vec<NamedValue> {
         let of = |name: &str, std_um: &[f64]| {
             let each = "standard uncertainty of the deviation at one position, rms over the positions";
-            value("std", rms(std_um), f64::NAN, "um", each).of(name)
+            NamedValue::new("std", rms(std_um), f64::NAN, "um", each).of(name)
         };
         let repeatability = "standard deviation of one trace at one position, rms over the positions";
         let mut values = vec![of("part", &self.part_std_um), of("slide", &self.slide_std_um)];
-        values.push(value("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
+        values.push(NamedValue::new("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
         let end = |z_mm: Option<&f64>| z_mm.copied().unwrap_or(f64::NAN);
-        values.push(value("first-position", end(self.z_mm.first()), f64::NAN, "mm", "first position along the axis"));
-        values.push(value("last-position", end(self.z_mm.last()), f64::NAN, "mm", "last position along the axis"));
-        values.push(value("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
+        values.push(NamedValue::new(
+            "first-position",
+            end(self.z_mm.first()),
+            f64::NAN,
+            "mm",
+            "first position along the axis",
+        ));
+        values.push(NamedValue::new(
+            "last-position",
+            end(self.z_mm.last()),
+            f64::NAN,
+            "mm",
+            "last position along the axis",
+        ));
+        values.push(NamedValue::new("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
         values
     }
 

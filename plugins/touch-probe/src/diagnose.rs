@@ -9,7 +9,8 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
-    stage::{NamedValue, Outcome, PointDiagnosis, PointModel},
+    stage::{Outcome, PointDiagnosis, PointModel},
+    summary::NamedValue,
 };
 
 use crate::{

@@ -21,7 +21,7 @@ pub mod simulate;
 mod touches;
 mod waves;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 pub use config::{SetupConfig, TouchProbeConfig};
 pub use separate::TouchProbe;

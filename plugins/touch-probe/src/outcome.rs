@@ -8,10 +8,8 @@ use runout_core::{
     Complex64, Result,
     model::diagnosis::LostOrders,
     separation::{Quantity, Residual, SectionAt, Separation},
-    stage::{
-        Evaluable, Form, NamedValue, Outcome,
-        points::{far_below_noise, value},
-    },
+    stage::{Evaluable, Form, Outcome, far_below_noise},
+    summary::NamedValue,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers, texts},
 };
 
@@ -242,7 +240,7 @@ impl Found<'_> {
         let [mean, std] = self.mean().unwrap_or([f64::NAN; 2]);
         let about = "mean pre-travel and stylus, over the time of the campaign: reading less ring radius; holds the error of the ring's radius, \
              and a scale error common to X and Y, one to one";
-        let mut values = vec![value("pretravel_mean", mean, std, "um", about)];
+        let mut values = vec![NamedValue::new("pretravel_mean", mean, std, "um", about)];
         let Ranges { before, after, without_form, by_repeats, .. } = self.ranges;
         let held = if by_repeats { "a repeat" } else { "touches" };
         let of_ranges = [
@@ -255,21 +253,39 @@ impl Found<'_> {
             ),
         ];
         for (symbol, range, about) in of_ranges {
-            values.push(value(symbol, range.um, range.std_um, "um", &format!("range, mean over passes: {about}")));
+            values.push(NamedValue::new(
+                symbol,
+                range.um,
+                range.std_um,
+                "um",
+                &format!("range, mean over passes: {about}"),
+            ));
         }
         for lobe in lobes {
             let of = |number: f64| if lobe.observable { number } else { f64::NAN };
             let [along, across] = lobe.std_um();
             let order = lobe.order;
             let about = format!("amplitude of lobing of order {order}");
-            values.push(value(&format!("lobe_{order}_amplitude"), of(lobe.amplitude_um()), of(along), "um", &about));
+            values.push(NamedValue::new(
+                &format!("lobe_{order}_amplitude"),
+                of(lobe.amplitude_um()),
+                of(along),
+                "um",
+                &about,
+            ));
             let about = format!(
                 "phase of lobing of order {order}: A cos({order} direction + phase), probe's frame; null without \
                                  evidence of the order"
             );
             let evident = |number: f64| if lobe.evident { of(number) } else { f64::NAN };
             let std = (across / lobe.amplitude_um()).to_degrees();
-            values.push(value(&format!("lobe_{order}_phase"), evident(lobe.phase_deg()), evident(std), "deg", &about));
+            values.push(NamedValue::new(
+                &format!("lobe_{order}_phase"),
+                evident(lobe.phase_deg()),
+                evident(std),
+                "deg",
+                &about,
+            ));
         }
         for setup in &self.touches.setups {
             for (axis, symbol) in ["centre_x", "centre_y"].into_iter().enumerate() {
@@ -280,7 +296,7 @@ impl Found<'_> {
                     [moved + self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()]
                 });
                 let about = "centre of the ring, from the nominal one; holds lobing of order 1";
-                values.push(value(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
+                values.push(NamedValue::new(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
             }
         }
         let about = match self.weights.noise {
@@ -297,7 +313,7 @@ impl Found<'_> {
                 (noise, noise / (2.0 * self.fit.solved.dof as f64).sqrt())
             }
         };
-        values.push(value("touch_std", noise, std, "um", &about));
+        values.push(NamedValue::new("touch_std", noise, std, "um", &about));
         values
     }
 

@@ -2,11 +2,9 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::Fault,
     model::diagnosis::LostOrders,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{
         PointColumn,
         PointKind::{Label, Number},

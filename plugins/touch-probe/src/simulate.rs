@@ -13,10 +13,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use runout_core::{
     Result,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     points::{Column, Labels, Points},
     stage::{Simulation, Simulator},
     table::{ColumnSpec, TableSpec, counts, numbers, texts},

@@ -1,6 +1,6 @@
 //! Touches of a ring, checked.
 
-use runout_core::{Error, Result, pipeline::error::known_names, points::Points};
+use runout_core::{Error, Result, fault::known_names, points::Points};
 
 use crate::config::TouchProbeConfig;
 

@@ -1,6 +1,6 @@
 //! Error motion of the axis.
 
-use runout_core::{evaluate::Value, pipeline::run::StationSummary};
+use runout_core::{standards::Value, summary::StationSummary};
 
 use super::{std_of, unit};
 use crate::render::{

@@ -1,6 +1,6 @@
 //! Readings by themselves, where the layout separates nothing.
 
-use runout_core::{evaluate::reading::ReadingValues, pipeline::run::StationSummary};
+use runout_core::{reading::ReadingValues, summary::StationSummary};
 
 use super::FEW_STATIONS;
 use crate::render::{

@@ -1,8 +1,8 @@
 //! Values of all sections together, and limits.
 
 use runout_core::{
-    evaluate::Value,
-    pipeline::run::{Decision, LimitSummary, LimitValue, Summary},
+    standards::Value,
+    summary::{Decision, LimitSummary, LimitValue, Summary},
 };
 
 use super::{FEW_STATIONS, known, std_of, unit};

@@ -6,6 +6,7 @@ pub(super) mod exports;
 mod route;
 mod schema;
 
+use runout_error::fault::{Fault, known_names};
 use std::path::{Path, PathBuf};
 
 use toml::de::DeValue;
@@ -16,7 +17,6 @@ pub use schema::{PlainTable, choice, pipeline_schema, plain_tables};
 
 use super::{
     document::{self, ConfigError, Document, Sources, Table, checked, required, table, tables},
-    error::{Fault, known_names},
     evaluate::{Evaluate, EvaluateConfig},
     registry::{Context, Registry},
 };

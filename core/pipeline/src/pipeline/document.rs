@@ -2,6 +2,7 @@
 
 mod table;
 
+use runout_error::fault::{Diagnostic, Fault, Place};
 use std::{
     io::Read,
     ops::Range,
@@ -15,7 +16,6 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::error::{Diagnostic, Fault, Place};
 use runout_error::{Error, ErrorKind};
 use runout_turning::input_file::open_regular;
 

@@ -237,21 +237,3 @@ fn residual_rows(terms: &LinearTerms, before: &LinearFit, after: &LinearFit) -> 
     ])?;
     Ok(TableRows { table: spec.name, rows })
 }
-
-/// A value that needs no more than a name, a number and a unit.
-#[must_use]
-pub fn value(symbol: &str, value: f64, std: f64, unit: &str, about: &str) -> NamedValue {
-    let known = |number: f64| number.is_finite().then_some(number);
-    NamedValue {
-        symbol: symbol.into(),
-        of: None,
-        value: known(value),
-        std: known(std),
-        unit: unit.into(),
-        about: about.into(),
-        interval_95: None,
-        reference: None,
-        filter: None,
-        no_uncertainty: None,
-    }
-}

@@ -4,14 +4,14 @@ mod capture;
 mod coding;
 mod extent;
 mod line;
-pub mod loader;
+mod loader;
 mod orientation;
 mod rows;
-pub mod samples;
+mod samples;
 mod stream;
 mod structure;
 mod truth;
-pub mod write;
+mod write;
 
 pub(crate) use capture::{CaptureSource, Phase};
 

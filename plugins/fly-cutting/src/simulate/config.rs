@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

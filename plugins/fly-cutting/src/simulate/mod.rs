@@ -16,11 +16,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use runout_core::{
     Result,
+    fault::Fault,
     height_grid::HeightGrid,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     stage::{Simulation, Simulator},
 };
 

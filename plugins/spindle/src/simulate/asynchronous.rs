@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::{Complex64, pipeline::error::Fault};
+use runout_core::{Complex64, fault::Fault};
 
 use super::{
     check,

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 
 use super::{
     check,

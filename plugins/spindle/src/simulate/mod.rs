@@ -32,10 +32,8 @@ mod tests;
 
 use runout_core::{
     Result,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     rig::Rig,
     stage::{Simulation, Simulator},
 };

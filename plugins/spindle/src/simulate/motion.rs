@@ -1,6 +1,6 @@
 //! Synchronous error motion of the spindle's axis.
 
-use runout_core::{Complex64, pipeline::error::Fault};
+use runout_core::{Complex64, fault::Fault};
 
 use super::{
     check,

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 
 use super::{
     check,

@@ -2,8 +2,8 @@
 
 use runout_core::{
     Complex64,
+    fault::Fault,
     measurement::StationKey,
-    pipeline::error::Fault,
     rig::{Calibration, Rig, Sensor},
 };
 

@@ -1,6 +1,6 @@
 //! Machines whose error over the travel is measured, drawn by chance.
 
-use runout_core::{Error, Result, pipeline::registry::Context};
+use runout_core::{Error, Result, pipeline::Context};
 use runout_spatial_error::{
     Query, SpatialErrorConfig,
     simulate::{Layout, Scenario, SimulatedEffect},

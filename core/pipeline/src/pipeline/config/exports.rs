@@ -1,5 +1,6 @@
 //! The files that a pipeline writes: exporters of `run` and of `diagnose`, none of which writes over another file.
 
+use runout_error::fault::Fault;
 use std::path::{Path, PathBuf};
 
 use toml::{Spanned, de::DeValue};
@@ -9,7 +10,6 @@ use crate::{
     atomic_file::resolved,
     pipeline::{
         document::{self, Sources, Table},
-        error::Fault,
         registry::{Context, Registry},
     },
     stage::{Exporter, Takes},

@@ -3,7 +3,6 @@
 use crate::{
     pipeline::{
         document::{self, Table, table},
-        error::Fault,
         registry::Registry,
         tables::{self, StationTables},
     },
@@ -14,6 +13,7 @@ use crate::{
     },
 };
 use runout_closed_loop::Effect;
+use runout_error::fault::Fault;
 use runout_table::TableSpec;
 use runout_turning::{
     rig::Rig,

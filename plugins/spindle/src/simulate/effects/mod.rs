@@ -8,7 +8,7 @@ mod setups;
 mod spindle;
 mod strangers;
 
-use runout_core::pipeline::error::{Fault, known_names};
+use runout_core::fault::{Fault, known_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
