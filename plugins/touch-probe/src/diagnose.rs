@@ -17,9 +17,9 @@ use crate::{
     config::TouchProbeConfig,
     design::{Content, Design, Noise, Parameter},
     effects::{Missing, highest},
-    outcome::residual_rows,
     second_order::SecondOrder,
     separate::{Prepared, TouchProbe},
+    tables::residual_rows,
     waves::{Part, angles},
 };
 

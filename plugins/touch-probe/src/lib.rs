@@ -18,6 +18,7 @@ mod plan;
 mod second_order;
 mod separate;
 pub mod simulate;
+mod tables;
 mod touches;
 mod waves;
 

@@ -20,7 +20,8 @@ use crate::{
     effects::{Missing, missing},
     held_out::ranges,
     noise::weights,
-    outcome::{Found, residual_rows, tables},
+    outcome::Found,
+    tables::{residual_rows, tables},
     touches::Touches,
 };
 
