@@ -117,7 +117,7 @@ pub struct DiagnoseArgs {
     /// Memory that the loop may take, in GB, in place of `memory_gb` in [diagnose]: it holds all stations at once.
     #[arg(long, value_name = "GB")]
     pub memory: Option<f64>,
-    /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can stand for it.
+    /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can replace it.
     #[arg(long, value_name = "RIG.toml")]
     pub write: Option<PathBuf>,
 }

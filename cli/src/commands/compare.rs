@@ -51,7 +51,7 @@ pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::resu
     drop(progress);
     comparison.stations = stations;
     output.finish(&comparison)?;
-    conclude(report, &comparison)?;
+    write_report(report, &comparison)?;
     print(&comparison, json, render::compare::text)
 }
 
@@ -76,7 +76,7 @@ fn points(
     let report = args.report.as_deref().map(begin).transpose()?;
     let comparison = comparing.run(outputs(args))?;
     output.finish(&comparison)?;
-    conclude(report, &comparison)?;
+    write_report(report, &comparison)?;
     print(&comparison, json, render::compare::text)
 }
 
@@ -86,7 +86,7 @@ fn outputs(args: &CompareArgs) -> Vec<PathBuf> {
 }
 
 /// Writes the report, where there is to be one.
-fn conclude(report: Option<OverviewReport>, comparison: &Comparison) -> Result<()> {
+fn write_report(report: Option<OverviewReport>, comparison: &Comparison) -> Result<()> {
     let Some(report) = report else { return Ok(()) };
     let (_, overview) = render::compare::page(comparison).into_overview(None);
     report.finish(comparison.provenance.clone(), &overview)
@@ -126,7 +126,7 @@ impl Output {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("parquet") => Ok(Self::Table(path.to_owned(), None)),
             Some("json") => Ok(Self::Document(path.to_owned())),
-            _ => Err(refuse(format!("cannot tell what {shown} is to be"), "end it in .parquet or .json")),
+            _ => Err(refuse(format!("the format of {shown} is not known"), "end it in .parquet or .json")),
         }
     }
 

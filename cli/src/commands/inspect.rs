@@ -13,7 +13,7 @@ use crate::{
     reports::inspect::{ColumnReport, Report, TableReport},
 };
 
-/// Says what a file holds, told by its first bytes and not by its name.
+/// Says what a file holds, by its first bytes and not by its name.
 ///
 /// # Errors
 /// When it cannot be read, or is of no known kind.

@@ -218,7 +218,7 @@ fn plane(comparison: &Comparison) -> Option<String> {
     };
     (high != 0.0).then(|| {
         format!(
-            "x and y are the axis's displacement at z = {place}: not every method tells tilt, which moves it to z = 0"
+            "x and y are the axis's displacement at z = {place}: tilt, which moves it to z = 0, is not observable by every method"
         )
     })
 }

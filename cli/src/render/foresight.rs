@@ -34,7 +34,7 @@ pub fn visible(page: &mut Page, foresight: &Foresight) {
     }
 }
 
-/// Effects that would not show, or not be told apart.
+/// Effects that are not visible, or cannot be distinguished.
 pub fn hidden(page: &mut Page, foresight: &Foresight) {
     // Face and z are of axial sensors: a table leaves out columns without entries.
     let columns = ["form", "motion", "face", "z"];
@@ -55,9 +55,9 @@ pub fn hidden(page: &mut Page, foresight: &Foresight) {
         let [form, motion, face, z] = columns.map(moves);
         table.row([first.blind.effect.clone(), targets, form, motion, face, z]);
     }
-    page.headed_table("Effects that would not show, and what one unit does all the same", &table);
+    page.headed_table("Effects that are not visible, and what one unit does all the same", &table);
     let sets: Vec<String> = foresight.confounded.iter().map(|set| names(set)).collect();
-    page.bullets("Effects that cannot be told apart", &sets);
+    page.bullets("Effects that cannot be distinguished", &sets);
 }
 
 /// Where an effect acts without a target, beside others of it that have one: uneven speed in all setups, or in one.

@@ -119,11 +119,11 @@ pub struct Order {
     pub rank: usize,
     /// Readings (complex) that are left over for a residual.
     pub residual_dof: usize,
-    /// Whether each of `unknowns` can be told.
+    /// Whether each of `unknowns` is observable.
     pub observable: Vec<bool>,
-    /// Standard deviation of each of `unknowns`, in its unit, for 1 µm in every reading; null where it cannot be told.
+    /// Standard deviation of each of `unknowns`, in its unit, for 1 µm in every reading; null where it is not observable.
     pub noise_gain: Vec<Option<f64>>,
-    /// Why something cannot be told.
+    /// Why something is not observable.
     pub lost_because: Option<String>,
 }
 

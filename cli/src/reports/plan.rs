@@ -99,7 +99,7 @@ pub struct Suggested {
     /// Of a setup: by how much the sensors are moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensors_deg: Option<f64>,
-    /// Of a sensor: the section that it looks at.
+    /// Of a sensor: the section that it measures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub section: Option<String>,
     /// Of a sensor: where it stands.
@@ -107,7 +107,7 @@ pub struct Suggested {
     pub angle_deg: Option<f64>,
     /// Blind effects, "effect target", that would show with this.
     pub reveals: Vec<String>,
-    /// Confounded sets that would be told apart.
+    /// Confounded sets that would be distinguished.
     pub tells_apart: Vec<Vec<String>>,
     /// The rig as it is.
     pub before: Score,
@@ -148,7 +148,7 @@ pub struct Arrangement {
     pub within_tolerance: Score,
 }
 
-/// What a layout of measured points tells and how well, and what to add to it.
+/// What is observable with a layout of measured points and how well, and what to add to it.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct PointReport {
     /// The pipeline's title.

@@ -20,7 +20,7 @@ use runout_parquet::ParquetConfig;
 
 const ANGLES: usize = 48;
 const MAX_ORDER: usize = 6;
-/// An order that the made-up layout cannot tell.
+/// An order that is not observable with the made-up layout.
 const LOST: usize = 4;
 
 fn value(station: usize, unknown: usize, order: usize) -> Complex64 {

@@ -5,6 +5,7 @@
 
 mod circle;
 mod config;
+mod generatrix;
 mod model;
 mod predict;
 mod robust;

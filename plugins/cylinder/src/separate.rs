@@ -24,7 +24,7 @@ pub(crate) use circles::Circle;
 use circles::unseen;
 
 use crate::{
-    circle::Harmonics, config::LeastSquaresCylinderConfig, predict::Prediction, robust::rms, scan::Scan,
+    circle::Harmonics, config::LeastSquaresCylinderConfig, generatrix::open_profiles, predict::Prediction, robust::rms, scan::Scan,
     shape::Cylinder,
 };
 
@@ -85,11 +85,14 @@ impl PointSeparator for LeastSquaresCylinder {
     }
 
     fn evaluables(&self) -> Vec<EvaluableKind> {
-        vec![EvaluableKind::ClosedProfiles]
+        vec![EvaluableKind::ClosedProfiles, EvaluableKind::OpenProfile]
     }
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
-        Ok(Outcome { evaluables: vec![Evaluable::ClosedProfiles(self.form(points)?)], ..Outcome::default() })
+        let mut evaluables = vec![Evaluable::ClosedProfiles(self.form(points)?)];
+        let profiles = open_profiles(points, &self.cylinder(points)?)?;
+        evaluables.extend(profiles.into_iter().map(Evaluable::OpenProfile));
+        Ok(Outcome { evaluables, ..Outcome::default() })
     }
 
     fn needs_surface(&self) -> bool {
@@ -134,7 +137,7 @@ impl LeastSquaresCylinder {
     /// The cylinder that is fitted to the traces used, their outliers left out.
     ///
     /// # Errors
-    /// When the traces cannot tell it.
+    /// When the traces do not determine it.
     pub fn cylinder(&self, points: &Points) -> Result<Cylinder> {
         cylinder(points, &self.circles(points)?, self.0.radius_mm)
     }

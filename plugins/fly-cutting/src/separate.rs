@@ -87,7 +87,7 @@ impl PointSeparator for FlyCutting {
             ));
         }
         remarks.extend(smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof));
-        self.concluded(&measured, (&fit, &fit), &[], remarks)
+        self.fitted_outcome(&measured, (&fit, &fit), &[], remarks)
     }
 
     fn evaluables(&self) -> Vec<EvaluableKind> {
@@ -129,7 +129,7 @@ impl FlyCutting {
     }
 
     /// The result of the fits of the declared and of the final model.
-    pub(crate) fn concluded(
+    pub(crate) fn fitted_outcome(
         &self,
         measured: &Measured,
         (declared, last): (&CutFit, &CutFit),

@@ -153,10 +153,10 @@ impl LinearModel for Quadrature {
         if samples.true_rad.is_some() {
             return Ok(model.judged_by(count..rows));
         }
-        Ok(model.told_apart_by(TOLD_APART))
+        Ok(model.distinguished_by(TOLD_APART))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
+    fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let samples = Samples::of(points)?;
         let count = samples.phase_rad.len();
         let blocks = format!(

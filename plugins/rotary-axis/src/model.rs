@@ -172,7 +172,7 @@ impl LinearModel for RTest {
         Ok(model.ending_at(format!("harmonic-{highest}"), format!("`separate.max_order` is {highest}")))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
+    fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let used = self.used(points)?;
         let Remainder { rms, dof, held_out_rms, .. } = fit.remainder();
         let all = points.column("a_deg")?.len();

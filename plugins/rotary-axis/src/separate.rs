@@ -56,7 +56,7 @@ impl PointSeparator for RotaryAxis {
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let campaign = Campaign::of(&self.0, points)?;
-        self.conclude(points, &campaign, &[], &[], &[])
+        self.fitted_outcome(points, &campaign, &[], &[], &[])
     }
 
     fn notes(&self) -> Vec<String> {
@@ -159,7 +159,7 @@ impl RotaryAxis {
     /// The outcome of a fit with effects, whose values are fitted beside; `before` is the residual without them. Where the data
     /// do not decide between effects, `alternatives` are the others: how far results with them differ is added to the
     /// uncertainty.
-    pub(crate) fn conclude(
+    pub(crate) fn fitted_outcome(
         &self,
         points: &Points,
         campaign: &Campaign,

@@ -22,7 +22,7 @@ const P_LIMIT: f64 = 1e-3;
 const BIC_LIMIT: f64 = -10.0;
 /// Effects and jumps that are tried in each round.
 const TRIED: [usize; 2] = [8, 4];
-/// Candidates whose criteria differ by less are not told apart, where one leaves nothing for the other.
+/// Candidates whose criteria differ by less are not distinguished, where one leaves nothing for the other.
 const SAME_BIC: f64 = 10.0;
 /// Share of its gain that is left of a candidate beside another one with which it is confounded, at most.
 const LEFT: f64 = 0.15;

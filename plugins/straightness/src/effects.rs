@@ -131,7 +131,7 @@ impl Alteration {
             return Some(format!("an angle of {}° is no reversal", self.turned_deg));
         }
         let other = self.drifts.iter().find(|[_, constant]| !TIME_CONSTANTS.contains(constant));
-        other.map(|[_, constant]| format!("a time constant of {constant} traces cannot be told"))
+        other.map(|[_, constant]| format!("a time constant of {constant} traces is not observable"))
     }
 
     /// a: the share of the part's deviation that the probe sees.

@@ -314,7 +314,7 @@ impl Fit for TracesFit {
         worst.map(report).into_iter().collect()
     }
 
-    fn told_apart_by(&self, effects: &[usize]) -> Option<String> {
+    fn distinguished_by(&self, effects: &[usize]) -> Option<String> {
         let members: Vec<&Candidate> =
             effects.iter().filter_map(|effect| self.design.data.candidates.get(*effect)).collect();
         let has = |kind: Kind| members.iter().any(|one| one.kind == kind);

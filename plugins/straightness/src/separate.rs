@@ -343,7 +343,7 @@ impl AxialReversal {
                 "one trace in each setup: uncertainty is the difference of both at waves that the slide does not have"
                     .into()
             }
-            [1, 1] => "one trace in each setup: nothing tells the uncertainty; repeat each at least once".into(),
+            [1, 1] => "one trace in each setup: the uncertainty is not known; repeat each at least once".into(),
             [first, second] => {
                 let dof = first + second - 2;
                 let single = match (first, second) {

@@ -16,12 +16,12 @@ pub const CONVENTION: &str = "Straightness along z about the least-squares line 
     initial setup. Standard uncertainties are those of one position, from the scatter of repeated traces; NaN if not \
     known.";
 
-/// What the readings cannot tell, whatever the data.
+/// What is not observable, whatever the data.
 pub const LIMIT: &str = "each trace has an offset and a slope of its own, so only the straightness about the \
     least-squares line is known: neither taper, nor parallelism, nor the angle between slide and part";
 
 /// Why values have no uncertainty.
-const NO_REPEATS: &str = "one trace in each setup: nothing tells the errors";
+const NO_REPEATS: &str = "one trace in each setup: the errors are not known";
 
 /// Straightness of part and slide on common positions.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! Part and slide told apart on made-up traces.
+//! Part and slide distinguished on made-up traces.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 

@@ -213,7 +213,7 @@ impl Fitted {
     }
 
     /// Whether the parameters are told by the touches.
-    pub fn is_told(&self, places: &[usize]) -> bool {
+    pub fn is_observable(&self, places: &[usize]) -> bool {
         places.iter().all(|place| !self.solved.lost[*place])
     }
 }

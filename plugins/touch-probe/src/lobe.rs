@@ -43,7 +43,7 @@ impl Lobe {
             let places = fit.design.pair(lobing_order, order).unwrap_or_default();
             let shared = matches!(fit.design.parameters[places[0]], Parameter::Lobing { shared: true, .. });
             let bound = config.ring_form_um.filter(|_| shared);
-            let observable = fit.is_told(&places) && (!shared || bound.is_some());
+            let observable = fit.is_observable(&places) && (!shared || bound.is_some());
             let parts_um = places.map(|place| fit.solved.coefficients[place]);
             let mut covariance = places.map(|row| places.map(|column| fit.covariance(row, column)));
             for index in 0..2 {

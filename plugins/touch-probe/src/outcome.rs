@@ -43,7 +43,7 @@ impl Found<'_> {
     }
 
     fn form_places(&self, order: usize) -> Option<[usize; 2]> {
-        self.fit.design.pair(form_order, order).filter(|places| self.fit.is_told(places))
+        self.fit.design.pair(form_order, order).filter(|places| self.fit.is_observable(places))
     }
 
     /// Tables, values, form and remarks; without the table `residual`.
@@ -134,7 +134,7 @@ impl Found<'_> {
     }
 
     fn mean(&self) -> Option<[f64; 2]> {
-        let place = self.fit.design.place(&Parameter::Mean).filter(|place| self.fit.is_told(&[*place]))?;
+        let place = self.fit.design.place(&Parameter::Mean).filter(|place| self.fit.is_observable(&[*place]))?;
         let std_um = self.fit.covariance(place, place).sqrt().hypot(self.second_order().amplitude_um(0));
         Some([self.fit.solved.coefficients[place], std_um])
     }
@@ -193,7 +193,7 @@ impl Found<'_> {
         for setup in &self.touches.setups {
             for (axis, symbol) in ["centre_x", "centre_y"].into_iter().enumerate() {
                 let parameter = Parameter::Centre { setup: *setup, axis };
-                let place = self.fit.design.place(&parameter).filter(|place| self.fit.is_told(&[*place]));
+                let place = self.fit.design.place(&parameter).filter(|place| self.fit.is_observable(&[*place]));
                 let [number, std] = place.map_or([f64::NAN; 2], |place| {
                     let moved = self.touches.centre_um[*setup][axis];
                     [moved + self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()]

@@ -24,7 +24,7 @@ impl SecondOrder {
             fit.design.parameters.iter().filter_map(|parameter| lobing_order(parameter).or(form_order(parameter)));
         let highest = orders.max().unwrap_or(config.max_order);
         let amplitude = |pair: Option<[usize; 2]>| {
-            let places = pair.filter(|places| fit.is_told(places));
+            let places = pair.filter(|places| fit.is_observable(places));
             places.map_or(0.0, |[a, b]| fit.solved.coefficients[a].hypot(fit.solved.coefficients[b]))
         };
         let of = |pair: &dyn Fn(usize) -> Option<[usize; 2]>| {

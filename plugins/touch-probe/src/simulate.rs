@@ -331,7 +331,7 @@ impl StageConfig for TouchProbeScenario {
             return Err(Fault::at("trigger_ratio", problem).under("probe"));
         }
         let text =
-            toml::to_string(&self).map_err(|error| Fault::here(format!("the scenario cannot be told: {error}")))?;
+            toml::to_string(&self).map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
         let text = format!("plugin = \"{}\"\n{text}", Self::NAME);
         Ok(Box::new(TouchProbeSimulator { scenario: self, text }))
     }

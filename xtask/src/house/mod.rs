@@ -148,7 +148,7 @@ fn reason(from: &str, to: &str) -> &'static str {
         ("plugins", "plugins") => "a plugin imports a plugin",
         ("formats", "plugins") => "a format knows a domain",
         ("core", "core") => "a crate of the core imports upwards",
-        ("core", _) => "the core imports what stands on it",
+        ("core", _) => "the core imports what depends on it",
         _ => "ARCHITECTURE.md does not have this arrow",
     }
 }

@@ -1,4 +1,4 @@
-//! `runout plan` of measured points: what their layout tells, and what to add to it.
+//! `runout plan` of measured points: what is observable with their layout, and what to add to it.
 
 use runout_core::{
     pipeline::{
@@ -33,7 +33,7 @@ pub fn report(args: &PlanArgs, sources: &Sources, registry: &Registry) -> Result
     let pipeline = Pipeline::from_sources(sources, registry)?;
     let nothing = || Failure::Name {
         message: format!("`{}` has nothing to plan", pipeline.separator),
-        help: "`runout check` says what it can and cannot tell".into(),
+        help: "`runout check` says what is and is not observable".into(),
     };
     let separator = pipeline.route.point_separator().ok_or_else(nothing)?;
     let mut notes = Vec::new();

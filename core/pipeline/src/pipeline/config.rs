@@ -67,7 +67,7 @@ pub struct Pipeline {
     pub checks: Vec<Box<dyn Check>>,
     /// The tables of its result, also those that it may lack.
     pub tables: Vec<TableSpec>,
-    /// What the separator can tell with the rig.
+    /// What is observable by the separator with the rig.
     pub assessment: Option<Assessment>,
     /// Files that stages besides `[load]` name and read: inputs of the result too.
     pub named_files: Vec<PathBuf>,

@@ -337,7 +337,7 @@ fn begun(pipeline: &Pipeline) -> Summary {
     }
 }
 
-/// What a rig that is not as declared looks like: a residual far above what the noise lets expect.
+/// What a rig that is not as declared looks like: a residual far above what is expected from noise.
 fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
     let beyond = stations.iter().filter(|station| station.is_misfit(stations.len()));
     let count = beyond.clone().count();

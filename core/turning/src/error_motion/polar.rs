@@ -79,7 +79,7 @@ pub(super) struct Synchronous {
     pub variance: Vec<f64>,
     /// Orders of the motion that count, both ends included.
     pub band: [usize; 2],
-    /// Orders of that band that the layout cannot tell.
+    /// Orders of that band that are not observable.
     pub lost: Vec<usize>,
     /// By how much declared forms may move the plot, peak to valley.
     pub bound: f64,
@@ -149,7 +149,7 @@ impl Synchronous {
         })
     }
 
-    /// Whether no order of the band can be told.
+    /// Whether no order of the band is observable.
     pub fn is_lost(&self) -> bool {
         self.lost.len() > self.band[1].saturating_sub(self.band[0])
     }

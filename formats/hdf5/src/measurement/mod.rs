@@ -3,7 +3,7 @@
 mod capture;
 mod coding;
 mod extent;
-mod line;
+mod vector;
 mod loader;
 mod orientation;
 mod rows;

@@ -1,4 +1,4 @@
-//! What a spindle model is fitted to: averaged readings, their weights, what noise lets expect of them.
+//! What a spindle model is fitted to: averaged readings, their weights, what is expected of them from noise.
 
 use std::sync::Arc;
 

@@ -145,7 +145,7 @@ impl Solved {
         unknown: usize,
     ) -> impl Iterator<Item = (usize, Complex64)> + 'a {
         let count = self.corrected.count;
-        self.told_orders(unknown).map(move |order| {
+        self.observable_orders(unknown).map(move |order| {
             let row = &self.operators.orders[order - 1].operator[unknown * count..(unknown + 1) * count];
             let readings = &partial[order * count..(order + 1) * count];
             (order, row.iter().zip(readings).map(|(a, b)| a * b).sum())
@@ -158,15 +158,15 @@ impl Solved {
         apply(&self.operators.orders[0].operator, &partial[count..2 * count])
     }
 
-    /// How z at 1/rev moves with a parameter, where it can be told.
+    /// How z at 1/rev moves with a parameter, where it is observable.
     pub fn first_moved_by(&self, partial: &[Complex64], layout: &Layout) -> Option<Complex64> {
         let z = layout.unknowns.iter().position(|unknown| *unknown == Quantity::Z)?;
         let place = layout.first_order_unknowns().iter().position(|unknown| *unknown == FirstOrder::Axial)?;
         self.operators.observable(1)[z].then(|| self.first_moved(partial)[place])
     }
 
-    /// Orders from 2 at which an unknown can be told.
-    fn told_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
+    /// Orders from 2 at which an unknown is observable.
+    fn observable_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
         (2..=self.corrected.max_order).filter(move |order| self.operators.observable(*order)[unknown])
     }
 }

@@ -54,7 +54,7 @@ impl Operators {
         Self { orders, systems, weights }
     }
 
-    /// Whether each unknown can be told at an order from 1.
+    /// Whether each unknown is observable at an order from 1.
     #[must_use]
     pub fn observable(&self, order: usize) -> &[bool] {
         &self.systems[order - 1].observable

@@ -138,7 +138,7 @@ impl<'a> SecondOrder<'a> {
                 if order == 0 {
                     Complex64::ZERO
                 } else {
-                    estimate.told(order, unknown).conj() * layout.motion_sign(setup, order)
+                    estimate.observable_value(order, unknown).conj() * layout.motion_sign(setup, order)
                 }
             });
             let curve = self.turn.synthesise(harmonics);

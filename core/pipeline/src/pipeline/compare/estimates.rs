@@ -55,12 +55,12 @@ impl Scatter {
 #[derive(Clone)]
 pub(super) struct Estimates {
     pub unknowns: Vec<Quantity>,
-    /// Where x and y are told.
+    /// Where x and y are observable.
     pub motion_z_mm: f64,
     /// `[order][unknown]`, NaN where lost.
     values: Vec<Complex64>,
     variance: Vec<f64>,
-    told: Vec<bool>,
+    observable: Vec<bool>,
     sensitivity: Sensitivity,
 }
 
@@ -71,7 +71,7 @@ impl Estimates {
             motion_z_mm: separation.motion_z_mm,
             values: separation.estimate.clone(),
             variance: separation.variance.clone(),
-            told: separation.observable.clone(),
+            observable: separation.observable.clone(),
             sensitivity,
         }
     }
@@ -84,10 +84,10 @@ impl Estimates {
         self.unknowns.iter().position(|unknown| *unknown == quantity)
     }
 
-    /// The estimate and its variance, where the order is told.
-    pub fn told(&self, order: usize, unknown: usize) -> Option<(Complex64, f64)> {
+    /// The estimate and its variance, where the order is observable.
+    pub fn observable_value(&self, order: usize, unknown: usize) -> Option<(Complex64, f64)> {
         let index = order * self.unknowns.len() + unknown;
-        (*self.told.get(index)?).then(|| (self.values[index], self.variance[index]))
+        (*self.observable.get(index)?).then(|| (self.values[index], self.variance[index]))
     }
 
     pub fn row(&self, order: usize, unknown: usize) -> &[Complex64] {
@@ -95,7 +95,7 @@ impl Estimates {
         &self.sensitivity.operator[start..start + self.sensitivity.readings]
     }
 
-    pub fn tells_motion(&self) -> bool {
+    pub fn has_motion(&self) -> bool {
         self.unknowns.iter().any(|unknown| !unknown.is_form())
     }
 
@@ -108,7 +108,7 @@ impl Estimates {
     }
 
     /// The same with x and y at another z: x(z) = X + z·E_y, y(z) = Y − z·E_x; lost where the tilt is. `None` where
-    /// no tilt is told.
+    /// no tilt is observable.
     pub fn moved_to(&self, z_mm: f64, scatter: &Scatter) -> Option<Self> {
         if self.in_plane(z_mm) {
             return Some(self.clone());
@@ -124,9 +124,9 @@ impl Estimates {
             let (tilt, lever) = (self.position(tilt), factor * distance);
             for order in 0..=self.max_order() {
                 let index = order * width + shift;
-                let turned = tilt.and_then(|tilt| Some((self.told(order, tilt)?.0, self.row(order, tilt))));
-                let (Some((value, row)), true) = (turned, self.told[index]) else {
-                    moved.told[index] = false;
+                let turned = tilt.and_then(|tilt| Some((self.observable_value(order, tilt)?.0, self.row(order, tilt))));
+                let (Some((value, row)), true) = (turned, self.observable[index]) else {
+                    moved.observable[index] = false;
                     continue;
                 };
                 moved.values[index] += value * lever;

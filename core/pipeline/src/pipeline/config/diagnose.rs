@@ -98,7 +98,7 @@ pub struct Diagnose {
     pub path: Option<PathBuf>,
     /// Memory that the loop may take, in GB.
     pub memory_gb: f64,
-    /// Where the corrected rig goes, where it is asked for: a file of TOML that can stand for `[rig]`.
+    /// Where the corrected rig goes, where it is asked for: a file of TOML that can replace `[rig]`.
     pub write_rig: Option<PathBuf>,
 }
 

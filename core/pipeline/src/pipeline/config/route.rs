@@ -128,7 +128,7 @@ pub(super) fn points(separator: Separator, separate_table: &Table, root: &Table)
     }
 }
 
-/// The route of recorded turns, and what its separator can tell.
+/// The route of recorded turns, and what is observable by its separator.
 pub(super) fn turns(
     preprocessors: Vec<(Preprocessor, Table)>,
     separator: Separator,

@@ -121,7 +121,7 @@ fn whole_order(diagnosis: &Diagnosis, stations: &[Station]) -> Option<String> {
     let found = orders.find_map(|order| Some((order, mains::near(order as f64 * turns_hz, resolution_hz)?)));
     found.map(|(order, mains)| {
         format!(
-            "order {order} is mains ({mains:.0} Hz) at this speed: pick-up at a whole order cannot be told from what repeats every turn; measure at another speed"
+            "order {order} is mains ({mains:.0} Hz) at this speed: pick-up at a whole order cannot be distinguished from what repeats every turn; measure at another speed"
         )
     })
 }
