@@ -7,7 +7,6 @@ mod scenario;
 
 pub use scenario::{Commands, Harmonic, Scenario, SimulatedEffect};
 
-use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
@@ -21,10 +20,8 @@ use runout_core::{
     stage::{Simulation, Simulator},
     table::{ColumnSpec, TableSpec, numbers, texts},
 };
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::{axis::Axis, config::Ball};
+use crate::axis::Axis;
 
 /// Simulated rows.
 #[derive(Debug, Clone)]

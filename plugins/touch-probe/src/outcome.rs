@@ -8,7 +8,7 @@ use runout_core::{
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{Evaluable, Form, Outcome, far_below_noise},
     summary::NamedValue,
-    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers, texts},
+    table::{TableRows, counts, flags, numbers},
 };
 
 use crate::{

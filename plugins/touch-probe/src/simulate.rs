@@ -21,8 +21,6 @@ use runout_core::{
     stage::{Simulation, Simulator},
     table::{ColumnSpec, TableSpec, counts, numbers, texts},
 };
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Steps of a bisection: 1 mm to below 1e-12 mm.
 const BISECTIONS: usize = 42;

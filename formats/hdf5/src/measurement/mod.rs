@@ -4,14 +4,14 @@ mod capture;
 mod coding;
 mod extent;
 mod vector;
-mod loader;
+pub(crate) mod loader;
 mod orientation;
 mod rows;
-mod samples;
+pub(crate) mod samples;
 mod stream;
 mod structure;
 mod truth;
-mod write;
+pub(crate) mod write;
 
 pub(crate) use capture::{CaptureSource, Phase};
 

@@ -20,8 +20,8 @@ use crate::{
         registry::Context,
     },
     points::PointColumn,
-    stage::{NamedValue, Outcome, PointSeparator, Request, Source},
-    summary::LostOrders,
+    stage::{Outcome, PointSeparator, Request, Source},
+    summary::{LostOrders, NamedValue},
 };
 use runout_error::{Error, Result};
 use runout_table::{Array, Float64Array, TableRows};

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::{stage::NamedValue, summary::Summary};
+use crate::summary::{NamedValue, Summary};
 use runout_closed_loop::diagnosis::Correction;
 use runout_error::Result;
 use runout_standards::{Value, uncertainty::Uncertainty};
