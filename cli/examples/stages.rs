@@ -52,7 +52,8 @@ fn main() -> Outcome {
         let record = Box::new(captures[0].clone());
         clocked(|| drain(&mut *stages.conditioner.attach(record)?))
     })?;
-    let projection = Stages::of(&three_point)?.separator.projection(0).ok_or("motion is not observable with three points")?;
+    let projection =
+        Stages::of(&three_point)?.separator.projection(0).ok_or("motion is not observable with three points")?;
     for (name, projection) in [("average", None), ("average-and-motion-of-every-turn", Some(&projection))] {
         let wanted = AverageRequest { projection, ..AverageRequest::default() };
         report(name, || {

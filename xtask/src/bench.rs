@@ -60,12 +60,12 @@ impl Options {
 }
 
 /// Writes the record once, times both programs on it in turns and prints a table.
-pub fn campaign(words: &[&str]) -> Outcome {
+pub(crate) fn campaign(words: &[&str]) -> Outcome {
     time_campaign(&Options::read(words)?).map(|_| ())
 }
 
 /// The same with both kinds of samples; the table goes where `benchmarks/README.md` shows it.
-pub fn all_peers(words: &[&str]) -> Outcome {
+pub(crate) fn all_peers(words: &[&str]) -> Outcome {
     let options = Options { i16: true, ..Options::read(words)? };
     if !time_campaign(&options)? {
         return Ok(());
@@ -100,7 +100,7 @@ fn show(name: &str, table: &str) -> Outcome {
 }
 
 /// Times each stage and the peers' in turns; the table goes where `benchmarks/README.md` shows it.
-pub fn stages(words: &[&str]) -> Outcome {
+pub(crate) fn stages(words: &[&str]) -> Outcome {
     let options = Options::read(words)?;
     let Some(peers) = peers(&["record.py", "pipeline.py"]) else { return Ok(()) };
     let python = python(&STAGES)?;
@@ -163,7 +163,7 @@ fn write_record(options: &Options, peers: &Path, python: &Path) -> Outcome {
 }
 
 /// Times the reference circles of runout and of the peers on the same points.
-pub fn roundness() -> Outcome {
+pub(crate) fn roundness() -> Outcome {
     run(&mut cargo(&["build", "--release", "--package", "runout-core", "--example", "reference_circles"])?)?;
     let Some(peers) = peers(&["roundness_bench.py", "roundness.py"]) else { return Ok(()) };
     let mut compare = Command::new(python(&ROUNDNESS)?);
@@ -172,7 +172,7 @@ pub fn roundness() -> Outcome {
 }
 
 /// Times predictions of 100 000 places from 1000 of runout, scikit-learn and pykrige, one thread; `words` may hold other numbers.
-pub fn kriging(words: &[&str]) -> Outcome {
+pub(crate) fn kriging(words: &[&str]) -> Outcome {
     run(&mut cargo(&["build", "--release", "--package", "runout-spatial-error", "--example", "spatial_error_bench"])?)?;
     let Some(peers) = peers(&["kriging_bench.py", "common.py"]) else { return Ok(()) };
     let mut compare = Command::new(python(&KRIGING)?);

@@ -54,7 +54,7 @@ impl Options {
 }
 
 /// Simulates recordings of 2 MB once, runs the batch with each number of jobs in turns and prints a table.
-pub fn batch(words: &[&str]) -> Outcome {
+pub(crate) fn batch(words: &[&str]) -> Outcome {
     let options = Options::read(words)?;
     let program = if let Some(program) = &options.program {
         program.clone()

@@ -17,7 +17,7 @@ use runout_core::{
 };
 use runout_spindle::{
     layout::Layout,
-    plan::{self, Change, Optimum, Search, Suggestion, TooTight, optimise},
+    plan::{self, Change, Optimum, PROGRESS_STEPS, Search, Suggestion, TooTight, optimise},
     selection::Selection,
     separators::face_notes,
 };
@@ -102,11 +102,11 @@ fn suggested(
     for_form: &[Suggestion],
     for_effects: &[Change],
 ) -> Vec<Suggested> {
-    let before = plan::suggest::score(rig, orders);
+    let before = plan::score(rig, orders);
     let mut all = for_form.to_vec();
     for change in for_effects {
         if !all.iter().any(|known| known.addition == change.addition) {
-            let after = plan::suggest::score(&change.rig, orders);
+            let after = plan::score(&change.rig, orders);
             all.push(Suggestion { addition: change.addition, rig: change.rig.clone(), after });
         }
     }
@@ -176,7 +176,7 @@ fn better_angles(rig: &Rig, args: &PlanArgs, progress: &Progress) -> Result<Opti
         },
         seed: args.seed,
     };
-    progress.expect(optimise::PROGRESS_STEPS);
+    progress.expect(PROGRESS_STEPS);
     optimise(rig, &search, &mut |best| progress.advance(best)).map_err(|tight| too_tight(&tight, args.clearance))
 }
 

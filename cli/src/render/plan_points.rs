@@ -36,7 +36,10 @@ pub fn page(report: &PointReport) -> Page {
     let foresight = shortened(&plan.foresight);
     foresight::visible(&mut page, &foresight);
     let blind: Vec<String> = foresight.blind_names().collect();
-    page.bullets("Effects that are not visible", &if blind.is_empty() { blind } else { vec![foresight::names(&blind)] });
+    page.bullets(
+        "Effects that are not visible",
+        &if blind.is_empty() { blind } else { vec![foresight::names(&blind)] },
+    );
     let sets: Vec<String> = foresight.confounded.iter().map(|set| foresight::names(set)).collect();
     page.bullets("Effects that cannot be distinguished", &sets);
     page.bullets("Notes", &plan.notes);

@@ -63,11 +63,11 @@ pub(crate) enum Drawn<'a> {
 
 impl<'a> Drawn<'a> {
     /// What a result holds.
-    pub fn of(result: &Completed<'a>) -> Option<Self> {
+    pub(crate) fn of(result: &Completed<'a>) -> Option<Self> {
         result.surface.map(Self::Surface).or(result.heights.map(Self::Heights))
     }
 
-    pub fn checksum(self) -> String {
+    pub(crate) fn checksum(self) -> String {
         match self {
             Self::Surface(surface) => surface.checksum(),
             Self::Heights(heights) => heights.checksum(),

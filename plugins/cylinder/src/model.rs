@@ -13,7 +13,7 @@ use runout_core::{
     Complex64, Result,
     model::{
         Effect, Fit, Parameter,
-        linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term, HeldOut},
+        linear_terms::{Declared, HeldOut, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
     separation::{Quantity, Residual, Separation},

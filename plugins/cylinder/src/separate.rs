@@ -24,8 +24,8 @@ pub(crate) use circles::Circle;
 use circles::unseen;
 
 use crate::{
-    circle::Harmonics, config::LeastSquaresCylinderConfig, generatrix::open_profiles, predict::Prediction, robust::rms, scan::Scan,
-    shape::Cylinder,
+    circle::Harmonics, config::LeastSquaresCylinderConfig, generatrix::open_profiles, predict::Prediction, robust::rms,
+    scan::Scan, shape::Cylinder,
 };
 
 impl StageConfig for LeastSquaresCylinderConfig {

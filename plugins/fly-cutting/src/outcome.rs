@@ -67,7 +67,7 @@ pub(crate) struct Known<'a> {
 }
 
 impl Known<'_> {
-    pub fn outcome(&self, remarks: Vec<String>) -> Result<Outcome> {
+    pub(crate) fn outcome(&self, remarks: Vec<String>) -> Result<Outcome> {
         let corrected = || self.ideal_nm.iter().zip(self.after_nm).map(|(ideal, left)| ideal + left);
         let mut rows = Vec::new();
         let columns = [

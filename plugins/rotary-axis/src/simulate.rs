@@ -7,7 +7,6 @@ mod scenario;
 
 pub use scenario::{Commands, Harmonic, Scenario, SimulatedEffect};
 
-
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

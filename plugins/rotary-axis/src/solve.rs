@@ -18,7 +18,7 @@ use crate::kinematics::{Errors, turn};
 
 /// A ball's reading at a command; mm, about an axis along z.
 #[derive(Debug, Clone, Copy)]
-pub struct Reading {
+pub(crate) struct Reading {
     pub ball: usize,
     pub command: usize,
     pub value: Vector3<f64>,
@@ -27,7 +27,7 @@ pub struct Reading {
 
 /// What is measured: balls at command 0 (mm) and distinct commands (rad).
 #[derive(Debug, Clone)]
-pub struct Layout {
+pub(crate) struct Layout {
     pub balls: Vec<Vector3<f64>>,
     pub phi: Vec<f64>,
     /// Whether component errors are free at each command.
@@ -35,11 +35,11 @@ pub struct Layout {
 }
 
 /// A declared or added effect: what one unit of its parameter adds to each reading, mm.
-pub type Column = Vec<Vector3<f64>>;
+pub(crate) type Column = Vec<Vector3<f64>>;
 
 /// A number with its standard uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     pub value: f64,
     pub std: f64,
 }
@@ -56,12 +56,12 @@ const MAX_STEPS: usize = 60;
 /// mm.
 const SETTLED: f64 = 1e-9;
 /// Number of conditions of the gauge.
-pub const GAUGE: usize = 10;
+pub(crate) const GAUGE: usize = 10;
 /// As many commands with all six component errors observable carry the gauge alone.
 const ENOUGH_COMMANDS: usize = 4;
 
 /// A fit, or why there is none.
-pub fn fit(layout: &Layout, readings: &[Reading], effects: &[Column]) -> Result<Fit, String> {
+pub(crate) fn fit(layout: &Layout, readings: &[Reading], effects: &[Column]) -> Result<Fit, String> {
     let problem = Problem::new(layout, readings, effects);
     let structure = problem.structure();
     let mut state = problem.start();
@@ -85,7 +85,7 @@ pub fn fit(layout: &Layout, readings: &[Reading], effects: &[Column]) -> Result<
 
 /// Rows of readings that component errors cannot reach, and what the other unknowns and the effects add to them, at a fit
 /// without the effects. In units of the standard uncertainty.
-pub struct Redundant {
+pub(crate) struct Redundant {
     pub rows: Vec<f64>,
     /// Command of each row.
     pub command: Vec<usize>,
@@ -96,7 +96,7 @@ pub struct Redundant {
 }
 
 /// The redundant part of the readings for the closed loop.
-pub fn redundant(layout: &Layout, readings: &[Reading], effects: &[Column]) -> Result<Redundant, String> {
+pub(crate) fn redundant(layout: &Layout, readings: &[Reading], effects: &[Column]) -> Result<Redundant, String> {
     let declared = fit(layout, readings, &[])?;
     let problem = Problem::new(layout, readings, effects);
     let structure = problem.structure();
@@ -211,7 +211,7 @@ struct Solution {
 }
 
 /// The ten conditions of one command.
-pub fn gauge(phi: f64) -> DMatrix<f64> {
+pub(crate) fn gauge(phi: f64) -> DMatrix<f64> {
     let back = turn(-phi);
     let mut conditions = DMatrix::zeros(GAUGE, 6);
     conditions.view_mut((0, 0), (6, 6)).fill_with_identity();
@@ -222,7 +222,7 @@ pub fn gauge(phi: f64) -> DMatrix<f64> {
 }
 
 /// A fit with its covariance.
-pub struct Fit {
+pub(crate) struct Fit {
     layout: Layout,
     lever: f64,
     effect_scale: Vec<f64>,

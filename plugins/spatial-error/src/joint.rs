@@ -9,9 +9,8 @@ mod predict;
 pub use predict::{Predicted, Predictor, Query};
 
 use faer::{
-    Accum, Mat, MatRef, Par, Side,
+    Accum, Mat, Par, Side,
     linalg::{matmul::matmul, triangular_inverse::invert_lower_triangular},
-    reborrow::{Reborrow, ReborrowMut},
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -142,7 +141,7 @@ pub(crate) struct Sums {
 
 impl Sums {
     /// Nothing but the scatter of repeats.
-    pub fn within(data: &Data) -> Self {
+    pub(crate) fn within(data: &Data) -> Self {
         let columns = data.columns();
         let (mut normal, mut right, mut squares) = (DMatrix::zeros(columns, columns), DVector::zeros(columns), 0.0);
         if let Some(within) = &data.within {
@@ -154,7 +153,7 @@ impl Sums {
     }
 
     /// Adds those of a field.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.normal += &other.normal;
         self.right += &other.right;
         self.squares += other.squares;
@@ -162,7 +161,7 @@ impl Sums {
     }
 
     /// Trend, its covariance, ln of the restricted likelihood.
-    pub fn trend(&self) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
+    pub(crate) fn trend(&self) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
         let (trend, covariance, ln_trend) = solve(&self.normal, &self.right)?;
         let squares = self.squares - trend.dot(&self.right);
         Some((trend, covariance, -0.5 * (self.ln_determinant + ln_trend + squares)))
@@ -283,7 +282,7 @@ fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<(DVector<f64>, D
 
 /// Reading less prediction from all other places.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeftOut {
+pub(crate) struct LeftOut {
     /// Mean of the readings at the place less prediction, in µm.
     pub residual_um: f64,
     /// Standard deviation expected of it, noise included, in µm.

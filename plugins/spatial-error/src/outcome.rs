@@ -27,7 +27,7 @@ const UNCERTAIN: f64 = 0.8;
 
 /// The tables of the result.
 #[must_use]
-pub fn tables(chain: &Chain) -> Vec<TableSpec> {
+pub(crate) fn tables(chain: &Chain) -> Vec<TableSpec> {
     let of = |name: &str, unit: &str, about: &str| ColumnSpec::number(name, unit, about);
     let places = || ["x", "y", "z"].map(|axis| of(&format!("{axis}_mm"), "mm", "command").repeating());
     let each = |before: &str, about: &str| COMPONENTS.map(|one| of(&format!("{before}{one}_um"), "um", about));
@@ -90,7 +90,7 @@ impl Conclusion<'_> {
     ///
     /// # Errors
     /// When the query cannot be read.
-    pub fn outcome(&self) -> Result<Outcome> {
+    pub(crate) fn outcome(&self) -> Result<Outcome> {
         let places = self.separator.query.places(self.campaign)?;
         let queries = self.queries(&places);
         let left_out = self.solution.left_out();
@@ -253,7 +253,7 @@ impl Conclusion<'_> {
 
 /// Reading less the fit at its place, trend and field, in µm.
 #[must_use]
-pub fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64; 3]> {
+pub(crate) fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64; 3]> {
     let terms = &solution.terms;
     let trend = &solution.joint.trend;
     // What noise is taken to be of the mean at each place.

@@ -11,13 +11,13 @@ use runout_core::{
 use crate::{moves::rms, value_std::ProfileErrors};
 
 /// What the numbers are, for files that explain themselves.
-pub const CONVENTION: &str = "Straightness along z about the least-squares line (LSLI, ISO 12780-1). part_um is \
+pub(crate) const CONVENTION: &str = "Straightness along z about the least-squares line (LSLI, ISO 12780-1). part_um is \
     positive where the part stands out towards the probe; slide_um is the slide's displacement towards the part in the \
     initial setup. Standard uncertainties are those of one position, from the scatter of repeated traces; NaN if not \
     known.";
 
 /// What is not observable, whatever the data.
-pub const LIMIT: &str = "each trace has an offset and a slope of its own, so only the straightness about the \
+pub(crate) const LIMIT: &str = "each trace has an offset and a slope of its own, so only the straightness about the \
     least-squares line is known: neither taper, nor parallelism, nor the angle between slide and part";
 
 /// Why values have no uncertainty.
@@ -47,7 +47,7 @@ pub struct Straightness {
 }
 
 /// The table of straightness.
-pub fn table() -> TableSpec {
+pub(crate) fn table() -> TableSpec {
     let std = |name: &str, of: &str| {
         let about =
             format!("standard uncertainty of {of} at this position, from the scatter; NaN where it is not known");

@@ -30,7 +30,7 @@ pub(crate) struct Lobe {
 
 impl Lobe {
     /// All orders from 2.
-    pub fn all(config: &TouchProbeConfig, fit: &Fitted) -> Vec<Self> {
+    pub(crate) fn all(config: &TouchProbeConfig, fit: &Fitted) -> Vec<Self> {
         let orders: Vec<usize> = (fit.design.parameters.iter())
             .filter_map(|parameter| match parameter {
                 Parameter::Lobing { order, part: Part::Cosine, .. } => Some(*order),
@@ -60,17 +60,17 @@ impl Lobe {
         orders.into_iter().map(lobe).collect()
     }
 
-    pub fn amplitude_um(&self) -> f64 {
+    pub(crate) fn amplitude_um(&self) -> f64 {
         self.parts_um[0].hypot(self.parts_um[1])
     }
 
     /// Of a cos nφ + b sin nφ = A cos(nφ + phase), in degrees.
-    pub fn phase_deg(&self) -> f64 {
+    pub(crate) fn phase_deg(&self) -> f64 {
         (-self.parts_um[1]).atan2(self.parts_um[0]).to_degrees()
     }
 
     /// Standard uncertainty along and across the amplitude.
-    pub fn std_um(&self) -> [f64; 2] {
+    pub(crate) fn std_um(&self) -> [f64; 2] {
         let amplitude = self.amplitude_um();
         let [a, b] = self.parts_um.map(|part| part / amplitude);
         let along = |[a, b]: [f64; 2]| {

@@ -36,7 +36,7 @@ pub(crate) struct Found<'a> {
 
 impl Found<'_> {
     /// Orders that are lost: of lobing (order 1 always), and of form.
-    pub fn lost(&self, lobes: &[Lobe]) -> [Vec<usize>; 2] {
+    pub(crate) fn lost(&self, lobes: &[Lobe]) -> [Vec<usize>; 2] {
         let lobing = lobes.iter().filter(|lobe| !lobe.observable).map(|lobe| lobe.order);
         let form = (2..=self.config.max_order).filter(|order| self.form_places(*order).is_none());
         [std::iter::once(1).chain(lobing).collect(), std::iter::once(1).chain(form).collect()]
@@ -47,7 +47,7 @@ impl Found<'_> {
     }
 
     /// Tables, values, form and remarks; without the table `residual`.
-    pub fn outcome(&self) -> Result<Outcome> {
+    pub(crate) fn outcome(&self) -> Result<Outcome> {
         let lobes = Lobe::all(self.config, self.fit);
         let mut tables = vec![self.pretravel(&lobes)?, self.compensation(&lobes)?, self.lobing(&lobes)?];
         tables.retain(|table| table.rows.num_rows() > 0);

@@ -84,7 +84,7 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     /// Readings, in µm.
-    pub fn readings_um(&self) -> Vec<f64> {
+    pub(crate) fn readings_um(&self) -> Vec<f64> {
         self.touches.all.iter().map(|touch| touch.reading_um).collect()
     }
 }
@@ -203,7 +203,9 @@ impl TouchProbe {
             let moved = (0..self.0.setups.len()).map(|setup| {
                 [0, 1].map(|axis| {
                     let place = fit.design.place(&Parameter::Centre { setup, axis });
-                    place.filter(|place| fit.is_observable(&[*place])).map_or(0.0, |place| fit.solved.coefficients[place])
+                    place
+                        .filter(|place| fit.is_observable(&[*place]))
+                        .map_or(0.0, |place| fit.solved.coefficients[place])
                 })
             });
             touches.recentre(&moved.collect::<Vec<_>>());

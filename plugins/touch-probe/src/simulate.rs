@@ -328,8 +328,8 @@ impl StageConfig for TouchProbeScenario {
             let problem = "preload and stiffness must be above 0, and the trigger's ratio above 1";
             return Err(Fault::at("trigger_ratio", problem).under("probe"));
         }
-        let text =
-            toml::to_string(&self).map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
+        let text = toml::to_string(&self)
+            .map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
         let text = format!("plugin = \"{}\"\n{text}", Self::NAME);
         Ok(Box::new(TouchProbeSimulator { scenario: self, text }))
     }

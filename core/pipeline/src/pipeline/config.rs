@@ -1,7 +1,7 @@
 //! A pipeline, from TOML to stages that can only be valid.
 
 pub(super) mod candidate;
-pub mod diagnose;
+pub(crate) mod diagnose;
 pub(super) mod exports;
 mod route;
 mod schema;

@@ -10,8 +10,8 @@ use runout_core::{
 use super::{
     ANGLE, INDEX, SAMPLES,
     extent::Extent,
-    vector::{Vector, each},
     samples::StoredSamples,
+    vector::{Vector, each},
 };
 use crate::node::{self, Place};
 
@@ -67,7 +67,9 @@ impl CaptureSource {
     /// The bytes of the file that its numbers take, those in chunks `with_chunks` only.
     pub(super) fn extents(&self, with_chunks: bool) -> impl Iterator<Item = Extent> {
         let vector = match &self.phase {
-            Phase::Index(vector) | Phase::Angle(vector) | Phase::Trace(Trace::Vector(vector), _) => vector.extents(with_chunks),
+            Phase::Index(vector) | Phase::Angle(vector) | Phase::Trace(Trace::Vector(vector), _) => {
+                vector.extents(with_chunks)
+            }
             Phase::Trace(Trace::Channel(_), _) | Phase::Unknown(_) => Vec::new(),
         };
         Extent::of(&self.dataset, &self.samples_place, with_chunks).into_iter().chain(vector)

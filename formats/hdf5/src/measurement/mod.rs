@@ -3,7 +3,6 @@
 mod capture;
 mod coding;
 mod extent;
-mod vector;
 pub(crate) mod loader;
 mod orientation;
 mod rows;
@@ -11,6 +10,7 @@ pub(crate) mod samples;
 mod stream;
 mod structure;
 mod truth;
+mod vector;
 pub(crate) mod write;
 
 pub(crate) use capture::{CaptureSource, Phase};

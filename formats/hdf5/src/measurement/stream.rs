@@ -15,9 +15,9 @@ use runout_core::{
 
 use super::{
     capture::{CaptureSource, Phase},
-    vector::Vector,
     rows::Rows,
     samples::SampleType,
+    vector::Vector,
 };
 use crate::node::Place;
 

@@ -109,8 +109,8 @@ impl StageConfig for FlyCuttingScenario {
 
     fn check(mut self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         self.checked()?;
-        let text =
-            toml::to_string(&self).map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
+        let text = toml::to_string(&self)
+            .map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
         let text = format!("plugin = \"{}\"\n{text}", Self::NAME);
         let resolve = |path: PathBuf| context.path(&path);
         self.motion = self.motion.map(resolve);

@@ -7,12 +7,12 @@ use crate::kinematics::{Errors, place, turn};
 
 impl Fit {
     /// χ² per degree of freedom; NaN without any.
-    pub fn chi2_per_dof(&self) -> f64 {
+    pub(crate) fn chi2_per_dof(&self) -> f64 {
         if self.dof == 0 { f64::NAN } else { self.chi2 / self.dof as f64 }
     }
 
     /// Location errors: two offsets in mm, two tilts in rad.
-    pub fn location(&self) -> [Estimate; 4] {
+    pub(crate) fn location(&self) -> [Estimate; 4] {
         let at = self.state.errors.first().copied().unwrap_or_default();
         let values = [at.offset.x, at.offset.y, at.tilt.x, at.tilt.y];
         [0, 1, 2, 3].map(|index| {
@@ -22,13 +22,13 @@ impl Fit {
     }
 
     /// A ball's placement, mm.
-    pub fn placement(&self, ball: usize) -> [Estimate; 3] {
+    pub(crate) fn placement(&self, ball: usize) -> [Estimate; 3] {
         let values = self.state.placement[ball];
         [0, 1, 2].map(|coordinate| self.common(4 + 3 * ball + coordinate, values[coordinate], 1.0))
     }
 
     /// Values of the effects.
-    pub fn effects(&self) -> Vec<Estimate> {
+    pub(crate) fn effects(&self) -> Vec<Estimate> {
         let first = 4 + 3 * self.layout.balls.len();
         let values = self.state.effects.iter().enumerate();
         values.map(|(index, value)| self.common(first + index, *value, self.effect_scale[index])).collect()
@@ -44,7 +44,7 @@ impl Fit {
     }
 
     /// Component errors at a command: three shifts in mm, three angles in rad.
-    pub fn component(&self, command: usize) -> [Estimate; 6] {
+    pub(crate) fn component(&self, command: usize) -> [Estimate; 6] {
         if !self.layout.component_errors {
             return [LOST; 6];
         }
@@ -81,12 +81,12 @@ impl Fit {
     }
 
     /// Location and component errors at a command.
-    pub fn errors(&self, command: usize) -> Errors {
+    pub(crate) fn errors(&self, command: usize) -> Errors {
         self.state.errors[command]
     }
 
     /// What location and component errors at a command do to a point that is nominally at `point` (mm, command 0).
-    pub fn deviation(&self, command: usize, point: &Vector3<f64>) -> [Estimate; 3] {
+    pub(crate) fn deviation(&self, command: usize, point: &Vector3<f64>) -> [Estimate; 3] {
         let phi = self.layout.phi[command];
         let errors = self.state.errors[command];
         let found = place(&errors, phi, point);
@@ -116,7 +116,7 @@ impl Fit {
     }
 
     /// Where a ball is expected at angle φ (rad) with these errors, less its nominal place; mm.
-    pub fn expected(&self, errors: &Errors, phi: f64, ball: usize) -> Vector3<f64> {
+    pub(crate) fn expected(&self, errors: &Errors, phi: f64, ball: usize) -> Vector3<f64> {
         let nominal = self.layout.balls[ball];
         place(errors, phi, &(nominal + self.state.placement[ball])).at - turn(phi) * nominal
     }

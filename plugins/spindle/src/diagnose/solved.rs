@@ -44,7 +44,7 @@ impl Shared {
 }
 
 impl Solved {
-    pub fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
+    pub(crate) fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
         let mut corrected = data.readings(alterations).clone();
         if let Some(covariance) = data.with_drifts(alterations) {
             corrected.covariance = Some(covariance.clone());
@@ -139,7 +139,7 @@ fn axial(
 
 impl Solved {
     /// How an unknown moves with a parameter, by order from 2: its operator on the readings' partials.
-    pub fn moved_by<'a>(
+    pub(crate) fn moved_by<'a>(
         &'a self,
         partial: &'a [Complex64],
         unknown: usize,
@@ -153,13 +153,13 @@ impl Solved {
     }
 
     /// How the unknowns of order 1 move with a parameter.
-    pub fn first_moved(&self, partial: &[Complex64]) -> Vec<Complex64> {
+    pub(crate) fn first_moved(&self, partial: &[Complex64]) -> Vec<Complex64> {
         let count = self.corrected.count;
         apply(&self.operators.orders[0].operator, &partial[count..2 * count])
     }
 
     /// How z at 1/rev moves with a parameter, where it is observable.
-    pub fn first_moved_by(&self, partial: &[Complex64], layout: &Layout) -> Option<Complex64> {
+    pub(crate) fn first_moved_by(&self, partial: &[Complex64], layout: &Layout) -> Option<Complex64> {
         let z = layout.unknowns.iter().position(|unknown| *unknown == Quantity::Z)?;
         let place = layout.first_order_unknowns().iter().position(|unknown| *unknown == FirstOrder::Axial)?;
         self.operators.observable(1)[z].then(|| self.first_moved(partial)[place])

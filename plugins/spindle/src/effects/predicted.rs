@@ -76,7 +76,9 @@ impl<'a> Predicted<'a> {
             })
             .collect();
         for order in 1..readings.len() / count {
-            let of = |unknown: Option<usize>| unknown.map_or(Complex64::ZERO, |unknown| estimate.observable_value(order, unknown));
+            let of = |unknown: Option<usize>| {
+                unknown.map_or(Complex64::ZERO, |unknown| estimate.observable_value(order, unknown))
+            };
             let mut motion = [Complex64::ZERO; 4];
             for (unknown, shares) in &motions {
                 let value = estimate.observable_value(order, *unknown);

@@ -10,6 +10,6 @@ mod suggest;
 
 pub use effects::{Change, Changes, changes, foresee, foresee_rig};
 pub use gain::{Criterion, FormGain, Score};
-pub use optimise::{Arrangement, Optimum, Search, optimise};
+pub use optimise::{Arrangement, Optimum, PROGRESS_STEPS, Search, optimise};
 pub use spacing::{Spacing, TooTight, distance_deg};
-pub use suggest::{Addition, Suggestion, suggest};
+pub use suggest::{Addition, Suggestion, score, suggest};

@@ -76,7 +76,8 @@ pub fn simulator(config: &SpindleConfig) -> std::result::Result<SpindleSimulator
         effect.apply(&mut world, index).map_err(|fault| fault.under_item("effect", index))?;
     }
     let world = world.completed()?;
-    let text = toml::to_string(config).map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
+    let text = toml::to_string(config)
+        .map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
     Ok(SpindleSimulator { world, scenario: format!("plugin = \"{}\"\n{text}", SpindleConfig::NAME) })
 }
 

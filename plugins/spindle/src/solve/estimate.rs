@@ -4,7 +4,7 @@ use runout_core::Complex64;
 
 /// The unknowns at all orders, motion at the sensors' mean z.
 #[derive(Debug, Clone)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     pub width: usize,
     /// First-order unknowns, as [`Layout::first_order_unknowns`] lists them.
     pub first: Vec<Complex64>,
@@ -20,14 +20,14 @@ pub struct Estimate {
 impl Estimate {
     /// An unknown at an order, 0 where it is not observable.
     #[must_use]
-    pub fn observable_value(&self, order: usize, unknown: usize) -> Complex64 {
+    pub(crate) fn observable_value(&self, order: usize, unknown: usize) -> Complex64 {
         let index = order * self.width + unknown;
         if self.observable[index] { self.values[index] } else { Complex64::ZERO }
     }
 
     /// A form at an order; where it is lost, what it may be: for what exact geometry carries into other orders, and for no result.
     #[must_use]
-    pub fn likely_form(&self, order: usize, unknown: usize) -> Complex64 {
+    pub(crate) fn likely_form(&self, order: usize, unknown: usize) -> Complex64 {
         let index = order * self.width + unknown;
         if self.observable[index] { self.values[index] } else { self.likely.get(index).copied().unwrap_or_default() }
     }

@@ -13,7 +13,7 @@ use super::{
 };
 
 /// What the solution leaves of linear readings, `[order][reading]`, and what is expected of that from noise.
-pub fn residual(
+pub(crate) fn residual(
     operators: &Operators,
     readings: &Readings,
     linear: &[Complex64],
@@ -66,7 +66,7 @@ pub fn residual(
 }
 
 /// What the solution leaves of each of the linear readings `[order][reading]`, at the orders that are redundant.
-pub fn by_reading(operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Vec<ReadingResidual> {
+pub(crate) fn by_reading(operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Vec<ReadingResidual> {
     let count = readings.count;
     let of = |place: &usize| ReadingResidual { place: *place, harmonics: Vec::with_capacity(operators.orders.len()) };
     let mut found: Vec<_> = readings.places.iter().map(of).collect();

@@ -48,7 +48,7 @@ const CANCELLING: f64 = 30.0;
 const UNSETTLED_UM: f64 = 5e-4;
 
 /// Solves one station.
-pub struct Solver<'a> {
+pub(crate) struct Solver<'a> {
     pub selection: &'a Selection,
     pub layout: &'a Layout,
     pub second_order: bool,
@@ -59,7 +59,7 @@ impl Solver<'_> {
     ///
     /// # Errors
     /// When the station's profiles do not fit the rig.
-    pub fn separate(
+    pub(crate) fn separate(
         &self,
         station: &Station,
         method: impl FnOnce(&Readings) -> Operators,
@@ -106,7 +106,8 @@ impl Solver<'_> {
         let mut worst: f64 = 0.0;
         for (unknown, _) in self.layout.circles() {
             let at = |order: usize| order * width + unknown;
-            let observable = |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
+            let observable =
+                |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
             for order in 2..=readings.max_order {
                 if !observable(&order) {
                     continue;
@@ -128,7 +129,7 @@ impl Solver<'_> {
 
     /// Solves, adds what exact geometry and `beyond` add to linear readings at that solution, and solves again until it
     /// settles. Gives the solution and the linear readings, `[order][reading]`.
-    pub fn iterate(
+    pub(crate) fn iterate(
         &self,
         readings: &Readings,
         operators: &Operators,
@@ -223,7 +224,11 @@ impl Solver<'_> {
     ///
     /// # Errors
     /// When the station's profiles do not fit the rig.
-    pub fn sensitivity(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Sensitivity> {
+    pub(crate) fn sensitivity(
+        &self,
+        station: &Station,
+        method: impl FnOnce(&Readings) -> Operators,
+    ) -> Result<Sensitivity> {
         let mut readings = Readings::gather(self.selection, self.layout, station, Scatter::Beside)?;
         weights::smooth_by_order(&mut readings);
         let operators = method(&readings);
@@ -344,7 +349,7 @@ impl Solver<'_> {
     }
 
     /// The operator of an order, with the unknowns of orders from 2 as rows.
-    pub fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
+    pub(crate) fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
         self.named_alike(&operators.orders[order - 1].operator, order, count)
     }
 

@@ -86,7 +86,8 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
         Quantity::Form(section) => Some(section),
         _ => None,
     };
-    let told: Vec<Option<(Complex64, f64)>> = (1..=one.max_order()).map(|order| one.observable_value(order, unknown)).collect();
+    let told: Vec<Option<(Complex64, f64)>> =
+        (1..=one.max_order()).map(|order| one.observable_value(order, unknown)).collect();
     let counted = || told.iter().skip(first_order(quantity) - 1).flatten();
     let ront = |section: usize| result.values.get(section)?.iter().find(|value| value.symbol == "RONt");
     Some(MethodValue {
@@ -122,8 +123,10 @@ fn difference(name: &str, quantity: Quantity, pair: [&Estimates; 2], scatter: &S
         } else if let Some(other) = pair[1].moved_to(planes[0], scatter) {
             pair[1] = moved.insert(other);
         } else {
-            let reason =
-                format!("given at z = {} mm and at z = {} mm, and tilt is observable by neither method", planes[0], planes[1]);
+            let reason = format!(
+                "given at z = {} mm and at z = {} mm, and tilt is observable by neither method",
+                planes[0], planes[1]
+            );
             return Some(Difference { method: name.to_owned(), not_compared: Some(reason), ..Difference::default() });
         }
     }

@@ -17,7 +17,7 @@ pub(super) struct Scatter {
 }
 
 impl Scatter {
-    pub fn of(station: &Station) -> Self {
+    pub(crate) fn of(station: &Station) -> Self {
         let capture = |profile: &Profile| {
             let channels = profile.channels();
             let mut covariance = profile.covariance.clone();
@@ -30,7 +30,7 @@ impl Scatter {
     }
 
     /// row · Σ · rowᴴ at an order; NaN where a reading that counts has no covariance.
-    pub fn variance(&self, order: usize, row: &[Complex64]) -> f64 {
+    pub(crate) fn variance(&self, order: usize, row: &[Complex64]) -> f64 {
         let mut rest = row;
         let mut sum = 0.0;
         for (channels, covariance) in &self.captures {
@@ -65,7 +65,7 @@ pub(super) struct Estimates {
 }
 
 impl Estimates {
-    pub fn new(separation: &Separation, sensitivity: Sensitivity) -> Self {
+    pub(crate) fn new(separation: &Separation, sensitivity: Sensitivity) -> Self {
         Self {
             unknowns: separation.unknowns.clone(),
             motion_z_mm: separation.motion_z_mm,
@@ -76,40 +76,40 @@ impl Estimates {
         }
     }
 
-    pub fn max_order(&self) -> usize {
+    pub(crate) fn max_order(&self) -> usize {
         (self.values.len() / self.unknowns.len().max(1)).saturating_sub(1)
     }
 
-    pub fn position(&self, quantity: Quantity) -> Option<usize> {
+    pub(crate) fn position(&self, quantity: Quantity) -> Option<usize> {
         self.unknowns.iter().position(|unknown| *unknown == quantity)
     }
 
     /// The estimate and its variance, where the order is observable.
-    pub fn observable_value(&self, order: usize, unknown: usize) -> Option<(Complex64, f64)> {
+    pub(crate) fn observable_value(&self, order: usize, unknown: usize) -> Option<(Complex64, f64)> {
         let index = order * self.unknowns.len() + unknown;
         (*self.observable.get(index)?).then(|| (self.values[index], self.variance[index]))
     }
 
-    pub fn row(&self, order: usize, unknown: usize) -> &[Complex64] {
+    pub(crate) fn row(&self, order: usize, unknown: usize) -> &[Complex64] {
         let start = (order * self.unknowns.len() + unknown) * self.sensitivity.readings;
         &self.sensitivity.operator[start..start + self.sensitivity.readings]
     }
 
-    pub fn has_motion(&self) -> bool {
+    pub(crate) fn has_motion(&self) -> bool {
         self.unknowns.iter().any(|unknown| !unknown.is_form())
     }
 
-    pub fn tells_tilt(&self) -> bool {
+    pub(crate) fn tells_tilt(&self) -> bool {
         self.unknowns.iter().any(|unknown| unknown.is_tilt())
     }
 
-    pub fn in_plane(&self, z_mm: f64) -> bool {
+    pub(crate) fn in_plane(&self, z_mm: f64) -> bool {
         (self.motion_z_mm - z_mm).abs() <= SAME_PLANE_MM
     }
 
     /// The same with x and y at another z: x(z) = X + z·E_y, y(z) = Y − z·E_x; lost where the tilt is. `None` where
     /// no tilt is observable.
-    pub fn moved_to(&self, z_mm: f64, scatter: &Scatter) -> Option<Self> {
+    pub(crate) fn moved_to(&self, z_mm: f64, scatter: &Scatter) -> Option<Self> {
         if self.in_plane(z_mm) {
             return Some(self.clone());
         }

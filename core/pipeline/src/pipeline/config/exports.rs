@@ -77,7 +77,7 @@ pub(crate) struct Exporting<'a> {
 
 impl Exporting<'_> {
     /// The exporters, none of which writes over what is read or what another file is for.
-    pub fn exports(&self, tables: &[Table], sources: &Sources) -> Result<Exports, Fault> {
+    pub(crate) fn exports(&self, tables: &[Table], sources: &Sources) -> Result<Exports, Fault> {
         let Self { registry, context, diagnose, .. } = self;
         let mut exports = Exports::default();
         let files = sources.files().map(|file| (resolved(file), "read as configuration")).collect();

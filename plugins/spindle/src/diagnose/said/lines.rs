@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Says each line that was found by its order, frequency and amplitude, and what it may be.
-pub fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
+pub(crate) fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
     let sensors = &shared.selection.rig.sensors;
     let id = |sensor: &usize| sensors.get(*sensor).map_or_else(String::new, |sensor| sensor.id.clone());
     // The line of the motion, which one that few sensors show may be as well.
