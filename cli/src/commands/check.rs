@@ -24,7 +24,7 @@ use crate::{
 ///
 /// # Errors
 /// When the configuration is wrong.
-pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, pipeline) = pipeline(args, registry)?;
     let report = report(&sources, &pipeline, &registry.effects)?;
     print(&report, json, render::check::text)
@@ -34,7 +34,7 @@ pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(
 ///
 /// # Errors
 /// When a check of it fails.
-pub fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
+pub(crate) fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
     notes.extend(pipeline.rig.as_ref().map(Rig::remarks).unwrap_or_default());
     let source = pipeline.loader.open(&pipeline.request());

@@ -21,7 +21,7 @@ use crate::{args::CompareArgs, failure::Failure, progress::Progress, render};
 ///
 /// # Errors
 /// When the configuration is wrong, nothing can be compared, or the data or a file fails.
-pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::result::Result<(), Failure> {
+pub(crate) fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::result::Result<(), Failure> {
     known(&args.with, registry)?;
     let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
     let mut output = Output::named(args.out.as_deref(), &sources)?;
@@ -96,7 +96,7 @@ fn write_report(report: Option<OverviewReport>, comparison: &Comparison) -> Resu
 ///
 /// # Errors
 /// The first that none has.
-pub fn known(names: &[String], registry: &Registry) -> std::result::Result<(), Failure> {
+pub(crate) fn known(names: &[String], registry: &Registry) -> std::result::Result<(), Failure> {
     let known = || registry.separators.iter().map(|plugin| plugin.name);
     match names.iter().find(|name| !known().any(|known| known == name.as_str())) {
         None => Ok(()),

@@ -3,7 +3,7 @@
 
 mod drawn;
 mod map;
-pub mod points;
+pub(crate) mod points;
 
 use std::ops::RangeInclusive;
 
@@ -40,7 +40,7 @@ use crate::{
 ///
 /// # Errors
 /// When the rig or the pipeline is wrong, the sensors have no room, or the map cannot be written.
-pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     match planned(args, registry, &Progress::new("steps"))? {
         Planned::Rig(report) => print(&*report, json, render::plan::text),
         Planned::Points(report) => print(&*report, json, |report| render::plan_points::page(report).into_text()),
@@ -51,7 +51,7 @@ pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), F
 ///
 /// # Errors
 /// As [`execute`].
-pub fn document(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<Value, Failure> {
+pub(crate) fn document(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<Value, Failure> {
     match planned(args, registry, progress)? {
         Planned::Rig(report) => to_value(&*report),
         Planned::Points(report) => to_value(&*report),

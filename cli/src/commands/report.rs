@@ -28,7 +28,7 @@ struct Written {
 ///
 /// # Errors
 /// When the file is no result, or the report cannot be written.
-pub fn execute(args: &ReportArgs, json: bool) -> std::result::Result<(), Failure> {
+pub(crate) fn execute(args: &ReportArgs, json: bool) -> std::result::Result<(), Failure> {
     let report = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
     if resolved(&report) == resolved(&args.result) {
         let message = format!("{} is the result itself", report.display());

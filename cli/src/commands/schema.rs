@@ -24,7 +24,7 @@ use crate::{
 ///
 /// # Errors
 /// When the name is unknown or a file cannot be written.
-pub fn execute(args: &SchemaArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &SchemaArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
         let written = write(registry, folder)?;
         return super::print(&json!({ "outputs": written }), json, |_| format!("written: {}\n", written.join(", ")));

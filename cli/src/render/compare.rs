@@ -13,7 +13,7 @@ use super::{
 
 /// The text of a comparison.
 #[must_use]
-pub fn text(comparison: &Comparison) -> String {
+pub(crate) fn text(comparison: &Comparison) -> String {
     let mut page = page(comparison);
     let outputs: Vec<String> = comparison.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
@@ -22,7 +22,7 @@ pub fn text(comparison: &Comparison) -> String {
 
 /// A comparison as lines and tables.
 #[must_use]
-pub fn page(comparison: &Comparison) -> Page {
+pub(crate) fn page(comparison: &Comparison) -> Page {
     let mut page = Page::default();
     page.line(&comparison.title);
     if comparison.stations.is_empty() && !comparison.values.is_empty() {

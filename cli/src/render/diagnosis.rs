@@ -12,7 +12,7 @@ use super::{
 
 /// The text of a diagnosis.
 #[must_use]
-pub fn text(diagnosis: &Diagnosis) -> String {
+pub(crate) fn text(diagnosis: &Diagnosis) -> String {
     let mut page = Page::default();
     page.line(diagnosis.headline());
     if diagnosis.added.iter().any(|one| !one.confounded_with.is_empty()) {

@@ -12,7 +12,7 @@ use super::{
 };
 
 /// Effects that would show, and from which size on.
-pub fn visible(page: &mut Page, foresight: &Foresight) {
+pub(crate) fn visible(page: &mut Page, foresight: &Foresight) {
     let mut table = Table::new(3, ["effect", "at", "parameter", "visible from", "usual size"]);
     for alike in groups(&foresight.visible, |one| (&one.effect, &one.targets)) {
         let Some(first) = alike.first() else { continue };
@@ -35,7 +35,7 @@ pub fn visible(page: &mut Page, foresight: &Foresight) {
 }
 
 /// Effects that are not visible, or cannot be distinguished.
-pub fn hidden(page: &mut Page, foresight: &Foresight) {
+pub(crate) fn hidden(page: &mut Page, foresight: &Foresight) {
     // Face and z are of axial sensors: a table leaves out columns without entries.
     let columns = ["form", "motion", "face", "z"];
     let heads = ["effect", "at"].map(str::to_owned).into_iter();
@@ -61,11 +61,11 @@ pub fn hidden(page: &mut Page, foresight: &Foresight) {
 }
 
 /// Where an effect acts without a target, beside others of it that have one: uneven speed in all setups, or in one.
-pub const WHOLE: &str = "the whole rig";
+pub(crate) const WHOLE: &str = "the whole rig";
 
 /// "sensor-gain S1, S2" from "sensor-gain S1" and "sensor-gain S2".
 #[must_use]
-pub fn names(names: &[String]) -> String {
+pub(crate) fn names(names: &[String]) -> String {
     let mut shown = String::new();
     let mut last = "";
     let has_targets = |effect: &str| names.iter().any(|name| name.split_once(' ').is_some_and(|(id, _)| id == effect));

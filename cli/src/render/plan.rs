@@ -13,7 +13,7 @@ const LINES: usize = 20;
 
 /// The text of a report.
 #[must_use]
-pub fn text(report: &Report) -> String {
+pub(crate) fn text(report: &Report) -> String {
     let mut page = page(report);
     if let Some(map) = &report.map {
         page.heading(format_args!("written: {}", map.display()));
@@ -23,7 +23,7 @@ pub fn text(report: &Report) -> String {
 
 /// A report as lines and tables.
 #[must_use]
-pub fn page(report: &Report) -> Page {
+pub(crate) fn page(report: &Report) -> Page {
     let mut page = Page::default();
     check::rig(&mut page, &report.rig);
     check::orders(&mut page, &report.separability);

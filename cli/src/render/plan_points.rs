@@ -15,7 +15,7 @@ use crate::reports::plan::PointReport;
 
 /// A plan as lines and tables.
 #[must_use]
-pub fn page(report: &PointReport) -> Page {
+pub(crate) fn page(report: &PointReport) -> Page {
     let plan = &report.plan;
     let mut page = Page::default();
     page.line(&report.title);

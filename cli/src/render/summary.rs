@@ -25,7 +25,7 @@ const FEW_TURNS: usize = 12;
 
 /// The text of a summary.
 #[must_use]
-pub fn text(summary: &Summary) -> String {
+pub(crate) fn text(summary: &Summary) -> String {
     let stations = &summary.stations;
     let mut page = Page::default();
     page.line(&summary.title);

@@ -14,7 +14,7 @@ use crate::{args::PlanArgs, failure::Failure, reports::plan::PointReport};
 ///
 /// # Errors
 /// When it is not TOML.
-pub fn is_pipeline(sources: &Sources) -> Result<bool, Failure> {
+pub(crate) fn is_pipeline(sources: &Sources) -> Result<bool, Failure> {
     let document = Document::parse(sources)?;
     let keys = document.root().get_ref();
     Ok(keys.contains_key("separate") && !keys.contains_key("rig"))
@@ -24,7 +24,7 @@ pub fn is_pipeline(sources: &Sources) -> Result<bool, Failure> {
 ///
 /// # Errors
 /// When the pipeline is wrong, or has nothing to plan.
-pub fn report(args: &PlanArgs, sources: &Sources, registry: &Registry) -> Result<PointReport, Failure> {
+pub(crate) fn report(args: &PlanArgs, sources: &Sources, registry: &Registry) -> Result<PointReport, Failure> {
     let of_a_rig = [("--optimise", args.optimise.is_some()), ("--map", args.map.is_some())];
     if let Some((option, _)) = of_a_rig.iter().find(|(_, given)| *given) {
         let message = format!("{option} is for a rig; this is a pipeline of measured points");
