@@ -20,7 +20,7 @@ use std::{
     io::{self, ErrorKind, IsTerminal, Write},
 };
 
-pub use runout_core::table::number;
+pub(crate) use runout_core::table::number;
 use serde::Serialize;
 
 /// Whether a character may change what a terminal shows of others: control characters, and marks that turn the direction of text.
