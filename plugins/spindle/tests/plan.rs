@@ -249,7 +249,7 @@ fn too_many_sensors_are_refused_with_the_clearance_that_fits() {
 #[test]
 fn one_sensor_is_told_to_be_reversed() {
     let rig = probes(&[0.0]);
-    let suggestions = suggest::suggest(&rig, &(2..=80), 15.0);
+    let suggestions = suggest(&rig, &(2..=80), 15.0);
     let before = score(&rig, &(2..=80));
     assert_eq!(before.lost, 79);
     // Donaldson: reading and reversed reading give form and motion, each with a gain of 1/√2, at every order.
@@ -264,7 +264,7 @@ fn fixed_sensors_and_two_setups_are_told_a_third_part_angle() {
     let rig = rig(&FOUR_SENSORS, &[(0.0, 0.0), (180.0, 0.0)]);
     let orders = 2..=80;
     assert_eq!(score(&rig, &orders).lost, 40);
-    let suggestions = suggest::suggest(&rig, &orders, 15.0);
+    let suggestions = suggest(&rig, &orders, 15.0);
     for pair in suggestions.windows(2) {
         assert!(pair[0].after.compare(&pair[1].after, Criterion::Worst).is_le());
     }
