@@ -14,8 +14,9 @@ use std::{
 use divan::{Bencher, counter::ItemsCount};
 use runout_cli::builtin::registry;
 use runout_core::{
-    pipeline::{registry::Context, run::Summary},
+    pipeline::Context,
     stage::{About, Completed, ResultInfo},
+    summary::Summary,
     surface::Surface,
 };
 use tempfile::TempDir;

@@ -13,11 +13,8 @@ use std::{
 use runout_core::{
     Result,
     atomic_file::PendingFile,
-    pipeline::{
-        Pipeline,
-        error::Fault,
-        registry::{Context, Plugin, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, Pipeline, Plugin, StageConfig},
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
     table::{RecordBatch, TableSpec},
 };

@@ -8,15 +8,12 @@ use std::{error::Error, path::Path};
 
 use runout_core::{
     ErrorKind,
+    fault::Fault,
     numerics::least_squares::{SINGULAR, least_norm},
-    pipeline::{
-        Pipeline, Registry,
-        error::Fault,
-        registry::{Context, Plugin, StageConfig},
-        run::Summary,
-    },
+    pipeline::{Context, Pipeline, Plugin, Registry, StageConfig},
     points::{PointColumn, PointKind, Points},
-    stage::{NamedValue, Outcome, PointSeparator, Separator, points::value},
+    stage::{Outcome, PointSeparator, Separator},
+    summary::{NamedValue, Summary},
     table::{ColumnSpec, TableRows, TableSpec, numbers},
 };
 use schemars::JsonSchema;
@@ -82,12 +79,12 @@ impl PointSeparator for Plane {
         let columns = [x.to_vec(), y.to_vec(), distance].map(numbers);
         let slope = |index: usize| (plane.coefficients[index], plane.covariance[(index, index)].sqrt());
         let tilt = |axis: &str, (slope, std): (f64, f64)| -> NamedValue {
-            value("slope", slope, std, "um/mm", "slope of the least-squares plane").of(axis)
+            NamedValue::new("slope", slope, std, "um/mm", "slope of the least-squares plane").of(axis)
         };
         let tables = vec![TableRows { table: "plane".into(), rows: residual().rows(columns.into())? }];
         // The range of noise is no uncertainty of a range: it has none here.
         let values = vec![
-            value("FLTt", range, f64::NAN, "um", "peak-to-valley flatness deviation LSPL (ISO 12781-1)"),
+            NamedValue::new("FLTt", range, f64::NAN, "um", "peak-to-valley flatness deviation LSPL (ISO 12781-1)"),
             tilt("x", slope(1)),
             tilt("y", slope(2)),
         ];

@@ -4,7 +4,7 @@
 
 use std::{error::Error, path::Path};
 
-use runout_core::pipeline::{Pipeline, run::Summary};
+use runout_core::{pipeline::Pipeline, summary::Summary};
 
 /// Separates the recording of example 8, and writes tables to a folder.
 ///

@@ -17,14 +17,12 @@ use runout_cli::builtin::registry;
 use runout_core::{
     atomic_file::commit_all,
     measurement::{Block, MemoryStream, Recording, SampleStream},
-    pipeline::{
-        config::{INCLUDE_KEY, Pipeline, Route},
-        document::Sources,
-        run::{StationResult, StationTables, Summary},
-    },
+    pipeline::{INCLUDE_KEY, Pipeline, Route, document::Sources, run::StationTables},
     profile::Profile,
     separation::Separation,
     stage::{AverageRequest, Averager, Conditioner, ResultInfo, Source, Station, StationSeparator},
+    station::StationResult,
+    summary::Summary,
 };
 
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;
@@ -54,7 +52,8 @@ fn main() -> Outcome {
         let record = Box::new(captures[0].clone());
         clocked(|| drain(&mut *stages.conditioner.attach(record)?))
     })?;
-    let projection = Stages::of(&three_point)?.separator.projection(0).ok_or("three points tell no motion")?;
+    let projection =
+        Stages::of(&three_point)?.separator.projection(0).ok_or("motion is not observable with three points")?;
     for (name, projection) in [("average", None), ("average-and-motion-of-every-turn", Some(&projection))] {
         let wanted = AverageRequest { projection, ..AverageRequest::default() };
         report(name, || {

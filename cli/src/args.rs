@@ -11,7 +11,7 @@ use clap_complete::Shell;
 /// command line or the configuration is wrong.
 #[derive(Debug, Parser)]
 #[command(name = "runout", version, arg_required_else_help = true)]
-pub struct CommandLine {
+pub(crate) struct CommandLine {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -22,7 +22,7 @@ pub struct CommandLine {
 
 /// What to do.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Load, preprocess, separate, evaluate and export; a summary at the end.
     Run(RunArgs),
     /// Say everything that can be said without the data: configuration, what the rig can and cannot separate.
@@ -51,7 +51,7 @@ pub enum Command {
 
 /// A pipeline and what to change in it.
 #[derive(Debug, Args)]
-pub struct PipelineArgs {
+pub(crate) struct PipelineArgs {
     /// The pipeline; paths in it are relative to it.
     #[arg(value_name = "PIPELINE.toml")]
     pub pipeline: PathBuf,
@@ -61,7 +61,7 @@ pub struct PipelineArgs {
 
 /// Keys to override.
 #[derive(Debug, Args)]
-pub struct Overrides {
+pub(crate) struct Overrides {
     /// Override one configuration key: `load.path=other.h5`, `preprocess.0.cutoff_hz=300`. Repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -69,7 +69,7 @@ pub struct Overrides {
 
 /// `runout run`.
 #[derive(Debug, Args)]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     #[command(flatten)]
     pub pipeline: PipelineArgs,
     /// Stations worked on at a time; as many as there are processors without it.
@@ -88,7 +88,7 @@ pub struct RunArgs {
 
 /// `runout batch`.
 #[derive(Debug, Args)]
-pub struct BatchArgs {
+pub(crate) struct BatchArgs {
     #[command(flatten)]
     pub pipeline: PipelineArgs,
     /// The recordings: each takes the place of the file that [load] names. A folder is one recording whose files have the names
@@ -108,7 +108,7 @@ pub struct BatchArgs {
 
 /// `runout diagnose`.
 #[derive(Debug, Args)]
-pub struct DiagnoseArgs {
+pub(crate) struct DiagnoseArgs {
     #[command(flatten)]
     pub pipeline: PipelineArgs,
     /// Stations read and averaged at a time; as many as there are processors without it.
@@ -117,14 +117,14 @@ pub struct DiagnoseArgs {
     /// Memory that the loop may take, in GB, in place of `memory_gb` in [diagnose]: it holds all stations at once.
     #[arg(long, value_name = "GB")]
     pub memory: Option<f64>,
-    /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can stand for it.
+    /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can replace it.
     #[arg(long, value_name = "RIG.toml")]
     pub write: Option<PathBuf>,
 }
 
 /// `runout compare`.
 #[derive(Debug, Args)]
-pub struct CompareArgs {
+pub(crate) struct CompareArgs {
     #[command(flatten)]
     pub pipeline: PipelineArgs,
     /// Separators to compare with the pipeline's own, configured by their [[compare]] tables where there are any.
@@ -144,7 +144,7 @@ pub struct CompareArgs {
 
 /// `runout simulate`.
 #[derive(Debug, Args)]
-pub struct SimulateArgs {
+pub(crate) struct SimulateArgs {
     /// The scenario; paths in it are relative to it.
     #[arg(value_name = "SCENARIO.toml")]
     pub scenario: PathBuf,
@@ -157,7 +157,7 @@ pub struct SimulateArgs {
 
 /// `runout plan`.
 #[derive(Debug, Args)]
-pub struct PlanArgs {
+pub(crate) struct PlanArgs {
     /// The rig: what stands under [rig] in a pipeline, in a file of its own. Or a pipeline of measured points, of which the layout
     /// is planned; the options but --set, --report and --json are of rigs.
     #[arg(value_name = "RIG.toml|PIPELINE.toml")]
@@ -192,14 +192,14 @@ pub struct PlanArgs {
 
 /// What can be made better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Optimise {
+pub(crate) enum Optimise {
     /// The angles of all sensors but the first.
     Angles,
 }
 
 /// What is to be low.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Criterion {
+pub(crate) enum Criterion {
     /// The worst noise gain of form.
     Worst,
     /// The root mean square of the noise gains of form.
@@ -241,7 +241,7 @@ fn degrees(text: &str) -> Result<f64, String> {
 
 /// `runout plugins`.
 #[derive(Debug, Args)]
-pub struct PluginsArgs {
+pub(crate) struct PluginsArgs {
     /// A plugin, a table without one (`rig`, `surface`, `evaluate`, `limit`, `diagnose`) or a stage; `stage/name` where two stages
     /// have a plugin of that name (`export/hdf5`).
     pub name: Option<String>,
@@ -249,7 +249,7 @@ pub struct PluginsArgs {
 
 /// `runout schema`.
 #[derive(Debug, Args)]
-pub struct SchemaArgs {
+pub(crate) struct SchemaArgs {
     /// `pipeline`, `scenario`, `rig`, `summary`, `diagnosis`, `compare`, `batch`, `check`, `plan`, `plan-points`, or a plugin's name; all the files' schemas without it.
     pub name: Option<String>,
     /// Write each file's schema to `NAME.schema.json` in this folder.
@@ -259,14 +259,14 @@ pub struct SchemaArgs {
 
 /// `runout inspect`.
 #[derive(Debug, Args)]
-pub struct InspectArgs {
+pub(crate) struct InspectArgs {
     /// A measurement, a result or a table.
     pub file: PathBuf,
 }
 
 /// `runout report`.
 #[derive(Debug, Args)]
-pub struct ReportArgs {
+pub(crate) struct ReportArgs {
     /// A result file, which `[[export]] plugin = "hdf5"` of a run or a diagnosis wrote.
     #[arg(value_name = "RESULT.h5")]
     pub result: PathBuf,
@@ -277,7 +277,7 @@ pub struct ReportArgs {
 
 /// `runout completions`.
 #[derive(Debug, Args)]
-pub struct CompletionsArgs {
+pub(crate) struct CompletionsArgs {
     /// The shell that reads the script: `runout completions bash > ~/.local/share/bash-completion/completions/runout`.
     pub shell: Shell,
 }

@@ -2,10 +2,7 @@
 
 use std::{borrow::Cow, io};
 
-use runout_core::{
-    Error, ErrorKind,
-    pipeline::{document::ConfigError, error::Diagnostic},
-};
+use runout_core::{Error, ErrorKind, fault::Diagnostic, pipeline::document::ConfigError};
 use serde::Serialize;
 use serde_json::{Value, json};
 

@@ -8,21 +8,21 @@ use runout_core::pipeline::run::Observer;
 use crate::render::printable;
 
 /// A bar that fills as things get done.
-pub struct Progress {
+pub(crate) struct Progress {
     bar: ProgressBar,
 }
 
 impl Progress {
     /// A bar for things of this name ("stations"); it shows once it is known how many there are.
     #[must_use]
-    pub fn new(things: &'static str) -> Self {
+    pub(crate) fn new(things: &'static str) -> Self {
         // Hidden by itself where stderr is no terminal.
         Self::shown_by(ProgressBar::new(0), things)
     }
 
     /// A bar that never shows.
     #[must_use]
-    pub fn hidden() -> Self {
+    pub(crate) fn hidden() -> Self {
         Self::shown_by(ProgressBar::hidden(), "")
     }
 
@@ -36,13 +36,13 @@ impl Progress {
     }
 
     /// There are so many.
-    pub fn expect(&self, count: usize) {
+    pub(crate) fn expect(&self, count: usize) {
         self.bar.set_length(count as u64);
         self.bar.enable_steady_tick(Duration::from_millis(200));
     }
 
     /// One more thing is done.
-    pub fn advance(&self, done: &str) {
+    pub(crate) fn advance(&self, done: &str) {
         self.bar.set_message(printable(done).into_owned());
         self.bar.inc(1);
     }

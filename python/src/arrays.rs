@@ -10,11 +10,9 @@ use pyo3::{exceptions::PyValueError, prelude::*};
 use runout_core::{
     Error, ErrorKind, Result,
     encoder::EncoderScan,
+    fault::Fault,
     measurement::{self, Block, Recording, SampleStream, StationKey},
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     rig::Rig,
     stage::{Loader, Request, Source, SourceKind},
 };

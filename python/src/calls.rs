@@ -6,12 +6,10 @@ use pyo3::prelude::*;
 use runout_cli::{Failure, builtin, documents};
 use runout_core::{
     pipeline::{
-        Pipeline, Registry,
+        INCLUDE_KEY, Pipeline, Plugin, Registry,
         compare::{Comparing, ComparingPoints, Comparison},
-        config::INCLUDE_KEY,
         diagnose::diagnose as find_effects,
         document::{Document, Sources},
-        registry::Plugin,
         run::{Observer, run as separate, run_alone as separate_alone},
     },
     stage::Exporter,

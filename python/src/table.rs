@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::{exceptions::PyKeyError, prelude::*, types::PyCapsule};
 use runout_cli::Failure;
 use runout_core::{
-    pipeline::error::known_names,
+    fault::known_names,
     surface,
     table::{Kind, TableSpec},
 };

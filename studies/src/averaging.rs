@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use runout_core::{
-    Complex64, Error, Result, evaluate::texture::ra_um, measurement::Recording, numerics::fourier::Fourier,
+    Complex64, Error, Result, measurement::Recording, numerics::fourier::Fourier, standards::texture::ra_um,
 };
 use runout_spindle::{
     selection::Selection,

@@ -5,19 +5,17 @@ use std::f64::consts::TAU;
 use runout_core::{
     Complex64, Error, Result,
     azimuth::FacePlace,
-    evaluate::{
-        Value,
-        error_motion::{CENTRE, ErrorMotion},
-    },
+    error_motion::{CENTRE, ErrorMotion},
     measurement::StationTruth,
     numerics::fourier::Fourier,
     rig::{Looks, SensorConfig},
     separation::{Quantity, Separation},
     stage::StationSeparator,
+    standards::Value,
 };
 use runout_spindle::{
     selection::Selection,
-    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::{AxialLineConfig, FaceConfig, MotionHarmonic, SpindleConfig, simulator},
 };
 

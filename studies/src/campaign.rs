@@ -7,7 +7,7 @@ use runout_core::{
     inspection::Inspection,
     measurement::{Recording, StationTruth},
     numerics::fourier::Fourier,
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     profile::Profile,
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     separation::{Quantity, Separation},

@@ -4,14 +4,14 @@ use std::fmt::Write;
 
 use runout_core::{
     Complex64, Error, Result,
-    evaluate::{roundness::ront_lsci_um, texture::ra_um, uncertainty},
     measurement::StationTruth,
     numerics::fourier::Fourier,
     separation::{Quantity, Separation},
     stage::StationSeparator,
+    standards::{roundness::ront_lsci_um, texture::ra_um, uncertainty},
 };
 use runout_spindle::{
-    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::{LineConfig, SpindleConfig, simulator},
 };
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use runout_core::{Error, Result};
 use runout_spindle::{
-    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::simulator,
 };
 

@@ -12,8 +12,7 @@ use runout_core::{
     Error, Result,
     model::closed_loop::Settings,
     pipeline::{
-        Pipeline, Registry,
-        config::INCLUDE_KEY,
+        INCLUDE_KEY, Pipeline, Registry,
         document::{ConfigError, Sources},
     },
     stage::{Outcome, Source},

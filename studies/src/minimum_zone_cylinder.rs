@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use runout_core::{
     Error, Result,
-    evaluate::cylindricity::{Points, Reference},
+    standards::{cylindricity::Points, reference::Reference},
 };
 
 /// Zones may differ by that: rounding of coordinates of 15 mm and of distances from an axis, in µm, with room.

@@ -10,7 +10,7 @@ use std::{
 
 use runout_core::{Error, Result};
 use runout_spindle::{
-    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::simulator,
 };
 

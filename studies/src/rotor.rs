@@ -3,14 +3,7 @@
 use std::{f64::consts::PI, fmt::Write as _, path::Path};
 
 use runout_core::{Error, Result};
-use runout_rotor::{
-    assemble,
-    crossings::Search,
-    equations::Equations,
-    loader,
-    modal::{Modal, Mode, hertz, rpm},
-    model::RotorModel,
-};
+use runout_rotor::{Equations, Modal, Mode, RotorModel, Search, assemble, hertz, rpm};
 use serde_json::Value;
 
 use crate::plot::{self, Axes, Curve};
@@ -175,7 +168,7 @@ pub fn table(rows: &[Row], reference: &str) -> String {
 /// # Errors
 /// When the rotor cannot be read or solved, or the picture cannot be drawn.
 pub fn campbell(path: &Path, most_rpm: f64, count: usize, orders: &[f64]) -> Result<Vec<u8>> {
-    let modal = Modal::new(&loader::read(path)?.equations)?;
+    let modal = Modal::new(&runout_rotor::read(path)?.equations)?;
     let speeds: Vec<f64> = (0..=40).map(|step| most_rpm * f64::from(step) / 40.0).collect();
     let lines: Vec<Vec<Mode>> = speeds.iter().map(|speed| modal.at(speed * PI / 30.0)).collect::<Result<_>>()?;
     let mut curves = Vec::new();
@@ -206,7 +199,7 @@ const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9
 fn rotor(name: &str, text: &str) -> Result<Equations> {
     let model: RotorModel = toml::from_str(text).map_err(|error| Error::new("read", name, error))?;
     model.check().map_err(|fault| Error::new("check", name, fault))?;
-    assemble::equations(name, &model)
+    assemble(name, &model)
 }
 
 fn list(value: &Value) -> &[Value] {

@@ -5,7 +5,7 @@ use std::{f64::consts::TAU, fmt::Write, path::Path};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use runout_core::{Error, Result, evaluate::straightness::about_lsli_um, stage::PointSeparator};
+use runout_core::{Error, Result, stage::PointSeparator, standards::straightness::about_lsli_um};
 use runout_straightness::{AxialReversalConfig, Straightness};
 
 use crate::plot::{self, Axes, Curve};

@@ -6,8 +6,7 @@ use runout_core::{
     Error, Result,
     atomic_file::PendingFile,
     pipeline::{
-        Pipeline, Registry,
-        config::INCLUDE_KEY,
+        INCLUDE_KEY, Pipeline, Registry,
         document::{ConfigError, Sources},
         run::{self, Silent},
     },

@@ -15,14 +15,13 @@ use std::{
 
 use runout_core::{
     Error, Result,
-    evaluate::Value,
     pipeline::{
-        Registry,
-        config::{INCLUDE_KEY, Pipeline},
+        INCLUDE_KEY, Pipeline, Registry,
         document::Sources,
         run::{Silent, run},
-        summary::Summary,
     },
+    standards::Value,
+    summary::Summary,
 };
 use runout_hdf5::{WriteOptions, write_measurement};
 use runout_spindle::simulate::{SpindleConfig, simulator};

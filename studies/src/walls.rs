@@ -10,12 +10,11 @@ use rand_distr::{Distribution, StandardNormal};
 use runout_core::{
     Error, Result,
     pipeline::{
-        Registry,
-        config::{INCLUDE_KEY, Pipeline},
+        INCLUDE_KEY, Pipeline, Registry,
         document::Sources,
         run::{Silent, run},
-        summary::Summary,
     },
+    summary::Summary,
 };
 
 use crate::values::{Rows, count};

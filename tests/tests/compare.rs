@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 
 use runout_core::{
     Result,
+    fault::Fault,
     pipeline::{
-        Pipeline, Registry,
+        Context, Pipeline, Plugin, Registry, StageConfig,
         compare::{Comparing, Comparison, QuantityComparison},
         document::Sources,
-        error::Fault,
-        registry::{Context, Plugin, StageConfig},
         run::Silent,
     },
     rig::RigConfig,
@@ -37,9 +36,9 @@ struct Simulated {
 }
 
 /// A simulator lives as long as the test.
-struct Held(&'static SpindleSimulator);
+struct SimulatedRecording(&'static SpindleSimulator);
 
-impl Loader for Held {
+impl Loader for SimulatedRecording {
     fn kind(&self) -> SourceKind {
         SourceKind::Turns
     }
@@ -71,7 +70,7 @@ impl StageConfig for Simulated {
             let effect = format!("plugin = 'sensor-gain'\ntargets = ['S2']\nrelative_gain = {}", self.gain);
             config.effect.push(toml::from_str(&effect).unwrap());
         }
-        Ok(Box::new(Held(Box::leak(Box::new(simulator(&config)?)))))
+        Ok(Box::new(SimulatedRecording(Box::leak(Box::new(simulator(&config)?)))))
     }
 }
 

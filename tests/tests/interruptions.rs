@@ -5,19 +5,19 @@
 use std::{num::NonZeroUsize, path::Path};
 
 use runout_core::{
-    evaluate::{
-        Value,
-        roundness::{Angles, Points, Reference},
-    },
     measurement::Recording,
     pipeline::{
-        Registry,
-        config::{INCLUDE_KEY, Pipeline},
+        INCLUDE_KEY, Pipeline, Registry,
         document::Sources,
         run::{Silent, run},
-        summary::Summary,
     },
     rig::Gaps,
+    standards::{
+        Value,
+        reference::Reference,
+        roundness::{Angles, Points},
+    },
+    summary::Summary,
 };
 use runout_hdf5::{WriteOptions, write_measurement};
 use runout_spindle::simulate::{SpindleConfig, SpindleSimulator, simulator};

@@ -18,8 +18,7 @@ use std::{
 };
 
 use runout_core::pipeline::{
-    Registry,
-    config::{INCLUDE_KEY, Pipeline},
+    INCLUDE_KEY, Pipeline, Registry,
     diagnose::diagnose,
     document::Sources,
     run::{Silent, run},

@@ -13,7 +13,7 @@ const PACKAGE: &str = "surfalize==0.19.2";
 const DEFAULTS: [&str; 3] = ["400", "2560", "7"];
 
 /// Prints the table of `docs/values.md`; rings, points of a ring and rounds may be given.
-pub fn peers(words: &[&str]) -> Outcome {
+pub(crate) fn peers(words: &[&str]) -> Outcome {
     if words.len() > DEFAULTS.len() || words.iter().any(|word| word.parse::<u32>().map_or(true, |number| number == 0)) {
         return Err("areal-peers takes rings, points of a ring and rounds: whole numbers of at least 1".into());
     }

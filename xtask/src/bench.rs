@@ -27,16 +27,16 @@ const SAMPLES_PER_REV: usize = 2560;
 const TURNS: usize = 120;
 
 /// What is asked for.
-struct Wanted {
+struct Options {
     scratch: PathBuf,
     stations: usize,
     rounds: usize,
     i16: bool,
 }
 
-impl Wanted {
+impl Options {
     fn read(words: &[&str]) -> Outcome<Self> {
-        let mut wanted = Self { scratch: target().join("bench"), stations: 40, rounds: 5, i16: false };
+        let mut options = Self { scratch: target().join("bench"), stations: 40, rounds: 5, i16: false };
         let mut words = words.iter();
         while let Some(word) = words.next() {
             let mut number = || {
@@ -44,33 +44,33 @@ impl Wanted {
                 value.ok_or_else(|| format!("{word} needs a number of at least 1"))
             };
             match *word {
-                "--stations" => wanted.stations = number()?,
-                "--rounds" => wanted.rounds = number()?,
-                "--i16" => wanted.i16 = true,
+                "--stations" => options.stations = number()?,
+                "--rounds" => options.rounds = number()?,
+                "--i16" => options.i16 = true,
                 option if option.starts_with('-') => {
                     return Err(format!("unknown option `{option}`; known: --stations K, --rounds N, --i16"));
                 }
                 folder => {
-                    wanted.scratch = std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?;
+                    options.scratch = std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?;
                 }
             }
         }
-        Ok(wanted)
+        Ok(options)
     }
 }
 
 /// Writes the record once, times both programs on it in turns and prints a table.
-pub fn campaign(words: &[&str]) -> Outcome {
-    time_campaign(&Wanted::read(words)?).map(|_| ())
+pub(crate) fn campaign(words: &[&str]) -> Outcome {
+    time_campaign(&Options::read(words)?).map(|_| ())
 }
 
 /// The same with both kinds of samples; the table goes where `benchmarks/README.md` shows it.
-pub fn all_peers(words: &[&str]) -> Outcome {
-    let wanted = Wanted { i16: true, ..Wanted::read(words)? };
-    if !time_campaign(&wanted)? {
+pub(crate) fn all_peers(words: &[&str]) -> Outcome {
+    let options = Options { i16: true, ..Options::read(words)? };
+    if !time_campaign(&options)? {
         return Ok(());
     }
-    let tables: Vec<Table> = KINDS.iter().map(|kind| Table::read(&wanted.scratch, kind)).collect::<Outcome<_>>()?;
+    let tables: Vec<Table> = KINDS.iter().map(|kind| Table::read(&options.scratch, kind)).collect::<Outcome<_>>()?;
     let Some(first) = tables.first() else { return Ok(()) };
     let columns = first.head.matches('|').count().saturating_sub(1);
     let rule = format!("|{}", " --- |".repeat(columns));
@@ -100,16 +100,16 @@ fn show(name: &str, table: &str) -> Outcome {
 }
 
 /// Times each stage and the peers' in turns; the table goes where `benchmarks/README.md` shows it.
-pub fn stages(words: &[&str]) -> Outcome {
-    let wanted = Wanted::read(words)?;
+pub(crate) fn stages(words: &[&str]) -> Outcome {
+    let options = Options::read(words)?;
     let Some(peers) = peers(&["record.py", "pipeline.py"]) else { return Ok(()) };
     let python = python(&STAGES)?;
-    write_record(&wanted, &peers, &python)?;
+    write_record(&options, &peers, &python)?;
     run(&mut cargo(&["build", "--release", "--package", "runout", "--example", "stages"])?)?;
     let mut compare = Command::new(python);
     compare.arg("-B").arg("benchmarks/stages/compare.py").arg(target().join("release/examples/stages"));
-    run(compare.arg(&peers).arg(&wanted.scratch).arg(wanted.rounds.to_string()).arg(wanted.stations.to_string()))?;
-    let path = wanted.scratch.join("table-stages.md");
+    run(compare.arg(&peers).arg(&options.scratch).arg(options.rounds.to_string()).arg(options.stations.to_string()))?;
+    let path = options.scratch.join("table-stages.md");
     show("bench-stages", &std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?)
 }
 
@@ -136,7 +136,7 @@ impl Table {
 }
 
 /// False where there are no peers.
-fn time_campaign(wanted: &Wanted) -> Outcome<bool> {
+fn time_campaign(options: &Options) -> Outcome<bool> {
     let Some(peers) = peers(&["record.py", "pipeline.py"]) else { return Ok(false) };
     let python = python(&CAMPAIGN)?;
     let script = |name: &str| {
@@ -144,26 +144,26 @@ fn time_campaign(wanted: &Wanted) -> Outcome<bool> {
         command.arg("-B").arg(Path::new("benchmarks/campaign").join(name));
         command
     };
-    write_record(wanted, &peers, &python)?;
+    write_record(options, &peers, &python)?;
     run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
-    for name in KINDS.into_iter().take(if wanted.i16 { 2 } else { 1 }) {
+    for name in KINDS.into_iter().take(if options.i16 { 2 } else { 1 }) {
         let mut compare = script("compare.py");
-        compare.arg(target().join("release/runout")).arg(&peers).arg(&wanted.scratch);
-        run(compare.arg(wanted.rounds.to_string()).arg(name).arg(wanted.stations.to_string()))?;
+        compare.arg(target().join("release/runout")).arg(&peers).arg(&options.scratch);
+        run(compare.arg(options.rounds.to_string()).arg(name).arg(options.stations.to_string()))?;
     }
     Ok(true)
 }
 
 /// The record that both programs read, where it is not yet.
-fn write_record(wanted: &Wanted, peers: &Path, python: &Path) -> Outcome {
+fn write_record(options: &Options, peers: &Path, python: &Path) -> Outcome {
     let mut write = Command::new(python);
-    write.args(["-B", "benchmarks/campaign/write_record.py"]).arg(peers).arg(&wanted.scratch);
-    write.args([SAMPLES_PER_REV, TURNS, wanted.stations].map(|number| number.to_string()));
-    run(write.args(wanted.i16.then_some("--i16")))
+    write.args(["-B", "benchmarks/campaign/write_record.py"]).arg(peers).arg(&options.scratch);
+    write.args([SAMPLES_PER_REV, TURNS, options.stations].map(|number| number.to_string()));
+    run(write.args(options.i16.then_some("--i16")))
 }
 
 /// Times the reference circles of runout and of the peers on the same points.
-pub fn roundness() -> Outcome {
+pub(crate) fn roundness() -> Outcome {
     run(&mut cargo(&["build", "--release", "--package", "runout-core", "--example", "reference_circles"])?)?;
     let Some(peers) = peers(&["roundness_bench.py", "roundness.py"]) else { return Ok(()) };
     let mut compare = Command::new(python(&ROUNDNESS)?);
@@ -172,7 +172,7 @@ pub fn roundness() -> Outcome {
 }
 
 /// Times predictions of 100 000 places from 1000 of runout, scikit-learn and pykrige, one thread; `words` may hold other numbers.
-pub fn kriging(words: &[&str]) -> Outcome {
+pub(crate) fn kriging(words: &[&str]) -> Outcome {
     run(&mut cargo(&["build", "--release", "--package", "runout-spatial-error", "--example", "spatial_error_bench"])?)?;
     let Some(peers) = peers(&["kriging_bench.py", "common.py"]) else { return Ok(()) };
     let mut compare = Command::new(python(&KRIGING)?);

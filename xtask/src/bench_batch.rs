@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// What is asked for.
-struct Wanted {
+struct Options {
     scratch: PathBuf,
     recordings: usize,
     rounds: usize,
@@ -23,10 +23,10 @@ struct Wanted {
     program: Option<PathBuf>,
 }
 
-impl Wanted {
+impl Options {
     fn read(words: &[&str]) -> Outcome<Self> {
         let scratch = target().join("bench/batch");
-        let mut wanted = Self { scratch, recordings: 1000, rounds: 1, jobs: vec![1, 2], program: None };
+        let mut options = Self { scratch, recordings: 1000, rounds: 1, jobs: vec![1, 2], program: None };
         let mut words = words.iter();
         while let Some(word) = words.next() {
             let mut value = || words.next().ok_or_else(|| format!("{word} needs a value"));
@@ -35,42 +35,42 @@ impl Wanted {
                 number.ok_or_else(|| format!("{word} needs numbers of at least 1, found `{text}`"))
             };
             match *word {
-                "--recordings" => wanted.recordings = number(value()?)?,
-                "--rounds" => wanted.rounds = number(value()?)?,
-                "--jobs" => wanted.jobs = value()?.split(',').map(number).collect::<Outcome<_>>()?,
-                "--program" => wanted.program = Some(root().join(value()?)),
+                "--recordings" => options.recordings = number(value()?)?,
+                "--rounds" => options.rounds = number(value()?)?,
+                "--jobs" => options.jobs = value()?.split(',').map(number).collect::<Outcome<_>>()?,
+                "--program" => options.program = Some(root().join(value()?)),
                 option if option.starts_with('-') => {
                     return Err(format!(
                         "unknown option `{option}`; known: --recordings N, --rounds N, --jobs A,B, --program FILE"
                     ));
                 }
                 folder => {
-                    wanted.scratch = std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?;
+                    options.scratch = std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?;
                 }
             }
         }
-        Ok(wanted)
+        Ok(options)
     }
 }
 
 /// Simulates recordings of 2 MB once, runs the batch with each number of jobs in turns and prints a table.
-pub fn batch(words: &[&str]) -> Outcome {
-    let wanted = Wanted::read(words)?;
-    let program = if let Some(program) = &wanted.program {
+pub(crate) fn batch(words: &[&str]) -> Outcome {
+    let options = Options::read(words)?;
+    let program = if let Some(program) = &options.program {
         program.clone()
     } else {
         run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
         target().join("release/runout")
     };
-    let recordings = simulate(&wanted, &program)?;
-    let mut times = vec![Vec::new(); wanted.jobs.len()];
-    let mut busy = vec![Vec::new(); wanted.jobs.len()];
-    let mut peaks = vec![0; wanted.jobs.len()];
+    let recordings = simulate(&options, &program)?;
+    let mut times = vec![Vec::new(); options.jobs.len()];
+    let mut busy = vec![Vec::new(); options.jobs.len()];
+    let mut peaks = vec![0; options.jobs.len()];
     // Each batch has a folder of its own, and all go at the end: some file systems slow down after a removal of many files.
-    let outs = wanted.scratch.join("out");
+    let outs = options.scratch.join("out");
     remove(&outs)?;
-    for round in 0..wanted.rounds {
-        for (at, jobs) in wanted.jobs.iter().enumerate() {
+    for round in 0..options.rounds {
+        for (at, jobs) in options.jobs.iter().enumerate() {
             let out = outs.join(format!("{round}-{jobs}"));
             let spent = timed(&program, &recordings, &out, *jobs)?;
             times[at].push(spent.seconds);
@@ -88,10 +88,10 @@ pub fn batch(words: &[&str]) -> Outcome {
     say(&format!(
         "{} recordings, {processors} processors, median of {}\n\n| jobs | time, s | processor time, s | recordings a second | times the first | peak memory, MiB |\n\
          | --- | --- | --- | --- | --- | --- |",
-        wanted.recordings, wanted.rounds
+        options.recordings, options.rounds
     ));
-    for (at, (jobs, seconds)) in wanted.jobs.iter().zip(&medians).enumerate() {
-        let (rate, gain, busy) = (wanted.recordings as f64 / seconds, medians[0] / seconds, median(&mut busy[at]));
+    for (at, (jobs, seconds)) in options.jobs.iter().zip(&medians).enumerate() {
+        let (rate, gain, busy) = (options.recordings as f64 / seconds, medians[0] / seconds, median(&mut busy[at]));
         let [busy, peak] = [(busy > 0.0, format!("{busy:.2}")), (peaks[at] > 0, (peaks[at] / 1024).to_string())]
             .map(|(is_known, text)| if is_known { text } else { "-".to_owned() });
         say(&format!("| {jobs} | {seconds:.2} | {busy} | {rate:.1} | {gain:.2} | {peak} |"));
@@ -100,10 +100,10 @@ pub fn batch(words: &[&str]) -> Outcome {
 }
 
 /// The recordings, those that are not there yet made by as many programs as there are processors.
-fn simulate(wanted: &Wanted, program: &Path) -> Outcome<Vec<PathBuf>> {
-    let folder = wanted.scratch.join("recordings");
+fn simulate(options: &Options, program: &Path) -> Outcome<Vec<PathBuf>> {
+    let folder = options.scratch.join("recordings");
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let all: Vec<PathBuf> = (1..=wanted.recordings).map(|number| folder.join(format!("part-{number}.h5"))).collect();
+    let all: Vec<PathBuf> = (1..=options.recordings).map(|number| folder.join(format!("part-{number}.h5"))).collect();
     let next = AtomicUsize::new(0);
     let work = || -> Outcome {
         while let Some(path) = all.get(next.fetch_add(1, Ordering::Relaxed)) {

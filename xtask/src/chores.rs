@@ -12,7 +12,7 @@ use crate::{
 
 /// Picture of the crates, format, lints, tests, and the demo with the program that the tests were built with. With `complete`
 /// files are also read by foreign readers, and a skipped test is a failure.
-pub fn test(foreign_readers: bool, complete: bool) -> Outcome {
+pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     house::check_quietly()?;
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
@@ -108,7 +108,7 @@ impl Skips {
 }
 
 /// Advisories, licences, yanked versions and sources of dependencies.
-pub fn deny() -> Outcome {
+pub(crate) fn deny() -> Outcome {
     if answer("cargo-deny", &["--version"]).is_none() {
         run(&mut cargo(&["install", "--locked", "cargo-deny"])?)?;
     }
@@ -118,7 +118,7 @@ pub fn deny() -> Outcome {
 }
 
 /// Writes schemas/ anew, and what is made from them where there is a Python.
-pub fn schemas() -> Outcome {
+pub(crate) fn schemas() -> Outcome {
     run(&mut cargo(&["run", "--quiet", "--package", "runout", "--", "schema", "--out", "schemas"])?)?;
     if answer("python3", &["--version"]).is_none() {
         say("there is no python3: the classes of python/runout were left as they are");
@@ -128,7 +128,7 @@ pub fn schemas() -> Outcome {
 }
 
 /// Makes the first example's campaign once, and runs its pipeline.
-pub fn demo() -> Outcome {
+pub(crate) fn demo() -> Outcome {
     run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
     let program = target().join("release/runout");
     run_example(&program)?;
@@ -139,7 +139,7 @@ pub fn demo() -> Outcome {
 }
 
 /// Takes the picture of the first example's report that the README shows.
-pub fn report_picture() -> Outcome {
+pub(crate) fn report_picture() -> Outcome {
     demo()?;
     let browser = foreign::browser().ok_or("Chromium is not installed")?;
     let example = root().join("examples/01-four-sensor");
@@ -170,7 +170,7 @@ fn run_example(program: &Path) -> Outcome {
 }
 
 /// Prints the figures that the READMEs show.
-pub fn studies(arguments: &[&str]) -> Outcome {
+pub(crate) fn studies(arguments: &[&str]) -> Outcome {
     let mut words = vec!["run", "--release", "--quiet", "--package", "runout-studies", "--"];
     words.extend(arguments);
     run(&mut cargo(&words)?)

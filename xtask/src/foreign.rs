@@ -27,12 +27,12 @@ const NODE_PACKAGES: [&str; 3] = ["gltf-validator@2.0.0-dev.3.10", "puppeteer-co
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
 /// The browser's name, where it is installed.
-pub fn browser() -> Option<&'static str> {
+pub(crate) fn browser() -> Option<&'static str> {
     BROWSERS.into_iter().find(|name| answer(name, &["--version"]).is_some())
 }
 
 /// Where the readers are.
-pub struct Readers {
+pub(crate) struct Readers {
     browser: &'static str,
     interpreter: PathBuf,
     node_modules: PathBuf,
@@ -40,7 +40,7 @@ pub struct Readers {
 
 impl Readers {
     /// Installs them below target/ where they are not yet; Chromium, Node.js and npm by the system's packages.
-    pub fn install() -> Outcome<Self> {
+    pub(crate) fn install() -> Outcome<Self> {
         let python = tools().join("python-venv");
         setup::python_environment(&python)?;
         let interpreter = python.join("bin/python");
@@ -72,7 +72,7 @@ impl Readers {
     }
 
     /// Tells a test run where they are, and that none may be left out.
-    pub fn equip(&self, tests: &mut Command) {
+    pub(crate) fn equip(&self, tests: &mut Command) {
         tests
             .env("RUNOUT_CHROMIUM", self.browser)
             .env("RUNOUT_PYTHON", &self.interpreter)

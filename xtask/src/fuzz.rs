@@ -78,7 +78,7 @@ struct Count {
 
 /// `[--inputs N] [--minutes M] [--seed S] [--folder DIR] [WORKER]`: as many inputs, or as much time, whichever ends first. `WORKER` is a build of
 /// the example `many_command_lines`; a folder in memory saves the time of syncing files.
-pub fn fuzz(words: &[&str]) -> Outcome {
+pub(crate) fn fuzz(words: &[&str]) -> Outcome {
     let (mut inputs, mut minutes, mut seed, mut program) = (u64::MAX, 2.0, 1_u64, None);
     let mut parent = target().join("fuzz");
     let mut words = words.iter();

@@ -20,7 +20,7 @@ const JOURNAL: usize = 2;
 const MOST_STEPS: u64 = 1000;
 
 /// `[--kills N] [--seed S] [PROGRAM]`.
-pub fn test(words: &[&str]) -> Outcome {
+pub(crate) fn test(words: &[&str]) -> Outcome {
     let (mut kills, mut seed, mut program) = (1000_u64, 1_u64, None);
     let mut words = words.iter();
     while let Some(word) = words.next() {

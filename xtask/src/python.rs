@@ -35,7 +35,7 @@ const TEST_PACKAGES: [&str; 15] = [
 const TEST_MODULES: &str = "import dask.bag, duckdb, h5py, ipykernel, moto.server, mypy, nbclient, numpy, pandas, polars, pyarrow, pytest, ray.data, s3fs";
 
 /// Builds the wheel into target/wheels, in the release profile or in that of the tests.
-pub fn wheel(words: &[&str]) -> Outcome {
+pub(crate) fn wheel(words: &[&str]) -> Outcome {
     let profile = match words {
         [] => "release",
         ["--dev"] => "dev",
@@ -55,7 +55,7 @@ pub fn wheel(words: &[&str]) -> Outcome {
 }
 
 /// Installs what the package's tests take.
-pub fn install_test_packages() -> Outcome {
+pub(crate) fn install_test_packages() -> Outcome {
     let environment = environment()?;
     if answer(environment.join("bin/python"), &["-c", TEST_MODULES]).is_none() {
         install(&environment, &TEST_PACKAGES)?;
@@ -65,7 +65,7 @@ pub fn install_test_packages() -> Outcome {
 
 /// Runs the tests of the package on the library that the workspace was built with: maturin would compile all dependencies
 /// again, since it builds the one crate with fewer features.
-pub fn test() -> Outcome {
+pub(crate) fn test() -> Outcome {
     // With the tests' targets named, the dependencies have the tests' features.
     run(&mut cargo(&["build", "--workspace", "--lib", "--bins", "--tests", "--quiet"])?)?;
     let place = target().join("python");

@@ -1,10 +1,10 @@
 //! Numbers without a pattern, and what they do to a text.
 
 /// The generator SplitMix64 (Steele, Lea, Flood 2014).
-pub struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
@@ -16,19 +16,19 @@ impl Random {
     }
 
     /// A number from 0, below another one.
-    pub fn below(&mut self, end: u64) -> u64 {
+    pub(crate) fn below(&mut self, end: u64) -> u64 {
         self.next() % end.max(1)
     }
 
     /// A word of a dictionary, some of them many times.
-    pub fn text(&mut self, dictionary: &[&str], longest: u64) -> String {
+    pub(crate) fn text(&mut self, dictionary: &[&str], longest: u64) -> String {
         let word = dictionary[self.below(dictionary.len() as u64) as usize];
         let times = if self.below(8) == 0 { 1 + self.below(longest / word.len().max(1) as u64) } else { 1 };
         word.repeat(times as usize)
     }
 
     /// Bytes with one to four mistakes in them.
-    pub fn mutated(&mut self, bytes: &[u8], dictionary: &[&str]) -> Vec<u8> {
+    pub(crate) fn mutated(&mut self, bytes: &[u8], dictionary: &[&str]) -> Vec<u8> {
         let mut mutated = bytes.to_vec();
         for _ in 0..=self.below(4) {
             let place = self.below(mutated.len() as u64) as usize;

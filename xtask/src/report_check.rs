@@ -22,7 +22,7 @@ const ROUNDS: usize = 7;
 const MANY: usize = 400;
 
 /// Runs all examples with a report each, looks at every page, and prints the table of docs/report.md.
-pub fn check(words: &[&str]) -> Outcome {
+pub(crate) fn check(words: &[&str]) -> Outcome {
     let program = match words {
         [] => {
             run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;

@@ -17,7 +17,7 @@ pub const PROGRAM: &str = "target/release/runout";
 
 /// Runs the commands of all examples' READMEs in a copy of the repository's examples, by the release program or another one. The
 /// folder then holds what they wrote, and what they printed as `NUMBER.txt`.
-pub fn record(words: &[&str]) -> Outcome {
+pub(crate) fn record(words: &[&str]) -> Outcome {
     let (folder, program) = match words {
         [folder] => {
             crate::process::run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
@@ -30,7 +30,7 @@ pub fn record(words: &[&str]) -> Outcome {
 }
 
 /// Runs the commands of all examples' READMEs in a copy of the examples; each copy is prepared before.
-pub fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path) -> std::io::Result<()>) -> Outcome {
+pub(crate) fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path) -> std::io::Result<()>) -> Outcome {
     let program = program.canonicalize().map_err(|error| format!("cannot find {}: {error}", program.display()))?;
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
@@ -71,7 +71,7 @@ pub fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path) -> st
 }
 
 /// Compares the numbers of two recorded folders, to 1e-12 relative or to what is given.
-pub fn compare(words: &[&str]) -> Outcome {
+pub(crate) fn compare(words: &[&str]) -> Outcome {
     chores::studies(&[&["compare-results"], words].concat())
 }
 

@@ -11,7 +11,7 @@ use crate::process::{Outcome, answer, run, say, tools};
 const OLDEST_CMAKE: (u32, u32) = (3, 26);
 
 /// Finds or brings everything and says what to do with it.
-pub fn report() -> Outcome {
+pub(crate) fn report() -> Outcome {
     let cmake = ready()?;
     say(&format!("set-up is complete; CMake is {}", cmake.display()));
     if answer("cmake", &["--version"]).and_then(|text| version(&text)).is_none_or(|found| found < OLDEST_CMAKE) {
@@ -21,7 +21,7 @@ pub fn report() -> Outcome {
 }
 
 /// A cargo command with everything that a build needs.
-pub fn cargo(arguments: &[&str]) -> Outcome<Command> {
+pub(crate) fn cargo(arguments: &[&str]) -> Outcome<Command> {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(arguments).env("CMAKE", ready()?);
     Ok(command)
@@ -34,7 +34,7 @@ pub fn ready() -> Outcome<PathBuf> {
 }
 
 /// The parts of Rust that a minimal installation leaves out.
-pub fn components() -> Outcome {
+pub(crate) fn components() -> Outcome {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     for (component, command) in [("rustfmt", "fmt"), ("clippy", "clippy")] {
         if answer(&cargo, &[command, "--version"]).is_none() {
@@ -81,7 +81,7 @@ fn cmake() -> Outcome<PathBuf> {
 }
 
 /// Makes a Python environment in `folder`, unless there is one that works.
-pub fn python_environment(folder: &Path) -> Outcome {
+pub(crate) fn python_environment(folder: &Path) -> Outcome {
     if answer(folder.join("bin/pip"), &["--version"]).is_some() {
         return Ok(());
     }
@@ -98,7 +98,7 @@ pub fn python_environment(folder: &Path) -> Outcome {
 }
 
 /// Installs Debian packages, as root or by sudo.
-pub fn install(packages: &[&str], what: &str) -> Outcome {
+pub(crate) fn install(packages: &[&str], what: &str) -> Outcome {
     let list = packages.join(" ");
     let refused = |problem: &str| format!("{what} is missing and {problem}; install it (Debian, Ubuntu: {list})");
     if answer("apt-get", &["--version"]).is_none() {

@@ -5,9 +5,8 @@ use std::{num::NonZeroUsize, thread::available_parallelism};
 use runout_core::{
     atomic_file::resolved,
     pipeline::{
-        Registry,
+        INCLUDE_KEY, Registry,
         batch::{Batch, Recording, recordings},
-        config::INCLUDE_KEY,
         document::Sources,
     },
 };

@@ -4,12 +4,11 @@ use runout_core::{
     effects::EffectCatalogue,
     mains,
     pipeline::{
-        Pipeline, Registry,
-        config::Route,
+        Pipeline, Registry, Route,
         document::{Document, Sources},
     },
     rig::Rig,
-    stage::{EvaluableKind, Planned, PointSeparator, Source, check},
+    stage::{EvaluableKind, Planned, PointSeparator, Source, speeds_and_turns, speeds_of},
 };
 use toml::{Spanned, de::DeValue};
 
@@ -25,7 +24,7 @@ use crate::{
 ///
 /// # Errors
 /// When the configuration is wrong.
-pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, pipeline) = pipeline(args, registry)?;
     let report = report(&sources, &pipeline, &registry.effects)?;
     print(&report, json, render::check::text)
@@ -35,7 +34,7 @@ pub fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(
 ///
 /// # Errors
 /// When a check of it fails.
-pub fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
+pub(crate) fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
     notes.extend(pipeline.rig.as_ref().map(Rig::remarks).unwrap_or_default());
     let source = pipeline.loader.open(&pipeline.request());
@@ -43,14 +42,14 @@ pub fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue)
         Ok(Source::Points(points)) => notes.extend(points.remarks.iter().cloned()),
         Ok(Source::Turns(recording)) => {
             let setups = pipeline.rig.as_ref().map_or(0, |rig| rig.setups.len());
-            notes.extend(mains::whole_orders(&check::speeds_and_turns(&**recording, setups)));
+            notes.extend(mains::whole_orders(&speeds_and_turns(&**recording, setups)));
         }
         Err(error) => notes.push(format!("the data are not there yet, or cannot be used: {error}")),
     }
     if !pipeline.checks.is_empty() {
         let speeds_rpm = match &source {
             Ok(Source::Turns(recording)) => {
-                check::speeds_of(&**recording, pipeline.rig.as_ref().map_or(0, |rig| rig.setups.len()))
+                speeds_of(&**recording, pipeline.rig.as_ref().map_or(0, |rig| rig.setups.len()))
             }
             _ => Vec::new(),
         };

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use runout_core::{
     Error, Result,
     atomic_file::{self, resolved},
+    fault::known_names,
     pipeline::{
         Pipeline, Registry,
         compare::{Comparing, ComparingPoints, Comparison, StationComparison},
         document::{Document, Sources},
-        error::known_names,
     },
 };
 use runout_parquet::{ComparisonTable, comparison_figures, comparison_rows};
@@ -21,7 +21,7 @@ use crate::{args::CompareArgs, failure::Failure, progress::Progress, render};
 ///
 /// # Errors
 /// When the configuration is wrong, nothing can be compared, or the data or a file fails.
-pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::result::Result<(), Failure> {
+pub(crate) fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::result::Result<(), Failure> {
     known(&args.with, registry)?;
     let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
     let mut output = Output::named(args.out.as_deref(), &sources)?;
@@ -51,7 +51,7 @@ pub fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> std::resu
     drop(progress);
     comparison.stations = stations;
     output.finish(&comparison)?;
-    conclude(report, &comparison)?;
+    write_report(report, &comparison)?;
     print(&comparison, json, render::compare::text)
 }
 
@@ -76,7 +76,7 @@ fn points(
     let report = args.report.as_deref().map(begin).transpose()?;
     let comparison = comparing.run(outputs(args))?;
     output.finish(&comparison)?;
-    conclude(report, &comparison)?;
+    write_report(report, &comparison)?;
     print(&comparison, json, render::compare::text)
 }
 
@@ -86,7 +86,7 @@ fn outputs(args: &CompareArgs) -> Vec<PathBuf> {
 }
 
 /// Writes the report, where there is to be one.
-fn conclude(report: Option<OverviewReport>, comparison: &Comparison) -> Result<()> {
+fn write_report(report: Option<OverviewReport>, comparison: &Comparison) -> Result<()> {
     let Some(report) = report else { return Ok(()) };
     let (_, overview) = render::compare::page(comparison).into_overview(None);
     report.finish(comparison.provenance.clone(), &overview)
@@ -96,7 +96,7 @@ fn conclude(report: Option<OverviewReport>, comparison: &Comparison) -> Result<(
 ///
 /// # Errors
 /// The first that none has.
-pub fn known(names: &[String], registry: &Registry) -> std::result::Result<(), Failure> {
+pub(crate) fn known(names: &[String], registry: &Registry) -> std::result::Result<(), Failure> {
     let known = || registry.separators.iter().map(|plugin| plugin.name);
     match names.iter().find(|name| !known().any(|known| known == name.as_str())) {
         None => Ok(()),
@@ -126,7 +126,7 @@ impl Output {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("parquet") => Ok(Self::Table(path.to_owned(), None)),
             Some("json") => Ok(Self::Document(path.to_owned())),
-            _ => Err(refuse(format!("cannot tell what {shown} is to be"), "end it in .parquet or .json")),
+            _ => Err(refuse(format!("the format of {shown} is not known"), "end it in .parquet or .json")),
         }
     }
 

@@ -12,7 +12,7 @@ use crate::{
 ///
 /// # Errors
 /// When stdout cannot be written to.
-pub fn execute(args: &CompletionsArgs, json: bool) -> Result<(), Failure> {
+pub(crate) fn execute(args: &CompletionsArgs, json: bool) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut CommandLine::command(), "runout", &mut script);
     let script = String::from_utf8_lossy(&script);

@@ -14,7 +14,7 @@ use crate::{args::DiagnoseArgs, failure::Failure, progress::Progress, render};
 ///
 /// # Errors
 /// When the configuration is wrong, or the data or a file fails. Whatever the verdict, a diagnosis is no failure.
-pub fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
     if let Some(memory_gb) = args.memory {
         if !(memory_gb > 0.0 && memory_gb.is_finite()) {

@@ -13,11 +13,11 @@ use crate::{
     reports::inspect::{ColumnReport, Report, TableReport},
 };
 
-/// Says what a file holds, told by its first bytes and not by its name.
+/// Says what a file holds, by its first bytes and not by its name.
 ///
 /// # Errors
 /// When it cannot be read, or is of no known kind.
-pub fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failure> {
+pub(crate) fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failure> {
     let report = report(&args.file)?;
     print(&report, json, render::file::text)
 }
@@ -26,7 +26,7 @@ pub fn execute(args: &InspectArgs, json: bool) -> std::result::Result<(), Failur
 ///
 /// # Errors
 /// When it cannot be read, or is of no known kind.
-pub fn report(path: &Path) -> Result<Report> {
+pub(crate) fn report(path: &Path) -> Result<Report> {
     complete_publication(path)?;
     let mut signature = Vec::new();
     let start = open_regular(path).and_then(|file| file.take(8).read_to_end(&mut signature));

@@ -1,19 +1,19 @@
 //! What each command does.
 
-pub mod batch;
-pub mod check;
-pub mod compare;
-pub mod completions;
-pub mod diagnose;
-pub mod inspect;
-pub mod plan;
-pub mod plugins;
-pub mod report;
-pub mod run;
-pub mod schema;
-pub mod simulate;
+pub(crate) mod batch;
+pub(crate) mod check;
+pub(crate) mod compare;
+pub(crate) mod completions;
+pub(crate) mod diagnose;
+pub(crate) mod inspect;
+pub(crate) mod plan;
+pub(crate) mod plugins;
+pub(crate) mod report;
+pub(crate) mod run;
+pub(crate) mod schema;
+pub(crate) mod simulate;
 
-use runout_core::pipeline::{Pipeline, Registry, config::INCLUDE_KEY, document::Sources};
+use runout_core::pipeline::{INCLUDE_KEY, Pipeline, Registry, document::Sources};
 use serde::Serialize;
 
 use crate::{
@@ -26,7 +26,7 @@ use crate::{
 ///
 /// # Errors
 /// When it cannot be done.
-pub fn execute(command: Command, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(command: Command, json: bool, registry: &Registry) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::execute(&args, json, registry),
         Command::Check(args) => check::execute(&args, json, registry),

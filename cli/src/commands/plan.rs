@@ -3,21 +3,21 @@
 
 mod drawn;
 mod map;
-pub mod points;
+pub(crate) mod points;
 
 use std::ops::RangeInclusive;
 
 use runout_core::{
+    fault::Fault,
     pipeline::{
         Registry,
         document::{self, Document, Sources},
-        error::Fault,
     },
     rig::{Rig, RigConfig},
 };
 use runout_spindle::{
     layout::Layout,
-    plan::{self, Change, Optimum, Search, Suggestion, TooTight, optimise},
+    plan::{self, Change, Optimum, PROGRESS_STEPS, Search, Suggestion, TooTight, optimise},
     selection::Selection,
     separators::face_notes,
 };
@@ -40,7 +40,7 @@ use crate::{
 ///
 /// # Errors
 /// When the rig or the pipeline is wrong, the sensors have no room, or the map cannot be written.
-pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     match planned(args, registry, &Progress::new("steps"))? {
         Planned::Rig(report) => print(&*report, json, render::plan::text),
         Planned::Points(report) => print(&*report, json, |report| render::plan_points::page(report).into_text()),
@@ -51,7 +51,7 @@ pub fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Result<(), F
 ///
 /// # Errors
 /// As [`execute`].
-pub fn document(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<Value, Failure> {
+pub(crate) fn document(args: &PlanArgs, registry: &Registry, progress: &Progress) -> Result<Value, Failure> {
     match planned(args, registry, progress)? {
         Planned::Rig(report) => to_value(&*report),
         Planned::Points(report) => to_value(&*report),
@@ -102,11 +102,11 @@ fn suggested(
     for_form: &[Suggestion],
     for_effects: &[Change],
 ) -> Vec<Suggested> {
-    let before = plan::suggest::score(rig, orders);
+    let before = plan::score(rig, orders);
     let mut all = for_form.to_vec();
     for change in for_effects {
         if !all.iter().any(|known| known.addition == change.addition) {
-            let after = plan::suggest::score(&change.rig, orders);
+            let after = plan::score(&change.rig, orders);
             all.push(Suggestion { addition: change.addition, rig: change.rig.clone(), after });
         }
     }
@@ -135,7 +135,7 @@ fn across(rig: &Rig) -> Rig {
 
 /// What to know of axial sensors and declared forms.
 fn notes(rig: &Rig, orders: &RangeInclusive<usize>) -> Vec<String> {
-    face_notes::notes(rig, &Layout::new(rig, false).assess(*orders.end()))
+    face_notes(rig, &Layout::new(rig, false).assess(*orders.end()))
 }
 
 /// What a rig can and cannot separate at these orders.
@@ -176,7 +176,7 @@ fn better_angles(rig: &Rig, args: &PlanArgs, progress: &Progress) -> Result<Opti
         },
         seed: args.seed,
     };
-    progress.expect(optimise::PROGRESS_STEPS);
+    progress.expect(PROGRESS_STEPS);
     optimise(rig, &search, &mut |best| progress.advance(best)).map_err(|tight| too_tight(&tight, args.clearance))
 }
 

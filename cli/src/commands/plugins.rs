@@ -1,7 +1,9 @@
 //! `runout plugins`: what is on board, and the keys of each.
 
-use runout_core::pipeline::{
-    Registry, config::plain_tables, effects::EffectEntry, error::known_names, registry::Catalogue,
+use runout_core::{
+    effects::EffectEntry,
+    fault::known_names,
+    pipeline::{Catalogue, Registry, plain_tables},
 };
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -18,7 +20,7 @@ const TABLE: &str = "table";
 
 /// One plugin, or one of the tables that name none.
 #[derive(Debug, Serialize)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// The table's key in TOML; "simulate" for scenarios, "effect" for what `[diagnose]` looks for, "table" for the tables
     /// that name no plugin.
     pub stage: &'static str,
@@ -37,7 +39,7 @@ pub struct Entry {
 ///
 /// # Errors
 /// When the name is unknown.
-pub fn execute(args: &PluginsArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &PluginsArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let entries = entries(registry);
     match &args.name {
         None => print(&entries.iter().collect::<Vec<_>>(), json, |entries| list(entries)),
@@ -55,7 +57,7 @@ pub fn execute(args: &PluginsArgs, json: bool, registry: &Registry) -> Result<()
 
 /// Every plugin, by stage, every effect, and the tables that name no plugin.
 #[must_use]
-pub fn entries(registry: &Registry) -> Vec<Entry> {
+pub(crate) fn entries(registry: &Registry) -> Vec<Entry> {
     let mut entries = Vec::new();
     add(&mut entries, "load", &registry.loaders);
     add(&mut entries, "preprocess", &registry.preprocessors);
@@ -110,7 +112,7 @@ fn values(effect: &EffectEntry) -> Value {
 
 /// Those that are meant by a name alone, or by `stage/name`.
 #[must_use]
-pub fn named<'a>(entries: &'a [Entry], name: &str) -> Vec<&'a Entry> {
+pub(crate) fn named<'a>(entries: &'a [Entry], name: &str) -> Vec<&'a Entry> {
     let meant = |entry: &&Entry| match name.split_once('/') {
         Some((stage, name)) => entry.stage == stage && entry.name == name,
         None => entry.name == name,
@@ -120,7 +122,7 @@ pub fn named<'a>(entries: &'a [Entry], name: &str) -> Vec<&'a Entry> {
 
 /// The failure that says which names there are.
 #[must_use]
-pub fn unknown(entries: &[Entry], name: &str, others: &[&str]) -> Failure {
+pub(crate) fn unknown(entries: &[Entry], name: &str, others: &[&str]) -> Failure {
     let mut known: Vec<&str> = entries.iter().map(|entry| entry.name).chain(others.iter().copied()).collect();
     known.sort_unstable();
     known.dedup();

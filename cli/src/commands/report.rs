@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use runout_core::{
     Result,
     atomic_file::{self, resolved},
-    pipeline::{document::Sources, summary::Summary},
+    pipeline::document::Sources,
     provenance::Provenance,
     stage::{About, Completed, Export, Exporter, Overview, ResultInfo},
+    summary::Summary,
     table::{RecordBatch, TableSpec},
 };
 use runout_hdf5::read_result;
@@ -27,7 +28,7 @@ struct Written {
 ///
 /// # Errors
 /// When the file is no result, or the report cannot be written.
-pub fn execute(args: &ReportArgs, json: bool) -> std::result::Result<(), Failure> {
+pub(crate) fn execute(args: &ReportArgs, json: bool) -> std::result::Result<(), Failure> {
     let report = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
     if resolved(&report) == resolved(&args.result) {
         let message = format!("{} is the result itself", report.display());

@@ -1,8 +1,8 @@
 //! `runout run`.
 
-use runout_core::pipeline::{
-    Registry,
-    run::{self, Decision},
+use runout_core::{
+    pipeline::{Registry, run},
+    summary::Decision,
 };
 
 use super::{pipeline, print};
@@ -13,7 +13,7 @@ use crate::{args::RunArgs, failure::Failure, progress::Progress, render};
 /// # Errors
 /// When the configuration is wrong, or the data or a file fails; where it was asked for, also when a limit is not proven to
 /// be kept or a warning was given.
-pub fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (_, pipeline) = pipeline(&args.pipeline, registry)?;
     if args.fail_on_limit && pipeline.evaluate.limits().is_empty() {
         let message = "--fail-on-limit, and the pipeline has no limit".into();

@@ -5,14 +5,9 @@ use std::path::Path;
 use runout_core::{
     Error, atomic_file,
     model::diagnosis::Diagnosis,
-    pipeline::{
-        Registry,
-        batch::BatchReport,
-        compare::Comparison,
-        config::{choice, pipeline_schema},
-        run::Summary,
-    },
+    pipeline::{Registry, batch::BatchReport, choice, compare::Comparison, pipeline_schema},
     rig::RigConfig,
+    summary::Summary,
 };
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
@@ -29,7 +24,7 @@ use crate::{
 ///
 /// # Errors
 /// When the name is unknown or a file cannot be written.
-pub fn execute(args: &SchemaArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &SchemaArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
         let written = write(registry, folder)?;
         return super::print(&json!({ "outputs": written }), json, |_| format!("written: {}\n", written.join(", ")));

@@ -5,13 +5,11 @@ use std::path::PathBuf;
 use runout_core::{
     Error,
     atomic_file::resolved,
+    fault::Fault,
     measurement::Recording,
     pipeline::{
-        Registry,
-        config::INCLUDE_KEY,
+        Context, INCLUDE_KEY, Registry,
         document::{Document, Sources, Table},
-        error::Fault,
-        registry::Context,
     },
     rig::Rig,
     stage::{Simulation, Simulator},
@@ -24,7 +22,7 @@ use crate::{args::SimulateArgs, failure::Failure, progress::Progress, render::co
 
 /// What was made. What is hidden in it stays hidden.
 #[derive(Debug, Serialize)]
-pub struct Report {
+pub(crate) struct Report {
     title: String,
     output: PathBuf,
     bytes: u64,
@@ -46,7 +44,7 @@ enum Made {
 ///
 /// # Errors
 /// When the scenario is wrong, cannot be computed, or the file cannot be written.
-pub fn execute(args: &SimulateArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &SimulateArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     print(&report(args, registry, &Progress::new("captures"))?, json, text)
 }
 
@@ -54,7 +52,7 @@ pub fn execute(args: &SimulateArgs, json: bool, registry: &Registry) -> Result<(
 ///
 /// # Errors
 /// When the scenario is wrong, cannot be computed, or the file cannot be written.
-pub fn report(args: &SimulateArgs, registry: &Registry, progress: &Progress) -> Result<Report, Failure> {
+pub(crate) fn report(args: &SimulateArgs, registry: &Registry, progress: &Progress) -> Result<Report, Failure> {
     let sources = Sources::read(&args.scenario, &args.overrides.set, INCLUDE_KEY)?;
     let document = Document::parse(&sources)?;
     let scenario = Scenario::build(document.root(), &sources, args.out.clone(), registry)

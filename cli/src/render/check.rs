@@ -14,7 +14,7 @@ use crate::reports::check::{Order, Report, RigSize, Separability, Unknown};
 
 /// The text of a report.
 #[must_use]
-pub fn text(report: &Report) -> String {
+pub(crate) fn text(report: &Report) -> String {
     let mut page = Page::default();
     page.line(&report.title);
     page.line("The configuration is valid.");

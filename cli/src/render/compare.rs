@@ -13,7 +13,7 @@ use super::{
 
 /// The text of a comparison.
 #[must_use]
-pub fn text(comparison: &Comparison) -> String {
+pub(crate) fn text(comparison: &Comparison) -> String {
     let mut page = page(comparison);
     let outputs: Vec<String> = comparison.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
@@ -22,7 +22,7 @@ pub fn text(comparison: &Comparison) -> String {
 
 /// A comparison as lines and tables.
 #[must_use]
-pub fn page(comparison: &Comparison) -> Page {
+pub(crate) fn page(comparison: &Comparison) -> Page {
     let mut page = Page::default();
     page.line(&comparison.title);
     if comparison.stations.is_empty() && !comparison.values.is_empty() {
@@ -218,7 +218,7 @@ fn plane(comparison: &Comparison) -> Option<String> {
     };
     (high != 0.0).then(|| {
         format!(
-            "x and y are the axis's displacement at z = {place}: not every method tells tilt, which moves it to z = 0"
+            "x and y are the axis's displacement at z = {place}: tilt, which moves it to z = 0, is not observable by every method"
         )
     })
 }

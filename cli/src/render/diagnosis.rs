@@ -12,7 +12,7 @@ use super::{
 
 /// The text of a diagnosis.
 #[must_use]
-pub fn text(diagnosis: &Diagnosis) -> String {
+pub(crate) fn text(diagnosis: &Diagnosis) -> String {
     let mut page = Page::default();
     page.line(diagnosis.headline());
     if diagnosis.added.iter().any(|one| !one.confounded_with.is_empty()) {
@@ -231,7 +231,7 @@ fn parameter(one: &Estimated) -> String {
     format!("{} {value} {}", one.name, unit(&one.unit)).trim_end().to_owned()
 }
 
-/// A parameter of any size with its standard uncertainty, of which two digits are told.
+/// A parameter of any size with its standard uncertainty, of which two digits are given.
 fn estimated(value: f64, std: f64) -> String {
     if !(std > 0.0 && std < 1e-5) {
         return with_std(value, Some(std));

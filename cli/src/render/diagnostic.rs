@@ -3,7 +3,7 @@
 use std::{borrow::Cow, fmt};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
-use runout_core::pipeline::error::Diagnostic;
+use runout_core::fault::Diagnostic;
 
 use textwrap::WordSplitter;
 
@@ -18,7 +18,7 @@ const EXCERPT: usize = 60;
 
 /// The report for stderr: in colour on a terminal, in ASCII elsewhere.
 #[must_use]
-pub fn report(diagnostic: &Diagnostic) -> String {
+pub(crate) fn report(diagnostic: &Diagnostic) -> String {
     if !can_be_drawn(diagnostic) {
         return plain(diagnostic);
     }

@@ -8,7 +8,7 @@ use crate::reports::inspect::{Report, TableReport};
 
 /// The text of a report.
 #[must_use]
-pub fn text(report: &Report) -> String {
+pub(crate) fn text(report: &Report) -> String {
     let mut page = Page::default();
     match report {
         Report::Hdf5(file) => hdf5(&mut page, file),

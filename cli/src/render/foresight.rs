@@ -12,7 +12,7 @@ use super::{
 };
 
 /// Effects that would show, and from which size on.
-pub fn visible(page: &mut Page, foresight: &Foresight) {
+pub(crate) fn visible(page: &mut Page, foresight: &Foresight) {
     let mut table = Table::new(3, ["effect", "at", "parameter", "visible from", "usual size"]);
     for alike in groups(&foresight.visible, |one| (&one.effect, &one.targets)) {
         let Some(first) = alike.first() else { continue };
@@ -34,8 +34,8 @@ pub fn visible(page: &mut Page, foresight: &Foresight) {
     }
 }
 
-/// Effects that would not show, or not be told apart.
-pub fn hidden(page: &mut Page, foresight: &Foresight) {
+/// Effects that are not visible, or cannot be distinguished.
+pub(crate) fn hidden(page: &mut Page, foresight: &Foresight) {
     // Face and z are of axial sensors: a table leaves out columns without entries.
     let columns = ["form", "motion", "face", "z"];
     let heads = ["effect", "at"].map(str::to_owned).into_iter();
@@ -55,17 +55,17 @@ pub fn hidden(page: &mut Page, foresight: &Foresight) {
         let [form, motion, face, z] = columns.map(moves);
         table.row([first.blind.effect.clone(), targets, form, motion, face, z]);
     }
-    page.headed_table("Effects that would not show, and what one unit does all the same", &table);
+    page.headed_table("Effects that are not visible, and what one unit does all the same", &table);
     let sets: Vec<String> = foresight.confounded.iter().map(|set| names(set)).collect();
-    page.bullets("Effects that cannot be told apart", &sets);
+    page.bullets("Effects that cannot be distinguished", &sets);
 }
 
 /// Where an effect acts without a target, beside others of it that have one: uneven speed in all setups, or in one.
-pub const WHOLE: &str = "the whole rig";
+pub(crate) const WHOLE: &str = "the whole rig";
 
 /// "sensor-gain S1, S2" from "sensor-gain S1" and "sensor-gain S2".
 #[must_use]
-pub fn names(names: &[String]) -> String {
+pub(crate) fn names(names: &[String]) -> String {
     let mut shown = String::new();
     let mut last = "";
     let has_targets = |effect: &str| names.iter().any(|name| name.split_once(' ').is_some_and(|(id, _)| id == effect));

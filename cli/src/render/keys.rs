@@ -6,7 +6,7 @@ use super::page::Page;
 
 /// Keys with type, default and description; those of inner tables by their path.
 #[must_use]
-pub fn text(schema: &Value) -> String {
+pub(crate) fn text(schema: &Value) -> String {
     let mut page = Page::default();
     add(&mut page, schema, "");
     let text = page.into_text();

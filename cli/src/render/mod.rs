@@ -1,18 +1,18 @@
 //! Terminal text.
 
-pub mod batch;
-pub mod check;
-pub mod compare;
-pub mod diagnosis;
-pub mod diagnostic;
-pub mod file;
-pub mod foresight;
-pub mod keys;
-pub mod page;
-pub mod plan;
-pub mod plan_points;
-pub mod summary;
-pub mod table;
+pub(crate) mod batch;
+pub(crate) mod check;
+pub(crate) mod compare;
+pub(crate) mod diagnosis;
+pub(crate) mod diagnostic;
+pub(crate) mod file;
+pub(crate) mod foresight;
+pub(crate) mod keys;
+pub(crate) mod page;
+pub(crate) mod plan;
+pub(crate) mod plan_points;
+pub(crate) mod summary;
+pub(crate) mod table;
 
 use std::{
     borrow::Cow,
@@ -20,7 +20,7 @@ use std::{
     io::{self, ErrorKind, IsTerminal, Write},
 };
 
-pub use runout_core::table::number;
+pub(crate) use runout_core::table::number;
 use serde::Serialize;
 
 /// Whether a character may change what a terminal shows of others: control characters, and marks that turn the direction of text.
@@ -31,7 +31,7 @@ fn is_harmful(character: char) -> bool {
 
 /// A text as a terminal may show it, whatever file it comes from: control characters as `\u{1b}`.
 #[must_use]
-pub fn printable(text: &str) -> Cow<'_, str> {
+pub(crate) fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(is_harmful) {
         return Cow::Borrowed(text);
     }
@@ -49,7 +49,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 ///
 /// # Errors
 /// When stdout cannot be written to.
-pub fn to_stdout(text: &str) -> io::Result<()> {
+pub(crate) fn to_stdout(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(printable(text).as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
@@ -58,7 +58,7 @@ pub fn to_stdout(text: &str) -> io::Result<()> {
 }
 
 /// Writes to stderr, as far as there is one.
-pub fn to_stderr(text: &str) {
+pub(crate) fn to_stderr(text: &str) {
     // Nowhere is left to say that stderr fails.
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
@@ -67,7 +67,7 @@ pub fn to_stderr(text: &str) {
 ///
 /// # Errors
 /// When stdout cannot be written to.
-pub fn document(value: &impl Serialize) -> io::Result<()> {
+pub(crate) fn document(value: &impl Serialize) -> io::Result<()> {
     let mut text = String::new();
     for character in serde_json::to_string_pretty(value)?.chars() {
         // Only texts have them; JSON knows no other spelling.
@@ -85,7 +85,7 @@ pub fn document(value: &impl Serialize) -> io::Result<()> {
 
 /// Whether stderr is a terminal whose user wants colours.
 #[must_use]
-pub fn fancy_stderr() -> bool {
+pub(crate) fn fancy_stderr() -> bool {
     let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty())
         || std::env::var_os("TERM").is_some_and(|value| value == "dumb");
     !refused && io::stderr().is_terminal()
@@ -93,6 +93,6 @@ pub fn fancy_stderr() -> bool {
 
 /// "1 turn", "2 turns".
 #[must_use]
-pub fn count(number: usize, thing: &str) -> String {
+pub(crate) fn count(number: usize, thing: &str) -> String {
     if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
 }

@@ -11,7 +11,7 @@ use super::table::Table;
 
 /// Lines, sections and tables in the order added.
 #[derive(Debug, Default)]
-pub struct Page {
+pub(crate) struct Page {
     blocks: Vec<Block>,
 }
 
@@ -25,22 +25,22 @@ enum Block {
 
 impl Page {
     /// Adds a line.
-    pub fn line(&mut self, line: impl Display) {
+    pub(crate) fn line(&mut self, line: impl Display) {
         self.blocks.push(Block::Line(line.to_string()));
     }
 
     /// Adds a heading behind an empty line.
-    pub fn heading(&mut self, heading: impl Display) {
+    pub(crate) fn heading(&mut self, heading: impl Display) {
         self.blocks.push(Block::Heading(heading.to_string()));
     }
 
     /// Adds a table's rows.
-    pub fn table(&mut self, table: &Table) {
+    pub(crate) fn table(&mut self, table: &Table) {
         self.blocks.push(Block::Table(table.clone()));
     }
 
     /// Adds a table under a heading; nothing where it has no rows.
-    pub fn headed_table(&mut self, heading: impl Display, table: &Table) {
+    pub(crate) fn headed_table(&mut self, heading: impl Display, table: &Table) {
         if !table.is_empty() {
             self.heading(heading);
             self.table(table);
@@ -49,7 +49,7 @@ impl Page {
 
     /// Adds lines under a heading, each behind a dash; nothing without lines. Equal lines become one that says how
     /// many they are.
-    pub fn bullets(&mut self, heading: impl Display, lines: &[String]) {
+    pub(crate) fn bullets(&mut self, heading: impl Display, lines: &[String]) {
         let mut seen: Vec<(&String, usize)> = Vec::new();
         for line in lines {
             match seen.iter_mut().find(|(known, _)| *known == line) {
@@ -69,7 +69,7 @@ impl Page {
 
     /// The text for a terminal.
     #[must_use]
-    pub fn into_text(self) -> String {
+    pub(crate) fn into_text(self) -> String {
         let mut text = String::new();
         for block in self.blocks {
             // A string takes whatever is written to it.
@@ -85,7 +85,7 @@ impl Page {
 
     /// The same for a report. The first line is its title, those before the first heading are its headline.
     #[must_use]
-    pub fn into_overview(self, rig: Option<Rig>) -> (String, Overview) {
+    pub(crate) fn into_overview(self, rig: Option<Rig>) -> (String, Overview) {
         let mut lead = Vec::new();
         let mut sections: Vec<Section> = Vec::new();
         for block in self.blocks {

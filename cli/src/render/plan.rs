@@ -13,7 +13,7 @@ const LINES: usize = 20;
 
 /// The text of a report.
 #[must_use]
-pub fn text(report: &Report) -> String {
+pub(crate) fn text(report: &Report) -> String {
     let mut page = page(report);
     if let Some(map) = &report.map {
         page.heading(format_args!("written: {}", map.display()));
@@ -23,7 +23,7 @@ pub fn text(report: &Report) -> String {
 
 /// A report as lines and tables.
 #[must_use]
-pub fn page(report: &Report) -> Page {
+pub(crate) fn page(report: &Report) -> Page {
     let mut page = Page::default();
     check::rig(&mut page, &report.rig);
     check::orders(&mut page, &report.separability);
@@ -82,7 +82,7 @@ fn suggestions(page: &mut Page, suggestions: &[Suggested]) {
     page.headed_table("What one addition does for form, best first", &table);
 }
 
-/// What would tell more of the effects.
+/// What would show more of the effects.
 fn additions(page: &mut Page, report: &Report) {
     let mut lines = Vec::new();
     for suggestion in &report.suggestions {
@@ -91,7 +91,7 @@ fn additions(page: &mut Page, report: &Report) {
             does.push(format!("shows {}", foresight::names(&suggestion.reveals)));
         }
         if !suggestion.tells_apart.is_empty() {
-            does.push(format!("tells apart {}", sets(&suggestion.tells_apart)));
+            does.push(format!("distinguishes {}", sets(&suggestion.tells_apart)));
         }
         if !does.is_empty() {
             lines.push(format!("{}: {}", suggestion.text, does.join("; ")));
@@ -102,7 +102,7 @@ fn additions(page: &mut Page, report: &Report) {
         lines.push(format!("no single addition that was tried shows {}", foresight::names(&left.blind_to)));
     }
     if !left.confounded.is_empty() {
-        lines.push(format!("no single addition that was tried tells apart {}", sets(&left.confounded)));
+        lines.push(format!("no single addition that was tried distinguishes {}", sets(&left.confounded)));
     }
     page.bullets("What one addition does for the effects", &lines);
 }

@@ -15,7 +15,7 @@ use crate::reports::plan::PointReport;
 
 /// A plan as lines and tables.
 #[must_use]
-pub fn page(report: &PointReport) -> Page {
+pub(crate) fn page(report: &PointReport) -> Page {
     let plan = &report.plan;
     let mut page = Page::default();
     page.line(&report.title);
@@ -36,9 +36,12 @@ pub fn page(report: &PointReport) -> Page {
     let foresight = shortened(&plan.foresight);
     foresight::visible(&mut page, &foresight);
     let blind: Vec<String> = foresight.blind_names().collect();
-    page.bullets("Effects that would not show", &if blind.is_empty() { blind } else { vec![foresight::names(&blind)] });
+    page.bullets(
+        "Effects that are not visible",
+        &if blind.is_empty() { blind } else { vec![foresight::names(&blind)] },
+    );
     let sets: Vec<String> = foresight.confounded.iter().map(|set| foresight::names(set)).collect();
-    page.bullets("Effects that cannot be told apart", &sets);
+    page.bullets("Effects that cannot be distinguished", &sets);
     page.bullets("Notes", &plan.notes);
     page
 }
@@ -110,7 +113,7 @@ fn suggestions(page: &mut Page, plan: &PointPlan) {
         }
         let sets: Vec<String> = addition.tells_apart.iter().map(|set| foresight::names(set)).collect();
         if !sets.is_empty() {
-            does.push(format!("tells apart {}", sets.join("; ")));
+            does.push(format!("distinguishes {}", sets.join("; ")));
         }
         lines.push(does.join("; "));
     }

@@ -6,8 +6,8 @@ mod reading;
 mod values;
 
 use runout_core::{
-    evaluate::Value,
-    pipeline::run::{CaptureSummary, SectionSummary, StationSummary, Summary},
+    standards::Value,
+    summary::{CaptureSummary, SectionSummary, StationSummary, Summary},
 };
 
 use super::{
@@ -25,7 +25,7 @@ const FEW_TURNS: usize = 12;
 
 /// The text of a summary.
 #[must_use]
-pub fn text(summary: &Summary) -> String {
+pub(crate) fn text(summary: &Summary) -> String {
     let stations = &summary.stations;
     let mut page = Page::default();
     page.line(&summary.title);

@@ -19,7 +19,7 @@ fn cut(cell: &str) -> String {
 
 /// Rows under a header; columns as wide as they need.
 #[derive(Debug, Clone)]
-pub struct Table {
+pub(crate) struct Table {
     /// Columns of words, at the left; the rest are numbers and stand right-aligned.
     words: usize,
     rows: Vec<Vec<String>>,
@@ -28,25 +28,25 @@ pub struct Table {
 impl Table {
     /// The first `words` columns stand left-aligned.
     #[must_use]
-    pub fn new<S: Into<String>>(words: usize, header: impl IntoIterator<Item = S>) -> Self {
+    pub(crate) fn new<S: Into<String>>(words: usize, header: impl IntoIterator<Item = S>) -> Self {
         Self { words, rows: vec![header.into_iter().map(Into::into).collect()] }
     }
 
     /// Adds a row.
-    pub fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
+    pub(crate) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         self.rows.push(cells.into_iter().map(|cell| cut(&cell.into())).collect());
     }
 
     /// Whether it has no rows yet.
     #[must_use]
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.rows.len() < 2
     }
 
     /// The text, two blanks indented and two between columns; nothing without rows. Columns that are empty in every
     /// row are left out.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         if self.is_empty() {
             return String::new();
         }
@@ -76,7 +76,7 @@ impl Table {
 
     /// The same for a report.
     #[must_use]
-    pub fn into_part(self) -> Part {
+    pub(crate) fn into_part(self) -> Part {
         let columns = self.used();
         let words = columns.iter().filter(|column| **column < self.words).count();
         let mut rows =

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 /// What can be said without the data.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Report {
+pub(crate) struct Report {
     /// The pipeline's title.
     pub title: String,
     /// The plugins in the order in which data meet them.
@@ -42,14 +42,14 @@ pub struct Report {
 
 /// What can be said of measured points.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct OfPoints {
+pub(crate) struct OfPoints {
     /// Orders that cannot be separated, by what they are of.
     pub lost_orders: diagnosis::LostOrders,
 }
 
 /// A column of measured points.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct TakenColumn {
+pub(crate) struct TakenColumn {
     /// Its name.
     pub name: &'static str,
     /// Its unit; empty for what has none.
@@ -62,7 +62,7 @@ pub struct TakenColumn {
 
 /// A plugin in its place.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Stage {
+pub(crate) struct Stage {
     /// The table's key: "load", "preprocess", "separate", "export", "check".
     pub stage: &'static str,
     /// The plugin's name.
@@ -71,7 +71,7 @@ pub struct Stage {
 
 /// A rig in numbers.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct RigSize {
+pub(crate) struct RigSize {
     /// Displacement sensors.
     pub sensors: usize,
     /// Circles of the part that they look at.
@@ -86,7 +86,7 @@ pub struct RigSize {
 
 /// What a rig can and cannot separate.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Separability {
+pub(crate) struct Separability {
     /// What is solved for, per order.
     pub unknowns: Vec<Unknown>,
     /// Orders that cannot be separated.
@@ -97,7 +97,7 @@ pub struct Separability {
 
 /// Something that is solved for.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Unknown {
+pub(crate) struct Unknown {
     /// "form", "x", "y", "tilt_x", "tilt_y", "along", "tilt_along".
     pub quantity: &'static str,
     /// The section whose form it is; absent for motion.
@@ -112,25 +112,25 @@ pub struct Unknown {
 /// One order.
 #[derive(Debug, Serialize, JsonSchema)]
 #[allow(clippy::struct_field_names, reason = "the number of an order is what the standards call its order")]
-pub struct Order {
+pub(crate) struct Order {
     /// Undulations per revolution.
     pub order: usize,
     /// Rank of the layout's matrix.
     pub rank: usize,
     /// Readings (complex) that are left over for a residual.
     pub residual_dof: usize,
-    /// Whether each of `unknowns` can be told.
+    /// Whether each of `unknowns` is observable.
     pub observable: Vec<bool>,
-    /// Standard deviation of each of `unknowns`, in its unit, for 1 µm in every reading; null where it cannot be told.
+    /// Standard deviation of each of `unknowns`, in its unit, for 1 µm in every reading; null where it is not observable.
     pub noise_gain: Vec<Option<f64>>,
-    /// Why something cannot be told.
+    /// Why something is not observable.
     pub lost_because: Option<String>,
 }
 
 impl Unknown {
     /// "form a", "tilt_x".
     #[must_use]
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         match (&self.section, self.along_deg) {
             (Some(section), _) => format!("{} {section}", self.quantity),
             (None, Some(along_deg)) => format!("{} {along_deg}°", self.quantity),
@@ -160,7 +160,7 @@ impl From<&Rig> for RigSize {
 
 impl Separability {
     /// Of a rig whose layout was assessed.
-    pub fn new(assessment: &Assessment, rig: Option<&Rig>) -> Self {
+    pub(crate) fn new(assessment: &Assessment, rig: Option<&Rig>) -> Self {
         let unknown = |quantity: &Quantity| Unknown {
             quantity: quantity.id(),
             section: quantity.section().and_then(|section| rig?.sections.get(section).cloned()),

@@ -9,7 +9,7 @@ use serde::Serialize;
 /// What a file holds.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-pub enum Report {
+pub(crate) enum Report {
     /// A measurement, a result, or another HDF5 file.
     Hdf5(FileReport),
     /// A table.
@@ -20,7 +20,7 @@ pub enum Report {
 
 /// A Parquet table in short.
 #[derive(Debug, Serialize)]
-pub struct TableReport {
+pub(crate) struct TableReport {
     /// "parquet".
     pub format: &'static str,
     /// Number of rows.
@@ -35,7 +35,7 @@ pub struct TableReport {
 
 /// A column of a Parquet table.
 #[derive(Debug, Serialize)]
-pub struct ColumnReport {
+pub(crate) struct ColumnReport {
     /// Its name.
     pub name: String,
     /// As Parquet stores it.

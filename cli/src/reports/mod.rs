@@ -1,5 +1,5 @@
 //! What commands say, before it is drawn as text or written as JSON.
 
-pub mod check;
-pub mod inspect;
-pub mod plan;
+pub(crate) mod check;
+pub(crate) mod inspect;
+pub(crate) mod plan;

@@ -12,7 +12,7 @@ use crate::args::{Criterion, PlanArgs};
 
 /// What a rig can separate and how well, what to add to it, and better angles for its sensors.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Report {
+pub(crate) struct Report {
     /// The rig in numbers.
     pub rig: RigSize,
     /// Unknowns, lost orders, and each order with its rank and the noise gain of every unknown.
@@ -41,14 +41,14 @@ pub struct Report {
 
 /// Noise gain by order.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct NoiseGain {
+pub(crate) struct NoiseGain {
     /// Of form, each order's worst over the sections.
     pub form: Vec<Gain>,
 }
 
 /// Noise gain at an order.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Gain {
+pub(crate) struct Gain {
     /// Undulations per revolution.
     pub order: usize,
     /// Standard deviation for 1 in every reading; null where it is lost.
@@ -57,7 +57,7 @@ pub struct Gain {
 
 /// What is left over at an order.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct ResidualDof {
+pub(crate) struct ResidualDof {
     /// Undulations per revolution.
     pub order: usize,
     /// Readings (complex) less the rank.
@@ -66,7 +66,7 @@ pub struct ResidualDof {
 
 /// Noise gain of form over all the orders.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Score {
+pub(crate) struct Score {
     /// Orders at which some section's form is lost, or its noise gain is above a million.
     pub lost_form_orders: usize,
     /// Worst noise gain over the other orders; null where there are none.
@@ -79,7 +79,7 @@ pub struct Score {
 
 /// What no single addition changes.
 #[derive(Debug, Default, Serialize, JsonSchema)]
-pub struct Unresolved {
+pub(crate) struct Unresolved {
     /// Blind effects, "effect target".
     pub blind_to: Vec<String>,
     /// Confounded sets.
@@ -88,7 +88,7 @@ pub struct Unresolved {
 
 /// Something to add to the rig.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Suggested {
+pub(crate) struct Suggested {
     /// "setup" or "sensor".
     pub add: &'static str,
     /// In words.
@@ -99,7 +99,7 @@ pub struct Suggested {
     /// Of a setup: by how much the sensors are moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensors_deg: Option<f64>,
-    /// Of a sensor: the section that it looks at.
+    /// Of a sensor: the section that it measures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub section: Option<String>,
     /// Of a sensor: where it stands.
@@ -107,7 +107,7 @@ pub struct Suggested {
     pub angle_deg: Option<f64>,
     /// Blind effects, "effect target", that would show with this.
     pub reveals: Vec<String>,
-    /// Confounded sets that would be told apart.
+    /// Confounded sets that would be distinguished.
     pub tells_apart: Vec<Vec<String>>,
     /// The rig as it is.
     pub before: Score,
@@ -117,7 +117,7 @@ pub struct Suggested {
 
 /// Better angles.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Optimised {
+pub(crate) struct Optimised {
     /// "worst" or "rms".
     pub criterion: &'static str,
     /// Smallest angle between two sensors of one section.
@@ -139,7 +139,7 @@ pub struct Optimised {
 
 /// Angles of the sensors and what they give.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Arrangement {
+pub(crate) struct Arrangement {
     /// By sensor.
     pub angles_deg: Vec<f64>,
     /// With every sensor where it should stand.
@@ -148,9 +148,9 @@ pub struct Arrangement {
     pub within_tolerance: Score,
 }
 
-/// What a layout of measured points tells and how well, and what to add to it.
+/// What is observable with a layout of measured points and how well, and what to add to it.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct PointReport {
+pub(crate) struct PointReport {
     /// The pipeline's title.
     pub title: String,
     /// Its separator.
@@ -161,7 +161,7 @@ pub struct PointReport {
 }
 
 /// An addition in words.
-pub fn words(addition: &Addition, rig: &Rig) -> String {
+pub(crate) fn words(addition: &Addition, rig: &Rig) -> String {
     match addition {
         Addition::Setup { part_deg, sensors_turned: false } => format!("a setup, part at {part_deg}°, sensors fixed"),
         Addition::Setup { part_deg, sensors_turned: true } => {
@@ -175,7 +175,7 @@ pub fn words(addition: &Addition, rig: &Rig) -> String {
 }
 
 /// Noise gain of form by order, the worst over the sections.
-pub fn form_gains(separability: &Separability) -> Vec<Gain> {
+pub(crate) fn form_gains(separability: &Separability) -> Vec<Gain> {
     let gain = |order: &Order| {
         let forms =
             separability.unknowns.iter().zip(&order.noise_gain).filter(|(unknown, _)| unknown.quantity == "form");
@@ -187,7 +187,7 @@ pub fn form_gains(separability: &Separability) -> Vec<Gain> {
 
 impl Report {
     /// Without suggestions yet.
-    pub fn new(rig: &Rig, separability: Separability, foresight: Foresight) -> Self {
+    pub(crate) fn new(rig: &Rig, separability: Separability, foresight: Foresight) -> Self {
         let dof = |order: &Order| ResidualDof { order: order.order, dof: order.residual_dof };
         Self {
             rig: RigSize::from(rig),
@@ -205,7 +205,7 @@ impl Report {
 }
 
 impl Suggested {
-    pub fn new(found: &Suggestion, change: Option<&Change>, rig: &Rig, before: plan::Score) -> Self {
+    pub(crate) fn new(found: &Suggestion, change: Option<&Change>, rig: &Rig, before: plan::Score) -> Self {
         let setup = found.rig.setups.last().filter(|_| matches!(found.addition, Addition::Setup { .. }));
         let (add, part_deg, section, angle_deg) = match found.addition {
             Addition::Setup { part_deg, .. } => ("setup", Some(part_deg), None, None),
@@ -229,7 +229,7 @@ impl Suggested {
 }
 
 impl Optimised {
-    pub fn new(optimum: &Optimum, rig: &Rig, args: &PlanArgs) -> Self {
+    pub(crate) fn new(optimum: &Optimum, rig: &Rig, args: &PlanArgs) -> Self {
         Self {
             criterion: match args.criterion {
                 Criterion::Worst => "worst",
@@ -270,6 +270,6 @@ impl From<plan::Score> for Score {
 }
 
 /// Degrees as they stood in the file, before they became radians.
-pub fn degrees(angle_rad: f64) -> f64 {
+pub(crate) fn degrees(angle_rad: f64) -> f64 {
     (angle_rad.to_degrees() * 1e9).round() / 1e9
 }

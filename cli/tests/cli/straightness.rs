@@ -73,7 +73,7 @@ fn from_traces_to_tables() {
     assert!(result.contains("straightness") && !result.contains("harmonics"), "{result}");
 
     let shown = folder.run(&["run", "pipeline.toml"]);
-    for word in ["STRt", "part", "slide", "neither taper", "nothing tells the uncertainty"] {
+    for word in ["STRt", "part", "slide", "neither taper", "the uncertainty is not known"] {
         assert!(shown.stdout.contains(word), "no {word} in\n{}", shown.stdout);
     }
     assert!(!shown.stdout.contains("station") && !shown.stdout.contains("Residual"), "{}", shown.stdout);

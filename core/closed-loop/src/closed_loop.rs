@@ -1,4 +1,4 @@
-//! Find, trace, add, report: until noise is left, or nothing earns its place.
+//! Find, trace, add, report: until only noise is left, or the evidence supports no further effect.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use super::{
 use runout_error::Result;
 use runout_numerics::least_squares::{dot, orthonormal};
 
-/// Candidates whose joint refits differ by less than this, in BIC, cannot be told apart.
+/// Candidates whose joint refits differ by less than this, in BIC, cannot be distinguished.
 const SAME_BIC: f64 = 10.0;
 /// Refits whose BIC differs by less than this share are equal up to rounding.
 pub(super) const SAME: f64 = 1e-9;
@@ -176,7 +176,7 @@ impl<M: Model> Tracing<'_, M> {
         refit(model, settings, self.settings.known.len())
     }
 
-    /// The effect of the lowest rank that earns its place, if any does.
+    /// The effect of the lowest rank that the evidence supports, if any.
     pub(super) fn next(&mut self, current: &Refit<M::Fit>) -> Option<Found> {
         let candidates: Vec<usize> = self.considered().into_iter().filter(|effect| !self.active(*effect)).collect();
         let mut ranks: Vec<usize> = candidates.iter().map(|effect| self.model.rank(*effect)).collect();
@@ -192,7 +192,7 @@ impl<M: Model> Tracing<'_, M> {
         None
     }
 
-    /// The effect that the data ask for most, if it earns its place among `count` that were looked at.
+    /// The effect with the strongest evidence, if it is sufficient among `count` candidates.
     fn best(&mut self, current: &Refit<M::Fit>, candidates: &[usize], count: usize) -> Option<Found> {
         let before = current.fit.remainder().clone();
         let fixed = self.settings.known.len();

@@ -118,9 +118,9 @@ pub struct Added {
     pub effect: String,
     /// Where it acts; of a confounded set, one representative.
     pub targets: Vec<String>,
-    /// What these data cannot tell it from: "effect target".
+    /// What these data do not distinguish it from: "effect target".
     pub confounded_with: Vec<String>,
-    /// What would tell them apart.
+    /// What would distinguish them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub told_apart_by: Option<String>,
     /// Its parameters. Of a confounded set: as if this member were all of it, without standard uncertainty.
@@ -164,7 +164,7 @@ pub struct Correction {
     pub effect: String,
     /// Where it acts; of a confounded set, one representative.
     pub targets: Vec<String>,
-    /// What these data cannot tell it from: "effect target".
+    /// What these data do not distinguish it from: "effect target".
     pub confounded_with: Vec<String>,
     /// Its parameters.
     pub parameters: Vec<Estimated>,

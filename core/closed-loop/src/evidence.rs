@@ -17,7 +17,7 @@ impl Evidence {
     /// From χ² without and with `parameters` more, `dof` degrees of freedom left with them.
     ///
     /// χ² counts in units of what remains unexplained, χ²/dof with the larger model, and at least of the noise where that
-    /// is known (1): an effect earns its place against what it does not explain.
+    /// is known (1): the evidence for an effect counts against what it does not explain.
     #[must_use]
     pub fn new(
         before: f64,

@@ -20,7 +20,7 @@ pub struct Foresight {
     /// Effects of which the usual size would show.
     pub visible: Vec<Visible>,
     /// Effects of which it would not.
-    pub blind_to: Vec<Unseen>,
+    pub blind_to: Vec<NotVisible>,
     /// Sets of visible effects, "effect target", that look the same: of their usual size, what one leaves of another is
     /// below what would show.
     pub confounded: Vec<Vec<String>>,
@@ -52,7 +52,7 @@ pub struct VisibleFrom {
 
 /// An effect that would not show.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Unseen {
+pub struct NotVisible {
     /// The effect, and the most that one unit of it does.
     #[serde(flatten)]
     pub blind: Blind,
@@ -89,7 +89,7 @@ pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
     let effects = model.effects();
     let fit = Kept::new(model.fit(&[])?, effects.len());
     let all: Vec<usize> = (0..effects.len()).filter(|effect| !model.is_mistake(*effect)).collect();
-    let mut blind_to: Vec<Unseen> = Vec::new();
+    let mut blind_to: Vec<NotVisible> = Vec::new();
     for blind in blind(effects, &all, &fit) {
         let same = |effect: &Effect| effect.id == blind.effect && effect.targets == blind.targets;
         let bias = all.iter().filter(|index| same(&effects[**index])).flat_map(|index| fit.bias(*index));
@@ -100,7 +100,7 @@ pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
                 None => worst.push(BiasPerUnit { value: bias.value, unit: bias.unit, on: bias.on }),
             }
         }
-        blind_to.push(Unseen { blind, bias: worst });
+        blind_to.push(NotVisible { blind, bias: worst });
     }
     let mut foresight = Foresight { blind_to, ..Foresight::default() };
     let unseen: Vec<String> = foresight.blind_names().collect();

@@ -2,7 +2,7 @@
 
 use super::{Remainder, evidence::Evidence};
 
-/// An effect that was believed, with everything that it cannot be told from.
+/// An effect that was added, with everything that it cannot be distinguished from.
 #[derive(Clone)]
 pub(super) struct Found {
     /// The best one first.

@@ -66,7 +66,7 @@ pub trait Model {
     /// When the data do not fit the model, or a parameter is beyond all bounds.
     fn fit(&self, applied: &[Setting]) -> Result<Self::Fit>;
 
-    /// When an effect's turn comes: those of a higher rank are asked only where none of a lower one earns its place. A part's
+    /// When an effect's turn comes: those of a higher rank are tried only where the evidence supports none of a lower one. A part's
     /// place comes before its size, and its size before its form, which counts from them.
     fn rank(&self, _effect: usize) -> usize {
         0
@@ -177,7 +177,7 @@ pub trait Fit {
     }
 
     /// What measurement would tell effects of a confounded set apart.
-    fn told_apart_by(&self, _effects: &[usize]) -> Option<String> {
+    fn distinguished_by(&self, _effects: &[usize]) -> Option<String> {
         None
     }
 }
@@ -226,7 +226,7 @@ pub struct Remainder {
     pub dof: usize,
     /// Root mean square of what is left, in the data's unit.
     pub rms: f64,
-    /// What the noise lets expect of it, in the data's unit; NaN where the noise is not known from elsewhere: then
+    /// Its value expected from noise, in the data's unit; NaN where the noise is not known from elsewhere: then
     /// `residual` is in the data's unit.
     pub noise_floor: f64,
     /// Root mean square of what the fit leaves of data that it has not seen, in the data's unit.

@@ -50,7 +50,7 @@ pub struct Term {
 
 /// Points that are never fitted, only predicted at the end.
 #[derive(Debug, Clone)]
-pub struct Unseen {
+pub struct HeldOut {
     /// What they are.
     pub name: String,
     /// One value a point.
@@ -78,7 +78,7 @@ struct Data {
     members: Vec<Vec<usize>>,
     /// Where each observation was before they were put in the order of the groups.
     places: Vec<usize>,
-    unseen: Vec<Unseen>,
+    unseen: Vec<HeldOut>,
     /// Effects that are declared with their values: never refitted.
     known: Vec<usize>,
     /// The last effect of each list, by id, and what ends the list.
@@ -88,7 +88,7 @@ struct Data {
     /// Points by which held-out predictions are judged; all without it.
     judged: Option<Range<usize>>,
     /// What measurement separates effects of a confounded set.
-    told_apart_by: Option<String>,
+    distinguished_by: Option<String>,
 }
 
 impl LinearTerms {
@@ -121,7 +121,7 @@ impl LinearTerms {
         }
         let effects = terms.iter().map(|term| term.effect.clone()).collect();
         let (unseen, known, ends) = (Vec::new(), Vec::new(), Vec::new());
-        let (chosen, judged, told_apart_by) = (None, None, None);
+        let (chosen, judged, distinguished_by) = (None, None, None);
         Ok(Self(Arc::new(Data {
             observations,
             declared,
@@ -135,7 +135,7 @@ impl LinearTerms {
             ends,
             chosen,
             judged,
-            told_apart_by,
+            distinguished_by,
         })))
     }
 
@@ -153,7 +153,7 @@ impl LinearTerms {
 
     /// Adds points that are only predicted; each set gives a value "rms of …".
     #[must_use]
-    pub fn predicting(mut self, unseen: Vec<Unseen>) -> Self {
+    pub fn predicting(mut self, unseen: Vec<HeldOut>) -> Self {
         Arc::make_mut(&mut self.0).unseen = unseen;
         self
     }
@@ -174,8 +174,8 @@ impl LinearTerms {
 
     /// Says what measurement separates effects that these points do not.
     #[must_use]
-    pub fn told_apart_by(mut self, measurement: &str) -> Self {
-        Arc::make_mut(&mut self.0).told_apart_by = Some(measurement.to_owned());
+    pub fn distinguished_by(mut self, measurement: &str) -> Self {
+        Arc::make_mut(&mut self.0).distinguished_by = Some(measurement.to_owned());
         self
     }
 

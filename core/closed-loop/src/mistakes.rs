@@ -19,7 +19,7 @@ const LEFT: f64 = 0.1;
 const LEFT_OF_UNKNOWN: f64 = 0.01;
 /// χ² per degree of freedom near the noise: what is left may be a small effect.
 const NEAR_NOISE: f64 = 4.0;
-/// Corrections whose χ² differ by less than this, in units of what is left, cannot be told apart.
+/// Corrections whose χ² differ by less than this, in units of what is left, cannot be distinguished.
 const SAME_CHI2: f64 = 10.0;
 
 impl<M: Model> Tracing<'_, M> {

@@ -87,7 +87,7 @@ impl fmt::Display for ErrorKind {
 /// Work that failed: its kind, what was tried, on what, what the problem was, and what the user can do.
 ///
 /// Configuration mistakes are [`Fault`]s, which point into the TOML; this error is for
-/// everything that only the data or the file system can tell.
+/// everything that depends on the data or the file system.
 ///
 /// The text holds the text of the source too, so that one line says all; [`source`](StdError::source) gives the source
 /// itself.

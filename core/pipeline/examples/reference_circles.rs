@@ -7,7 +7,10 @@
 
 use std::{error::Error, hint::black_box, time::Instant};
 
-use runout_core::evaluate::roundness::{Angles, Points, Reference};
+use runout_core::standards::{
+    reference::Reference,
+    roundness::{Angles, Points},
+};
 
 const ROUNDS: usize = 301;
 

@@ -7,10 +7,9 @@
 
 use std::{error::Error, time::Instant};
 
-use runout_core::evaluate::{
-    areal::{self, HeightMap},
-    parameter::Parameter,
-    texture,
+use runout_core::{
+    numerics::height_map::HeightMap,
+    standards::{areal, parameter::Parameter, texture},
 };
 use serde_json::{Map, Value, json};
 

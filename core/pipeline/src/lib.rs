@@ -27,21 +27,11 @@ pub mod stage;
 pub mod summary;
 
 pub use runout_closed_loop as model;
-pub use runout_error::{Error, ErrorKind, Result};
+pub use runout_error::{Error, ErrorKind, Result, fault};
 pub use runout_numerics::{self as numerics, Complex64};
+pub use runout_standards as standards;
 pub use runout_table as table;
 pub use runout_turning::{
-    azimuth, checksum, creep, encoder, input_file, inspection, level_step, mains, marker, measurement, near_tone,
-    neighbours, profile, provenance, rig, separation, spread, surface,
+    azimuth, checksum, creep, encoder, error_motion, input_file, inspection, level_step, mains, marker, measurement,
+    near_tone, neighbours, profile, provenance, reading, rig, separation, spread, station, surface,
 };
-
-/// The standards' values, and those of recorded turns.
-pub mod evaluate {
-    pub use runout_standards::*;
-    pub use runout_turning::{error_motion, reading};
-}
-
-/// Errors of data and files.
-pub mod error {
-    pub use runout_error::{Error, ErrorKind, Result};
-}

@@ -80,9 +80,9 @@ impl Summary {
 /// Orders that cannot be separated.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LostOrders {
-    /// At which a section's form cannot be told.
+    /// At which a section's form is not observable.
     pub form: Vec<usize>,
-    /// At which a motion cannot be told.
+    /// At which a motion is not observable.
     pub motion: Vec<usize>,
     /// Of other quantities of a domain, by their names.
     #[serde(flatten)]
@@ -129,7 +129,7 @@ pub struct StationSummary {
     pub motion_values: Vec<Value>,
     /// Root mean square that the fit leaves of the readings, in µm; absent where nothing is redundant.
     pub residual_rms_um: Option<f64>,
-    /// What the covariance of the averages lets expect of it, in µm.
+    /// Its value expected from the covariance of the averages, in µm.
     pub expected_residual_rms_um: Option<f64>,
     /// Weighted residual per degree of freedom.
     pub chi2_per_dof: Option<f64>,
@@ -207,7 +207,7 @@ pub struct SectionSummary {
     pub form_std_um: Option<f64>,
     /// The standards' values.
     pub values: Vec<Value>,
-    /// True error of the form (root mean square over orders from 2 that could be told), where the truth is known.
+    /// True error of the form (root mean square over observable orders from 2), where the truth is known.
     pub truth_form_rms_error_um: Option<f64>,
 }
 
@@ -216,7 +216,7 @@ fn nan_for_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Er
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
-/// True errors of the motion: root mean square over orders from 2 that could be told.
+/// True errors of the motion: root mean square over observable orders from 2.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MotionTruth {
     /// Of x, in µm.

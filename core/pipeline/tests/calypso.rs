@@ -14,7 +14,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use runout_core::evaluate::{cylindricity, reference::Reference, roundness};
+use runout_core::standards::{cylindricity, reference::Reference, roundness};
 
 /// Name, what Calypso stores as `actual` in µm and its last digit, and the nominal radius in mm (any large one for circles:
 /// their plots have none).

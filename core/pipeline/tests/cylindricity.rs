@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use runout_core::evaluate::{
-    cylindricity::{Cylinder, Generatrices, MedianLine, Points, Reference, Section},
+use runout_core::standards::{
+    cylindricity::{Cylinder, Generatrices, MedianLine, Points, Section},
+    reference::Reference,
     roundness::{self, Angles},
 };
 

@@ -1,6 +1,6 @@
 //! Least-squares circles and cylinders against 60 digits computed elsewhere: `golden/least_squares.py`.
 
-use runout_core::evaluate::{cylindricity, roundness};
+use runout_core::standards::{cylindricity, roundness};
 
 struct Case {
     points: Vec<[f64; 3]>,

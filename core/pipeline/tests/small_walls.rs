@@ -4,7 +4,10 @@ use std::f64::consts::TAU;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use runout_core::evaluate::cylindricity::{Points, Reference, Undetermined};
+use runout_core::standards::{
+    cylindricity::Points,
+    reference::{Reference, Undetermined},
+};
 
 struct Wall {
     radius_mm: f64,
@@ -80,7 +83,7 @@ fn no_search_finds_a_better_cylinder() {
     for seed in 0..120 {
         let wall = Wall::random(seed);
         let points = Points::new(wall.radius_mm, wall.points.iter().copied());
-        let line = |cylinder: &runout_core::evaluate::cylindricity::Cylinder| {
+        let line = |cylinder: &runout_core::standards::cylindricity::Cylinder| {
             let [a, b] = [1e-6 * cylinder.slope_x_urad, 1e-6 * cylinder.slope_y_urad];
             [cylinder.x_um - 1e3 * cylinder.z_mm * a, cylinder.y_um - 1e3 * cylinder.z_mm * b, a, b]
         };

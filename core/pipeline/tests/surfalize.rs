@@ -4,9 +4,12 @@
 
 use std::collections::BTreeMap;
 
-use runout_core::evaluate::{
-    areal::{HeightMap, MaterialRatio, Settings, areal},
-    texture,
+use runout_core::{
+    numerics::height_map::HeightMap,
+    standards::{
+        areal::{MaterialRatio, Settings, areal},
+        texture,
+    },
 };
 use serde::Deserialize;
 

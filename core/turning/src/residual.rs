@@ -7,7 +7,7 @@ use runout_numerics::Complex64;
 pub struct Residual {
     /// Root mean square over all readings and angles, in µm; NaN where nothing is redundant.
     pub rms_um: f64,
-    /// What the covariance of the averages lets expect of it, in µm; NaN without a covariance.
+    /// Its value expected from the covariance of the averages, in µm; NaN without a covariance.
     pub expected_rms_um: f64,
     /// Weighted sum of squares per degree of freedom; NaN where not known.
     pub chi2_per_dof: f64,

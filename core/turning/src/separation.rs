@@ -1,4 +1,4 @@
-//! Form and motion, one harmonic at a time: estimates, covariance, and what the layout cannot tell.
+//! Form and motion, one harmonic at a time: estimates, covariance, and what is not observable with the layout.
 
 mod quantity;
 
@@ -13,7 +13,7 @@ use runout_standards::{
 
 /// What the numbers of form, motion and harmonics are, for files that explain themselves.
 pub const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \
-    Re sum c exp(-i n Phi) over the spindle's angle Phi. Lost orders cannot be told by the layout: NaN in the \
+    Re sum c exp(-i n Phi) over the spindle's angle Phi. Lost orders are not observable with the layout: NaN in the \
     harmonics, left out of form and motion.";
 
 /// What is said where no order of form is observable.
@@ -23,7 +23,7 @@ pub const NOTHING_SEPARATED: &str = "nothing is separated: this layout has no ob
 /// Displacement in µm at a lever of 1 mm per 1 µrad.
 pub const UM_PER_MM_URAD: f64 = 1e-3;
 
-/// What a separator can and cannot tell with a rig, before any data.
+/// What is and is not observable by a separator with a rig, before any data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
     /// What it solves for.
@@ -45,22 +45,22 @@ pub struct OrderAssessment {
     pub rank: usize,
     /// Readings (complex) that are left over for a residual.
     pub residual_dof: usize,
-    /// Whether each unknown can be told.
+    /// Whether each unknown is observable.
     pub observable: Vec<bool>,
-    /// Standard deviation of each unknown per unit standard deviation of every reading; NaN where it cannot be told.
+    /// Standard deviation of each unknown per unit standard deviation of every reading; NaN where it is not observable.
     pub noise_gain: Vec<f64>,
-    /// Why something cannot be told.
+    /// Why something is not observable.
     pub lost_because: Option<String>,
 }
 
 impl Assessment {
-    /// Orders at which a form cannot be told.
+    /// Orders at which a form is not observable.
     #[must_use]
     pub fn lost_form_orders(&self) -> Vec<usize> {
         self.lost(Quantity::is_form)
     }
 
-    /// Orders at which a motion cannot be told.
+    /// Orders at which a motion is not observable.
     #[must_use]
     pub fn lost_motion_orders(&self) -> Vec<usize> {
         self.lost(|quantity| !quantity.is_form())
@@ -74,7 +74,7 @@ impl Assessment {
         some && !orders.any(|entry| entry.observable.contains(&true))
     }
 
-    /// Orders at which one unknown cannot be told.
+    /// Orders at which one unknown is not observable.
     #[must_use]
     pub fn lost_orders(&self, unknown: usize) -> Vec<usize> {
         let lost = self.orders.iter().filter(|entry| entry.observable.get(unknown) == Some(&false));
@@ -98,15 +98,15 @@ pub struct Separation {
     pub sections: Vec<SectionAt>,
     /// What was solved for; forms first, in the order of `sections`.
     pub unknowns: Vec<Quantity>,
-    /// Estimates `[order][unknown]` from order 0; NaN where the layout cannot tell.
+    /// Estimates `[order][unknown]` from order 0; NaN where not observable.
     pub estimate: Vec<Complex64>,
     /// Variance E|δ|² of each estimate `[order][unknown]`; NaN where not known.
     pub variance: Vec<f64>,
-    /// Covariance E[δ δᴴ] of the motions among `unknowns`, `[order][motion][motion]` from order 0; what cannot be told means
+    /// Covariance E[δ δᴴ] of the motions among `unknowns`, `[order][motion][motion]` from order 0; what is not observable means
     /// nothing. `None` where it is not known.
     pub motion_covariance: Option<Vec<Complex64>>,
     /// Covariance E[δ δᴴ] of the forms among `unknowns`, `[order][form][form]` from order 0: sections of a station
-    /// share the errors of its motion. What cannot be told means nothing. `None` where it is not known.
+    /// share the errors of its motion. What is not observable means nothing. `None` where it is not known.
     pub form_covariance: Option<Vec<Complex64>>,
     /// Real degrees of freedom behind `variance` at an order that was looked at by itself; 0 where it is taken as exact.
     /// [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
@@ -114,7 +114,7 @@ pub struct Separation {
     /// Other estimates `[order][unknown]` that agree with the readings as well, less `estimate`: one of them is true, and
     /// the data do not decide which. `variance` and `motion_covariance` include them; none where the data decide.
     pub equivalents: Vec<Vec<Complex64>>,
-    /// Whether the layout can tell it, `[order][unknown]`.
+    /// Whether it is observable with the layout, `[order][unknown]`.
     pub observable: Vec<bool>,
     /// Where x and y are the axis's displacement, in mm along the spindle: 0 where tilt is told, the sensors' plane
     /// where it is not.
@@ -135,7 +135,7 @@ pub struct Separation {
 pub struct Sensitivity {
     /// Readings an order: the channels of all profiles of the station, in their order.
     pub readings: usize,
-    /// `[order][unknown][reading]` from order 0; 0 where the layout cannot tell. Forms of a clockwise part are meant
+    /// `[order][unknown][reading]` from order 0; 0 where not observable. Forms of a clockwise part are meant
     /// before they are conjugated.
     pub operator: Vec<Complex64>,
 }
@@ -283,7 +283,7 @@ impl Separation {
         each.map(|(index, variance)| (variance - open(index)).max(0.0)).collect()
     }
 
-    /// Coefficients of one unknown by order from 0, in each of the equivalents; 0 where the layout cannot tell.
+    /// Coefficients of one unknown by order from 0, in each of the equivalents; 0 where not observable.
     pub fn equivalent_coefficients(&self, unknown: usize) -> impl Iterator<Item = Vec<Complex64>> + '_ {
         let width = self.unknowns.len();
         self.equivalents.iter().map(move |distance| {
@@ -299,7 +299,7 @@ impl Separation {
         self.unknowns.iter().position(|unknown| *unknown == quantity)
     }
 
-    /// Coefficients of one unknown by order from 0, with 0 where the layout cannot tell.
+    /// Coefficients of one unknown by order from 0, with 0 where not observable.
     pub fn coefficients(&self, unknown: usize) -> impl Iterator<Item = Complex64> + '_ {
         let width = self.unknowns.len();
         let picked = self.estimate.iter().skip(unknown).step_by(width.max(1));
@@ -307,7 +307,7 @@ impl Separation {
         picked.zip(seen).map(|(value, seen)| if *seen { *value } else { Complex64::ZERO })
     }
 
-    /// Whether no order (from 1) of an unknown can be told.
+    /// Whether no order (from 1) of an unknown is observable.
     #[must_use]
     pub fn is_lost(&self, unknown: usize) -> bool {
         let width = self.unknowns.len();
@@ -339,7 +339,7 @@ impl Separation {
         (variance + bound * bound / 6.0).sqrt()
     }
 
-    /// Orders (from 1) at which one unknown cannot be told.
+    /// Orders (from 1) at which one unknown is not observable.
     #[must_use]
     pub fn lost_orders(&self, unknown: usize) -> Vec<usize> {
         let width = self.unknowns.len();

@@ -42,10 +42,10 @@ impl StationResult {
         self.profiles.iter().filter_map(of).reduce(f64::min)
     }
 
-    /// Root mean square of a section's form over the orders from 2 that can be told, and its standard uncertainty, in µm.
+    /// Root mean square of a section's form over the observable orders from 2, and its standard uncertainty, in µm.
     ///
     /// rms² = ½ Σ|c|², so that errors δ of no favoured phase give u² = Σ|c|² E|δ|² / (8 rms²); NaN where no variance is known.
-    /// `None` where nothing can be told.
+    /// `None` where nothing is observable.
     #[must_use]
     pub fn form_rms_um(&self, section: usize) -> Option<(f64, f64)> {
         let separation = &self.separation;
@@ -59,7 +59,7 @@ impl StationResult {
     }
 
     /// One unknown on [`angles`](Self::angles) equal angles from 0: form over the part's, motion over the spindle's.
-    /// Orders that the layout cannot tell are left out; where nothing is known, and of no unknown, values are NaN.
+    /// Orders that are not observable are left out; where nothing is known, and of no unknown, values are NaN.
     #[must_use]
     pub fn over_angle(&self, unknown: usize) -> Vec<f64> {
         let known = self.separation.unknowns.get(unknown).filter(|_| !self.separation.is_lost(unknown));

@@ -4,11 +4,9 @@ use std::collections::VecDeque;
 
 use runout_core::{
     Error, Result,
+    fault::Fault,
     measurement::{Block, Capture, SampleStream},
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     stage::{Conditioner, Preprocessor},
 };
 use schemars::JsonSchema;

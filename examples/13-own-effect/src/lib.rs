@@ -6,7 +6,7 @@
 //! ∂c/∂λ = i n c.
 //!
 //! Three effects of the toolkit come close. To first order a low-pass in one channel (`filter-attenuation`, p = λ) is the
-//! same: the amplitudes of high orders tell them apart, once nλ is no longer small. A turned sensor (`sensor-angle`) shifts the
+//! same: the amplitudes of high orders distinguish them, once nλ is no longer small. A turned sensor (`sensor-angle`) shifts the
 //! form as much and the motion otherwise. A lag in all channels alike is another zero of the spindle's angle, and can never be
 //! told.
 
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64,
-    pipeline::{Registry, registry::Plugin},
+    pipeline::{Plugin, Registry},
 };
 use runout_spindle::effects::{self, About, ActsOn, Alterations, Predicted, SpindleEffect, Transfer, parameter};
 
@@ -60,7 +60,7 @@ mod tests {
         inspection::Inspection,
         measurement::Recording,
         model::{Effect, Fit, Model, Setting, closed_loop::Settings, diagnosis::Verdict},
-        pipeline::registry::{Context, StageConfig},
+        pipeline::{Context, StageConfig},
         rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
         stage::{AverageRequest, Preprocessor, Station},
     };

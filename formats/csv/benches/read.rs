@@ -6,7 +6,7 @@ use std::{fmt::Write, fs, hint::black_box};
 use divan::{Bencher, counter::BytesCount};
 use runout_core::{
     measurement::Block,
-    pipeline::registry::{Context, Registry},
+    pipeline::{Context, Registry},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     stage::{Request, Source},
 };

@@ -4,12 +4,10 @@ use std::path::{Path, PathBuf};
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::{Fault, known_names},
     marker::Marker,
     measurement::StationKey,
-    pipeline::{
-        error::{Fault, known_names},
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     rig::Rig,
     stage::{Loader, Request, Source, SourceKind},
 };

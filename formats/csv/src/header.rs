@@ -1,8 +1,6 @@
 //! The first line that is no comment: which column is what.
 
-use runout_core::{
-    Error, ErrorKind, Result, input_file::InputFile, marker::Marker, pipeline::error::known_names, rig::Rig,
-};
+use runout_core::{Error, ErrorKind, Result, fault::known_names, input_file::InputFile, marker::Marker, rig::Rig};
 
 use crate::lines::{Stretch, Stretches, cells};
 

@@ -30,7 +30,7 @@ mod stated;
 
 pub use config::{CsvConfig, FileConfig, StationConfig};
 pub use inspect::{TextReport, inspect};
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 /// Adds the loader `csv`.
 pub fn register(registry: &mut Registry) {

@@ -7,7 +7,7 @@ use runout_core::{
     Result,
     marker::{Edge, Marker},
     measurement::{Block, Capture, Recording},
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     stage::{Request, Source},
 };

@@ -15,7 +15,7 @@ use runout_core::{
 
 pub(crate) use kuva::render::render::Scene;
 
-/// Points of a curve that are drawn: more cannot be told apart on a screen.
+/// Points of a curve that are drawn: more cannot be distinguished on a screen.
 const MOST_POINTS: usize = 1440;
 /// Cells of a map, along the vertical and along the horizontal axis.
 const MOST_CELLS: [usize; 2] = [120, 240];

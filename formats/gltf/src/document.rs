@@ -18,7 +18,7 @@ use crate::vertices::{COLOUR, DEVIATION, Layout, NORMAL, POSITION, STRIDE};
 /// of them keep the notes.
 ///
 /// There is no material: readers such as trimesh take vertex colours only where there is none.
-pub fn json(layout: &Layout, notes: &Notes) -> io::Result<Vec<u8>> {
+pub(crate) fn json(layout: &Layout, notes: &Notes) -> io::Result<Vec<u8>> {
     let extras: Option<Box<RawValue>> = Some(serde_json::value::to_raw_value(notes)?);
     let asset = Asset { extras: extras.clone(), generator: Some(notes.program.clone()), ..Asset::default() };
     let mut root = Root { asset, ..Root::default() };

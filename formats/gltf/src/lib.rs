@@ -13,10 +13,8 @@ use std::{
 };
 
 use runout_core::{
-    pipeline::{
-        error::Fault,
-        registry::{Context, Plugin, Registry, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, Plugin, Registry, StageConfig},
     stage::Exporter,
 };
 use runout_mesh::{Format, Mesh, MeshConfig, Notes};

@@ -8,15 +8,15 @@ use std::io::{self, Write};
 use runout_mesh::{COLOUR_STEPS, Cap, LANES, Mesh, UNMEASURED, Vertices, Wall, in_order, linear, palette, processors};
 
 /// Bytes from one vertex to the next.
-pub const STRIDE: usize = 32;
+pub(crate) const STRIDE: usize = 32;
 /// Where each attribute lies within a vertex, in bytes.
-pub const POSITION: usize = 0;
+pub(crate) const POSITION: usize = 0;
 /// See [`POSITION`].
-pub const NORMAL: usize = 12;
+pub(crate) const NORMAL: usize = 12;
 /// See [`POSITION`].
-pub const COLOUR: usize = 24;
+pub(crate) const COLOUR: usize = 24;
 /// See [`POSITION`].
-pub const DEVIATION: usize = 28;
+pub(crate) const DEVIATION: usize = 28;
 /// Bytes of an index.
 const INDEX: usize = 4;
 /// Bytes that are handed on at a time, about.
@@ -24,7 +24,7 @@ const PORTION: usize = 1 << 20;
 
 /// What the binary chunk holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// Vertices of wall and caps, or of a sheet.
     pub vertices: usize,
     /// Three a triangle.
@@ -37,7 +37,7 @@ pub struct Layout {
 
 impl Layout {
     /// Of a mesh.
-    pub fn of(mesh: &Mesh) -> Self {
+    pub(crate) fn of(mesh: &Mesh) -> Self {
         let caps = mesh.wall().map_or(0, |wall| wall.caps().len());
         let angles = mesh.columns();
         // Rounding keeps the order, so that these are the extremes of what is written; the turn swaps those of one axis.
@@ -53,12 +53,12 @@ impl Layout {
     }
 
     /// Bytes of all vertices.
-    pub fn vertex_bytes(&self) -> usize {
+    pub(crate) fn vertex_bytes(&self) -> usize {
         STRIDE * self.vertices
     }
 
     /// Bytes of all triangles.
-    pub fn index_bytes(&self) -> usize {
+    pub(crate) fn index_bytes(&self) -> usize {
         INDEX * self.indices
     }
 }
@@ -73,7 +73,7 @@ fn y_up([x, y, z]: [f32; 3]) -> [f32; 3] {
 }
 
 /// Writes the chunk: wall or sheet row by row, then each cap's own vertices, then the triangles.
-pub fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
+pub(crate) fn write(mesh: &Mesh, to: &mut impl Write) -> io::Result<()> {
     let colours: [[u8; 4]; COLOUR_STEPS] = palette().map(linear_rgba);
     let together = PORTION / (STRIDE * mesh.columns());
     // Writing keeps a processor as busy as making what is written.

@@ -16,11 +16,9 @@ use ndarray::ArrayView2;
 use runout_core::{
     Error, Result,
     atomic_file::PendingFile,
+    fault::Fault,
     height_grid::HeightGrid,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::Points,
     provenance,
     stage::{Loader, Request, Source, SourceKind},

@@ -38,7 +38,7 @@ pub use measurement::{
     write::{WriteOptions, write_measurement},
 };
 pub use result::{ResultConfig, StoredResult, read_result};
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 /// `format` of a measurement file.
 pub const MEASUREMENT_FORMAT: &str = "runout-measurement";

@@ -4,7 +4,7 @@ use std::{fmt::Write as _, path::Path};
 
 use runout_core::{
     measurement::{MemoryStream, Recording},
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     rig::Rig,
     stage::{Request, Source},
 };

@@ -6,7 +6,7 @@ use runout_core::{
     Error, Result,
     marker::Marker,
     measurement::{Block, Capture, MemoryStream, Recording, SampleStream, StationKey, StationTruth},
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     stage::{Request, Source},
 };

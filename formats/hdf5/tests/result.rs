@@ -10,13 +10,12 @@ use runout_core::{
     Complex64,
     atomic_file::commit_all,
     model::diagnosis::Correction,
-    pipeline::{
-        registry::{Context, StageConfig},
-        run::{LostOrders, StationResult, StationSummary, StationTables, Summary},
-    },
+    pipeline::{Context, StageConfig, run::StationTables},
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::Export,
+    station::StationResult,
+    summary::{LostOrders, StationSummary, Summary},
 };
 use runout_hdf5::{ResultConfig, inspect};
 

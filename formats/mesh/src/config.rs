@@ -18,7 +18,7 @@ pub struct MeshConfig {
     /// Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends.
     #[serde(default)]
     pub capped: bool,
-    /// Deviation that the two strongest colours stand for, ± µm; without it the largest deviation.
+    /// Deviation of the two strongest colours, ± µm; without it the largest deviation.
     #[serde(default)]
     pub colour_range_um: Option<f64>,
 }

@@ -5,7 +5,8 @@ use std::{fs::File, path::PathBuf, thread};
 use runout_core::{
     Error, ErrorKind, Result,
     atomic_file::PendingFile,
-    pipeline::{error::Fault, registry::Context},
+    fault::Fault,
+    pipeline::Context,
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
     table::{RecordBatch, TableSpec},
 };

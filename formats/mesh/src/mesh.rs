@@ -66,7 +66,7 @@ impl Mesh<'_> {
         }
     }
 
-    /// What the strongest colours stand for, ± µm.
+    /// Deviation of the strongest colours, ± µm.
     #[must_use]
     pub fn range_um(&self) -> f64 {
         match self {

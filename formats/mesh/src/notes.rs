@@ -17,7 +17,7 @@ pub struct Notes {
     /// Radius that the deviations are added to, in mm; none on a plane.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_mm: Option<f64>,
-    /// What the strongest colours stand for, ± µm.
+    /// Deviation of the strongest colours, ± µm.
     pub colour_range_um: f64,
     /// Lowest and highest order (undulations per revolution) that the form holds.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -63,11 +63,11 @@ pub(crate) enum Drawn<'a> {
 
 impl<'a> Drawn<'a> {
     /// What a result holds.
-    pub fn of(result: &Completed<'a>) -> Option<Self> {
+    pub(crate) fn of(result: &Completed<'a>) -> Option<Self> {
         result.surface.map(Self::Surface).or(result.heights.map(Self::Heights))
     }
 
-    pub fn checksum(self) -> String {
+    pub(crate) fn checksum(self) -> String {
         match self {
             Self::Surface(surface) => surface.checksum(),
             Self::Heights(heights) => heights.checksum(),

@@ -100,7 +100,7 @@ impl<'a> Sheet<'a> {
         self.scale
     }
 
-    /// What the strongest colours stand for, ± µm.
+    /// Deviation of the strongest colours, ± µm.
     #[must_use]
     pub fn range_um(&self) -> f64 {
         self.range_um

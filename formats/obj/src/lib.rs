@@ -11,10 +11,8 @@ use std::{
 };
 
 use runout_core::{
-    pipeline::{
-        error::Fault,
-        registry::{Context, Plugin, Registry, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, Plugin, Registry, StageConfig},
     stage::Exporter,
 };
 use runout_mesh::{

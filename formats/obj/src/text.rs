@@ -1,24 +1,24 @@
 //! Numbers as text, fast.
 
 /// A growing text.
-pub struct Text<'a> {
+pub(crate) struct Text<'a> {
     bytes: &'a mut Vec<u8>,
     number: zmij::Buffer,
 }
 
 impl<'a> Text<'a> {
     /// Goes on behind what is there.
-    pub fn behind(bytes: &'a mut Vec<u8>) -> Self {
+    pub(crate) fn behind(bytes: &'a mut Vec<u8>) -> Self {
         Self { bytes, number: zmij::Buffer::new() }
     }
 
-    pub fn raw(&mut self, text: &str) -> &mut Self {
+    pub(crate) fn raw(&mut self, text: &str) -> &mut Self {
         self.bytes.extend_from_slice(text.as_bytes());
         self
     }
 
     /// A blank before each of three numbers, which a reader gets back as the same f32.
-    pub fn vector(&mut self, vector: [f64; 3]) -> &mut Self {
+    pub(crate) fn vector(&mut self, vector: [f64; 3]) -> &mut Self {
         for value in vector {
             self.bytes.push(b' ');
             self.bytes.extend_from_slice(self.number.format(value as f32).as_bytes());
@@ -27,7 +27,7 @@ impl<'a> Text<'a> {
     }
 
     /// " v//vn".
-    pub fn corner(&mut self, vertex: u32, normal: u32) -> &mut Self {
+    pub(crate) fn corner(&mut self, vertex: u32, normal: u32) -> &mut Self {
         let vertex = Digits::of(vertex);
         self.bytes.push(b' ');
         self.bytes.extend_from_slice(vertex.text());

@@ -4,7 +4,7 @@ use runout_core::{provenance::Provenance, stage::Completed, table::TableSpec};
 use serde_json::json;
 
 /// Keys and values for a table's metadata; lists are JSON.
-pub fn entries(table: &TableSpec, result: &Completed) -> Vec<(String, String)> {
+pub(crate) fn entries(table: &TableSpec, result: &Completed) -> Vec<(String, String)> {
     let summary = result.summary;
     let warnings: Vec<String> = summary.all_warnings().collect();
     let mut entries = of_program(&summary.title, &summary.provenance, &result.about.convention, &warnings);
@@ -15,7 +15,7 @@ pub fn entries(table: &TableSpec, result: &Completed) -> Vec<(String, String)> {
 }
 
 /// What a file of any result says.
-pub fn of_program(
+pub(crate) fn of_program(
     title: &str,
     provenance: &Provenance,
     convention: &str,

@@ -23,7 +23,7 @@ use runout_core::{
 const ROWS_PER_GROUP: usize = 65_536;
 
 /// A table under a temporary name.
-pub struct TableFile {
+pub(crate) struct TableFile {
     writer: ArrowWriter<File>,
     // Last, so that the file is closed before its temporary name is removed.
     pending: PendingFile,
@@ -34,7 +34,7 @@ impl TableFile {
     ///
     /// # Errors
     /// When it cannot be created.
-    pub fn create(path: PathBuf, table: &TableSpec) -> Result<Self> {
+    pub(crate) fn create(path: PathBuf, table: &TableSpec) -> Result<Self> {
         let pending = PendingFile::new(path)?;
         let schema = table.schema();
         let properties = properties(&schema).build();
@@ -47,7 +47,7 @@ impl TableFile {
     ///
     /// # Errors
     /// When the file system refuses them.
-    pub fn append(&mut self, rows: &RecordBatch) -> Result<()> {
+    pub(crate) fn append(&mut self, rows: &RecordBatch) -> Result<()> {
         self.writer.write(rows).map_err(|error| self.pending.caused(error))
     }
 
@@ -55,7 +55,7 @@ impl TableFile {
     ///
     /// # Errors
     /// When the file system refuses the rest.
-    pub fn close(mut self, entries: &[(String, String)]) -> Result<PendingFile> {
+    pub(crate) fn close(mut self, entries: &[(String, String)]) -> Result<PendingFile> {
         for (key, value) in entries {
             self.writer.append_key_value_metadata(KeyValue::new(key.clone(), value.clone()));
         }

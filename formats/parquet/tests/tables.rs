@@ -9,19 +9,18 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use runout_core::{
     Complex64,
     atomic_file::commit_all,
-    evaluate::{Value, uncertainty::Uncertainty},
-    pipeline::{
-        registry::{Context, StageConfig},
-        run::{LostOrders, PartSummary, SectionSummary, StationResult, StationSummary, StationTables, Summary},
-    },
+    pipeline::{Context, StageConfig, run::StationTables},
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
+    standards::{Value, uncertainty::Uncertainty},
+    station::StationResult,
+    summary::{LostOrders, PartSummary, SectionSummary, StationSummary, Summary},
 };
 use runout_parquet::ParquetConfig;
 
 const ANGLES: usize = 48;
 const MAX_ORDER: usize = 6;
-/// An order that the made-up layout cannot tell.
+/// An order that is not observable with the made-up layout.
 const LOST: usize = 4;
 
 fn value(station: usize, unknown: usize, order: usize) -> Complex64 {

@@ -17,11 +17,9 @@ use std::{
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::Fault,
     input_file::InputFile,
-    pipeline::{
-        error::Fault,
-        registry::{Context, Plugin, Registry, StageConfig},
-    },
+    pipeline::{Context, Plugin, Registry, StageConfig},
     points::{PointColumn, Points},
     stage::{Loader, Request, Source, SourceKind},
 };

@@ -14,7 +14,7 @@ use runout_core::{Error, Result, input_file::InputFile};
 
 use crate::{RawColumn, RawTable, failed};
 
-pub fn read(input: &InputFile) -> Result<RawTable> {
+pub(crate) fn read(input: &InputFile) -> Result<RawTable> {
     let shown = input.path().display().to_string();
     let file = input.open()?;
     // The types of Parquet itself, so that dictionaries of another program are plain texts.

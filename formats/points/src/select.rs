@@ -4,8 +4,8 @@ use std::path::Path;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::known_names,
     input_file::InputFile,
-    pipeline::error::known_names,
     points::{Column, Labels, PointColumn, PointKind, Points, Trace},
 };
 
@@ -16,7 +16,12 @@ const SAME: f64 = 1e-6;
 /// Two names as near as this (Jaro-Winkler) are one with a slip of the pen.
 const ALIKE: f64 = 0.93;
 
-pub fn points(table: RawTable, input: &InputFile, config: &PointsConfig, wanted: &[PointColumn]) -> Result<Points> {
+pub(crate) fn points(
+    table: RawTable,
+    input: &InputFile,
+    config: &PointsConfig,
+    wanted: &[PointColumn],
+) -> Result<Points> {
     let path = input.path();
     let table = renamed(table, path, config)?;
     let file = Raw { file: path.display().to_string(), table };

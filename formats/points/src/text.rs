@@ -10,7 +10,7 @@ use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
 
 use crate::{RawColumn, RawTable, failed};
 
-pub fn read(input: &InputFile) -> Result<RawTable> {
+pub(crate) fn read(input: &InputFile) -> Result<RawTable> {
     let shown = input.path().display().to_string();
     let mut file = BufReader::new(input.open()?);
     let delimiter = delimiter(&mut file).map_err(|error| failed(&shown, error))?;

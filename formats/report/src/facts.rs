@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 use runout_core::{
     model::diagnosis::{Diagnosis, Verdict},
-    pipeline::{run::Decision, summary::Summary},
     rig::Rig,
+    summary::{Decision, Summary},
     surface::Surface,
     table::number::{ranges, significant},
 };

@@ -24,10 +24,8 @@ use std::path::PathBuf;
 use runout_core::{
     Result,
     atomic_file::PendingFile,
-    pipeline::{
-        error::Fault,
-        registry::{Context, Plugin, Registry, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, Plugin, Registry, StageConfig},
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
     table::{RecordBatch, TableSpec, panels::Panels},
 };

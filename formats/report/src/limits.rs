@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use runout_core::{
-    pipeline::run::{Decision, Limit, LimitSummary, LimitValue},
+    summary::{Decision, Limit, LimitSummary, LimitValue},
     table::number::significant,
 };
 

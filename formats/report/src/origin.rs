@@ -1,7 +1,7 @@
 //! Where the numbers came from: turns that were left out, warnings, provenance.
 
 use maud::{Markup, html};
-use runout_core::{pipeline::summary::Summary, stage::About};
+use runout_core::{stage::About, summary::Summary};
 
 /// Turns that were left out, one row a capture.
 pub(crate) fn turns(summary: &Summary) -> Markup {

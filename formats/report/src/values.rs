@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use runout_core::{
-    pipeline::summary::Summary,
+    summary::Summary,
     table::number::{significant, with_std},
 };
 use serde::Serialize;

@@ -15,7 +15,7 @@ use crate::{
 
 /// Harmonics cₙ of a circle, deviation = Re Σ cₙ e^{+inα}.
 #[derive(Debug, Clone)]
-pub struct Harmonics {
+pub(crate) struct Harmonics {
     /// From order 0 to the highest that the points carry, in µm.
     pub coefficients: Vec<Complex64>,
     /// Variance E|δ|² of each, in µm².
@@ -51,7 +51,7 @@ impl Harmonics {
     ///
     /// # Errors
     /// When the points carry no order of roundness, in words.
-    pub fn fit(scan: &Scan, max_order: usize, about_mm: Option<f64>) -> Result<Self, String> {
+    pub(crate) fn fit(scan: &Scan, max_order: usize, about_mm: Option<f64>) -> Result<Self, String> {
         let slopes = if about_mm.is_some() { SLOPES } else { 0 };
         let points = scan.len();
         let most = points.saturating_sub(slopes + 2) / 2;
@@ -99,13 +99,13 @@ impl Harmonics {
 
     /// The highest order.
     #[must_use]
-    pub fn max_order(&self) -> usize {
+    pub(crate) fn max_order(&self) -> usize {
         self.coefficients.len() - 1
     }
 
     /// Their sum at a place, in µm.
     #[must_use]
-    pub fn value_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
+    pub(crate) fn value_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
         let terms = self.coefficients.iter().enumerate();
         let at_height: f64 = terms.map(|(order, value)| (value * Complex64::cis(order as f64 * angle_rad)).re).sum();
         at_height + self.sloped_um(angle_rad, z_mm)
@@ -113,7 +113,7 @@ impl Harmonics {
 
     /// What the slopes add at a place, in µm.
     #[must_use]
-    pub fn sloped_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
+    pub(crate) fn sloped_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
         let Some((about_mm, slopes)) = self.slopes else { return 0.0 };
         slopes.iter().enumerate().map(|(column, slope)| slope * along(angle_rad, z_mm - about_mm, column)).sum()
     }
@@ -165,7 +165,7 @@ fn basis(angle_rad: f64, column: usize) -> f64 {
 
 /// A circle with its wild points set aside.
 #[derive(Debug, Clone)]
-pub struct Cleaned {
+pub(crate) struct Cleaned {
     /// Whether each point is kept.
     pub kept: Vec<bool>,
     /// Distance of each point from the fit of those kept, in µm.
@@ -189,7 +189,7 @@ impl Cleaned {
     ///
     /// # Errors
     /// What hinders the fit, in words.
-    pub fn of(scan: &Scan, max_order: usize, about_mm: Option<f64>, deviations: f64) -> Result<Self, String> {
+    pub(crate) fn of(scan: &Scan, max_order: usize, about_mm: Option<f64>, deviations: f64) -> Result<Self, String> {
         let max_order = max_order.min((scan.len() / POINTS_AN_ORDER).max(LOWEST_ORDER));
         let mut kept = vec![true; scan.len()];
         for round in 1.. {
@@ -208,7 +208,7 @@ impl Cleaned {
 
     /// The same for some consecutive points.
     #[must_use]
-    pub fn range(self, start: usize, count: usize) -> Self {
+    pub(crate) fn range(self, start: usize, count: usize) -> Self {
         let kept = self.kept.into_iter().skip(start).take(count).collect();
         let distance_um = self.distance_um.into_iter().skip(start).take(count).collect();
         Self { kept, distance_um, ..self }
@@ -216,13 +216,13 @@ impl Cleaned {
 
     /// Number of points left out.
     #[must_use]
-    pub fn left_out(&self) -> usize {
+    pub(crate) fn left_out(&self) -> usize {
         self.kept.iter().filter(|kept| !**kept).count()
     }
 
     /// Stretches of the trace that points were left out of, as angles in degrees: from, to, how many.
     #[must_use]
-    pub fn stretches(&self, scan: &Scan) -> Vec<(f64, f64, usize)> {
+    pub(crate) fn stretches(&self, scan: &Scan) -> Vec<(f64, f64, usize)> {
         // Ringing leaves out every other point; so many kept ones between do not end a stretch.
         const BRIDGED: usize = 5;
         let mut stretches: Vec<(f64, f64, usize)> = Vec::new();
@@ -244,7 +244,7 @@ impl Cleaned {
 
 /// Stretches of the circle from each point to the next one, in rad.
 #[must_use]
-pub fn empty_stretches(angle_rad: &[f64]) -> Vec<[f64; 2]> {
+pub(crate) fn empty_stretches(angle_rad: &[f64]) -> Vec<[f64; 2]> {
     let mut angles: Vec<f64> = angle_rad.iter().map(|angle| angle.rem_euclid(TAU)).collect();
     angles.sort_by(f64::total_cmp);
     let around = angles.first().map(|first| first + TAU);

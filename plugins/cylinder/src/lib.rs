@@ -5,6 +5,7 @@
 
 mod circle;
 mod config;
+mod generatrix;
 mod model;
 mod predict;
 mod robust;
@@ -12,7 +13,7 @@ mod scan;
 mod separate;
 mod shape;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 pub use config::LeastSquaresCylinderConfig;
 pub use predict::Prediction;

@@ -13,7 +13,7 @@ use runout_core::{
     Complex64, Result,
     model::{
         Effect, Fit, Parameter,
-        linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term, Unseen},
+        linear_terms::{Declared, HeldOut, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
     separation::{Quantity, Residual, Separation},
@@ -21,6 +21,7 @@ use runout_core::{
 };
 
 use crate::{
+    generatrix::open_profiles,
     robust::correlation_factor,
     scan::Scan,
     separate::{Circle, LeastSquaresCylinder},
@@ -118,14 +119,14 @@ impl<'a> Basis<'a> {
     }
 
     /// Points of traces that were not used, kind by kind.
-    fn unseen(&self, separator: &LeastSquaresCylinder, points: &Points) -> Result<Vec<Unseen>> {
+    fn unseen(&self, separator: &LeastSquaresCylinder, points: &Points) -> Result<Vec<HeldOut>> {
         let kinds = separator.unused(points).into_iter().map(|(kind, traces)| {
             let scans: Vec<Scan> = traces.iter().map(|trace| Scan::of(points, trace)).collect::<Result<_>>()?;
             let scans: Vec<Scan> = scans.iter().map(|scan| place(&self.cylinder, scan)).collect();
             let values: Vec<f64> = scans.iter().flat_map(|scan| scan.deviation_um.iter().copied()).collect();
             let ids: Vec<&str> = traces.iter().map(|trace| trace.id.as_str()).collect();
             let name = format!("{kind} {}", ids.join(", "));
-            Ok(Unseen { name, declared: vec![vec![1.0; values.len()]], values, terms: self.columns(&scans) })
+            Ok(HeldOut { name, declared: vec![vec![1.0; values.len()]], values, terms: self.columns(&scans) })
         });
         kinds.collect()
     }
@@ -180,7 +181,7 @@ impl LinearModel for LeastSquaresCylinder {
         Ok(model.predicting(basis.unseen(self, points)?))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
+    fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let basis = Basis::of(self, points)?;
         let raised = correlation_factor(&fit.remainder().residual);
         let circles = basis.circles.iter().zip(&basis.placed);
@@ -200,8 +201,8 @@ impl LinearModel for LeastSquaresCylinder {
                 basis.circles.iter().map(|circle| circle.measured - circle.scan.len()).sum::<usize>(),
                 basis.circles.iter().map(|circle| circle.measured).sum::<usize>()
             ),
-            "the noise is not known from elsewhere, and points of one circle are no independent witnesses: evidence and \
-             standard uncertainties of the effects flatter, and the circles left out decide"
+            "the noise is not known from elsewhere, and points of one circle are not independent: evidence and \
+             standard uncertainties of the effects are too optimistic, and the circles left out decide"
                 .into(),
             "form of the exports is that of the effects found (taper, barrel, lobes), not of each circle on its own"
                 .into(),
@@ -210,7 +211,9 @@ impl LinearModel for LeastSquaresCylinder {
             remarks.push("the circles are at one height: tilt, taper and barrel are not observable".into());
         }
         let form = Form { sections, radius_mm: self.nominal_mm() + 1e-3 * offset_um };
-        Ok(Outcome { evaluables: vec![Evaluable::ClosedProfiles(form)], remarks, ..Outcome::default() })
+        let mut evaluables = vec![Evaluable::ClosedProfiles(form)];
+        evaluables.extend(open_profiles(points, &basis.cylinder)?.into_iter().map(Evaluable::OpenProfile));
+        Ok(Outcome { evaluables, remarks, ..Outcome::default() })
     }
 }
 

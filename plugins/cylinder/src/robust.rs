@@ -4,7 +4,7 @@ use runout_core::numerics::statistics::{median, median_absolute_deviation};
 
 /// What lies further from the median than so many median absolute deviations.
 #[derive(Debug, Clone, Copy)]
-pub struct Fence {
+pub(crate) struct Fence {
     /// Median.
     pub centre: f64,
     /// Distance from it that is still accepted.
@@ -17,21 +17,21 @@ const ROUNDING_UM: f64 = 1e-6;
 impl Fence {
     /// For values in µm.
     #[must_use]
-    pub fn around(values: &[f64], deviations: f64) -> Self {
+    pub(crate) fn around(values: &[f64], deviations: f64) -> Self {
         let centre = median(values.iter().copied());
         Self { centre, distance: (deviations * median_absolute_deviation(values)).max(ROUNDING_UM) }
     }
 
     /// Whether a value is accepted.
     #[must_use]
-    pub fn holds(self, value: f64) -> bool {
+    pub(crate) fn holds(self, value: f64) -> bool {
         (value - self.centre).abs() <= self.distance
     }
 }
 
 /// Root mean square; NaN of nothing.
 #[must_use]
-pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (count, sum) = values.into_iter().fold((0_usize, 0.0), |(count, sum), value| (count + 1, sum + value * value));
     (sum / count as f64).sqrt()
 }
@@ -42,7 +42,7 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
 /// n such values are worth n divided by it (Bartlett 1946, "On the theoretical specification and sampling properties
 /// of autocorrelated time-series", J. R. Stat. Soc. Suppl. 8, 27-41).
 #[must_use]
-pub fn correlation_factor(values: &[f64]) -> f64 {
+pub(crate) fn correlation_factor(values: &[f64]) -> f64 {
     let power: f64 = values.iter().map(|value| value * value).sum();
     let correlation = |lag: usize| {
         let sum: f64 = values.iter().zip(values.iter().skip(lag)).map(|(early, late)| early * late).sum();

@@ -12,7 +12,7 @@ use runout_core::{
 
 /// Points of one trace, in the order measured.
 #[derive(Debug, Clone, Default)]
-pub struct Scan {
+pub(crate) struct Scan {
     pub angle_rad: Vec<f64>,
     pub z_mm: Vec<f64>,
     pub deviation_um: Vec<f64>,
@@ -23,7 +23,7 @@ impl Scan {
     ///
     /// # Errors
     /// When a column is missing or shorter than the trace.
-    pub fn of(points: &Points, trace: &Trace) -> Result<Self> {
+    pub(crate) fn of(points: &Points, trace: &Trace) -> Result<Self> {
         let column = |name: &str| {
             points.column(name)?.get(trace.points.clone()).map(<[f64]>::to_vec).ok_or_else(|| {
                 let object = format!("{}: trace {}", points.input.display(), trace.id);
@@ -34,12 +34,12 @@ impl Scan {
         Ok(Self { angle_rad, z_mm: column("z_mm")?, deviation_um: column("deviation_um")? })
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.angle_rad.len()
     }
 
     /// (angle in rad, z in mm, deviation in µm) of each point.
-    pub fn iter(&self) -> impl Iterator<Item = (f64, f64, f64)> + Clone {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (f64, f64, f64)> + Clone {
         self.angle_rad
             .iter()
             .zip(&self.z_mm)
@@ -47,14 +47,14 @@ impl Scan {
             .map(|((angle, z), deviation)| (*angle, *z, *deviation))
     }
 
-    pub fn push(&mut self, angle_rad: f64, z_mm: f64, deviation_um: f64) {
+    pub(crate) fn push(&mut self, angle_rad: f64, z_mm: f64, deviation_um: f64) {
         self.angle_rad.push(angle_rad);
         self.z_mm.push(z_mm);
         self.deviation_um.push(deviation_um);
     }
 
     /// The points that are kept.
-    pub fn keep(&self, kept: &[bool]) -> Self {
+    pub(crate) fn keep(&self, kept: &[bool]) -> Self {
         let mut some = Self::default();
         for ((angle, z, deviation), _) in self.iter().zip(kept).filter(|(_, kept)| **kept) {
             some.push(angle, z, deviation);
@@ -63,24 +63,24 @@ impl Scan {
     }
 
     /// The same points with their deviation counted from `from` (angle in rad, z in mm).
-    pub fn less(&self, from: impl Fn(f64, f64) -> f64) -> Self {
+    pub(crate) fn less(&self, from: impl Fn(f64, f64) -> f64) -> Self {
         let deviation_um = self.iter().map(|(angle, z, deviation)| deviation - from(angle, z)).collect();
         Self { deviation_um, ..self.clone() }
     }
 
     /// Some consecutive points.
-    pub fn range(&self, points: Range<usize>) -> Self {
+    pub(crate) fn range(&self, points: Range<usize>) -> Self {
         let cut = |values: &[f64]| values.get(points.clone()).map(<[f64]>::to_vec).unwrap_or_default();
         Self { angle_rad: cut(&self.angle_rad), z_mm: cut(&self.z_mm), deviation_um: cut(&self.deviation_um) }
     }
 
     /// Mean height of the points, in mm.
-    pub fn mean_z_mm(&self) -> f64 {
+    pub(crate) fn mean_z_mm(&self) -> f64 {
         self.z_mm.iter().sum::<f64>() / self.len() as f64
     }
 
     /// Lowest and highest point, in mm.
-    pub fn z_range_mm(&self) -> [f64; 2] {
+    pub(crate) fn z_range_mm(&self) -> [f64; 2] {
         let heights = self.z_mm.iter();
         heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(*z), high.max(*z)])
     }
@@ -88,7 +88,7 @@ impl Scan {
 
 /// A trace along which angle and height advance together for more than one turn.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Helix {
+pub(crate) struct Helix {
     /// Advance along z over one turn, in mm.
     pub pitch_mm: f64,
     /// Its whole turns.
@@ -99,7 +99,7 @@ pub struct Helix {
 
 /// One turn of a helix.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Turn {
+pub(crate) struct Turn {
     /// Its points.
     pub points: Range<usize>,
     /// These and half a turn on either side: there every angle is seen at two heights, so that what changes along z is
@@ -114,7 +114,7 @@ const LEAST_PITCH: f64 = 3.0;
 
 impl Helix {
     /// Recognises a helix by its points, whatever the trace is called.
-    pub fn of(scan: &Scan) -> Option<Self> {
+    pub(crate) fn of(scan: &Scan) -> Option<Self> {
         let turned = unwrapped(&scan.angle_rad);
         let last = turned.last()?.abs();
         if last < LEAST_TURNS * TAU {

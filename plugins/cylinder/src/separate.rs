@@ -6,18 +6,16 @@ use std::f64::consts::PI;
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
+    fault::Fault,
     numerics::statistics::median,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{
         PointColumn,
         PointKind::{Number, Trace as TraceId, TraceKind},
         Points, Trace,
     },
     separation::{Quantity, Residual, Separation},
-    stage::{Evaluable, EvaluableKind, Form, Outcome, PointModel, PointSeparator, Separator, points::residual_table},
+    stage::{Evaluable, EvaluableKind, Form, Outcome, PointModel, PointSeparator, Separator, residual_table},
     surface::Surface,
     table::TableSpec,
 };
@@ -26,8 +24,8 @@ pub(crate) use circles::Circle;
 use circles::unseen;
 
 use crate::{
-    circle::Harmonics, config::LeastSquaresCylinderConfig, predict::Prediction, robust::rms, scan::Scan,
-    shape::Cylinder,
+    circle::Harmonics, config::LeastSquaresCylinderConfig, generatrix::open_profiles, predict::Prediction, robust::rms,
+    scan::Scan, shape::Cylinder,
 };
 
 impl StageConfig for LeastSquaresCylinderConfig {
@@ -87,11 +85,14 @@ impl PointSeparator for LeastSquaresCylinder {
     }
 
     fn evaluables(&self) -> Vec<EvaluableKind> {
-        vec![EvaluableKind::ClosedProfiles]
+        vec![EvaluableKind::ClosedProfiles, EvaluableKind::OpenProfile]
     }
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
-        Ok(Outcome { evaluables: vec![Evaluable::ClosedProfiles(self.form(points)?)], ..Outcome::default() })
+        let mut evaluables = vec![Evaluable::ClosedProfiles(self.form(points)?)];
+        let profiles = open_profiles(points, &self.cylinder(points)?)?;
+        evaluables.extend(profiles.into_iter().map(Evaluable::OpenProfile));
+        Ok(Outcome { evaluables, ..Outcome::default() })
     }
 
     fn needs_surface(&self) -> bool {
@@ -136,7 +137,7 @@ impl LeastSquaresCylinder {
     /// The cylinder that is fitted to the traces used, their outliers left out.
     ///
     /// # Errors
-    /// When the traces cannot tell it.
+    /// When the traces do not determine it.
     pub fn cylinder(&self, points: &Points) -> Result<Cylinder> {
         cylinder(points, &self.circles(points)?, self.0.radius_mm)
     }

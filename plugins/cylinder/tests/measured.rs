@@ -16,10 +16,12 @@ use runout_core::{
         Pipeline, Registry,
         diagnose::diagnose,
         document::Sources,
-        run::{Silent, StationResult, Summary, run},
+        run::{Silent, run},
     },
     points::Points,
     stage::{LinearModel, PointSeparator},
+    station::StationResult,
+    summary::Summary,
     surface::{Surface, SurfaceBuilder, SurfaceConfig},
 };
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
@@ -360,7 +362,7 @@ fn the_final_model_is_exported_with_its_form() {
     let closed = closed_loop::diagnose(&terms, &closed_loop::Settings::default()).unwrap();
     let added: Vec<&str> = closed.diagnosis.added.iter().map(|added| added.effect.as_str()).collect();
     assert_eq!(added, ["part-eccentricity", "axis-tilt", "lobes-3"]);
-    let shape = separator.conclude(&points, &closed.after).unwrap().form().unwrap().clone();
+    let shape = separator.outcome(&points, &closed.after).unwrap().form().unwrap().clone();
     let order: Vec<f64> = shape.sections.iter().map(|section| section.sections[0].z_mm).collect();
     // Along the tilted axis, heights differ by its slope times the axis's offset.
     assert!(order.iter().zip([2.0, 7.0, 12.0, 17.0]).all(|(z, truth)| (z - truth).abs() < 1e-5), "{order:?}");

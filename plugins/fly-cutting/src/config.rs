@@ -1,6 +1,6 @@
 //! `[separate] plugin = "fly-cutting"`.
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

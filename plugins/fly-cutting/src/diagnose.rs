@@ -75,7 +75,7 @@ impl FlyCutting {
         left_out: usize,
     ) -> Result<PointDiagnosis> {
         let Closed { mut diagnosis, before, after: last, settings } = closed;
-        let mut after = self.concluded(measured, (&before, &last), &settings, measured.remarks.clone())?;
+        let mut after = self.fitted_outcome(measured, (&before, &last), &settings, measured.remarks.clone())?;
         diagnosis.moved = moved(&after);
         for set in aliases {
             confound(&mut diagnosis, set);

@@ -48,7 +48,7 @@ pub(crate) const MISSING: [Missing; 6 + MOST_LINES] = [
 
 impl Missing {
     /// Id and what it does, for lists.
-    pub fn about(self) -> (&'static str, &'static str) {
+    pub(crate) fn about(self) -> (&'static str, &'static str) {
         match self {
             Self::WorkpieceTilt => ("workpiece-tilt", "a height map is of a surface that was tilted: a plane"),
             Self::TableStraightness => {
@@ -66,7 +66,7 @@ impl Missing {
     }
 
     /// Id, target and parameters.
-    pub fn effect(self) -> Effect {
+    pub(crate) fn effect(self) -> Effect {
         let parameter =
             |name: &str, unit: &str, tolerance: f64| Parameter { name: name.into(), unit: unit.into(), tolerance };
         let line = |amplitude: Parameter| {
@@ -91,7 +91,7 @@ impl Missing {
     }
 
     /// Whether it is a line, and whether that is of the tilt about x.
-    pub fn line(self) -> Option<bool> {
+    pub(crate) fn line(self) -> Option<bool> {
         match self {
             Self::SpindleLine(_) => Some(false),
             Self::TiltLine => Some(true),
@@ -100,7 +100,7 @@ impl Missing {
     }
 
     /// Puts values of it on a cut.
-    pub fn apply(self, values: &[f64], applied: &mut Applied) {
+    pub(crate) fn apply(self, values: &[f64], applied: &mut Applied) {
         match (self, values) {
             (Self::WorkpieceTilt, [x, y]) => applied.tilt_urad = [*x, *y],
             (Self::TableStraightness, values) => {
@@ -123,7 +123,7 @@ impl Missing {
 
     /// Change of the surface with each of its parameters at `values`, in nm per unit, `[parameter][point]`. Where passes meet, the
     /// lowest one counts: the change is that of the pass that remains.
-    pub fn partials(self, values: &[f64], cut: &Cut, heights: &Heights, surface: &Surface) -> Vec<Vec<f64>> {
+    pub(crate) fn partials(self, values: &[f64], cut: &Cut, heights: &Heights, surface: &Surface) -> Vec<Vec<f64>> {
         let count = self.effect().parameters.len();
         let mut columns = vec![Vec::with_capacity(heights.len()); count];
         let mut applied = Applied::none();

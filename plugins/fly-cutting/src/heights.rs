@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use runout_core::{Error, Result, evaluate::areal::HeightMap, points::Points};
+use runout_core::{Error, Result, numerics::height_map::HeightMap, points::Points};
 
 use crate::config::FlyCuttingConfig;
 
@@ -45,13 +45,13 @@ pub(crate) struct Grid {
 
 impl Grid {
     /// Values of points as a map in µm, NaN where there is no point.
-    pub fn map_um(&self, values_nm: impl Iterator<Item = f64>) -> Result<HeightMap<'static>> {
+    pub(crate) fn map_um(&self, values_nm: impl Iterator<Item = f64>) -> Result<HeightMap<'static>> {
         let all = self.laid(values_nm.map(|value| 1e-3 * value));
         HeightMap::new(all, self.columns, self.step_x_mm, self.step_y_mm, false)
     }
 
     /// Values of points at their nodes, row by row, NaN where there is no point.
-    pub fn laid(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+    pub(crate) fn laid(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut all = vec![f64::NAN; self.rows * self.columns];
         for (node, value) in self.node.iter().zip(values) {
             all[*node as usize] = value;
@@ -60,14 +60,14 @@ impl Grid {
     }
 
     /// Nodes without a point.
-    pub fn holes(&self) -> usize {
+    pub(crate) fn holes(&self) -> usize {
         self.rows * self.columns - self.node.len()
     }
 }
 
 impl Heights {
     /// Reads the columns of points.
-    pub fn new(points: &Points, config: &FlyCuttingConfig) -> Result<(Self, Grid)> {
+    pub(crate) fn new(points: &Points, config: &FlyCuttingConfig) -> Result<(Self, Grid)> {
         let object = || points.input.display().to_string();
         let failure = |problem: String| Error::new("read the surface from", object(), problem);
         let [x, y, z] = [points.column("x_mm")?, points.column("y_mm")?, points.column("height_nm")?];
@@ -119,12 +119,12 @@ impl Heights {
     }
 
     /// Points.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.x_mm.len()
     }
 
     /// The points that are wanted, by row and place.
-    pub fn part(&self, is_wanted: impl Fn(usize, usize) -> bool) -> Self {
+    pub(crate) fn part(&self, is_wanted: impl Fn(usize, usize) -> bool) -> Self {
         let mut part = Self { rows: Vec::new(), x_mm: Vec::new(), height_nm: Vec::new(), std_nm: self.std_nm };
         for (number, row) in self.rows.iter().enumerate() {
             let start = part.x_mm.len();
@@ -140,7 +140,7 @@ impl Heights {
     }
 
     /// At most about so many points, of rows evenly over the map. A row stays whole unless too few rows would be left.
-    pub fn thinned(&self, most: usize) -> Self {
+    pub(crate) fn thinned(&self, most: usize) -> Self {
         if self.len() <= most {
             return self.clone();
         }
@@ -155,7 +155,7 @@ impl Heights {
     }
 
     /// First and last x, and first and last y, in mm.
-    pub fn extent_mm(&self) -> [[f64; 2]; 2] {
+    pub(crate) fn extent_mm(&self) -> [[f64; 2]; 2] {
         let fold = |start: f64, pick: fn(f64, f64) -> f64| self.x_mm.iter().copied().fold(start, pick);
         let ends = [self.rows.first(), self.rows.last()];
         [
@@ -165,7 +165,7 @@ impl Heights {
     }
 
     /// y of each point.
-    pub fn y_mm(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn y_mm(&self) -> impl Iterator<Item = f64> + '_ {
         self.rows.iter().flat_map(|row| row.points.clone().map(|_| row.y_mm))
     }
 }

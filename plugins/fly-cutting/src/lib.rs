@@ -22,9 +22,9 @@ mod strangers;
 #[cfg(test)]
 mod tests;
 
-use runout_core::pipeline::{
+use runout_core::{
     effects::EffectEntry,
-    registry::{Plugin, Registry},
+    pipeline::{Plugin, Registry},
 };
 
 pub use config::FlyCuttingConfig;

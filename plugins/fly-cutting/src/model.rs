@@ -54,7 +54,7 @@ pub(crate) struct CutModel {
 
 impl CutModel {
     /// Of a map, whose points are thinned for the search; every fifth row is held out.
-    pub fn new(config: &FlyCuttingConfig, heights: &Heights, known: &[Setting]) -> Self {
+    pub(crate) fn new(config: &FlyCuttingConfig, heights: &Heights, known: &[Setting]) -> Self {
         let known: Vec<usize> = known.iter().map(|setting| setting.effect).collect();
         let extent_mm = heights.extent_mm();
         let of = |fitted: Heights, held_out: Heights, whole: Option<CutModel>| {
@@ -76,7 +76,7 @@ impl CutModel {
     }
 
     /// A cut with some effects applied.
-    pub fn cut(&self, settings: &[Setting]) -> Result<Cut> {
+    pub(crate) fn cut(&self, settings: &[Setting]) -> Result<Cut> {
         Cut::new(&self.data.config, self.data.extent_mm, applied(settings))
             .ok_or_else(|| Error::new("fit", "the cut", "a feed or a nose radius is beyond all bounds"))
     }
@@ -235,7 +235,7 @@ impl CutFit {
         Self { data, cut, phased, settings: applied.to_vec(), remainder, starts: [OnceLock::new(), OnceLock::new()] }
     }
 
-    pub fn left(&self) -> Left<'_> {
+    pub(crate) fn left(&self) -> Left<'_> {
         Left { heights: &self.data.fitted, surface: &self.phased.surface, residual_nm: &self.phased.residual_nm }
     }
 
@@ -259,12 +259,12 @@ impl CutFit {
     }
 
     /// Feeds from the pass nearest to x = 0 to the pass 0 of the fit: the same surface has every whole number of them.
-    pub fn feeds_off(&self) -> f64 {
+    pub(crate) fn feeds_off(&self) -> f64 {
         (self.phased.phase_mm / self.cut.feed_mm).round()
     }
 
     /// Phase of the scallops and its standard uncertainty, in µm, where it shows.
-    pub fn phase_um(&self) -> Option<[f64; 2]> {
+    pub(crate) fn phase_um(&self) -> Option<[f64; 2]> {
         let norm = self.phased.norm_nm_per_mm?;
         let level = self.remainder.chi2_per_dof();
         let noise_nm = match self.data.fitted.std_nm {
@@ -276,7 +276,7 @@ impl CutFit {
     }
 
     /// Points that were fitted.
-    pub fn heights(&self) -> &Heights {
+    pub(crate) fn heights(&self) -> &Heights {
         &self.data.fitted
     }
 }

@@ -2,9 +2,11 @@
 
 use runout_core::{
     Result,
-    evaluate::areal::{self, HeightMap},
     height_grid::HeightGrid,
-    stage::{Evaluable, NamedValue, Outcome, PlaneMap, points::value},
+    numerics::height_map::HeightMap,
+    stage::{Evaluable, Outcome, PlaneMap},
+    standards::areal,
+    summary::NamedValue,
     table::{ColumnSpec, Figure, TableRows, TableSpec, numbers},
 };
 
@@ -65,7 +67,7 @@ pub(crate) struct Known<'a> {
 }
 
 impl Known<'_> {
-    pub fn outcome(&self, remarks: Vec<String>) -> Result<Outcome> {
+    pub(crate) fn outcome(&self, remarks: Vec<String>) -> Result<Outcome> {
         let corrected = || self.ideal_nm.iter().zip(self.after_nm).map(|(ideal, left)| ideal + left);
         let mut rows = Vec::new();
         let columns = [
@@ -107,7 +109,7 @@ impl Known<'_> {
         let found = areal::heights(&map);
         let about = |what: &str| format!("{what} after removal of the least-squares plane (ISO 25178-2, 4.2)");
         let named = |symbol: &str, number: f64, unit: &str, what: &str| {
-            value(symbol, number, f64::NAN, unit, &about(what)).of(of)
+            NamedValue::new(symbol, number, f64::NAN, unit, &about(what)).of(of)
         };
         Ok(vec![
             named("Sq", 1e3 * found.sq, "nm", "root mean square height"),
@@ -125,13 +127,20 @@ impl Known<'_> {
         let half_mm = 0.5e-3 * feed_um_per_rev;
         let scallop_nm =
             1e6 * half_mm * half_mm / (nose_radius_mm + (nose_radius_mm * nose_radius_mm - half_mm * half_mm).sqrt());
-        let known = |symbol: &str, number: f64, unit: &str, about: &str| value(symbol, number, f64::NAN, unit, about);
+        let known =
+            |symbol: &str, number: f64, unit: &str, about: &str| NamedValue::new(symbol, number, f64::NAN, unit, about);
         let mut values = vec![
             known("scallop", scallop_nm, "nm", "height of the scallops of the declared cut, f²/8R"),
             known("scallop_rq", scallop_nm * (4.0_f64 / 45.0).sqrt(), "nm", "their root mean square, f²/8R·√(4/45)"),
         ];
         let [phase, std] = self.phase_um.unwrap_or([f64::NAN; 2]);
-        values.push(value("scallop_phase", phase, std, "um", "x at which a pass crosses y = 0, nearest to x = 0"));
+        values.push(NamedValue::new(
+            "scallop_phase",
+            phase,
+            std,
+            "um",
+            "x at which a pass crosses y = 0, nearest to x = 0",
+        ));
         let several = self.lines.len() > 1;
         for (index, line) in self.lines.iter().enumerate() {
             let of = if several { format!("line {}", index + 1) } else { "line".into() };

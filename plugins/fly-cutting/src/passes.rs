@@ -30,12 +30,12 @@ pub(crate) struct Line {
 
 impl Line {
     /// What the amplitude is multiplied by in a row.
-    pub fn lever(&self, row: &Row) -> f64 {
+    pub(crate) fn lever(&self, row: &Row) -> f64 {
         if self.tilts { row.y_mm } else { 1.0 }
     }
 
     /// Phase at a pass, in radians.
-    pub fn at(&self, pass: f64, row: &Row) -> f64 {
+    pub(crate) fn at(&self, pass: f64, row: &Row) -> f64 {
         TAU * self.ratio * (pass + row.angle / TAU) + self.phase
     }
 }
@@ -58,7 +58,7 @@ pub(crate) struct Applied {
 
 impl Applied {
     /// Nothing.
-    pub fn none() -> Self {
+    pub(crate) fn none() -> Self {
         Self {
             feed_scale: 0.0,
             radius_mm: 0.0,
@@ -106,7 +106,7 @@ pub(crate) fn legendre(u: f64) -> [f64; ORDERS] {
 }
 
 impl Cut {
-    pub fn new(config: &FlyCuttingConfig, extent_mm: [[f64; 2]; 2], applied: Applied) -> Option<Self> {
+    pub(crate) fn new(config: &FlyCuttingConfig, extent_mm: [[f64; 2]; 2], applied: Applied) -> Option<Self> {
         let declared_mm = 1e-3 * config.feed_um_per_rev;
         let (feed_mm, nose_mm) = (declared_mm * (1.0 + applied.feed_scale), config.nose_radius_mm + applied.radius_mm);
         let middle_mm = extent_mm.map(|[from, to]| [0.5 * (from + to), 0.5 * (to - from)]);
@@ -120,18 +120,18 @@ impl Cut {
     }
 
     /// x at which the pass 0 crosses a row, in mm.
-    pub fn first_mm(&self, row: &Row) -> f64 {
+    pub(crate) fn first_mm(&self, row: &Row) -> f64 {
         row.sag_mm + self.feed_mm * row.angle / TAU
     }
 
     /// Place of the table at a pass, from −1 to 1 over the map.
-    pub fn table_at(&self, pass: f64, row: &Row) -> f64 {
+    pub(crate) fn table_at(&self, pass: f64, row: &Row) -> f64 {
         let [middle_mm, half_mm] = self.middle_mm[0];
         (self.feed_mm * (pass + row.angle / TAU) - middle_mm) / half_mm
     }
 
     /// Legendre polynomials of a row over the map.
-    pub fn across(&self, row: &Row) -> [f64; ORDERS] {
+    pub(crate) fn across(&self, row: &Row) -> [f64; ORDERS] {
         let [middle_mm, half_mm] = self.middle_mm[1];
         legendre((row.y_mm - middle_mm) / half_mm)
     }
@@ -185,7 +185,7 @@ impl Cut {
     }
 
     /// The surface at the points of a map, with the scallops at a phase.
-    pub fn surface(&self, heights: &Heights, phase_mm: f64) -> Surface {
+    pub(crate) fn surface(&self, heights: &Heights, phase_mm: f64) -> Surface {
         let mut surface = Surface {
             height_nm: Vec::with_capacity(heights.len()),
             pass: Vec::with_capacity(heights.len()),
@@ -237,7 +237,7 @@ impl Cut {
     }
 
     /// Change of the height with the distance from the pass, in nm/mm.
-    pub fn slope(&self, beside_mm: f64) -> f64 {
+    pub(crate) fn slope(&self, beside_mm: f64) -> f64 {
         1e6 * beside_mm / (self.nose_mm * self.nose_mm - beside_mm * beside_mm).sqrt()
     }
 }

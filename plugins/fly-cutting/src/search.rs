@@ -41,7 +41,7 @@ pub(crate) struct Left<'a> {
 
 impl Left<'_> {
     /// The lines that explain most, of ratios up to `highest`, one for each of some fractions; the largest first.
-    pub fn lines(&self, tilts: bool, highest: usize) -> Vec<Line> {
+    pub(crate) fn lines(&self, tilts: bool, highest: usize) -> Vec<Line> {
         let Some(length) = self.transform_length() else { return Vec::new() };
         let of = |fraction: f64| {
             let near = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|part| fraction + part / length as f64);
@@ -53,7 +53,7 @@ impl Left<'_> {
     }
 
     /// Lines at all other ratios that look alike at y = 0.
-    pub fn others(&self, line: Line, highest: usize) -> Vec<Line> {
+    pub(crate) fn others(&self, line: Line, highest: usize) -> Vec<Line> {
         let all = self.aliases(line.ratio, line.tilts, highest, 1e-3).into_iter();
         let other = all.filter(|(ratio, _)| (ratio - line.ratio).abs() > 1e-3);
         other
@@ -62,7 +62,7 @@ impl Left<'_> {
     }
 
     /// Amplitudes at all ratios with this fraction, below and above whole numbers; `lines` that were taken out count again.
-    pub fn aliases(&self, fraction: f64, tilts: bool, highest: usize, lowest: f64) -> Vec<(f64, Complex64)> {
+    pub(crate) fn aliases(&self, fraction: f64, tilts: bool, highest: usize, lowest: f64) -> Vec<(f64, Complex64)> {
         let fraction = fraction.rem_euclid(1.0);
         let mut weight = 0.0;
         let sums: Vec<(f64, Complex64)> = self
@@ -162,7 +162,7 @@ impl Left<'_> {
 
     /// The relative error of the feed at which scallops explain most, the residual with those of the model put back; `None` where the
     /// declared feed explains as much.
-    pub fn feed_scale(&self, cut: &Cut) -> Option<f64> {
+    pub(crate) fn feed_scale(&self, cut: &Cut) -> Option<f64> {
         let mut heights = self.residual_nm.to_vec();
         let square = cut.nose_mm * cut.nose_mm;
         for (height, beside_mm) in heights.iter_mut().zip(&self.surface.beside_mm) {

@@ -2,13 +2,11 @@
 
 use runout_core::{
     Result,
+    fault::Fault,
     model::{Fit, Model, Setting},
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
-    stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator, points::far_below_noise},
+    stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator, far_below_noise},
     table::TableSpec,
 };
 
@@ -89,7 +87,7 @@ impl PointSeparator for FlyCutting {
             ));
         }
         remarks.extend(smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof));
-        self.concluded(&measured, (&fit, &fit), &[], remarks)
+        self.fitted_outcome(&measured, (&fit, &fit), &[], remarks)
     }
 
     fn evaluables(&self) -> Vec<EvaluableKind> {
@@ -131,7 +129,7 @@ impl FlyCutting {
     }
 
     /// The result of the fits of the declared and of the final model.
-    pub(crate) fn concluded(
+    pub(crate) fn fitted_outcome(
         &self,
         measured: &Measured,
         (declared, last): (&CutFit, &CutFit),

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::{CUT, scenario, separator};
 use runout_core::{
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     points::{Column, Points},
     stage::PointSeparator,
 };

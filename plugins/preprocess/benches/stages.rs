@@ -7,7 +7,7 @@ use divan::{Bencher, black_box, counter::ItemsCount};
 use runout_core::{
     inspection::Inspection,
     measurement::{Block, Capture, MemoryStream, SampleStream},
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     stage::{Averager, Conditioner, Preprocessor},
 };
 use runout_preprocess::{LowPassConfig, SynchronousAverageConfig};

@@ -11,7 +11,7 @@ mod trim;
 mod testing;
 
 pub use low_pass::{LowPass, LowPassConfig};
-use runout_core::pipeline::{registry::Plugin, registry::Registry};
+use runout_core::pipeline::{Plugin, Registry};
 pub use synchronous_average::{SynchronousAverage, SynchronousAverageConfig};
 pub use trim::{EndTrim, TrimConfig};
 
@@ -27,10 +27,8 @@ mod tests {
     use std::path::Path;
 
     use runout_core::{
-        pipeline::{
-            error::Fault,
-            registry::{Context, StageConfig},
-        },
+        fault::Fault,
+        pipeline::{Context, StageConfig},
         stage::Preprocessor,
     };
 

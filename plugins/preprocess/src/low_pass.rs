@@ -7,13 +7,11 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::Fault,
     measurement::{Block, Capture, Defect, Response, SampleStream},
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     rig::Rig,
-    stage::{Conditioner, Preprocessor, preprocessor::sample_rate_hz},
+    stage::{Conditioner, Preprocessor, sample_rate_hz},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;

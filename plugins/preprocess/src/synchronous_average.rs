@@ -26,13 +26,11 @@ mod window;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::Fault,
     measurement::{Block, Capture, Response, SampleStream},
     near_tone::NearTone,
     numerics::fourier,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     profile::{Profile, TurnCount},
     rig::Rig,
     stage::{AverageRequest, Averager, Preprocessor},

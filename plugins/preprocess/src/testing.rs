@@ -6,7 +6,7 @@ use std::path::Path;
 use runout_core::{
     Result,
     measurement::{Block, Capture, Defect, MemoryStream, SampleStream},
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     stage::{Averager, Conditioner, Preprocessor},
 };
 

@@ -2,11 +2,9 @@
 
 use runout_core::{
     Result,
+    fault::Fault,
     measurement::{Block, Capture, SampleStream, Trim},
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     stage::{Conditioner, Preprocessor},
 };
 use schemars::JsonSchema;

@@ -16,7 +16,7 @@ use crate::{components::Component, samples::Samples, signal::Signal};
 const DIFFERENCE_OVER_SUM: f64 = 19.0 / 4.0;
 
 /// What is done to the angle.
-pub struct Correction {
+pub(crate) struct Correction {
     signal: Signal,
     /// Variance of the angle by the components, in rad².
     variance: f64,
@@ -38,7 +38,7 @@ impl Correction {
     ///
     /// # Errors
     /// When the samples do not determine what was found.
-    pub fn of(samples: &Samples, max_order: usize, fit: &LinearFit) -> Result<Self> {
+    pub(crate) fn of(samples: &Samples, max_order: usize, fit: &LinearFit) -> Result<Self> {
         let radius = fit.declared().first().copied().unwrap_or(f64::NAN);
         let found = fit.effects().filter_map(|(effect, values, variance)| {
             let component = Component::of(&effect.id, max_order)?;
@@ -97,7 +97,7 @@ impl Correction {
     }
 
     /// What the user should know.
-    pub fn remarks(&self) -> Vec<String> {
+    pub(crate) fn remarks(&self) -> Vec<String> {
         let mut remarks: Vec<String> = self
             .undecided
             .iter()
@@ -129,7 +129,7 @@ impl Correction {
     ///
     /// # Errors
     /// Never in practice: the columns are of one length.
-    pub fn rows(&self, points: &Points, samples: &Samples) -> Result<TableRows> {
+    pub(crate) fn rows(&self, points: &Points, samples: &Samples) -> Result<TableRows> {
         let corrected = samples.phase_rad.iter().zip(&samples.radius).map(|(phase, radius)| {
             let angle = self.signal.angle_rad(*phase, *radius);
             // The same turn as the phase has.
@@ -151,11 +151,11 @@ impl Correction {
 }
 
 /// What the numbers of the angle are.
-pub const ANGLE: &str = "Angle of a quadrature signal within its period. corrected_deg is phase_deg without the errors that the \
+pub(crate) const ANGLE: &str = "Angle of a quadrature signal within its period. corrected_deg is phase_deg without the errors that the \
     diagnosis decided; std_deg includes what it did not decide and the noise of the reading.";
 
 /// The table of angles, one row a sample.
-pub fn angle_table() -> TableSpec {
+pub(crate) fn angle_table() -> TableSpec {
     TableSpec::new(
         "angle",
         ANGLE,

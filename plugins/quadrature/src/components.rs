@@ -28,39 +28,39 @@ use runout_core::{
 
 /// A component that rotates m times as fast as the pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Component(pub i32);
+pub(crate) struct Component(pub i32);
 
 /// Expected size of offset, gain ratio and quadrature angle, relative to the radius; a k-th harmonic has 1/k of it.
-pub const USUAL: f64 = 0.01;
-pub const UNIT: &str = "counts";
+pub(crate) const USUAL: f64 = 0.01;
+pub(crate) const UNIT: &str = "counts";
 
 impl Component {
     /// All up to an order of the radius, backward before forward at each order.
-    pub fn all(max_order: usize) -> Vec<Self> {
+    pub(crate) fn all(max_order: usize) -> Vec<Self> {
         (1..=max_order).flat_map(Self::of_order).collect()
     }
 
     /// The backward and the forward one of an order of the radius.
-    pub fn of_order(order: usize) -> [Self; 2] {
+    pub(crate) fn of_order(order: usize) -> [Self; 2] {
         let order = i32::try_from(order).unwrap_or(i32::MAX - 1);
         [Self(1 - order), Self(1 + order)]
     }
 
     /// Its order in radius and angle.
-    pub fn order(self) -> usize {
+    pub(crate) fn order(self) -> usize {
         (self.0 - 1).unsigned_abs() as usize
     }
 
     /// The other component of the same order in the radius.
-    pub fn partner(self) -> Self {
+    pub(crate) fn partner(self) -> Self {
         Self(2 - self.0)
     }
 
-    pub fn is_forward(self) -> bool {
+    pub(crate) fn is_forward(self) -> bool {
         self.0 > 1
     }
 
-    pub fn id(self) -> String {
+    pub(crate) fn id(self) -> String {
         match self.0 {
             0 => "quadrature-offset".into(),
             -1 => "quadrature-gain-and-angle".into(),
@@ -70,12 +70,12 @@ impl Component {
     }
 
     /// The component of an effect.
-    pub fn of(id: &str, max_order: usize) -> Option<Self> {
+    pub(crate) fn of(id: &str, max_order: usize) -> Option<Self> {
         Self::all(max_order).into_iter().find(|component| component.id() == id)
     }
 
     /// Standard deviation that is expected of real and imaginary part of p, of a pair of unit radius.
-    pub fn usual(self) -> f64 {
+    pub(crate) fn usual(self) -> f64 {
         match self.0 {
             0 => USUAL,
             -1 => 0.5 * USUAL,
@@ -84,7 +84,7 @@ impl Component {
     }
 
     /// The effect on a pair of a radius. Parameters are what the radius has: c cos nφ + s sin nφ.
-    pub fn effect(self, radius: f64) -> Effect {
+    pub(crate) fn effect(self, radius: f64) -> Effect {
         let wave = ["cosine", "sine"].map(|name| (name, UNIT, radius * self.usual()));
         let parameters =
             if self.0 == -1 { [("gain_ratio_less_1", "", USUAL), ("angle_error", "rad", USUAL)] } else { wave };
@@ -94,7 +94,7 @@ impl Component {
     }
 
     /// What the radius has, c and s, of parameters of the [`effect`](Self::effect).
-    pub fn waves(self, radius: f64, parameters: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn waves(self, radius: f64, parameters: [f64; 2]) -> [f64; 2] {
         if self.0 != -1 {
             return parameters;
         }
@@ -104,7 +104,7 @@ impl Component {
     }
 
     /// The parameters of what the radius has.
-    pub fn parameters(self, radius: f64, waves: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn parameters(self, radius: f64, waves: [f64; 2]) -> [f64; 2] {
         if self.0 != -1 {
             return waves;
         }
@@ -114,7 +114,7 @@ impl Component {
     }
 
     /// Change of c and of s per unit of each parameter, `[parameter][wave]`.
-    pub fn slopes(self, radius: f64, parameters: [f64; 2]) -> [[f64; 2]; 2] {
+    pub(crate) fn slopes(self, radius: f64, parameters: [f64; 2]) -> [[f64; 2]; 2] {
         if self.0 != -1 {
             return [[1.0, 0.0], [0.0, 1.0]];
         }
@@ -124,18 +124,18 @@ impl Component {
     }
 
     /// p from what the radius has, c cos nφ + s sin nφ.
-    pub fn of_radius(self, [cosine, sine]: [f64; 2]) -> Complex64 {
+    pub(crate) fn of_radius(self, [cosine, sine]: [f64; 2]) -> Complex64 {
         Complex64::new(cosine, if self.is_forward() { -sine } else { sine })
     }
 
     /// What c and s of the radius add to the angle, times the radius, at an angle.
-    pub fn along(self, angle_rad: f64) -> [f64; 2] {
+    pub(crate) fn along(self, angle_rad: f64) -> [f64; 2] {
         let (sine, cosine) = (self.order() as f64 * angle_rad).sin_cos();
         if self.is_forward() { [sine, -cosine] } else { [-sine, cosine] }
     }
 
     /// What c and s of the radius add to it at an angle.
-    pub fn across(self, angle_rad: f64) -> [f64; 2] {
+    pub(crate) fn across(self, angle_rad: f64) -> [f64; 2] {
         let (sine, cosine) = (self.order() as f64 * angle_rad).sin_cos();
         [cosine, sine]
     }

@@ -9,7 +9,7 @@ mod model;
 mod samples;
 mod signal;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 pub use model::{Quadrature, QuadratureConfig};
 

@@ -8,19 +8,15 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::{Fault, within},
     model::{
         Effect, Fit,
         linear_terms::{LinearFit, LinearTerms, Observations, Term},
     },
-    pipeline::{
-        error::{Fault, within},
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
-    stage::{
-        LinearModel, Outcome, PointModel, PointSeparator, Separator,
-        points::{residual_table, separate_declared, value},
-    },
+    stage::{LinearModel, Outcome, PointModel, PointSeparator, Separator, residual_table, separate_declared},
+    summary::NamedValue,
     table::TableSpec,
 };
 use schemars::JsonSchema;
@@ -157,10 +153,10 @@ impl LinearModel for Quadrature {
         if samples.true_rad.is_some() {
             return Ok(model.judged_by(count..rows));
         }
-        Ok(model.told_apart_by(TOLD_APART))
+        Ok(model.distinguished_by(TOLD_APART))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
+    fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let samples = Samples::of(points)?;
         let count = samples.phase_rad.len();
         let blocks = format!(
@@ -174,10 +170,9 @@ impl LinearModel for Quadrature {
         let correction = Correction::of(&samples, self.0.max_order, fit)?;
         let mut remarks = vec![blocks, evidence.to_owned()];
         remarks.extend(correction.remarks());
-        let values = fit
-            .values()
-            .into_iter()
-            .map(|found| value(&found.value, found.number, found.std, &found.unit, "declared part of the signal"));
+        let values = fit.values().into_iter().map(|found| {
+            NamedValue::new(&found.value, found.number, found.std, &found.unit, "declared part of the signal")
+        });
         Ok(Outcome {
             convention: ANGLE.into(),
             tables: vec![correction.rows(points, &samples)?],

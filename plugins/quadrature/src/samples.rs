@@ -11,7 +11,7 @@ use crate::{
 const FAR_OFF: f64 = 0.5;
 
 /// Samples as the model takes them.
-pub struct Samples {
+pub(crate) struct Samples {
     pub phase_rad: Vec<f64>,
     pub radius: Vec<f64>,
     /// The true angle with the phase's zero, where it is known.
@@ -19,7 +19,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    pub fn of(points: &Points) -> Result<Self> {
+    pub(crate) fn of(points: &Points) -> Result<Self> {
         let rad = |name: &str| -> Result<Vec<f64>> {
             Ok(points.column(name)?.iter().map(|degrees| degrees.to_radians()).collect())
         };
@@ -44,17 +44,17 @@ impl Samples {
     }
 
     /// Mean of the radius, in counts.
-    pub fn mean_radius(&self) -> f64 {
+    pub(crate) fn mean_radius(&self) -> f64 {
         self.radius.iter().sum::<f64>() / self.radius.len() as f64
     }
 
     /// Where each sample is on the circle: the true angle, or the phase.
-    pub fn angles(&self) -> &[f64] {
+    pub(crate) fn angles(&self) -> &[f64] {
         self.true_rad.as_deref().unwrap_or(&self.phase_rad)
     }
 
     /// The radius; with a reference both parts of z e^{−iθ}, the one along the circle behind the other.
-    pub fn values(&self) -> Vec<f64> {
+    pub(crate) fn values(&self) -> Vec<f64> {
         let Some(angles) = &self.true_rad else { return self.radius.clone() };
         let z = self.radius.iter().zip(&self.phase_rad).zip(angles);
         let turned: Vec<Complex64> =
@@ -63,7 +63,7 @@ impl Samples {
     }
 
     /// What is always fitted: the radius, and with a reference the zero of the angle.
-    pub fn declared(&self) -> Vec<Declared> {
+    pub(crate) fn declared(&self) -> Vec<Declared> {
         let count = self.phase_rad.len();
         let rows = if self.true_rad.is_some() { 2 * count } else { count };
         let part = |name: &str, of: std::ops::Range<usize>| {
@@ -81,7 +81,7 @@ impl Samples {
     ///
     /// What the radius over the phase has beyond first order is taken out of it, as if all components were backward ones: of
     /// components that the radius alone does not decide, it is not known better.
-    pub fn linearised(&self, max_order: usize) -> Result<(Vec<f64>, f64, [f64; 2])> {
+    pub(crate) fn linearised(&self, max_order: usize) -> Result<(Vec<f64>, f64, [f64; 2])> {
         let mut values = self.values();
         let gain = Component::of_order(2)[0];
         let (radius, waves) = if self.true_rad.is_some() {
@@ -120,7 +120,7 @@ impl Samples {
     }
 
     /// What the cosine or the sine of a component in the radius adds to the values.
-    pub fn column(&self, component: Component, wave: usize) -> Vec<f64> {
+    pub(crate) fn column(&self, component: Component, wave: usize) -> Vec<f64> {
         let across = self.angles().iter().map(|angle| component.across(*angle)[wave]);
         let along = self.true_rad.iter().flatten().map(|angle| component.along(*angle)[wave]);
         across.chain(along).collect()

@@ -12,7 +12,7 @@ use crate::components::{Component, UNIT};
 
 /// A circle with components that rotate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Signal {
+pub(crate) struct Signal {
     /// Radius of the circle, in counts.
     pub radius: f64,
     /// Components and their p, in counts.
@@ -33,7 +33,7 @@ impl Signal {
     ///
     /// # Errors
     /// When the samples do not determine them.
-    pub fn fit(
+    pub(crate) fn fit(
         phase_rad: &[f64],
         radius: &[f64],
         known: &[(Component, Complex64)],
@@ -66,7 +66,7 @@ impl Signal {
     }
 
     /// Whether the components are small enough beside the radius for all of this to converge.
-    pub fn is_usable(&self) -> bool {
+    pub(crate) fn is_usable(&self) -> bool {
         let sum: f64 = self.components.iter().map(|(_, p)| p.norm()).sum();
         self.radius > 0.0 && sum < 0.5 * self.radius
     }
@@ -79,7 +79,7 @@ impl Signal {
     }
 
     /// The true angle behind a reading of a phase and a radius: that at which z less all components has the angle itself.
-    pub fn angle_rad(&self, phase_rad: f64, radius: f64) -> f64 {
+    pub(crate) fn angle_rad(&self, phase_rad: f64, radius: f64) -> f64 {
         settle(phase_rad, |angle| {
             let others: Complex64 =
                 self.components.iter().map(|(component, p)| p * Complex64::cis(f64::from(component.0) * angle)).sum();
@@ -89,7 +89,7 @@ impl Signal {
     }
 
     /// The radius that the pair has where its phase is this, not its angle.
-    pub fn radius_at_phase(&self, phase_rad: f64) -> f64 {
+    pub(crate) fn radius_at_phase(&self, phase_rad: f64) -> f64 {
         let angle = settle(phase_rad, |angle| phase_rad - (1.0 + self.beside(angle)).arg());
         self.radius * (1.0 + self.beside(angle)).norm()
     }
@@ -99,7 +99,7 @@ impl Signal {
 ///
 /// # Errors
 /// When the columns are dependent.
-pub fn least_squares(values: Vec<f64>, columns: Vec<Declared>) -> Result<Vec<f64>> {
+pub(crate) fn least_squares(values: Vec<f64>, columns: Vec<Declared>) -> Result<Vec<f64>> {
     let group = vec![0; values.len()];
     let observations = Observations { values, unit: UNIT.into(), std: None, group, groups: vec!["all".into()] };
     Ok(LinearTerms::new(observations, columns, Vec::new())?.fit(&[])?.declared().to_vec())

@@ -107,7 +107,7 @@ fn corrected(recording: &Recording, effects: Option<&[&str]>) -> (Diagnosis, [f6
     let terms = model.terms(&points).unwrap().considering(effects.as_deref());
     let settings = closed_loop::Settings { effects, max_added: 20, ..closed_loop::Settings::default() };
     let closed = closed_loop::diagnose(&terms, &settings).unwrap();
-    let conclusion = model.conclude(&points, &closed.after).unwrap();
+    let conclusion = model.outcome(&points, &closed.after).unwrap();
     let table = &conclusion.tables[0];
     assert_eq!(table.table, "angle");
     let column = |name: &str| {

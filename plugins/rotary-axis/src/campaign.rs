@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, Result,
-    pipeline::error::known_names,
+    fault::known_names,
     points::{
         PointColumn,
         PointKind::{Label, Number},
@@ -22,7 +22,7 @@ use crate::{
 /// Commands closer than this are the same, in degrees.
 const SAME_COMMAND_DEG: f64 = 5e-3;
 /// Fewer distinct commands determine no harmonic.
-pub const FEWEST_COMMANDS: usize = 3;
+pub(crate) const FEWEST_COMMANDS: usize = 3;
 /// Commands within ±this are a turn in radians, or nothing that separates much.
 const RADIANS: f64 = 7.0;
 /// A median deviation above this, in mm, looks like another unit.
@@ -33,7 +33,7 @@ const SMALL_MM: f64 = 1e-5;
 const GAP_DEG: f64 = 120.0;
 
 /// The columns of an R-test on an axis.
-pub fn columns(axis: Axis) -> Vec<PointColumn> {
+pub(crate) fn columns(axis: Axis) -> Vec<PointColumn> {
     let command = "command of the rotary axis";
     vec![
         PointColumn::needed("ball", Label, "", "id of the ball, one of `balls`"),
@@ -49,7 +49,7 @@ pub fn columns(axis: Axis) -> Vec<PointColumn> {
 }
 
 /// Readings of a campaign, about an axis along z.
-pub struct Campaign {
+pub(crate) struct Campaign {
     pub layout: Layout,
     pub readings: Vec<Reading>,
     /// Ids of the balls that were measured, in the order of the layout.
@@ -69,7 +69,7 @@ pub struct Campaign {
 impl Campaign {
     /// The readings of points.
     #[allow(clippy::too_many_lines, reason = "one column after the other")]
-    pub fn of(config: &RotaryAxisConfig, points: &Points) -> Result<Self> {
+    pub(crate) fn of(config: &RotaryAxisConfig, points: &Points) -> Result<Self> {
         let file = points.input.display().to_string();
         let refuse = |problem: String| Error::new("fit", &file, problem);
         let optional = |name: &str| points.columns.iter().find(|column| column.name == name);
@@ -218,12 +218,12 @@ fn distinct(command: &[f64]) -> (Vec<f64>, Vec<usize>) {
 }
 
 /// The widest step between neighbouring commands around a turn.
-pub fn widest_gap(commands_deg: &[f64]) -> f64 {
+pub(crate) fn widest_gap(commands_deg: &[f64]) -> f64 {
     steps(commands_deg).into_iter().fold(0.0, f64::max)
 }
 
 /// Steps between neighbouring commands around a turn.
-pub fn steps(commands_deg: &[f64]) -> Vec<f64> {
+pub(crate) fn steps(commands_deg: &[f64]) -> Vec<f64> {
     let mut sorted: Vec<f64> = commands_deg.iter().map(|command| command.rem_euclid(360.0)).collect();
     sorted.sort_by(f64::total_cmp);
     let mut steps: Vec<f64> = sorted.windows(2).map(|pair| pair[1] - pair[0]).collect();

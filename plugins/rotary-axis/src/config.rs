@@ -2,10 +2,8 @@
 
 use nalgebra::Vector3;
 use runout_core::{
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     stage::Separator,
 };
 use schemars::JsonSchema;

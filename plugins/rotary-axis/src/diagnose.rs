@@ -15,7 +15,8 @@ use runout_core::{
     },
     numerics::least_squares::dot,
     points::Points,
-    stage::{NamedValue, Outcome, PointDiagnosis, PointModel, PointSeparator},
+    stage::{Outcome, PointDiagnosis, PointModel, PointSeparator},
+    summary::NamedValue,
 };
 
 use crate::{
@@ -247,7 +248,7 @@ impl RotaryAxis {
         });
         let model = LinearTerms::new(observations, declared.collect(), terms.collect())
             .map_err(|error| error.to_string())?
-            .told_apart_by(
+            .distinguished_by(
                 "a calibration of the linear axes on their own, or a campaign with the balls in another order of time",
             );
         Ok(Assembled { terms: model, data, first, tried, nest })
@@ -295,7 +296,7 @@ impl RotaryAxis {
         }
         nest::confound(&mut diagnosis, &instead);
         let columns = self.columns_of(campaign, &effects, constants);
-        let mut after = self.conclude(points, campaign, &columns, before, &alternatives)?;
+        let mut after = self.fitted_outcome(points, campaign, &columns, before, &alternatives)?;
         let last = fit(&campaign.layout, &campaign.readings, &columns)
             .map_err(|problem| Error::new("fit", points.input.display().to_string(), problem))?;
         if scale(&last, campaign.noise).is_more && diagnosis.verdict != Verdict::Unexplained {

@@ -18,7 +18,7 @@ use crate::{axis::Axis, campaign::Campaign, kinematics::turn, solve::Column};
 
 /// An effect, wherever it acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     LinearAxisScale,
     LinearAxisSquareness,
     ThermalDrift,
@@ -26,16 +26,17 @@ pub enum Kind {
 }
 
 /// Every effect.
-pub const KINDS: [Kind; 4] = [Kind::LinearAxisScale, Kind::LinearAxisSquareness, Kind::ThermalDrift, Kind::Backlash];
+pub(crate) const KINDS: [Kind; 4] =
+    [Kind::LinearAxisScale, Kind::LinearAxisSquareness, Kind::ThermalDrift, Kind::Backlash];
 
 /// Time constant at which a known drift without one counts, as a share of the campaign.
-pub const USUAL_TIME_CONSTANT: f64 = 0.3;
+pub(crate) const USUAL_TIME_CONSTANT: f64 = 0.3;
 /// Time constants that are looked for: shorter ones end within the first readings, longer ones are straight lines.
-pub const TIME_CONSTANTS: [f64; 2] = [0.02, 1.0];
+pub(crate) const TIME_CONSTANTS: [f64; 2] = [0.02, 1.0];
 
 impl Kind {
     /// Its id.
-    pub fn id(self) -> &'static str {
+    pub(crate) fn id(self) -> &'static str {
         match self {
             Self::LinearAxisScale => "linear-axis-scale",
             Self::LinearAxisSquareness => "linear-axis-squareness",
@@ -45,7 +46,7 @@ impl Kind {
     }
 
     /// What it does, in one line.
-    pub fn about(self) -> &'static str {
+    pub(crate) fn about(self) -> &'static str {
         match self {
             Self::LinearAxisScale => "a linear axis that measures has a scale error",
             Self::LinearAxisSquareness => "two linear axes that measure are not square to each other",
@@ -55,7 +56,7 @@ impl Kind {
     }
 
     /// What it is described by.
-    pub fn parameters(self) -> Vec<Parameter> {
+    pub(crate) fn parameters(self) -> Vec<Parameter> {
         let of = |name: &str, unit: &str, tolerance| Parameter { name: name.into(), unit: unit.into(), tolerance };
         match self {
             Self::LinearAxisScale => vec![of("scale", "um/m", 50.0)],
@@ -68,7 +69,7 @@ impl Kind {
 
 /// An effect at its target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Candidate {
+pub(crate) enum Candidate {
     /// Of the machine's coordinate.
     Scale(usize),
     /// Adds to the first coordinate, in proportion to the second.
@@ -79,7 +80,7 @@ pub enum Candidate {
 }
 
 /// Everything that is looked for.
-pub const CANDIDATES: [Candidate; 13] = [
+pub(crate) const CANDIDATES: [Candidate; 13] = [
     Candidate::Scale(0),
     Candidate::Scale(1),
     Candidate::Scale(2),
@@ -106,7 +107,7 @@ impl Candidate {
     }
 
     /// Its description.
-    pub fn effect(self) -> Effect {
+    pub(crate) fn effect(self) -> Effect {
         let upper = ["X", "Y", "Z"];
         let lower = ["x", "y", "z"];
         let mut parameters = self.kind().parameters();
@@ -129,7 +130,7 @@ impl Candidate {
     }
 
     /// What one unit of each parameter adds to each reading, mm; of an exponential drift, D and D·ΔT at a time constant T.
-    pub fn columns(self, axis: Axis, campaign: &Campaign, time_constant: f64) -> Vec<Column> {
+    pub(crate) fn columns(self, axis: Axis, campaign: &Campaign, time_constant: f64) -> Vec<Column> {
         let each = |add: &dyn Fn(usize, [f64; 3]) -> [f64; 3]| -> Column {
             let readings = campaign.readings.iter().enumerate();
             readings

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Rotation by |v| rad about v (Rodrigues).
-pub fn rotation(v: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn rotation(v: &Vector3<f64>) -> Matrix3<f64> {
     let angle = v.norm();
     let cross = v.cross_matrix();
     // Both series hold to rounding below this angle.
@@ -16,7 +16,7 @@ pub fn rotation(v: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Rotation by φ about z, right-handed.
-pub fn turn(phi: f64) -> Matrix3<f64> {
+pub(crate) fn turn(phi: f64) -> Matrix3<f64> {
     let (sine, cosine) = phi.sin_cos();
     Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0)
 }
@@ -29,7 +29,7 @@ fn by_rotation(v: &Vector3<f64>, turned: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Location and component errors at one command; mm and rad.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Errors {
+pub(crate) struct Errors {
     /// e; z is 0.
     pub offset: Vector3<f64>,
     /// θ; z is 0.
@@ -41,7 +41,7 @@ pub struct Errors {
 }
 
 /// A ball's place and its derivatives.
-pub struct Place {
+pub(crate) struct Place {
     pub at: Vector3<f64>,
     pub by_tilt: Matrix3<f64>,
     pub by_shift: Matrix3<f64>,
@@ -51,7 +51,7 @@ pub struct Place {
 }
 
 /// The place at command φ of a ball that stands at `ball` (p + b) at command 0.
-pub fn place(errors: &Errors, phi: f64, ball: &Vector3<f64>) -> Place {
+pub(crate) fn place(errors: &Errors, phi: f64, ball: &Vector3<f64>) -> Place {
     let (table, component, axis) = (turn(phi), rotation(&errors.angle), rotation(&errors.tilt));
     let turned = component * (table * ball);
     let whole = axis * (errors.shift + turned);

@@ -24,9 +24,9 @@ pub mod simulate;
 mod solve;
 mod tables;
 
-use runout_core::pipeline::{
+use runout_core::{
     effects::EffectEntry,
-    registry::{Plugin, Registry},
+    pipeline::{Plugin, Registry},
 };
 
 pub use axis::Axis;

@@ -9,19 +9,15 @@
 
 use runout_core::{
     Error, Result,
+    fault::{Fault, within},
     model::{
         Effect, Fit, Parameter, Remainder,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
-    pipeline::{
-        error::{Fault, within},
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
-    stage::{
-        LinearModel, Outcome, PointModel, PointSeparator, Separator,
-        points::{residual_table, separate_declared, value},
-    },
+    stage::{LinearModel, Outcome, PointModel, PointSeparator, Separator, residual_table, separate_declared},
+    summary::NamedValue,
     table::TableSpec,
 };
 use schemars::JsonSchema;
@@ -176,7 +172,7 @@ impl LinearModel for RTest {
         Ok(model.ending_at(format!("harmonic-{highest}"), format!("`separate.max_order` is {highest}")))
     }
 
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
+    fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let used = self.used(points)?;
         let Remainder { rms, dof, held_out_rms, .. } = fit.remainder();
         let all = points.column("a_deg")?.len();
@@ -204,8 +200,10 @@ impl LinearModel for RTest {
             ));
         }
         let about = "level or first harmonic of C of the ball's deviation: installation of the axis and of the ball";
-        let values =
-            fit.values().into_iter().map(|found| value(&found.value, found.number, found.std, &found.unit, about));
+        let values = fit
+            .values()
+            .into_iter()
+            .map(|found| NamedValue::new(&found.value, found.number, found.std, &found.unit, about));
         let convention = "actual less nominal place of the ball, in machine coordinates".into();
         Ok(Outcome { convention, values: values.collect(), remarks, ..Outcome::default() })
     }

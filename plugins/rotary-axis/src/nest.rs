@@ -28,7 +28,7 @@ const TOLD_APART_BY: &str =
 
 /// An error of the nest instead of errors of linear axes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Nest {
+pub(crate) struct Nest {
     /// Its place among [`columns`].
     pub index: usize,
     /// Places of the added effects that it replaces.
@@ -39,7 +39,7 @@ pub struct Nest {
 ///
 /// # Errors
 /// When the declared model cannot be fitted.
-pub fn columns(axis: Axis, campaign: &Campaign) -> Result<Vec<Column>, String> {
+pub(crate) fn columns(axis: Axis, campaign: &Campaign) -> Result<Vec<Column>, String> {
     let found = fit(&campaign.layout, &campaign.readings, &[])?;
     let expected: Vec<[f64; 3]> = campaign
         .readings
@@ -60,7 +60,7 @@ pub fn columns(axis: Axis, campaign: &Campaign) -> Result<Vec<Column>, String> {
 }
 
 /// Errors of the nest that explain as much as effects of the linear axes (marked) that were added: instead of each, or of all.
-pub fn instead(data: &Redundant, added: &[(bool, Vec<Vec<f64>>)], first: usize) -> Vec<Nest> {
+pub(crate) fn instead(data: &Redundant, added: &[(bool, Vec<Vec<f64>>)], first: usize) -> Vec<Nest> {
     let of_axes: Vec<usize> = (0..added.len()).filter(|place| added[*place].0).collect();
     if of_axes.is_empty() {
         return Vec::new();
@@ -93,7 +93,7 @@ pub fn instead(data: &Redundant, added: &[(bool, Vec<Vec<f64>>)], first: usize) 
 }
 
 /// Names them in the confounded sets of the effects.
-pub fn confound(diagnosis: &mut Diagnosis, instead: &[Nest]) {
+pub(crate) fn confound(diagnosis: &mut Diagnosis, instead: &[Nest]) {
     for Nest { index, replaced } in instead {
         for place in replaced {
             let Some(found) = diagnosis.added.get_mut(*place) else { continue };
@@ -110,7 +110,7 @@ pub fn confound(diagnosis: &mut Diagnosis, instead: &[Nest]) {
 }
 
 /// What errors of the nest do where nothing shows them: a share of the offsets of the axis.
-pub fn blind(axis: Axis, found: &Fit) -> Vec<Blind> {
+pub(crate) fn blind(axis: Axis, found: &Fit) -> Vec<Blind> {
     let symbols = axis.location_symbols();
     let offsets = found.location();
     let largest = (0..2).filter(|index| offsets[*index].value.is_finite());

@@ -7,7 +7,7 @@ use crate::solve::Reading;
 
 /// What the standard uncertainty of a reading comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Noise {
+pub(crate) enum Noise {
     /// The column `std_um`.
     Column,
     /// The key `std_um`.
@@ -32,7 +32,7 @@ const FREEDOM_A_FUNCTION: usize = 12;
 /// Each ball and command, approached in one direction, has a level of its own; a drift common to all, a polynomial of time in each
 /// coordinate, is fitted beside. Where no repeats share a direction, both directions share a level, and what lost motion of the
 /// rotary axis adds (`lost_motion`, of any size) is fitted, too.
-pub fn of_repeats(readings: &[Reading], time: &[f64], direction: &[f64], lost_motion: &[Vector3<f64>]) -> Noise {
+pub(crate) fn of_repeats(readings: &[Reading], time: &[f64], direction: &[f64], lost_motion: &[Vector3<f64>]) -> Noise {
     let place = |index: usize| (readings[index].ball, readings[index].command);
     let in_one_direction = scatter(readings, time, None, |index| (place(index), direction[index] > 0.0));
     let found = in_one_direction.or_else(|| scatter(readings, time, Some(lost_motion), place));

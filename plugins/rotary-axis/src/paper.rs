@@ -7,11 +7,9 @@
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::{Fault, known_names},
     numerics::least_squares::least_norm,
-    pipeline::{
-        error::{Fault, known_names},
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{PointColumn, Points},
     stage::{Outcome, PointSeparator, Separator},
     table::{TableRows, TableSpec, numbers, numbers_or_null},

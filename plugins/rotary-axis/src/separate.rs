@@ -4,10 +4,8 @@ use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
     points::{PointColumn, Points},
-    stage::{
-        NamedValue, Outcome, PointModel, PointPlan, PointSeparator,
-        points::{far_below_noise, residual_table, value},
-    },
+    stage::{Outcome, PointModel, PointPlan, PointSeparator, far_below_noise, residual_table},
+    summary::NamedValue,
     table::{TableRows, TableSpec, numbers, numbers_or_null, texts},
 };
 
@@ -58,7 +56,7 @@ impl PointSeparator for RotaryAxis {
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let campaign = Campaign::of(&self.0, points)?;
-        self.conclude(points, &campaign, &[], &[], &[])
+        self.fitted_outcome(points, &campaign, &[], &[], &[])
     }
 
     fn notes(&self) -> Vec<String> {
@@ -161,7 +159,7 @@ impl RotaryAxis {
     /// The outcome of a fit with effects, whose values are fitted beside; `before` is the residual without them. Where the data
     /// do not decide between effects, `alternatives` are the others: how far results with them differ is added to the
     /// uncertainty.
-    pub(crate) fn conclude(
+    pub(crate) fn fitted_outcome(
         &self,
         points: &Points,
         campaign: &Campaign,
@@ -274,7 +272,7 @@ impl RotaryAxis {
             for (when, ranges, about) in &what {
                 for (coordinate, name) in ["dx", "dy", "dz"].into_iter().enumerate() {
                     let number = ranges[ball].um(coordinate);
-                    values.push(value(&format!("{name}_range_{when}"), number, f64::NAN, "um", about).of(id));
+                    values.push(NamedValue::new(&format!("{name}_range_{when}"), number, f64::NAN, "um", about).of(id));
                 }
             }
         }
@@ -353,7 +351,7 @@ pub(crate) fn location_values(axis: Axis, found: [Estimate; 4]) -> Vec<NamedValu
             } else {
                 (1e6, "urad", "location error: tilt of the axis' average line (ISO 230-1)")
             };
-            value(&symbol, scale * one.value, scale * one.std, unit, about)
+            NamedValue::new(&symbol, scale * one.value, scale * one.std, unit, about)
         })
         .collect();
     values.sort_by(|a, b| (&b.unit == "um", &a.symbol).cmp(&(&a.unit == "um", &b.symbol)));

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use runout_core::{
     Result,
-    stage::points::residual_table,
+    stage::residual_table,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts},
 };
 

@@ -6,7 +6,7 @@ mod common;
 
 use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, column, scenario, separated, value};
 use runout_core::{
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     points::Points,
     stage::Outcome,
 };

@@ -26,7 +26,7 @@ const SIGN_YZ: [f64; 4] = [1.0, -1.0, 1.0, -1.0];
 ///
 /// # Errors
 /// When no degree of freedom is left.
-pub fn equations(object: &str, model: &RotorModel) -> Result<Equations> {
+pub fn assemble(object: &str, model: &RotorModel) -> Result<Equations> {
     let mesh = Mesh::new(model);
     let size = DOFS * mesh.z_mm.len();
     let mut all = Assembly::new(size);

@@ -1,17 +1,17 @@
 //! Speeds at which a mode is near a multiple of the speed.
 
-use runout_core::{Result, pipeline::error::Fault};
+use runout_core::{Result, fault::Fault};
 
 use crate::crossings::Search;
 
 /// Orders that matter where nothing else is said: unbalance, and what a bent, oval or three-jawed part does twice and thrice a turn.
-pub const USUAL_ORDERS: [f64; 3] = [1.0, 2.0, 3.0];
+pub(crate) const USUAL_ORDERS: [f64; 3] = [1.0, 2.0, 3.0];
 /// How near a mode may not be, in percent of order times speed.
-pub const USUAL_PERCENT: f64 = 15.0;
+pub(crate) const USUAL_PERCENT: f64 = 15.0;
 
 /// A range of speeds, in rad/s, where a mode is near an order.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub(crate) struct Range {
     /// Number of the mode in the order of speeds.
     pub mode: usize,
     /// Multiple of the speed.
@@ -26,7 +26,12 @@ pub struct Range {
 ///
 /// # Errors
 /// The first value that cannot be.
-pub fn check(orders_key: &str, orders: &[f64], percent_key: &str, percent: f64) -> std::result::Result<(), Fault> {
+pub(crate) fn check(
+    orders_key: &str,
+    orders: &[f64],
+    percent_key: &str,
+    percent: f64,
+) -> std::result::Result<(), Fault> {
     if let Some(order) = orders.iter().find(|order| !(order.is_finite() && **order > 0.0)) {
         return Err(Fault::at(orders_key, format!("expected orders above 0, found {order}")));
     }
@@ -40,7 +45,7 @@ pub fn check(orders_key: &str, orders: &[f64], percent_key: &str, percent: f64) 
 ///
 /// # Errors
 /// When eigenvalues do not converge.
-pub fn ranges(search: &mut Search, orders: &[f64], share: f64, modes: usize) -> Result<Vec<Range>> {
+pub(crate) fn ranges(search: &mut Search, orders: &[f64], share: f64, modes: usize) -> Result<Vec<Range>> {
     let mut found = Vec::new();
     for order in orders {
         let begins = search.speeds(order * (1.0 + share), modes)?;
@@ -57,7 +62,7 @@ pub fn ranges(search: &mut Search, orders: &[f64], share: f64, modes: usize) -> 
 
 /// Ranges joined where they overlap, ascending.
 #[must_use]
-pub fn joined(ranges: &[Range]) -> Vec<(f64, f64)> {
+pub(crate) fn joined(ranges: &[Range]) -> Vec<(f64, f64)> {
     let mut bounds: Vec<(f64, f64)> = ranges.iter().map(|range| (range.from, range.to)).collect();
     bounds.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut all: Vec<(f64, f64)> = Vec::new();

@@ -6,11 +6,11 @@
 use std::f64::consts::PI;
 
 /// A 4 × 4 matrix of an element.
-pub type Square = [[f64; 4]; 4];
+pub(crate) type Square = [[f64; 4]; 4];
 
 /// A circular section of one material, in SI units.
 #[derive(Debug, Clone, Copy)]
-pub struct Section {
+pub(crate) struct Section {
     /// Outer diameter, in m.
     pub outer: f64,
     /// Inner diameter, in m.
@@ -38,7 +38,7 @@ impl Section {
     /// Cowper's shear coefficient of a hollow circle (Cowper 1966, J. Appl. Mech. 33, 335), m the ratio of the diameters:
     /// 6(1 + ν)(1 + m²)² / ((7 + 6ν)(1 + m²)² + (20 + 12ν)m²).
     #[must_use]
-    pub fn shear_coefficient(&self) -> f64 {
+    pub(crate) fn shear_coefficient(&self) -> f64 {
         let (nu, m2) = (self.poisson, (self.inner / self.outer).powi(2));
         let squared = (1.0 + m2).powi(2);
         6.0 * (1.0 + nu) * squared / ((7.0 + 6.0 * nu) * squared + (20.0 + 12.0 * nu) * m2)
@@ -47,7 +47,7 @@ impl Section {
 
 /// Matrices of an element.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Element {
+pub(crate) struct Element {
     /// Stiffness of bending and shear.
     pub stiffness: Square,
     /// Mass of displacement and rotation.
@@ -67,7 +67,7 @@ const GAUSS: [(f64, f64); 4] = [
 impl Element {
     /// The element of a section with a length in m.
     #[must_use]
-    pub fn new(section: &Section, length: f64) -> Self {
+    pub(crate) fn new(section: &Section, length: f64) -> Self {
         let (bending, shearing) =
             (section.youngs * section.second_moment(), section.shear_coefficient() * section.shear * section.area());
         let phi = 12.0 * bending / (shearing * length * length);

@@ -4,26 +4,32 @@
 //! reads their matrices; the separator `rotor-modes` solves them; the check `rotor-speeds` compares the modes with the speed of a
 //! campaign.
 
-pub mod assemble;
+mod assemble;
 mod avoid;
 mod beam;
-pub mod crossings;
-pub mod equations;
-pub mod loader;
+mod crossings;
+mod equations;
+mod loader;
 mod matrix_market;
-pub mod modal;
-pub mod model;
+mod modal;
+mod model;
 mod plausible;
 mod separate;
 mod speeds;
 mod transfer;
-pub mod whirl;
+mod whirl;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
-pub use loader::RotorModelConfig;
+pub use assemble::assemble;
+pub use crossings::{Crossing, Search};
+pub use equations::{Equations, Node, Role};
+pub use loader::{Rotor, RotorModelConfig, read};
+pub use modal::{Modal, Mode, hertz, rpm};
+pub use model::{Bearing, Disk, Dof, Material, Matrices, RotorModel, Segment, Support, SupportKind};
 pub use separate::RotorModesConfig;
 pub use speeds::RotorSpeedsConfig;
+pub use whirl::{Whirl, whirl};
 
 /// Adds the loader, the separator and the check.
 pub fn register(registry: &mut Registry) {

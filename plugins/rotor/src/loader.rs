@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use faer::Mat;
 use runout_core::{
     Error, Result,
+    fault::Fault,
     input_file::InputFile,
     pipeline::{
+        Context, StageConfig,
         document::{ConfigError, Document, Sources, checked},
-        error::Fault,
-        registry::{Context, StageConfig},
     },
     points::Points,
     stage::{Loader, Request, Source, SourceKind},
@@ -18,7 +18,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    assemble,
+    assemble::assemble,
     equations::{Equations, Node, Role},
     matrix_market,
     model::{Bearing, Disk, Dof, Material, Matrices, RotorModel, Segment, Support},
@@ -172,12 +172,7 @@ fn failure(error: ConfigError) -> Error {
 fn build(object: &str, folder: &Path, model: &RotorModel) -> Result<Rotor> {
     let warnings = plausible::warnings(model);
     match &model.matrices {
-        None => Ok(Rotor {
-            equations: assemble::equations(object, model)?,
-            files: Vec::new(),
-            opened: Vec::new(),
-            warnings,
-        }),
+        None => Ok(Rotor { equations: assemble(object, model)?, files: Vec::new(), opened: Vec::new(), warnings }),
         Some(matrices) => {
             let files: Vec<(Role, PathBuf)> =
                 matrices.files().into_iter().map(|(role, file)| (role, folder.join(file))).collect();

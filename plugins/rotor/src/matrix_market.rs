@@ -12,7 +12,7 @@ use crate::model::MOST_DEGREES_OF_FREEDOM;
 ///
 /// # Errors
 /// When the file cannot be read, is not of this format, is not square, or is too large.
-pub fn read(path: &Path) -> Result<Mat<f64>> {
+pub(crate) fn read(path: &Path) -> Result<Mat<f64>> {
     let object = path.display().to_string();
     let text = read_text(path).map_err(|error| Error::new("read", &object, error))?;
     parse(&text).map_err(|problem| {

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use runout_core::pipeline::error::{Fault, known_names};
+use runout_core::fault::{Fault, known_names};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// Most degrees of freedom of a model; eigenvalues of larger ones take minutes.
-pub const MOST_DEGREES_OF_FREEDOM: usize = 800;
+pub(crate) const MOST_DEGREES_OF_FREEDOM: usize = 800;
 
 /// A rotor: either its parts, or `matrices` alone.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -292,7 +292,7 @@ impl RotorModel {
 }
 
 /// Places nearer to each other than this are one, in mm.
-pub const ON_SHAFT_MM: f64 = 1e-6;
+pub(crate) const ON_SHAFT_MM: f64 = 1e-6;
 
 impl Material {
     /// Poisson's ratio.

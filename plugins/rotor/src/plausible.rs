@@ -4,7 +4,7 @@ use crate::model::{Bearing, Disk, Material, RotorModel, Segment};
 
 /// What looks like a mistake in a unit.
 #[must_use]
-pub fn warnings(model: &RotorModel) -> Vec<String> {
+pub(crate) fn warnings(model: &RotorModel) -> Vec<String> {
     let mut found = Vec::new();
     for material in &model.materials {
         of_material(material, &mut found);

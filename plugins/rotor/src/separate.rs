@@ -2,12 +2,11 @@
 
 use runout_core::{
     Result,
-    pipeline::{
-        error::{Fault, within},
-        registry::{Context, StageConfig},
-    },
+    fault::{Fault, within},
+    pipeline::{Context, StageConfig},
     points::{PointColumn, Points},
-    stage::{NamedValue, Outcome, PointSeparator, Separator, points::value},
+    stage::{Outcome, PointSeparator, Separator},
+    summary::NamedValue,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
 };
 use schemars::JsonSchema;
@@ -260,7 +259,8 @@ impl Solution {
     }
 
     fn values(&self) -> Vec<NamedValue> {
-        let exact = |symbol: &str, number: f64, unit: &str, about: &str| value(symbol, number, f64::NAN, unit, about);
+        let exact =
+            |symbol: &str, number: f64, unit: &str, about: &str| NamedValue::new(symbol, number, f64::NAN, unit, about);
         let mut values = Vec::new();
         for (index, mode) in self.at_rest.iter().enumerate() {
             let about = "natural frequency at rest";

@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 use runout_core::{
     Result,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     stage::{Check, Planned},
 };
 use schemars::JsonSchema;

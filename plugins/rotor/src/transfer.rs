@@ -20,7 +20,7 @@ const PLACES: &str = "places";
 
 /// The columns of equations of motion.
 #[must_use]
-pub fn columns() -> Vec<PointColumn> {
+pub(crate) fn columns() -> Vec<PointColumn> {
     vec![
         PointColumn::needed(
             MATRIX,
@@ -41,7 +41,7 @@ pub fn columns() -> Vec<PointColumn> {
 
 /// Equations as points.
 #[must_use]
-pub fn to_points(equations: &Equations) -> Points {
+pub(crate) fn to_points(equations: &Equations) -> Points {
     let mut rows = Rows::default();
     for role in Role::ALL {
         let matrix = equations.matrix(role);
@@ -92,7 +92,7 @@ impl Rows {
 ///
 /// # Errors
 /// When an index is no whole number in its range, a matrix is unknown, or the matrices are no equations of motion.
-pub fn from_points(points: &Points) -> Result<Equations> {
+pub(crate) fn from_points(points: &Points) -> Result<Equations> {
     let object = points.input.display().to_string();
     let [rows, columns, values] = [points.column(ROW)?, points.column(COLUMN)?, points.column(VALUE)?];
     let mut size = 0;

@@ -69,7 +69,7 @@ pub fn whirl(shape: &[c64], nodes: &[Node]) -> Whirl {
 /// The shape at the instant of its largest displacement, largest radius 1: x and y at each node. Without nodes, each degree of
 /// freedom as x.
 #[must_use]
-pub fn shape(mode: &Mode, nodes: &[Node]) -> Vec<(f64, f64)> {
+pub(crate) fn shape(mode: &Mode, nodes: &[Node]) -> Vec<(f64, f64)> {
     let zero = c64::new(0.0, 0.0);
     let places = match nodes {
         [] => mode.shape.iter().map(|value| (*value, zero)).collect(),
@@ -96,7 +96,7 @@ const SAME: f64 = 1e-7;
 
 /// Turns modes of one frequency so that the first moves along x as far as it can: with equal planes, any mixture of both is a
 /// mode, and a solver gives an accidental one.
-pub fn align(modes: &mut [Mode], nodes: &[Node]) {
+pub(crate) fn align(modes: &mut [Mode], nodes: &[Node]) {
     let mut start = 0;
     while start < modes.len() {
         let first = modes[start].eigenvalue;

@@ -6,11 +6,7 @@ mod support;
 
 use std::f64::consts::PI;
 
-use runout_rotor::{
-    crossings::Search,
-    modal::Mode,
-    whirl::{Whirl, whirl},
-};
+use runout_rotor::{Mode, Search, Whirl, whirl};
 use support::{equations, frequencies, modal, near, rad_per_s};
 
 /// Bending stiffness E·I of a solid shaft of steel, in N·m².

@@ -7,10 +7,7 @@
 
 use std::{error::Error, path::Path, time::Instant};
 
-use runout_spatial_error::{
-    correlation::Family,
-    joint::{Covariance, Data, Joint, Observed, Predicted, Predictor, Query},
-};
+use runout_spatial_error::kriging::{Covariance, Data, Family, Joint, Observed, Predicted, Predictor, Query};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().collect();

@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Components of the error.
-pub const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
+pub(crate) const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
 
 /// Commands that differ by less than this, in mm, are one place.
 const SAME_MM: f64 = 1e-6;
@@ -32,7 +32,7 @@ const SMALL_SHARE: f64 = 2e-6;
 const UNLIKE: f64 = 0.01;
 
 /// Columns of a campaign.
-pub const COLUMNS: [PointColumn; 9] = [
+pub(crate) const COLUMNS: [PointColumn; 9] = [
     PointColumn::needed("x_mm", Number, "mm", "command of X"),
     PointColumn::needed("y_mm", Number, "mm", "command of Y"),
     PointColumn::needed("z_mm", Number, "mm", "command of Z"),

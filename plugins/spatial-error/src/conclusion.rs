@@ -5,7 +5,7 @@ use crate::{
 };
 
 /// What a result is made of.
-pub struct Conclusion<'a> {
+pub(crate) struct Conclusion<'a> {
     /// Configuration.
     pub separator: &'a SpatialError,
     /// Readings.
@@ -17,7 +17,7 @@ pub struct Conclusion<'a> {
 }
 
 /// A prediction at a query.
-pub struct At {
+pub(crate) struct At {
     /// The place, in mm.
     pub place_mm: [f64; 3],
     /// Each component.

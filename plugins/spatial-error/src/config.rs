@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use runout_core::pipeline::{error::Fault, registry::Context};
+use runout_core::{fault::Fault, pipeline::Context};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

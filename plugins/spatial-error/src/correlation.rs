@@ -93,21 +93,21 @@ pub(crate) struct Scaled {
 }
 
 impl Scaled {
-    pub fn of(places: &[[f64; 3]], range_mm: [f64; 3]) -> Self {
+    pub(crate) fn of(places: &[[f64; 3]], range_mm: [f64; 3]) -> Self {
         Self { axes: [0, 1, 2].map(|axis| places.iter().map(|place| place[axis] / range_mm[axis]).collect()) }
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.axes[0].len()
     }
 
     /// Coordinates of the places from one on.
-    pub fn from(&self, first: usize) -> [&[f64]; 3] {
+    pub(crate) fn from(&self, first: usize) -> [&[f64]; 3] {
         [0, 1, 2].map(|axis| &self.axes[axis][first..])
     }
 
     /// One place.
-    pub fn at(&self, place: usize) -> [f64; 3] {
+    pub(crate) fn at(&self, place: usize) -> [f64; 3] {
         [0, 1, 2].map(|axis| self.axes[axis][place])
     }
 }

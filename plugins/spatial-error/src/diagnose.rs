@@ -10,7 +10,8 @@ use runout_core::{
         },
     },
     points::Points,
-    stage::{NamedValue, Outcome, PointDiagnosis, PointModel},
+    stage::{Outcome, PointDiagnosis, PointModel},
+    summary::NamedValue,
 };
 
 use crate::{

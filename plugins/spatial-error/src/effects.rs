@@ -20,7 +20,7 @@ const FEWEST: usize = 4;
 
 /// Something that the model may lack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Missing {
+pub(crate) enum Missing {
     /// Length error of an axis.
     Scale(usize),
     /// Positioning of an axis.
@@ -37,7 +37,7 @@ pub enum Missing {
 
 /// An effect at one order, where it has orders.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Index into [`missing`].
     pub effect: usize,
     /// Its order.
@@ -48,7 +48,7 @@ pub struct Candidate {
 
 /// All effects.
 #[must_use]
-pub fn missing() -> Vec<Missing> {
+pub(crate) fn missing() -> Vec<Missing> {
     let axes = [0, 1, 2];
     let mut all: Vec<Missing> = axes.map(Missing::Scale).into();
     all.extend(axes.map(Missing::Positioning));
@@ -66,7 +66,7 @@ pub fn missing() -> Vec<Missing> {
 impl Missing {
     /// Its id, where it acts, and its parameters.
     #[must_use]
-    pub fn effect(self) -> Effect {
+    pub(crate) fn effect(self) -> Effect {
         let parameter =
             |name: &str, unit: &str, tolerance| Parameter { name: name.into(), unit: unit.into(), tolerance };
         let order = || parameter("order", "1", 1.0);
@@ -96,13 +96,13 @@ impl Missing {
 
     /// Whether its first parameter is an order.
     #[must_use]
-    pub fn has_order(self) -> bool {
+    pub(crate) fn has_order(self) -> bool {
         matches!(self, Self::Positioning(_) | Self::Straightness(..) | Self::Angular(..))
     }
 
     /// Its columns at an order.
     #[must_use]
-    pub fn terms(self, order: usize) -> Vec<Term> {
+    pub(crate) fn terms(self, order: usize) -> Vec<Term> {
         match self {
             Self::Scale(axis) => vec![Term::Scale(axis)],
             Self::Positioning(axis) => vec![Term::Linear { moved: axis, axis, order }],
@@ -115,7 +115,7 @@ impl Missing {
 
     /// Orders that it may have; one entry of no meaning where it has none.
     #[must_use]
-    pub fn orders(self) -> std::ops::RangeInclusive<usize> {
+    pub(crate) fn orders(self) -> std::ops::RangeInclusive<usize> {
         match self {
             Self::Positioning(_) | Self::Straightness(..) => ORDERS[0].clone(),
             Self::Angular(..) => ORDERS[1].clone(),
@@ -126,7 +126,7 @@ impl Missing {
 
 /// Every effect at every order.
 #[must_use]
-pub fn candidates() -> Vec<Candidate> {
+pub(crate) fn candidates() -> Vec<Candidate> {
     let of = |(effect, one): (usize, Missing)| {
         one.orders().map(move |order| Candidate {
             effect,
@@ -139,7 +139,7 @@ pub fn candidates() -> Vec<Candidate> {
 
 /// A jump that no effect describes: across a plane, or within a box at a corner, along all three axes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Jump {
+pub(crate) struct Jump {
     /// Its columns.
     pub terms: Vec<Term>,
     /// Where it is.
@@ -148,7 +148,7 @@ pub struct Jump {
 
 /// All jumps that leave enough places on both sides.
 #[must_use]
-pub fn jumps(campaign: &Campaign) -> Vec<Jump> {
+pub(crate) fn jumps(campaign: &Campaign) -> Vec<Jump> {
     let places = &campaign.places_mm;
     let axes = [0, 1, 2];
     let cuts = axes.map(|axis| cuts(places, axis));

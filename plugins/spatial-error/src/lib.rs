@@ -5,15 +5,15 @@
 //! name moves a chain of rigid bodies.
 
 mod campaign;
-pub mod compensate;
+mod compensate;
 mod conclusion;
 mod config;
-pub mod correlation;
+mod correlation;
 mod diagnose;
 mod effects;
-pub mod joint;
+mod joint;
 mod level;
-pub mod likelihood;
+mod likelihood;
 mod neighbours;
 mod noise;
 mod outcome;
@@ -30,10 +30,18 @@ mod trace;
 mod trend;
 mod variogram;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 pub use config::{Compensate, Declared, Kriging, Letter, SpatialError, SpatialErrorConfig, Variogram};
 pub use query::Query;
+
+/// Predictions from points with a covariance that is known, without a pipeline.
+pub mod kriging {
+    pub use crate::{
+        correlation::Family,
+        joint::{Covariance, Data, Joint, Observed, Predicted, Predictor, Query},
+    };
+}
 
 /// Adds the separator and the simulator `spatial-error`.
 pub fn register(registry: &mut Registry) {

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Parameters of one field: ln of sill, of three ranges, of nugget.
-pub const PARAMETERS: usize = 5;
+pub(crate) const PARAMETERS: usize = 5;
 /// Steps of an estimate at most.
 const STEPS: usize = 60;
 /// A step that raises ln of the likelihood by less is the last.
@@ -33,7 +33,7 @@ const LONGEST: f64 = 1.5;
 
 /// Which likelihood.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Criterion {
+pub(crate) enum Criterion {
     /// Of the readings, the trend at its best.
     Full,
     /// Of what the trend leaves.
@@ -43,7 +43,7 @@ pub enum Criterion {
 /// What is usual of the parameters: normal in their logarithms, wide against what data say. It keeps a range that the data do not
 /// determine from running away.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prior {
+pub(crate) struct Prior {
     /// Centres.
     pub centre: DVector<f64>,
     /// Inverse variances; infinite for what is fixed at its centre.
@@ -71,7 +71,7 @@ impl Prior {
 
 /// An estimate.
 #[derive(Debug, Clone)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// Covariance of each field.
     pub covariances: Vec<Covariance>,
     /// Its parameters.
@@ -86,7 +86,7 @@ pub struct Estimate {
 
 /// Covariances of parameters.
 #[must_use]
-pub fn covariances(family: Family, parameters: &DVector<f64>) -> Vec<Covariance> {
+pub(crate) fn covariances(family: Family, parameters: &DVector<f64>) -> Vec<Covariance> {
     let one = |field: &[f64]| Covariance {
         family,
         sill_um: field[0].exp(),
@@ -98,14 +98,14 @@ pub fn covariances(family: Family, parameters: &DVector<f64>) -> Vec<Covariance>
 
 /// ln of the likelihood of a fit.
 #[must_use]
-pub fn ln_likelihood(joint: &Joint, criterion: Criterion) -> f64 {
+pub(crate) fn ln_likelihood(joint: &Joint, criterion: Criterion) -> f64 {
     let of_trend = if criterion == Criterion::Restricted { joint.ln_trend } else { 0.0 };
     -0.5 * (joint.ln_determinant + of_trend + joint.squares)
 }
 
 /// The most likely covariances of a family, from a start on. `None` where no step is possible.
 #[must_use]
-pub fn estimate(
+pub(crate) fn estimate(
     data: &Data,
     family: Family,
     prior: &Prior,

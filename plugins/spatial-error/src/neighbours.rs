@@ -15,11 +15,11 @@ use crate::{
 };
 
 /// Places that a prediction takes, and that of a place left out.
-pub const NEAREST: [usize; 2] = [192, 96];
+pub(crate) const NEAREST: [usize; 2] = [192, 96];
 
 /// Places by nearness, in ranges of each field.
 #[derive(Debug, Clone)]
-pub struct Neighbours {
+pub(crate) struct Neighbours {
     trees: Vec<ImmutableKdTree<f64, 3>>,
     covariances: Vec<Covariance>,
 }
@@ -35,7 +35,7 @@ struct Local<'a> {
 impl Neighbours {
     /// Of the places of data.
     #[must_use]
-    pub fn new(data: &Data, covariances: &[Covariance]) -> Self {
+    pub(crate) fn new(data: &Data, covariances: &[Covariance]) -> Self {
         let tree = |covariance: &Covariance| {
             let scaled: Vec<[f64; 3]> = data.places.iter().map(|place| scaled(place, covariance)).collect();
             ImmutableKdTree::new_from_slice(&scaled)
@@ -52,7 +52,7 @@ impl Neighbours {
 
     /// Predicts a field.
     #[must_use]
-    pub fn predict(&self, data: &Data, joint: &Joint, field: usize, query: &Query) -> Vec<Predicted> {
+    pub(crate) fn predict(&self, data: &Data, joint: &Joint, field: usize, query: &Query) -> Vec<Predicted> {
         let local = Local { data, joint, field, covariance: &self.covariances[field] };
         let one = |(row, place): (usize, &[f64; 3])| {
             let columns = query.design.ncols();
@@ -64,7 +64,7 @@ impl Neighbours {
 
     /// Each place's mean reading less its prediction from its neighbours.
     #[must_use]
-    pub fn left_out(&self, data: &Data, joint: &Joint) -> Vec<[LeftOut; 3]> {
+    pub(crate) fn left_out(&self, data: &Data, joint: &Joint) -> Vec<[LeftOut; 3]> {
         let one = |(index, place): (usize, &[f64; 3])| {
             [0, 1, 2].map(|field| {
                 let covariance = &self.covariances[field];

@@ -31,7 +31,7 @@ const COPIED: f64 = 1e-9;
 
 /// Noise of repeats of places.
 #[must_use]
-pub fn of_repeats(place_of: &[usize], places: usize, readings_um: &[[f64; 3]], time: &[f64]) -> Noise {
+pub(crate) fn of_repeats(place_of: &[usize], places: usize, readings_um: &[[f64; 3]], time: &[f64]) -> Noise {
     let mut members = vec![Vec::new(); places];
     place_of.iter().enumerate().for_each(|(row, place)| members[*place].push(row));
     members.retain(|rows| rows.len() > 1);

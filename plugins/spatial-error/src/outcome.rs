@@ -2,7 +2,8 @@
 
 use runout_core::{
     Result,
-    stage::{NamedValue, Outcome, points::value},
+    stage::Outcome,
+    summary::NamedValue,
     table::{ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers},
 };
 
@@ -26,7 +27,7 @@ const UNCERTAIN: f64 = 0.8;
 
 /// The tables of the result.
 #[must_use]
-pub fn tables(chain: &Chain) -> Vec<TableSpec> {
+pub(crate) fn tables(chain: &Chain) -> Vec<TableSpec> {
     let of = |name: &str, unit: &str, about: &str| ColumnSpec::number(name, unit, about);
     let places = || ["x", "y", "z"].map(|axis| of(&format!("{axis}_mm"), "mm", "command").repeating());
     let each = |before: &str, about: &str| COMPONENTS.map(|one| of(&format!("{before}{one}_um"), "um", about));
@@ -89,7 +90,7 @@ impl Conclusion<'_> {
     ///
     /// # Errors
     /// When the query cannot be read.
-    pub fn outcome(&self) -> Result<Outcome> {
+    pub(crate) fn outcome(&self) -> Result<Outcome> {
         let places = self.separator.query.places(self.campaign)?;
         let queries = self.queries(&places);
         let left_out = self.solution.left_out();
@@ -190,11 +191,11 @@ impl Conclusion<'_> {
                 }
                 _ => continue,
             };
-            values.push(value(symbol, number, std, wanted.unit(), about));
+            values.push(NamedValue::new(symbol, number, std, wanted.unit(), about));
         }
         for (id, target, term) in self.names {
             let [number, std] = fitted(*term);
-            values.push(value(id, number, std, term.unit(), "effect that was added").of(target));
+            values.push(NamedValue::new(id, number, std, term.unit(), "effect that was added").of(target));
         }
         for (axis, component) in COMPONENTS.into_iter().enumerate() {
             let covariance = &solution.covariances[axis];
@@ -206,7 +207,7 @@ impl Conclusion<'_> {
                 })
             };
             let mut add = |symbol: &str, number: f64, std: f64, unit: &str, about: &str| {
-                values.push(value(symbol, number, std, unit, about).of(component));
+                values.push(NamedValue::new(symbol, number, std, unit, about).of(component));
             };
             let sill = covariance.sill_um;
             add("sill", sill, of_estimate(0, sill), "um", "standard deviation of the field");
@@ -243,16 +244,16 @@ impl Conclusion<'_> {
             (sum / known().count() as f64).sqrt()
         };
         let about = "root mean square length of the predicted error without the placement, at the places of the query";
-        values.push(value("error_rms", rms(&|query, _| query.error_um), f64::NAN, "um", about));
+        values.push(NamedValue::new("error_rms", rms(&|query, _| query.error_um), f64::NAN, "um", about));
         let about = "the same that the corrections leave";
-        values.push(value("remains_rms", rms(&|_, correction| correction.remains_um), f64::NAN, "um", about));
+        values.push(NamedValue::new("remains_rms", rms(&|_, correction| correction.remains_um), f64::NAN, "um", about));
         values
     }
 }
 
 /// Reading less the fit at its place, trend and field, in µm.
 #[must_use]
-pub fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64; 3]> {
+pub(crate) fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64; 3]> {
     let terms = &solution.terms;
     let trend = &solution.joint.trend;
     // What noise is taken to be of the mean at each place.

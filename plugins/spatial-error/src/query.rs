@@ -2,11 +2,7 @@
 
 use std::path::PathBuf;
 
-use runout_core::{
-    Error, Result,
-    input_file::read_text,
-    pipeline::{error::Fault, registry::Context},
-};
+use runout_core::{Error, Result, fault::Fault, input_file::read_text, pipeline::Context};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

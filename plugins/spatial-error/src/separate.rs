@@ -2,10 +2,8 @@
 
 use runout_core::{
     Result,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     points::{PointColumn, Points},
     stage::{Outcome, PointModel, PointSeparator, Separator},
     table::TableSpec,

@@ -24,13 +24,13 @@ const CHUNK: usize = 8192;
 impl Solution {
     /// Whether the nugget is real variation, beyond noise that is known.
     #[must_use]
-    pub fn nugget_counts(campaign: &Campaign) -> bool {
+    pub(crate) fn nugget_counts(campaign: &Campaign) -> bool {
         campaign.noise != Noise::Unknown
     }
 
     /// Columns of the trend along an axis at places, at the time of the first reading.
     #[must_use]
-    pub fn design(&self, campaign: &Campaign, places: &[[f64; 3]], axis: usize) -> Mat<f64> {
+    pub(crate) fn design(&self, campaign: &Campaign, places: &[[f64; 3]], axis: usize) -> Mat<f64> {
         Mat::from_fn(places.len(), self.terms.len(), |row, column| {
             self.terms[column].at(&campaign.volume, places[row], 0.0)[axis]
         })
@@ -38,7 +38,7 @@ impl Solution {
 
     /// What would be read at places, without noise. The variance contains what is not known of estimated covariances.
     #[must_use]
-    pub fn predict(&self, campaign: &Campaign, places: &[[f64; 3]], variance: bool) -> Vec<[Predicted; 3]> {
+    pub(crate) fn predict(&self, campaign: &Campaign, places: &[[f64; 3]], variance: bool) -> Vec<[Predicted; 3]> {
         let mut all = self.plain(campaign, &self.joint, self.neighbours.as_ref(), places, variance);
         if variance && self.estimate.is_some() {
             self.widen(campaign, places, &mut all);
@@ -144,14 +144,14 @@ impl Solution {
 
     /// Standard deviation of the field and what varies from place to place, before any reading.
     #[must_use]
-    pub fn prior_std_um(&self, campaign: &Campaign, axis: usize) -> f64 {
+    pub(crate) fn prior_std_um(&self, campaign: &Campaign, axis: usize) -> f64 {
         let covariance = &self.covariances[axis];
         covariance.sill_um.hypot(if Self::nugget_counts(campaign) { covariance.nugget_um } else { 0.0 })
     }
 
     /// What of a prediction is the declared placement, at a place.
     #[must_use]
-    pub fn placement_um(&self, campaign: &Campaign, place: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn placement_um(&self, campaign: &Campaign, place: [f64; 3]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (term, value) in self.terms.iter().zip(self.joint.trend.iter()) {
             if matches!(term, Term::Shift(_) | Term::Turn(_)) {
@@ -164,7 +164,7 @@ impl Solution {
 
     /// Noise variance that averaging over the repeats leaves of the mean at a place: where the noise is not known, the nugget's.
     #[must_use]
-    pub fn noise_um2(&self, campaign: &Campaign, place: usize, axis: usize) -> f64 {
+    pub(crate) fn noise_um2(&self, campaign: &Campaign, place: usize, axis: usize) -> f64 {
         let observed = &self.data.observed[axis];
         if Self::nugget_counts(campaign) {
             observed.noise_um2[place]
@@ -175,7 +175,7 @@ impl Solution {
 
     /// Each place's mean reading less its prediction from all other places.
     #[must_use]
-    pub fn left_out(&self) -> Vec<[LeftOut; 3]> {
+    pub(crate) fn left_out(&self) -> Vec<[LeftOut; 3]> {
         if let Some(near) = &self.neighbours {
             return near.left_out(&self.data, &self.joint);
         }
@@ -193,7 +193,7 @@ impl Solution {
 
     /// Blocks of P = K⁻¹ − K⁻¹X(XᵀK⁻¹X)⁻¹XᵀK⁻¹, one a place of the fit.
     #[must_use]
-    pub fn projections(&self) -> Vec<Matrix3<f64>> {
+    pub(crate) fn projections(&self) -> Vec<Matrix3<f64>> {
         let count = self.joint.fields[0].alpha.len();
         let columns = self.terms.len();
         let mut blocks = vec![Matrix3::zeros(); count];

@@ -30,7 +30,7 @@ const INDEPENDENT: f64 = 1e-6;
 
 /// Covariances and trend.
 #[derive(Debug, Clone)]
-pub struct Solution {
+pub(crate) struct Solution {
     /// The family of all three covariances.
     pub family: Family,
     /// Their estimation; `None` where they are given.
@@ -54,7 +54,7 @@ pub struct Solution {
 
 /// Parameters of a family's most likely covariances, with their covariance.
 #[derive(Debug, Clone)]
-pub struct Guess {
+pub(crate) struct Guess {
     /// The family.
     pub family: Family,
     /// As in an [`Estimate`].
@@ -67,7 +67,7 @@ pub struct Guess {
 
 /// The columns that are not in the span of those before them, and the others.
 #[must_use]
-pub fn independent(campaign: &Campaign, terms: &[Term]) -> (Vec<Term>, Vec<Term>) {
+pub(crate) fn independent(campaign: &Campaign, terms: &[Term]) -> (Vec<Term>, Vec<Term>) {
     let (mut kept, mut lost) = (Vec::new(), Vec::new());
     let mut basis: Vec<DVector<f64>> = Vec::new();
     for term in terms {
@@ -96,7 +96,7 @@ pub fn independent(campaign: &Campaign, terms: &[Term]) -> (Vec<Term>, Vec<Term>
 
 /// What is usual of the covariances of data: sills as large as what the trend leaves, ranges of half the extent.
 #[must_use]
-pub fn prior(campaign: &Campaign, data: &Data) -> Prior {
+pub(crate) fn prior(campaign: &Campaign, data: &Data) -> Prior {
     let total = PARAMETERS * data.observed.len();
     let (mut centre, mut precision) = (DVector::zeros(total), DVector::zeros(total));
     let extents = campaign.volume.half_mm.map(|half| 2.0 * half);
@@ -143,7 +143,7 @@ fn left_of_trend(values: &[f64], design: &Mat<f64>) -> f64 {
 
 /// The most likely family and covariances.
 #[must_use]
-pub fn most_likely(
+pub(crate) fn most_likely(
     data: &Data,
     prior: &Prior,
     families: &[Family],
@@ -200,7 +200,7 @@ fn reach(family: Family) -> f64 {
 
 /// Families that may be taken.
 #[must_use]
-pub fn families(kriging: &Kriging) -> Vec<Family> {
+pub(crate) fn families(kriging: &Kriging) -> Vec<Family> {
     // A smooth and a rough one first: the others begin at the better of them.
     const ORDER: [Family; 5] =
         [Family::Matern52, Family::Matern32, Family::Gaussian, Family::Exponential, Family::Spherical];
@@ -210,7 +210,7 @@ pub fn families(kriging: &Kriging) -> Vec<Family> {
 /// Places that covariances are estimated from: all, or some at random, which show ranges, and dense clusters around some of these. Only
 /// the clusters show how smooth the field is between the places that a prediction is made from.
 #[must_use]
-pub fn estimated_from(campaign: &Campaign) -> Option<Vec<usize>> {
+pub(crate) fn estimated_from(campaign: &Campaign) -> Option<Vec<usize>> {
     let count = campaign.places_mm.len();
     if count <= ESTIMATED_FROM[0] {
         return None;
@@ -243,7 +243,7 @@ pub fn estimated_from(campaign: &Campaign) -> Option<Vec<usize>> {
 ///
 /// # Errors
 /// When the places are too few, or a given covariance has no positive definite matrix.
-pub fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[Term]) -> Result<Solution> {
+pub(crate) fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[Term]) -> Result<Solution> {
     let wanted: Vec<Term> = config.declared_terms().into_iter().chain(added.iter().copied()).collect();
     let (terms, lost) = independent(campaign, &wanted);
     has_enough(campaign, config, &terms)?;
@@ -275,7 +275,7 @@ pub fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[Term]) -
 }
 
 /// Covariances and columns, without the fit of all places.
-pub struct Found {
+pub(crate) struct Found {
     /// The family.
     pub family: Family,
     /// Its estimation.
@@ -294,7 +294,7 @@ pub struct Found {
 ///
 /// # Errors
 /// When a covariance has no positive definite matrix.
-pub fn complete(campaign: &Campaign, config: &SpatialErrorConfig, found: Found) -> Result<Solution> {
+pub(crate) fn complete(campaign: &Campaign, config: &SpatialErrorConfig, found: Found) -> Result<Solution> {
     let Found { family, estimate, guesses, covariances, terms, lost } = found;
     let count = campaign.places_mm.len();
     let by_neighbours = count > config.kriging.full_places;

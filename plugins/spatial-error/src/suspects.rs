@@ -29,7 +29,7 @@ const DRIFTS: f64 = 5.0;
 
 /// Neighbouring places that err together.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Group {
+pub(crate) struct Group {
     /// The places.
     pub places: Vec<usize>,
     /// Mean reading of each less what all other places predict, in µm.
@@ -38,7 +38,7 @@ pub struct Group {
 
 impl Group {
     /// The places with what they are off.
-    pub fn named(&self, campaign: &Campaign) -> String {
+    pub(crate) fn named(&self, campaign: &Campaign) -> String {
         let each = self.places.iter().zip(&self.by_um).map(|(place, [dx, dy, dz])| {
             let [x, y, z] = campaign.places_mm[*place];
             format!("({x}, {y}, {z}) mm by ({dx:.1}, {dy:.1}, {dz:.1}) µm")
@@ -48,7 +48,7 @@ impl Group {
 }
 
 /// Neighbouring places that all other places do not predict. They predict each other, so that no single one of them need be far.
-pub fn groups(campaign: &Campaign, solution: &Solution) -> Vec<Group> {
+pub(crate) fn groups(campaign: &Campaign, solution: &Solution) -> Vec<Group> {
     let count = campaign.places_mm.len();
     if solution.fitted.is_some() || !(3 * TOGETHER..=MOST_PLACES).contains(&count) || solution.joint.fields.len() != 3 {
         return Vec::new();
@@ -151,7 +151,7 @@ impl Projections {
 }
 
 /// A drift in time that is not in the model, where places or their order separate it from errors of the axes.
-pub fn drift(campaign: &Campaign, solution: &Solution) -> Option<String> {
+pub(crate) fn drift(campaign: &Campaign, solution: &Solution) -> Option<String> {
     if solution.terms.iter().any(|term| matches!(term, Term::Drift(_))) || solution.fitted.is_some() {
         return None;
     }

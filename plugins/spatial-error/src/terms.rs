@@ -122,7 +122,7 @@ fn turned(about: usize, arm: [f64; 3]) -> [f64; 3] {
 
 /// The Legendre polynomial of an order.
 #[must_use]
-pub fn legendre(order: usize, u: f64) -> f64 {
+pub(crate) fn legendre(order: usize, u: f64) -> f64 {
     let (mut before, mut last) = (1.0, u);
     if order == 0 {
         return 1.0;

@@ -22,7 +22,7 @@ const P_LIMIT: f64 = 1e-3;
 const BIC_LIMIT: f64 = -10.0;
 /// Effects and jumps that are tried in each round.
 const TRIED: [usize; 2] = [8, 4];
-/// Candidates whose criteria differ by less are not told apart, where one leaves nothing for the other.
+/// Candidates whose criteria differ by less are not distinguished, where one leaves nothing for the other.
 const SAME_BIC: f64 = 10.0;
 /// Share of its gain that is left of a candidate beside another one with which it is confounded, at most.
 const LEFT: f64 = 0.15;
@@ -35,7 +35,7 @@ const OWN: f64 = 1e-9;
 
 /// Evidence for columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gain {
+pub(crate) struct Gain {
     /// 2ΔlnL.
     pub likelihood: f64,
     /// Change of the Bayesian information criterion.
@@ -46,7 +46,7 @@ pub struct Gain {
 
 /// Something found: a candidate or a jump, with what it is not told from.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub(crate) struct Found {
     /// Indices of candidates, the best first; of the jump alone.
     pub members: Vec<usize>,
     /// Whether it is a jump.
@@ -57,7 +57,7 @@ pub struct Found {
 
 /// A refusal.
 #[derive(Debug, Clone)]
-pub struct Doubt {
+pub(crate) struct Doubt {
     /// The candidate.
     pub candidate: usize,
     /// Why.
@@ -65,7 +65,7 @@ pub struct Doubt {
 }
 
 /// The search.
-pub struct Tracing<'a> {
+pub(crate) struct Tracing<'a> {
     campaign: &'a Campaign,
     candidates: &'a [Candidate],
     jumps: &'a [Jump],
@@ -92,7 +92,7 @@ struct State {
 impl<'a> Tracing<'a> {
     /// A search beside declared columns. `None` where no covariance can be estimated.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         campaign: &'a Campaign,
         declared: Vec<Term>,
         candidates: &'a [Candidate],
@@ -110,7 +110,7 @@ impl<'a> Tracing<'a> {
     }
 
     /// Looks for at most so many effects.
-    pub fn run(&mut self, most: usize) -> Option<Vec<Found>> {
+    pub(crate) fn run(&mut self, most: usize) -> Option<Vec<Found>> {
         let start = self.start()?;
         let with_jumps = self.follow(start.clone(), most, true);
         if !with_jumps.found.iter().any(|found| found.jump) {
@@ -341,7 +341,7 @@ impl Sums {
 
 /// Whether places determine an effect's columns beside declared ones.
 #[must_use]
-pub fn is_observable(campaign: &Campaign, declared: &[Term], terms: &[Term]) -> bool {
+pub(crate) fn is_observable(campaign: &Campaign, declared: &[Term], terms: &[Term]) -> bool {
     let all: Vec<Term> = declared.iter().chain(terms).copied().collect();
     independent(campaign, &all).1.iter().all(|lost| !terms.contains(lost))
 }

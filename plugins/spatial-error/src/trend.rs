@@ -37,7 +37,7 @@ type Draws = Vec<(Sums, f64)>;
 impl Solution {
     /// Standard uncertainty of each column of the trend, with what is not known of estimated covariances.
     #[must_use]
-    pub fn trend_std(&self, campaign: &Campaign) -> Vec<f64> {
+    pub(crate) fn trend_std(&self, campaign: &Campaign) -> Vec<f64> {
         let plain = self.joint.trend_covariance.diagonal();
         let factor = self.growth(campaign).unwrap_or_else(|| DVector::from_element(plain.len(), 1.0));
         plain.iter().zip(&factor).map(|(variance, factor)| (variance * factor).sqrt()).collect()

@@ -16,7 +16,7 @@ const ALONG: f64 = 0.9;
 
 /// The table.
 #[must_use]
-pub fn table() -> TableSpec {
+pub(crate) fn table() -> TableSpec {
     let um2 = |name: &str, about: &str| ColumnSpec::number(name, "um2", about);
     TableSpec::new(
         "variogram",
@@ -43,7 +43,7 @@ pub fn table() -> TableSpec {
 
 /// Its columns.
 #[must_use]
-pub fn columns(campaign: &Campaign, solution: &Solution) -> Vec<ArrayRef> {
+pub(crate) fn columns(campaign: &Campaign, solution: &Solution) -> Vec<ArrayRef> {
     let data = &solution.data;
     let count = data.places.len();
     let every = count.div_ceil(MOST);

@@ -6,13 +6,7 @@ use std::path::{Path, PathBuf};
 
 use runout_core::{
     model::diagnosis::Verdict,
-    pipeline::{
-        Pipeline, Registry,
-        diagnose::diagnose,
-        document::Sources,
-        registry::{Context, StageConfig},
-        run::Silent,
-    },
+    pipeline::{Context, Pipeline, Registry, StageConfig, diagnose::diagnose, document::Sources, run::Silent},
     stage::Simulation,
 };
 use runout_spatial_error::simulate::Scenario;

@@ -8,7 +8,7 @@ use runout_core::{
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     stage::{Station, StationSeparator},
 };
-use runout_spindle::separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting};
+use runout_spindle::separators::{HarmonicLeastSquares, Weighting};
 
 const SENSORS_DEG: [f64; 4] = [0.0, 90.0, 180.0, 228.75];
 const PART_DEG: [f64; 2] = [0.0, 180.0];

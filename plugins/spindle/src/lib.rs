@@ -1,6 +1,6 @@
 //! Spindles: separators of the part's form from the axis's error motion, and a simulator of both.
 
-pub mod alterations;
+mod alterations;
 pub mod diagnose;
 pub mod effects;
 pub mod layout;
@@ -12,10 +12,10 @@ mod sizes;
 mod solve;
 mod wiring;
 
-use runout_core::pipeline::{Registry, registry::Plugin};
+use runout_core::pipeline::{Plugin, Registry};
 use separators::{
-    closed_form::MethodConfig, donaldson_reversal::DonaldsonReversal, four_sensor_reversal::FourSensorReversalConfig,
-    harmonic_least_squares::HarmonicLeastSquaresConfig, multi_step::MultiStep, three_point::ThreePoint,
+    DonaldsonReversal, HarmonicLeastSquaresConfig, MethodConfig, MultiStep, ThreePoint,
+    four_sensor_reversal::FourSensorReversalConfig,
 };
 use simulate::SpindleConfig;
 

@@ -1,7 +1,7 @@
 //! The sensors and setups of a rig that a method uses: a rig may hold more than one method needs.
 
 use runout_core::{
-    pipeline::error::{Fault, known_names},
+    fault::{Fault, known_names},
     rig::Rig,
     separation::Assessment,
 };

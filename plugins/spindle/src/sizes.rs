@@ -13,7 +13,7 @@ const FEWEST_OTHERS: usize = 2;
 
 /// Names each sensor whose readings are about a thousand times smaller or larger than the median of the other sensors that look
 /// the same way.
-pub fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
+pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
     let sensors = rig.sensors.len();
     let size = |sensor: usize| {
         let orders = readings.mean.chunks_exact(readings.count).skip(1);

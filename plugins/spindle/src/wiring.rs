@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Mistakes are looked for above this weighted sum of squares per degree of freedom.
-pub const SUSPICIOUS_CHI2: f64 = 4.0;
+pub(crate) const SUSPICIOUS_CHI2: f64 = 4.0;
 /// A correction is suspected where it leaves less than this share.
 const SUSPICIOUS_SHARE: f64 = 0.25;
 /// Two mistakes at once are looked for where one leaves more than this, and suspected where they leave less than this share of
@@ -38,7 +38,7 @@ const MAX_ORDER: usize = 24;
 
 /// Mistakes that were made together, as a target of [`ActsOn`] counts.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Suspect {
+pub(crate) struct Suspect {
     /// One or two.
     pub mistakes: Vec<(Mistake, usize)>,
     /// Per degree of freedom, with them corrected.
@@ -47,7 +47,7 @@ pub struct Suspect {
 
 /// Mistakes whose correction leaves far less than the declaration and least of all, with some effects applied.
 #[must_use]
-pub fn suspects(
+pub(crate) fn suspects(
     layout: &Layout,
     applied: &Alterations,
     readings: &Readings,
@@ -84,7 +84,7 @@ pub fn suspects(
 /// Mistakes that change nothing of what low orders leave by the linear equations: single ones, and the signs of all sensors of a
 /// section, or of all sensors, together.
 #[must_use]
-pub fn traceless(
+pub(crate) fn traceless(
     layout: &Layout,
     applied: &Alterations,
     readings: &Readings,
@@ -238,7 +238,7 @@ impl<'a> Trial<'a> {
 }
 
 /// Names the likeliest mistake, where one is suspected, and what to change in the rig file.
-pub fn warning(
+pub(crate) fn warning(
     selection: &Selection,
     layout: &Layout,
     readings: &Readings,
@@ -294,7 +294,7 @@ pub fn warning(
 const SAME: f64 = 1e-12;
 
 /// Setups and channels that hold one recording twice, noise included.
-pub fn copies(rig: &Rig, readings: &Readings) -> Vec<String> {
+pub(crate) fn copies(rig: &Rig, readings: &Readings) -> Vec<String> {
     // Without noise, two readings may be the same by right.
     let Some(scatter) = &readings.scatter else { return Vec::new() };
     let (sensors, setups) = (rig.sensors.len(), rig.setups.len());

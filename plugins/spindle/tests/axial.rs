@@ -28,12 +28,8 @@ use runout_spindle::{
     layout::Layout,
     selection::Selection,
     separators::{
-        closed_form::{ClosedFormSeparator, Method},
-        donaldson_reversal::DonaldsonReversal,
+        ClosedFormSeparator, DonaldsonReversal, HarmonicLeastSquares, Method, MultiStep, ThreePoint, Weighting,
         four_sensor_reversal,
-        harmonic_least_squares::{HarmonicLeastSquares, Weighting},
-        multi_step::MultiStep,
-        three_point::ThreePoint,
     },
     simulate::{FaceConfig, MotionHarmonic, SpindleConfig},
 };

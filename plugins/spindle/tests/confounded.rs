@@ -9,7 +9,6 @@ mod campaigns;
 use campaigns::{averaged, campaign};
 use runout_core::{
     Complex64,
-    evaluate::roundness::ront_lsci_um,
     measurement::StationTruth,
     model::{
         closed_loop::Settings,
@@ -18,6 +17,7 @@ use runout_core::{
     numerics::fourier::Fourier,
     separation::{Quantity, Separation},
     stage::StationDiagnosis,
+    standards::roundness::ront_lsci_um,
 };
 use runout_spindle::{diagnose::diagnose, effects, layout::Layout, selection::Selection, simulate::SpindleConfig};
 

@@ -14,7 +14,7 @@ use runout_core::{
     separation::{Quantity, Separation},
     stage::{Station, StationSeparator},
 };
-use runout_spindle::separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting};
+use runout_spindle::separators::{HarmonicLeastSquares, Weighting};
 
 /// Without noise; asynchronous motion, if any, is averaged over the turns.
 fn quiet(eccentricity_um: f64, noise_um: f64) -> (Station, StationTruth, Rig) {

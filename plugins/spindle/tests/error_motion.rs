@@ -10,22 +10,19 @@ use std::{f64::consts::TAU, path::Path, time::Instant};
 use campaigns::campaign;
 use common::{FOUR_SENSORS, Sum, rig, value};
 use runout_core::{
-    evaluate::{
-        Value,
-        error_motion::{Centre, ErrorMotion},
-        roundness::Reference,
-    },
+    error_motion::{Centre, ErrorMotion},
     inspection::Inspection,
     measurement::Recording,
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     profile::Profile,
     rig::{Rig, Rotation},
     separation::{Quantity, Separation},
     stage::{AverageRequest, Averager, Preprocessor, Station, StationSeparator},
+    standards::{Value, reference::Reference},
 };
 use runout_preprocess::SynchronousAverageConfig;
 use runout_spindle::{
-    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::{self, LineConfig, MotionConfig, MotionHarmonic, SpindleConfig, TiltHarmonic},
 };
 

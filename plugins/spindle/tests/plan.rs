@@ -14,7 +14,7 @@ use runout_core::{
 };
 use runout_spindle::{
     layout::Layout,
-    plan::{Addition, Criterion, FormGain, Search, optimise, spacing::distance_deg, suggest},
+    plan::{Addition, Criterion, FormGain, Search, distance_deg, optimise, score, suggest},
 };
 
 const ONE_SETUP: [(f64, f64); 1] = [(0.0, 0.0)];
@@ -249,8 +249,8 @@ fn too_many_sensors_are_refused_with_the_clearance_that_fits() {
 #[test]
 fn one_sensor_is_told_to_be_reversed() {
     let rig = probes(&[0.0]);
-    let suggestions = suggest::suggest(&rig, &(2..=80), 15.0);
-    let before = suggest::score(&rig, &(2..=80));
+    let suggestions = suggest(&rig, &(2..=80), 15.0);
+    let before = score(&rig, &(2..=80));
     assert_eq!(before.lost, 79);
     // Donaldson: reading and reversed reading give form and motion, each with a gain of 1/√2, at every order.
     let first = &suggestions[0];
@@ -263,8 +263,8 @@ fn one_sensor_is_told_to_be_reversed() {
 fn fixed_sensors_and_two_setups_are_told_a_third_part_angle() {
     let rig = rig(&FOUR_SENSORS, &[(0.0, 0.0), (180.0, 0.0)]);
     let orders = 2..=80;
-    assert_eq!(suggest::score(&rig, &orders).lost, 40);
-    let suggestions = suggest::suggest(&rig, &orders, 15.0);
+    assert_eq!(score(&rig, &orders).lost, 40);
+    let suggestions = suggest(&rig, &orders, 15.0);
     for pair in suggestions.windows(2) {
         assert!(pair[0].after.compare(&pair[1].after, Criterion::Worst).is_le());
     }

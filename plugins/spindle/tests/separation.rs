@@ -19,10 +19,7 @@ use runout_core::{
 use runout_spindle::{
     layout::Layout,
     selection::Selection,
-    separators::{
-        four_sensor_reversal,
-        harmonic_least_squares::{HarmonicLeastSquares, Weighting},
-    },
+    separators::{HarmonicLeastSquares, Weighting, four_sensor_reversal},
 };
 
 const REVERSAL: [(f64, f64); 2] = [(0.0, 0.0), (180.0, 180.0)];

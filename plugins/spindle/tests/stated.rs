@@ -20,7 +20,7 @@ use runout_spindle::{
     effects,
     layout::Layout,
     selection::Selection,
-    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::SpindleConfig,
 };
 

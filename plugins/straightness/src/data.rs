@@ -8,7 +8,7 @@ use crate::{
 };
 
 /// The traces and what they may lack.
-pub struct Data {
+pub(crate) struct Data {
     /// Traces with few enough points.
     pub traces: Vec<AxialTrace>,
     /// Setup of each.
@@ -31,7 +31,7 @@ pub struct Data {
 
 /// The positions on which part and slide are compared.
 #[derive(Debug, Clone)]
-pub struct Results {
+pub(crate) struct Results {
     pub z_mm: Vec<f64>,
     /// The deviations that the slide may have, where they are declared.
     pub smooth: Option<Basis>,
@@ -39,12 +39,12 @@ pub struct Results {
 
 impl Data {
     /// The place of one of its points.
-    pub fn place(&self, trace: usize, point: usize) -> Place {
+    pub(crate) fn place(&self, trace: usize, point: usize) -> Place {
         self.place_of(&self.traces[trace], trace, point)
     }
 
     /// The place of a point of a trace that may have more points than this one's of that number.
-    pub fn place_of(&self, trace: &AxialTrace, number: usize, point: usize) -> Place {
+    pub(crate) fn place_of(&self, trace: &AxialTrace, number: usize, point: usize) -> Place {
         Place {
             sign: if self.setups[number] == 0 { 1.0 } else { -1.0 },
             parabola: -(2.0 * (trace.z_mm[point] - self.middle_mm) / self.length_mm).powi(2),

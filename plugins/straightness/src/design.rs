@@ -17,7 +17,7 @@ const KNOT_SPACINGS: f64 = 1.5;
 const INDEPENDENT: f64 = 1e-7;
 
 /// Readings that something contradicts, and the splines that they are fitted by.
-pub struct Readings {
+pub(crate) struct Readings {
     /// Trace and point, in the order of z.
     pub of: Vec<(usize, usize)>,
     part: Knots,
@@ -29,7 +29,7 @@ pub struct Readings {
 
 impl Data {
     /// Traces of a setup.
-    pub fn repeats(&self, setup: usize) -> usize {
+    pub(crate) fn repeats(&self, setup: usize) -> usize {
         self.setups.iter().filter(|own| **own == setup).count()
     }
 
@@ -51,7 +51,7 @@ impl Data {
 }
 
 /// The linear part of the model with some effects applied.
-pub struct Design {
+pub(crate) struct Design {
     pub data: Arc<Data>,
     pub readings: Readings,
     pub alterations: Vec<Alteration>,
@@ -70,7 +70,7 @@ pub struct Design {
 
 impl Design {
     /// Of these traces, altered so.
-    pub fn new(data: &Arc<Data>, mut alterations: Vec<Alteration>) -> Self {
+    pub(crate) fn new(data: &Arc<Data>, mut alterations: Vec<Alteration>) -> Self {
         let readings = data.readings();
         if readings.slide.is_none() {
             // A setup's own splines are what the probe sees of the part, turned or not, and move with its traces: only the
@@ -176,7 +176,7 @@ impl Design {
     }
 
     /// What everything that is fitted leaves of a column.
-    pub fn left(&self, column: &[f64]) -> Vec<f64> {
+    pub(crate) fn left(&self, column: &[f64]) -> Vec<f64> {
         let (solutions, _) = self.splines_of(&[column]);
         let mut left = solutions.first().map_or_else(Vec::new, |solution| self.less_splines(column, solution));
         self.basis.remove_from(&mut left);
@@ -184,7 +184,7 @@ impl Design {
     }
 
     /// The readings less what is added to them whatever part and slide are.
-    pub fn readings_um(&self) -> Vec<f64> {
+    pub(crate) fn readings_um(&self) -> Vec<f64> {
         let value = |(trace, point): &(usize, usize)| {
             let alteration = &self.alterations[*trace];
             let added = (1.0 + alteration.gain) * alteration.added(&self.data.place(*trace, *point));
@@ -194,7 +194,7 @@ impl Design {
     }
 
     /// Part and slide at each reading. Where the slide has no splines of its own, the part's are those of the sum of both.
-    pub fn contents(&self, readings_um: &[f64]) -> Vec<Content> {
+    pub(crate) fn contents(&self, readings_um: &[f64]) -> Vec<Content> {
         let (solutions, _) = self.splines_of(&[readings_um]);
         let Some(alone) = solutions.first() else { return Vec::new() };
         let dense = self.basis.coefficients(&self.less_splines(readings_um, alone));

@@ -14,7 +14,7 @@ use runout_core::model::{Effect, Parameter, Setting};
 
 /// An effect, whatever it acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     AxialRegistration,
     SensorGain,
     PartTilt,
@@ -23,17 +23,17 @@ pub enum Kind {
 }
 
 /// Every effect.
-pub const KINDS: [Kind; 5] =
+pub(crate) const KINDS: [Kind; 5] =
     [Kind::AxialRegistration, Kind::SensorGain, Kind::PartTilt, Kind::RotationOffset, Kind::ThermalDrift];
 
 /// Time constant that a drift's search begins at, in lengths of a trace.
-pub const USUAL_TIME_CONSTANT: f64 = 0.3;
+pub(crate) const USUAL_TIME_CONSTANT: f64 = 0.3;
 /// Time constants that a trace can show: shorter ones end between its first readings, longer ones are parabolas.
 const TIME_CONSTANTS: std::ops::RangeInclusive<f64> = 0.02..=3.0;
 
 impl Kind {
     /// Its id.
-    pub fn id(self) -> &'static str {
+    pub(crate) fn id(self) -> &'static str {
         match self {
             Self::AxialRegistration => "axial-registration",
             Self::SensorGain => "sensor-gain",
@@ -44,7 +44,7 @@ impl Kind {
     }
 
     /// What it does, in one line.
-    pub fn about(self) -> &'static str {
+    pub(crate) fn about(self) -> &'static str {
         match self {
             Self::AxialRegistration => "a trace along an axis is shifted: its z is too small",
             Self::SensorGain => "a trace's readings are too large by a factor",
@@ -55,7 +55,7 @@ impl Kind {
     }
 
     /// What it is described by.
-    pub fn parameters(self) -> Vec<Parameter> {
+    pub(crate) fn parameters(self) -> Vec<Parameter> {
         let of = |name: &str, unit: &str, tolerance| Parameter { name: name.into(), unit: unit.into(), tolerance };
         match self {
             Self::AxialRegistration => vec![of("shift", "mm", 0.1)],
@@ -67,14 +67,14 @@ impl Kind {
     }
 
     /// The effect at a target.
-    pub fn at(self, target: Option<String>) -> Effect {
+    pub(crate) fn at(self, target: Option<String>) -> Effect {
         Effect { id: self.id().into(), targets: target.into_iter().collect(), parameters: self.parameters() }
     }
 }
 
 /// What is applied to one trace.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Alteration {
+pub(crate) struct Alteration {
     pub shift_mm: f64,
     pub gain: f64,
     pub bow_um: f64,
@@ -86,7 +86,7 @@ pub struct Alteration {
 
 /// One reading's place.
 #[derive(Debug, Clone, Copy)]
-pub struct Place {
+pub(crate) struct Place {
     /// σ: whether the slide adds to the part or takes away from it.
     pub sign: f64,
     /// q(z).
@@ -97,14 +97,14 @@ pub struct Place {
 
 /// Part and slide at a reading's true place, with their derivatives by z.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Content {
+pub(crate) struct Content {
     pub part: [f64; 2],
     pub slide: [f64; 2],
 }
 
 impl Alteration {
     /// Adds an effect's values.
-    pub fn add(&mut self, kind: Kind, values: &[f64]) {
+    pub(crate) fn add(&mut self, kind: Kind, values: &[f64]) {
         match (kind, values) {
             (Kind::AxialRegistration, [shift]) => self.shift_mm += shift,
             (Kind::SensorGain, [gain]) => self.gain += gain,
@@ -120,7 +120,7 @@ impl Alteration {
     }
 
     /// What cannot be: a shift beyond `most_mm`, a gain that leaves nothing, a time constant that no trace can show.
-    pub fn beyond(&self, most_mm: f64) -> Option<String> {
+    pub(crate) fn beyond(&self, most_mm: f64) -> Option<String> {
         if self.shift_mm.abs() > most_mm {
             return Some(format!("a shift of {} mm is beyond `max_shift_mm` ({most_mm})", self.shift_mm));
         }
@@ -131,16 +131,16 @@ impl Alteration {
             return Some(format!("an angle of {}° is no reversal", self.turned_deg));
         }
         let other = self.drifts.iter().find(|[_, constant]| !TIME_CONSTANTS.contains(constant));
-        other.map(|[_, constant]| format!("a time constant of {constant} traces cannot be told"))
+        other.map(|[_, constant]| format!("a time constant of {constant} traces is not observable"))
     }
 
     /// a: the share of the part's deviation that the probe sees.
-    pub fn cosine(&self) -> f64 {
+    pub(crate) fn cosine(&self) -> f64 {
         self.turned_deg.to_radians().cos()
     }
 
     /// What is added whatever part and slide are, before the gain.
-    pub fn added(&self, place: &Place) -> f64 {
+    pub(crate) fn added(&self, place: &Place) -> f64 {
         let drift: f64 = self.drifts.iter().map(|[drift, constant]| drift * (-place.time / constant).exp()).sum();
         self.bow_um * place.parabola + drift
     }
@@ -156,7 +156,14 @@ impl Alteration {
     }
 
     /// Derivatives of the reading by an effect's parameters, where it is applied at `values`; into `into`.
-    pub fn partials(&self, kind: Kind, values: Option<&[f64]>, place: &Place, content: &Content, into: &mut [f64]) {
+    pub(crate) fn partials(
+        &self,
+        kind: Kind,
+        values: Option<&[f64]>,
+        place: &Place,
+        content: &Content,
+        into: &mut [f64],
+    ) {
         let gain = 1.0 + self.gain;
         match (kind, into) {
             (Kind::AxialRegistration, [shift]) => {
@@ -178,12 +185,18 @@ impl Alteration {
     }
 
     /// A reading without what is applied, but for the shift.
-    pub fn corrected(&self, reading_um: f64, place: &Place) -> f64 {
+    pub(crate) fn corrected(&self, reading_um: f64, place: &Place) -> f64 {
         reading_um / (1.0 + self.gain) - self.added(place)
     }
 
     /// Derivatives of a corrected reading by an effect's parameters other than a shift.
-    pub fn corrected_partials(&self, kind: Kind, values: Option<&[f64]>, reading_um: f64, place: &Place) -> [f64; 2] {
+    pub(crate) fn corrected_partials(
+        &self,
+        kind: Kind,
+        values: Option<&[f64]>,
+        reading_um: f64,
+        place: &Place,
+    ) -> [f64; 2] {
         match kind {
             Kind::SensorGain => [-reading_um / (1.0 + self.gain).powi(2), 0.0],
             Kind::PartTilt => [-place.parabola, 0.0],
@@ -207,7 +220,7 @@ fn drift_of(values: Option<&[f64]>) -> [f64; 2] {
 
 /// An effect at a target: the traces that it acts on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     pub kind: Kind,
     pub traces: Vec<usize>,
     pub effect: Effect,
@@ -216,7 +229,7 @@ pub struct Candidate {
 /// Every effect that these traces may have: of a whole setup, and of one trace where its setup has others. `setups` are the
 /// setups' names, `traces` the traces' names and setups. Positions count from the initial setup, and only the reversed
 /// one is turned.
-pub fn candidates(setups: [&str; 2], traces: &[(String, usize)]) -> Vec<Candidate> {
+pub(crate) fn candidates(setups: [&str; 2], traces: &[(String, usize)]) -> Vec<Candidate> {
     let of_setup = |setup: usize| -> Vec<usize> {
         traces.iter().enumerate().filter(|(_, (_, own))| *own == setup).map(|(index, _)| index).collect()
     };
@@ -241,7 +254,7 @@ pub fn candidates(setups: [&str; 2], traces: &[(String, usize)]) -> Vec<Candidat
 }
 
 /// What settings do to each of `count` traces.
-pub fn alterations(candidates: &[Candidate], settings: &[Setting], count: usize) -> Vec<Alteration> {
+pub(crate) fn alterations(candidates: &[Candidate], settings: &[Setting], count: usize) -> Vec<Alteration> {
     let mut all = vec![Alteration::default(); count];
     for setting in settings {
         let Some(candidate) = candidates.get(setting.effect) else { continue };

@@ -1,6 +1,6 @@
 //! Part and slide on common positions, from traces that were brought to them.
 
-use runout_core::{evaluate::straightness::about_lsli_um, numerics::least_squares::Basis};
+use runout_core::{numerics::least_squares::Basis, standards::straightness::about_lsli_um};
 
 use crate::spline::Knots;
 
@@ -11,7 +11,7 @@ const SETTLED: f64 = 1e-12;
 
 /// Common positions, and which traces have readings there.
 #[derive(Debug, Clone)]
-pub struct Grid {
+pub(crate) struct Grid {
     pub z_mm: Vec<f64>,
     /// Setup of each trace: 0 or 1.
     pub setups: Vec<usize>,
@@ -25,7 +25,7 @@ pub struct Grid {
 
 /// Part and slide.
 #[derive(Debug, Clone)]
-pub struct Split {
+pub(crate) struct Split {
     pub part_um: Vec<f64>,
     pub slide_um: Vec<f64>,
     /// Variance of one trace at each position, in µm²; NaN where not known.
@@ -41,7 +41,7 @@ pub struct Split {
 
 /// The deviations about a straight line that have no waves shorter than `cutoff_mm`: cubic splines whose knots are half of
 /// that apart.
-pub fn smooth(z_mm: &[f64], cutoff_mm: f64) -> Basis {
+pub(crate) fn smooth(z_mm: &[f64], cutoff_mm: f64) -> Basis {
     let range = [z_mm.first(), z_mm.last()].map(|z| z.copied().unwrap_or_default());
     let knots = Knots::over(range, 0.5 * cutoff_mm);
     let columns = (0..knots.splines()).map(|spline| {
@@ -111,7 +111,7 @@ impl Grid {
     }
 
     /// Part and slide from what each trace has at each position, `[trace][position]`; what is not present is not used.
-    pub fn split(&self, rows: &[Vec<f64>]) -> Split {
+    pub(crate) fn split(&self, rows: &[Vec<f64>]) -> Split {
         let aligned = self.align(rows);
         let positions = 0..self.z_mm.len();
         let counts: Vec<[f64; 2]> = positions.clone().map(|position| self.counts(position)).collect();
@@ -166,7 +166,7 @@ impl Grid {
     }
 
     /// How part and slide change with the share of the part's deviation that the reversed setup sees.
-    pub fn by_cosine(&self, rows: &[Vec<f64>]) -> [Vec<f64>; 2] {
+    pub(crate) fn by_cosine(&self, rows: &[Vec<f64>]) -> [Vec<f64>; 2] {
         let aligned = self.align(rows);
         let means: Vec<[f64; 2]> = (0..self.z_mm.len()).map(|position| self.means(&aligned, position)).collect();
         let c = self.cosine;

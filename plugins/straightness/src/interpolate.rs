@@ -12,7 +12,7 @@ const UNEVEN: f64 = 2.0;
 ///
 /// It is linear in the readings: an offset and a slope go through unchanged. Of a wave of length λ read every h the
 /// cubic leaves up to (3/128)·(2πh/λ)⁴ of its amplitude.
-pub fn cubic(z_mm: &[f64], readings_um: &[f64], at: f64) -> f64 {
+pub(crate) fn cubic(z_mm: &[f64], readings_um: &[f64], at: f64) -> f64 {
     let (first, count) = around(z_mm, at);
     let knots = || z_mm.iter().enumerate().skip(first).take(count);
     let weight = |own: usize, z: f64| -> f64 {
@@ -22,7 +22,7 @@ pub fn cubic(z_mm: &[f64], readings_um: &[f64], at: f64) -> f64 {
 }
 
 /// The derivative of [`cubic`] by `at`.
-pub fn cubic_slope(z_mm: &[f64], readings_um: &[f64], at: f64) -> f64 {
+pub(crate) fn cubic_slope(z_mm: &[f64], readings_um: &[f64], at: f64) -> f64 {
     let (first, count) = around(z_mm, at);
     let knots = || z_mm.iter().enumerate().skip(first).take(count);
     let others = |own: usize| knots().filter(move |(other, _)| *other != own);

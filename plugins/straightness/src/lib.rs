@@ -21,9 +21,9 @@ mod straightness;
 mod trace;
 mod value_std;
 
-use runout_core::pipeline::{
+use runout_core::{
     effects::EffectEntry,
-    registry::{Plugin, Registry},
+    pipeline::{Plugin, Registry},
 };
 
 pub use separate::{AxialReversal, AxialReversalConfig};

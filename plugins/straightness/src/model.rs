@@ -30,14 +30,14 @@ const MOST_SHIFTS: f64 = 40.0;
 
 /// The traces and what they may lack.
 #[derive(Clone)]
-pub struct TracesModel(Arc<Data>);
+pub(crate) struct TracesModel(Arc<Data>);
 
 impl TracesModel {
-    pub fn new(data: Data) -> Self {
+    pub(crate) fn new(data: Data) -> Self {
         Self(Arc::new(data))
     }
 
-    pub fn data(&self) -> &Data {
+    pub(crate) fn data(&self) -> &Data {
         &self.0
     }
 
@@ -133,7 +133,7 @@ impl Model for TracesModel {
 }
 
 /// A fit of the traces.
-pub struct TracesFit {
+pub(crate) struct TracesFit {
     design: Design,
     /// Part and slide at each reading.
     contents: Vec<Content>,
@@ -154,17 +154,17 @@ impl TracesFit {
     }
 
     /// All fits that explain the data as well, this one first, with their weights in the result.
-    pub fn members(&self) -> Vec<(f64, &Self)> {
+    pub(crate) fn members(&self) -> Vec<(f64, &Self)> {
         self.weights.iter().copied().zip(std::iter::once(self).chain(&self.others)).collect()
     }
 
     /// Effects applied, with their values.
-    pub fn applied(&self) -> &[Setting] {
+    pub(crate) fn applied(&self) -> &[Setting] {
         &self.applied
     }
 
     /// What is not known of the parameters of effects: one after the other, and their covariance.
-    pub fn uncertain(&self) -> &[(Vec<usize>, Vec<Vec<f64>>)] {
+    pub(crate) fn uncertain(&self) -> &[(Vec<usize>, Vec<Vec<f64>>)] {
         &self.uncertain
     }
 
@@ -314,7 +314,7 @@ impl Fit for TracesFit {
         worst.map(report).into_iter().collect()
     }
 
-    fn told_apart_by(&self, effects: &[usize]) -> Option<String> {
+    fn distinguished_by(&self, effects: &[usize]) -> Option<String> {
         let members: Vec<&Candidate> =
             effects.iter().filter_map(|effect| self.design.data.candidates.get(*effect)).collect();
         let has = |kind: Kind| members.iter().any(|one| one.kind == kind);

@@ -14,10 +14,10 @@ use crate::{
 };
 
 /// Of part and slide.
-pub type Both = [Vec<f64>; 2];
+pub(crate) type Both = [Vec<f64>; 2];
 
 /// A trace with its readings and positions corrected.
-pub fn corrected(data: &Data, traces: &[AxialTrace], all: &[Alteration]) -> Vec<AxialTrace> {
+pub(crate) fn corrected(data: &Data, traces: &[AxialTrace], all: &[Alteration]) -> Vec<AxialTrace> {
     let of = |(index, (trace, alteration)): (usize, (&AxialTrace, &Alteration))| {
         let readings = trace.reading_um.iter().enumerate();
         let reading =
@@ -32,7 +32,7 @@ pub fn corrected(data: &Data, traces: &[AxialTrace], all: &[Alteration]) -> Vec<
 }
 
 /// The grid of traces on some positions.
-pub fn grid(z_mm: &[f64], smooth: Option<Basis>, setups: &[usize], traces: &[AxialTrace], cosine: f64) -> Grid {
+pub(crate) fn grid(z_mm: &[f64], smooth: Option<Basis>, setups: &[usize], traces: &[AxialTrace], cosine: f64) -> Grid {
     let range = [z_mm.first(), z_mm.last()].map(|z| z.copied().unwrap_or_default());
     let step = (range[1] - range[0]) / (z_mm.len().max(2) - 1) as f64;
     let present = traces.iter().map(|trace| {
@@ -56,13 +56,13 @@ pub fn grid(z_mm: &[f64], smooth: Option<Basis>, setups: &[usize], traces: &[Axi
 }
 
 /// What each trace has on a grid's positions.
-pub fn rows(grid: &Grid, traces: &[AxialTrace]) -> Vec<Vec<f64>> {
+pub(crate) fn rows(grid: &Grid, traces: &[AxialTrace]) -> Vec<Vec<f64>> {
     let row = |trace: &AxialTrace| grid.z_mm.iter().map(|at| cubic(&trace.z_mm, &trace.reading_um, *at)).collect();
     traces.iter().map(row).collect()
 }
 
 /// a of the reversed setup.
-pub fn cosine(setups: &[usize], all: &[Alteration]) -> f64 {
+pub(crate) fn cosine(setups: &[usize], all: &[Alteration]) -> f64 {
     setups.iter().zip(all).find(|(setup, _)| **setup == 1).map_or(1.0, |(_, alteration)| alteration.cosine())
 }
 
@@ -75,14 +75,14 @@ impl Results {
     }
 
     /// Part and slide with effects applied.
-    pub fn of(&self, data: &Data, applied: &[Setting]) -> Both {
+    pub(crate) fn of(&self, data: &Data, applied: &[Setting]) -> Both {
         let (_, traces, grid) = self.corrected(data, applied);
         let split = grid.split(&rows(&grid, &traces));
         [split.part_um, split.slide_um]
     }
 
     /// How they change with each parameter of an effect.
-    pub fn moves(&self, data: &Data, applied: &[Setting], effect: usize) -> Vec<Both> {
+    pub(crate) fn moves(&self, data: &Data, applied: &[Setting], effect: usize) -> Vec<Both> {
         let Some(Candidate { kind, traces: acted_on, effect: named }) = data.candidates.get(effect) else {
             return Vec::new();
         };
@@ -119,7 +119,7 @@ impl Results {
 
     /// Root mean square of what one unit of each parameter does to part and slide. A part that was turned by 180° + ε shows
     /// another generatrix, a·p + q·sin ε: q is not measured, and is taken to be as large as p.
-    pub fn bias(&self, data: &Data, applied: &[Setting], effect: usize) -> Vec<Bias> {
+    pub(crate) fn bias(&self, data: &Data, applied: &[Setting], effect: usize) -> Vec<Bias> {
         let Some(candidate) = data.candidates.get(effect) else { return Vec::new() };
         let of = |parameter: usize, both: Both| {
             let unit = format!("um/{}", candidate.effect.parameters[parameter].unit);
@@ -137,6 +137,6 @@ impl Results {
 }
 
 /// Root mean square; NaN of nothing.
-pub fn rms(values: &[f64]) -> f64 {
+pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }

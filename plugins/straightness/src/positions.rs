@@ -12,7 +12,7 @@ const MOST_POSITIONS: f64 = 1e6;
 const FEWEST_POSITIONS: usize = 3;
 
 /// The range that all traces cover.
-pub fn common_range(file: &Path, all: &[&AxialTrace]) -> Result<[f64; 2]> {
+pub(crate) fn common_range(file: &Path, all: &[&AxialTrace]) -> Result<[f64; 2]> {
     let start = |trace: &&&AxialTrace| trace.range_mm()[0];
     let end = |trace: &&&AxialTrace| trace.range_mm()[1];
     let latest = all.iter().max_by(|a, b| start(a).total_cmp(&start(b)));
@@ -40,7 +40,7 @@ pub fn common_range(file: &Path, all: &[&AxialTrace]) -> Result<[f64; 2]> {
 }
 
 /// Where straightness is given.
-pub fn positions(step_mm: Option<f64>, file: &Path, all: &[&AxialTrace], range: [f64; 2]) -> Result<Vec<f64>> {
+pub(crate) fn positions(step_mm: Option<f64>, file: &Path, all: &[&AxialTrace], range: [f64; 2]) -> Result<Vec<f64>> {
     let [first, last] = range;
     let z_mm = match (step_mm, all) {
         (None, [one, others @ ..]) if others.iter().all(|other| other.z_mm == one.z_mm) => one.z_mm.clone(),
@@ -73,6 +73,6 @@ pub fn positions(step_mm: Option<f64>, file: &Path, all: &[&AxialTrace], range: 
 }
 
 /// Largest of the traces' median spacings, in mm.
-pub fn coarsest_mm(all: &[&AxialTrace]) -> f64 {
+pub(crate) fn coarsest_mm(all: &[&AxialTrace]) -> f64 {
     all.iter().map(|trace| trace.spacing_mm()).fold(0.0, f64::max)
 }

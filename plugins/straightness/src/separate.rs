@@ -2,10 +2,8 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
-    pipeline::{
-        error::{Fault, known_names},
-        registry::{Context, StageConfig},
-    },
+    fault::{Fault, known_names},
+    pipeline::{Context, StageConfig},
     points::{
         PointColumn,
         PointKind::{Flag, Number, Trace, TraceKind},
@@ -345,7 +343,7 @@ impl AxialReversal {
                 "one trace in each setup: uncertainty is the difference of both at waves that the slide does not have"
                     .into()
             }
-            [1, 1] => "one trace in each setup: nothing tells the uncertainty; repeat each at least once".into(),
+            [1, 1] => "one trace in each setup: the uncertainty is not known; repeat each at least once".into(),
             [first, second] => {
                 let dof = first + second - 2;
                 let single = match (first, second) {

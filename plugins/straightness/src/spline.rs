@@ -1,13 +1,13 @@
 //! Cubic B-splines on even knots, and their least squares by Givens rotations of a banded matrix.
 
 /// Splines that differ from 0 at one place.
-pub const WIDTH: usize = 4;
+pub(crate) const WIDTH: usize = 4;
 /// A diagonal entry below this share of the largest belongs to a spline that no reading determines.
 const DETERMINED: f64 = 1e-9;
 
 /// Even knots, with a spline beyond each end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Knots {
+pub(crate) struct Knots {
     first: f64,
     step: f64,
     intervals: usize,
@@ -15,7 +15,7 @@ pub struct Knots {
 
 /// The splines at one place: the first of four, their values and their derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Local {
+pub(crate) struct Local {
     pub start: usize,
     pub value: [f64; WIDTH],
     pub slope: [f64; WIDTH],
@@ -23,30 +23,30 @@ pub struct Local {
 
 impl Local {
     /// The spline's value with these coefficients.
-    pub fn of(&self, coefficients: &[f64]) -> f64 {
+    pub(crate) fn of(&self, coefficients: &[f64]) -> f64 {
         self.value.iter().zip(&coefficients[self.start..]).map(|(weight, entry)| weight * entry).sum()
     }
 
     /// Its derivative.
-    pub fn slope_of(&self, coefficients: &[f64]) -> f64 {
+    pub(crate) fn slope_of(&self, coefficients: &[f64]) -> f64 {
         self.slope.iter().zip(&coefficients[self.start..]).map(|(weight, entry)| weight * entry).sum()
     }
 }
 
 impl Knots {
     /// Knots over a range, about `step` apart.
-    pub fn over([first, last]: [f64; 2], step: f64) -> Self {
+    pub(crate) fn over([first, last]: [f64; 2], step: f64) -> Self {
         let intervals = ((last - first) / step).ceil().max(1.0);
         Self { first, step: (last - first) / intervals, intervals: intervals as usize }
     }
 
     /// Number of splines.
-    pub fn splines(&self) -> usize {
+    pub(crate) fn splines(&self) -> usize {
         self.intervals + WIDTH - 1
     }
 
     /// The splines at a place; beyond the range, the outermost polynomials.
-    pub fn at(&self, place: f64) -> Local {
+    pub(crate) fn at(&self, place: f64) -> Local {
         let position = (place - self.first) / self.step;
         let start = (position.max(0.0) as usize).min(self.intervals - 1);
         let t = position - start as f64;
@@ -64,7 +64,7 @@ impl Knots {
 
 /// A banded least-squares problem, factored row by row (Golub, Van Loan, *Matrix Computations*, 4th ed., section 5.2.5),
 /// with several right-hand sides.
-pub struct Banded {
+pub(crate) struct Banded {
     /// R, each row from its diagonal on.
     upper: Vec<[f64; WIDTH]>,
     /// Qᵀ·b, `[unknown][right-hand side]`.
@@ -72,12 +72,12 @@ pub struct Banded {
 }
 
 impl Banded {
-    pub fn new(unknowns: usize, sides: usize) -> Self {
+    pub(crate) fn new(unknowns: usize, sides: usize) -> Self {
         Self { upper: vec![[0.0; WIDTH]; unknowns], right: vec![vec![0.0; sides]; unknowns] }
     }
 
     /// Adds one equation. Equations are best added in the order of `start`.
-    pub fn add(&mut self, start: usize, mut weights: [f64; WIDTH], sides: &mut [f64]) {
+    pub(crate) fn add(&mut self, start: usize, mut weights: [f64; WIDTH], sides: &mut [f64]) {
         for (upper, right) in self.upper.iter_mut().zip(&mut self.right).skip(start) {
             if weights.iter().all(|weight| *weight == 0.0) {
                 return;
@@ -101,13 +101,13 @@ impl Banded {
     }
 
     /// Unknowns that the equations determine.
-    pub fn rank(&self) -> usize {
+    pub(crate) fn rank(&self) -> usize {
         let floor = self.floor();
         self.upper.iter().filter(|row| row[0].abs() > floor).count()
     }
 
     /// The solutions, `[right-hand side][unknown]`; an unknown that nothing determines is 0.
-    pub fn solve(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn solve(&self) -> Vec<Vec<f64>> {
         let floor = self.floor();
         let sides = self.right.first().map_or(0, Vec::len);
         let mut solutions = vec![vec![0.0; self.upper.len()]; sides];

@@ -2,25 +2,26 @@
 
 use runout_core::{
     Result,
-    evaluate::open_errors::OpenErrors,
-    stage::{Evaluable, NamedValue, OpenProfile, Outcome, points::value},
+    stage::{Evaluable, OpenProfile, Outcome},
+    standards::open_errors::OpenErrors,
+    summary::NamedValue,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 
 use crate::{moves::rms, value_std::ProfileErrors};
 
 /// What the numbers are, for files that explain themselves.
-pub const CONVENTION: &str = "Straightness along z about the least-squares line (LSLI, ISO 12780-1). part_um is \
+pub(crate) const CONVENTION: &str = "Straightness along z about the least-squares line (LSLI, ISO 12780-1). part_um is \
     positive where the part stands out towards the probe; slide_um is the slide's displacement towards the part in the \
     initial setup. Standard uncertainties are those of one position, from the scatter of repeated traces; NaN if not \
     known.";
 
-/// What the readings cannot tell, whatever the data.
-pub const LIMIT: &str = "each trace has an offset and a slope of its own, so only the straightness about the \
+/// What is not observable, whatever the data.
+pub(crate) const LIMIT: &str = "each trace has an offset and a slope of its own, so only the straightness about the \
     least-squares line is known: neither taper, nor parallelism, nor the angle between slide and part";
 
 /// Why values have no uncertainty.
-const NO_REPEATS: &str = "one trace in each setup: nothing tells the errors";
+const NO_REPEATS: &str = "one trace in each setup: the errors are not known";
 
 /// Straightness of part and slide on common positions.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +47,7 @@ pub struct Straightness {
 }
 
 /// The table of straightness.
-pub fn table() -> TableSpec {
+pub(crate) fn table() -> TableSpec {
     let std = |name: &str, of: &str| {
         let about =
             format!("standard uncertainty of {of} at this position, from the scatter; NaN where it is not known");
@@ -116,15 +117,27 @@ impl Straightness {
     fn values(&self) -> Vec<NamedValue> {
         let of = |name: &str, std_um: &[f64]| {
             let each = "standard uncertainty of the deviation at one position, rms over the positions";
-            value("std", rms(std_um), f64::NAN, "um", each).of(name)
+            NamedValue::new("std", rms(std_um), f64::NAN, "um", each).of(name)
         };
         let repeatability = "standard deviation of one trace at one position, rms over the positions";
         let mut values = vec![of("part", &self.part_std_um), of("slide", &self.slide_std_um)];
-        values.push(value("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
+        values.push(NamedValue::new("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
         let end = |z_mm: Option<&f64>| z_mm.copied().unwrap_or(f64::NAN);
-        values.push(value("first-position", end(self.z_mm.first()), f64::NAN, "mm", "first position along the axis"));
-        values.push(value("last-position", end(self.z_mm.last()), f64::NAN, "mm", "last position along the axis"));
-        values.push(value("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
+        values.push(NamedValue::new(
+            "first-position",
+            end(self.z_mm.first()),
+            f64::NAN,
+            "mm",
+            "first position along the axis",
+        ));
+        values.push(NamedValue::new(
+            "last-position",
+            end(self.z_mm.last()),
+            f64::NAN,
+            "mm",
+            "last position along the axis",
+        ));
+        values.push(NamedValue::new("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
         values
     }
 

@@ -15,7 +15,7 @@ const GAP: f64 = 3.0;
 
 /// Readings along z, ascending.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AxialTrace {
+pub(crate) struct AxialTrace {
     /// Its name in the file.
     pub id: String,
     /// Rows of the file's points that it has, counted from 1.
@@ -35,7 +35,7 @@ impl AxialTrace {
     ///
     /// # Errors
     /// When it has too few points, or its z neither rises nor falls throughout.
-    pub fn of(points: &Points, trace: &Trace) -> Result<Self> {
+    pub(crate) fn of(points: &Points, trace: &Trace) -> Result<Self> {
         let [first_row, last_row] = [trace.points.start + 1, trace.points.end];
         let refuse = |problem: String| {
             Error::new("separate", format!("trace {} of {}", trace.id, points.input.display()), problem)
@@ -88,31 +88,31 @@ impl AxialTrace {
     }
 
     /// First and last position, in mm.
-    pub fn range_mm(&self) -> [f64; 2] {
+    pub(crate) fn range_mm(&self) -> [f64; 2] {
         [self.z_mm.first(), self.z_mm.last()].map(|z| z.copied().unwrap_or(f64::NAN))
     }
 
     /// Median distance of neighbouring positions, in mm.
-    pub fn spacing_mm(&self) -> f64 {
+    pub(crate) fn spacing_mm(&self) -> f64 {
         let mut spacings: Vec<f64> = self.z_mm.windows(2).map(|pair| pair[1] - pair[0]).collect();
         spacings.sort_by(f64::total_cmp);
         spacings.get(spacings.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
     /// Points beyond a range.
-    pub fn beyond(&self, [first, last]: [f64; 2]) -> usize {
+    pub(crate) fn beyond(&self, [first, last]: [f64; 2]) -> usize {
         self.z_mm.iter().filter(|z| !(first..=last).contains(*z)).count()
     }
 
     /// Where it has no points for long within a range: the positions on both sides.
-    pub fn gaps(&self, [first, last]: [f64; 2], step_mm: f64) -> Vec<[f64; 2]> {
+    pub(crate) fn gaps(&self, [first, last]: [f64; 2], step_mm: f64) -> Vec<[f64; 2]> {
         let wide = GAP * step_mm.max(self.spacing_mm());
         let pairs = self.z_mm.windows(2).map(|pair| [pair[0], pair[1]]);
         pairs.filter(|[from, to]| *to > first && *from < last && to - from > wide).collect()
     }
 
     /// With neighbouring points averaged, so that there are no more than `most`.
-    pub fn condensed(&self, most: usize) -> Self {
+    pub(crate) fn condensed(&self, most: usize) -> Self {
         let block = self.z_mm.len().div_ceil(most.max(1));
         if block < 2 {
             return self.clone();

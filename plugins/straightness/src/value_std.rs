@@ -9,7 +9,7 @@ const NONE: f64 = 0.1;
 
 /// What errors of a profile are made of.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct ProfileErrors {
+pub(crate) struct ProfileErrors {
     /// Standard deviation at each position of what the scatter of the traces shows, in µm.
     pub noise_um: Vec<f64>,
     /// Correlation of that over 0, 1, … positions.
@@ -21,7 +21,7 @@ pub struct ProfileErrors {
 impl ProfileErrors {
     /// Standard uncertainty of Σ gᵢ·pᵢ; NaN where the noise is not known.
     #[must_use]
-    pub fn of(&self, weights: &[f64]) -> f64 {
+    pub(crate) fn of(&self, weights: &[f64]) -> f64 {
         let scaled: Vec<f64> = weights.iter().zip(&self.noise_um).map(|(weight, std)| weight * std).collect();
         let own: f64 = scaled.iter().map(|value| value * value).sum();
         let at = |lag: usize| scaled.iter().zip(&scaled[lag.min(scaled.len())..]).map(|(a, b)| a * b).sum::<f64>();
@@ -33,7 +33,7 @@ impl ProfileErrors {
     }
 
     /// Adds what parameters of effects change, which are known with a covariance.
-    pub fn add(&mut self, moves: &[&[f64]], covariance: &[Vec<f64>]) {
+    pub(crate) fn add(&mut self, moves: &[&[f64]], covariance: &[Vec<f64>]) {
         // Cholesky's factor; a parameter that others determine adds nothing.
         let count = moves.len();
         let mut lower = vec![vec![0.0; count]; count];
@@ -59,7 +59,7 @@ impl ProfileErrors {
 
     /// The same at some of the positions.
     #[must_use]
-    pub fn at(&self, kept: &[usize]) -> Self {
+    pub(crate) fn at(&self, kept: &[usize]) -> Self {
         let select = |values: &Vec<f64>| kept.iter().filter_map(|at| values.get(*at).copied()).collect::<Vec<f64>>();
         Self {
             noise_um: select(&self.noise_um),
@@ -70,7 +70,7 @@ impl ProfileErrors {
 }
 
 /// Correlation of the errors of a fit by some deviations, over 0, 1, … of so many positions: what a single error in the middle becomes.
-pub fn correlation_of(smooth: &Basis, positions: usize) -> Vec<f64> {
+pub(crate) fn correlation_of(smooth: &Basis, positions: usize) -> Vec<f64> {
     let middle = positions / 2;
     let mut left = vec![0.0; positions];
     left[middle] = 1.0;
@@ -84,7 +84,7 @@ pub fn correlation_of(smooth: &Basis, positions: usize) -> Vec<f64> {
 
 impl Grid {
     /// Correlation along the profile of what traces differ by from their setup's mean, over 0, 1, … positions, as far as there is one.
-    pub fn correlation(&self, aligned: &[Vec<f64>], means: &[[f64; 2]]) -> Vec<f64> {
+    pub(crate) fn correlation(&self, aligned: &[Vec<f64>], means: &[[f64; 2]]) -> Vec<f64> {
         let positions = means.len();
         let left = |trace: usize, at: usize| {
             if self.present[trace][at] { aligned[trace][at] - means[at][self.setups[trace]] } else { 0.0 }

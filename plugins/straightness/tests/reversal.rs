@@ -1,4 +1,4 @@
-//! Part and slide told apart on made-up traces.
+//! Part and slide distinguished on made-up traces.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -8,9 +8,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use runout_core::{
-    evaluate::{drawn::Sensitivity, straightness::Straightness as Values},
     points::{Column, Points, Trace},
     stage::{Evaluable, PointSeparator},
+    standards::{drawn::Sensitivity, straightness::Straightness as Values},
 };
 use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 

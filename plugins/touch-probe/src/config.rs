@@ -1,6 +1,6 @@
 //! `[separate] plugin = "touch-probe"`, and what its setups can separate.
 
-use runout_core::pipeline::error::{Fault, within};
+use runout_core::fault::{Fault, within};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -41,7 +41,7 @@ pub(crate) struct Content {
 
 impl Content {
     /// What is declared.
-    pub fn declared() -> Self {
+    pub(crate) fn declared() -> Self {
         Self { more_lobing: Vec::new(), more_form: Vec::new(), effects: Vec::new() }
     }
 }
@@ -57,7 +57,7 @@ pub(crate) struct Design {
 
 impl Design {
     /// The model of touches.
-    pub fn new(config: &TouchProbeConfig, touches: &Touches, missing: &[Missing], content: &Content) -> Self {
+    pub(crate) fn new(config: &TouchProbeConfig, touches: &Touches, missing: &[Missing], content: &Content) -> Self {
         let Touches { all, setups, .. } = touches;
         let mut design =
             Self { parameters: Vec::new(), columns: Vec::new(), time: all.iter().map(|touch| touch.time).collect() };
@@ -98,12 +98,12 @@ impl Design {
     }
 
     /// Place of a parameter.
-    pub fn place(&self, wanted: &Parameter) -> Option<usize> {
+    pub(crate) fn place(&self, wanted: &Parameter) -> Option<usize> {
         self.parameters.iter().position(|parameter| parameter == wanted)
     }
 
     /// Places of the cosine and sine of lobing or form of an order.
-    pub fn pair(&self, wanted: impl Fn(&Parameter) -> Option<usize>, order: usize) -> Option<[usize; 2]> {
+    pub(crate) fn pair(&self, wanted: impl Fn(&Parameter) -> Option<usize>, order: usize) -> Option<[usize; 2]> {
         let first = self.parameters.iter().position(|parameter| wanted(parameter) == Some(order))?;
         Some([first, first + 1])
     }
@@ -160,14 +160,14 @@ pub(crate) struct Weights {
 
 impl Weights {
     /// Root mean square of them.
-    pub fn rms_um(&self) -> f64 {
+    pub(crate) fn rms_um(&self) -> f64 {
         (self.std_um.iter().map(|std| std * std).sum::<f64>() / self.std_um.len().max(1) as f64).sqrt()
     }
 }
 
 impl Design {
     /// Fits some touches (indices; all of them in order where they are all) to readings in µm.
-    pub fn fit(&self, readings_um: &[f64], weights: &Weights, used: &[usize]) -> Fitted {
+    pub(crate) fn fit(&self, readings_um: &[f64], weights: &Weights, used: &[usize]) -> Fitted {
         let weigh =
             |column: &Vec<f64>| used.iter().map(|row| column[*row] / weights.std_um[*row]).collect::<Vec<f64>>();
         let columns: Vec<Vec<f64>> = self.columns.iter().map(weigh).collect();
@@ -203,17 +203,17 @@ impl Design {
 
 impl Fitted {
     /// Covariance of parameters, in their units.
-    pub fn covariance(&self, one: usize, other: usize) -> f64 {
+    pub(crate) fn covariance(&self, one: usize, other: usize) -> f64 {
         self.variance * self.solved.covariance[(one, other)]
     }
 
     /// Covariance of some parameters.
-    pub fn covariance_of(&self, places: &[usize]) -> DMatrix<f64> {
+    pub(crate) fn covariance_of(&self, places: &[usize]) -> DMatrix<f64> {
         DMatrix::from_fn(places.len(), places.len(), |row, column| self.covariance(places[row], places[column]))
     }
 
     /// Whether the parameters are told by the touches.
-    pub fn is_told(&self, places: &[usize]) -> bool {
+    pub(crate) fn is_observable(&self, places: &[usize]) -> bool {
         places.iter().all(|place| !self.solved.lost[*place])
     }
 }

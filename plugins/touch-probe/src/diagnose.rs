@@ -9,16 +9,17 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
-    stage::{NamedValue, Outcome, PointDiagnosis, PointModel},
+    stage::{Outcome, PointDiagnosis, PointModel},
+    summary::NamedValue,
 };
 
 use crate::{
     config::TouchProbeConfig,
     design::{Content, Design, Noise, Parameter},
     effects::{Missing, highest},
-    outcome::residual_rows,
     second_order::SecondOrder,
     separate::{Prepared, TouchProbe},
+    tables::residual_rows,
     waves::{Part, angles},
 };
 
@@ -74,7 +75,7 @@ impl PointModel for TouchProbe {
                 names.join(", ")
             ));
         }
-        self.concluded(&prepared, &missing, &terms, closed, settings)
+        self.diagnosed_outcome(&prepared, &missing, &terms, closed, settings)
     }
 }
 
@@ -136,7 +137,7 @@ impl TouchProbe {
         Ok(model
             .ending_at(format!("lobing-order-{last}"), limit.clone())
             .ending_at(format!("ring-form-order-{last}"), limit)
-            .told_apart_by("more setups, with the ring and the probe each turned by an angle of its own"))
+            .distinguished_by("more setups, with the ring and the probe each turned by an angle of its own"))
     }
 
     /// What is held out together: a pass, or every fifth touch of a setup where there is one pass only.
@@ -162,7 +163,7 @@ impl TouchProbe {
         (group.collect(), names)
     }
 
-    fn concluded(
+    fn diagnosed_outcome(
         &self,
         prepared: &Prepared,
         missing: &[Missing],
@@ -177,8 +178,8 @@ impl TouchProbe {
                 readings.iter_mut().zip(column).for_each(|(reading, entry)| *reading -= value * entry);
             }
         }
-        let (_, declared) = self.conclude(prepared, missing, &Content::declared(), &readings)?;
-        let (_, mut after) = self.conclude(prepared, missing, &content(missing, &diagnosis), &readings)?;
+        let (_, declared) = self.fitted_outcome(prepared, missing, &Content::declared(), &readings)?;
+        let (_, mut after) = self.fitted_outcome(prepared, missing, &content(missing, &diagnosis), &readings)?;
         diagnosis.moved = moved(&declared, &after);
         self.of_mean(&mut diagnosis, &after);
         if let Noise::Repeats(dof) = prepared.weights.noise {

@@ -46,7 +46,7 @@ pub(crate) fn highest(max_order: usize) -> usize {
 
 impl Missing {
     /// Its id, where it acts, and its parameters.
-    pub fn effect(self) -> Effect {
+    pub(crate) fn effect(self) -> Effect {
         let parameter =
             |name: &str, unit: &str, tolerance| Parameter { name: name.into(), unit: unit.into(), tolerance };
         let waves = |tolerance| vec![parameter("cosine", "um", tolerance), parameter("sine", "um", tolerance)];
@@ -67,7 +67,7 @@ impl Missing {
     }
 
     /// What one unit of each parameter adds to each reading, in µm.
-    pub fn columns(self, config: &TouchProbeConfig, touches: &Touches) -> Vec<Vec<f64>> {
+    pub(crate) fn columns(self, config: &TouchProbeConfig, touches: &Touches) -> Vec<Vec<f64>> {
         let of = |entry: &dyn Fn(&Touch) -> f64| -> Vec<f64> { touches.all.iter().map(entry).collect() };
         // 1 µm/m, or 1 µrad, at a radius in mm, in µm.
         let arm = 1e-3 * config.ring_radius_mm;

@@ -18,10 +18,11 @@ mod plan;
 mod second_order;
 mod separate;
 pub mod simulate;
+mod tables;
 mod touches;
 mod waves;
 
-use runout_core::pipeline::registry::{Plugin, Registry};
+use runout_core::pipeline::{Plugin, Registry};
 
 pub use config::{SetupConfig, TouchProbeConfig};
 pub use separate::TouchProbe;

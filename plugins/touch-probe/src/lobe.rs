@@ -30,7 +30,7 @@ pub(crate) struct Lobe {
 
 impl Lobe {
     /// All orders from 2.
-    pub fn all(config: &TouchProbeConfig, fit: &Fitted) -> Vec<Self> {
+    pub(crate) fn all(config: &TouchProbeConfig, fit: &Fitted) -> Vec<Self> {
         let orders: Vec<usize> = (fit.design.parameters.iter())
             .filter_map(|parameter| match parameter {
                 Parameter::Lobing { order, part: Part::Cosine, .. } => Some(*order),
@@ -43,7 +43,7 @@ impl Lobe {
             let places = fit.design.pair(lobing_order, order).unwrap_or_default();
             let shared = matches!(fit.design.parameters[places[0]], Parameter::Lobing { shared: true, .. });
             let bound = config.ring_form_um.filter(|_| shared);
-            let observable = fit.is_told(&places) && (!shared || bound.is_some());
+            let observable = fit.is_observable(&places) && (!shared || bound.is_some());
             let parts_um = places.map(|place| fit.solved.coefficients[place]);
             let mut covariance = places.map(|row| places.map(|column| fit.covariance(row, column)));
             for index in 0..2 {
@@ -60,17 +60,17 @@ impl Lobe {
         orders.into_iter().map(lobe).collect()
     }
 
-    pub fn amplitude_um(&self) -> f64 {
+    pub(crate) fn amplitude_um(&self) -> f64 {
         self.parts_um[0].hypot(self.parts_um[1])
     }
 
     /// Of a cos nφ + b sin nφ = A cos(nφ + phase), in degrees.
-    pub fn phase_deg(&self) -> f64 {
+    pub(crate) fn phase_deg(&self) -> f64 {
         (-self.parts_um[1]).atan2(self.parts_um[0]).to_degrees()
     }
 
     /// Standard uncertainty along and across the amplitude.
-    pub fn std_um(&self) -> [f64; 2] {
+    pub(crate) fn std_um(&self) -> [f64; 2] {
         let amplitude = self.amplitude_um();
         let [a, b] = self.parts_um.map(|part| part / amplitude);
         let along = |[a, b]: [f64; 2]| {

@@ -1,6 +1,4 @@
-//! From a fit to lobes, tables and values.
-//!
-//! Long because each table and value is declared beside what fills it, from one fit.
+//! From a fit to lobes, rows of tables and values.
 
 use std::f64::consts::TAU;
 
@@ -8,11 +6,9 @@ use runout_core::{
     Complex64, Result,
     model::diagnosis::LostOrders,
     separation::{Quantity, Residual, SectionAt, Separation},
-    stage::{
-        Evaluable, Form, NamedValue, Outcome,
-        points::{far_below_noise, value},
-    },
-    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers, texts},
+    stage::{Evaluable, Form, Outcome, far_below_noise},
+    summary::NamedValue,
+    table::{TableRows, counts, flags, numbers},
 };
 
 use crate::{
@@ -21,108 +17,13 @@ use crate::{
     held_out::Ranges,
     lobe::{Lobe, pretravel_um},
     second_order::SecondOrder,
+    tables::rows,
     touches::Touches,
     waves::{Part, wave},
 };
 
 /// Directions of the tables `pretravel` and `compensation`: every 6°.
 const DIRECTIONS: usize = 60;
-
-/// The tables of the result.
-pub(crate) fn tables() -> Vec<TableSpec> {
-    let um = |name: &str, about: &str| ColumnSpec::number(name, "um", about);
-    let mm = |name: &str, about: &str| ColumnSpec::number(name, "mm", about);
-    let deg = |name: &str, about: &str| ColumnSpec::number(name, "deg", about);
-    vec![
-        TableSpec::new(
-            "pretravel",
-            "pre-travel by direction, without mean and order 1, of the observable orders of lobing",
-            vec![
-                deg("direction_deg", "direction of the touch in the probe's frame").repeating(),
-                um(
-                    "pretravel_um",
-                    "travel after contact until the probe triggers, less its mean and order 1; outward positive",
-                ),
-                um("std_pretravel_um", "its standard uncertainty"),
-            ],
-        )
-        .figure(Figure::polar(
-            "pretravel",
-            "Pre-travel",
-            "direction_deg",
-            [Measure::new("pretravel_um").with_std("std_pretravel_um")],
-        )),
-        TableSpec::new(
-            "compensation",
-            "what to add to a place that was read, by direction: mean and the orders of lobing with evidence",
-            vec![
-                deg(
-                    "direction_deg",
-                    "direction of the touch in the probe's frame, outward; the machine's at probe angle 0",
-                )
-                .repeating(),
-                mm("dx_mm", "to add to x, in the probe's frame"),
-                mm("dy_mm", "to add to y, in the probe's frame"),
-            ],
-        ),
-        TableSpec::new(
-            "lobing",
-            "orders of lobing and of ring form: A cos(n angle + phase); NaN where an order is lost",
-            vec![
-                ColumnSpec::count("order", "", "undulations per revolution"),
-                ColumnSpec::flag("lobing_lost", "whether lobing of this order is not observable"),
-                ColumnSpec::flag("form_lost", "whether form of the ring of this order is not observable"),
-                ColumnSpec::flag("bounded", "whether lobing holds the form of the ring, within its declared bound"),
-                ColumnSpec::flag("evident", "whether lobing of this order is in the compensation"),
-                um("amplitude_um", "amplitude of lobing"),
-                um("std_amplitude_um", "its standard uncertainty"),
-                deg("phase_deg", "phase of lobing, in the probe's frame"),
-                deg("std_phase_deg", "its standard uncertainty"),
-                um("form_amplitude_um", "amplitude of the form of the ring"),
-                um("std_form_amplitude_um", "its standard uncertainty"),
-            ],
-        ),
-        TableSpec::new(
-            "residual",
-            "residual of each touch",
-            vec![
-                ColumnSpec::count("reading", "", "number of the touch, from 0"),
-                ColumnSpec::name("setup", "id of the setup"),
-                ColumnSpec::count("repeat", "", "number of the repeat"),
-                deg("direction_deg", "direction of the touch in the machine, from the centre of the ring"),
-                um("value", "reading less ring radius and centring"),
-                um("before", "value less the declared model"),
-                um("after", "value less the final model; that of a run is the declared one"),
-            ],
-        ),
-    ]
-}
-
-fn rows(name: &str, columns: Vec<runout_core::table::ArrayRef>) -> Result<TableRows> {
-    let spec = tables().into_iter().find(|spec| spec.name == name);
-    let spec = spec.unwrap_or_else(|| TableSpec::new(name, "", Vec::new()));
-    Ok(TableRows { rows: spec.rows(columns)?, table: spec.name })
-}
-
-/// Rows of the table `residual`.
-pub(crate) fn residual_rows(
-    config: &TouchProbeConfig,
-    touches: &Touches,
-    before: &[f64],
-    after: &[f64],
-) -> Result<TableRows> {
-    let all = || touches.all.iter();
-    let columns = vec![
-        counts(0..touches.all.len()),
-        texts(all().map(|touch| &config.setups[touch.setup].id)),
-        counts(all().map(|touch| touch.repeat)),
-        numbers(all().map(|touch| touch.angle.to_degrees().rem_euclid(360.0))),
-        numbers(all().map(|touch| touch.reading_um)),
-        numbers(before.iter().copied()),
-        numbers(after.iter().copied()),
-    ];
-    rows("residual", columns)
-}
 
 /// What a result is made of.
 pub(crate) struct Found<'a> {
@@ -135,18 +36,18 @@ pub(crate) struct Found<'a> {
 
 impl Found<'_> {
     /// Orders that are lost: of lobing (order 1 always), and of form.
-    pub fn lost(&self, lobes: &[Lobe]) -> [Vec<usize>; 2] {
+    pub(crate) fn lost(&self, lobes: &[Lobe]) -> [Vec<usize>; 2] {
         let lobing = lobes.iter().filter(|lobe| !lobe.observable).map(|lobe| lobe.order);
         let form = (2..=self.config.max_order).filter(|order| self.form_places(*order).is_none());
         [std::iter::once(1).chain(lobing).collect(), std::iter::once(1).chain(form).collect()]
     }
 
     fn form_places(&self, order: usize) -> Option<[usize; 2]> {
-        self.fit.design.pair(form_order, order).filter(|places| self.fit.is_told(places))
+        self.fit.design.pair(form_order, order).filter(|places| self.fit.is_observable(places))
     }
 
     /// Tables, values, form and remarks; without the table `residual`.
-    pub fn outcome(&self) -> Result<Outcome> {
+    pub(crate) fn outcome(&self) -> Result<Outcome> {
         let lobes = Lobe::all(self.config, self.fit);
         let mut tables = vec![self.pretravel(&lobes)?, self.compensation(&lobes)?, self.lobing(&lobes)?];
         tables.retain(|table| table.rows.num_rows() > 0);
@@ -233,7 +134,7 @@ impl Found<'_> {
     }
 
     fn mean(&self) -> Option<[f64; 2]> {
-        let place = self.fit.design.place(&Parameter::Mean).filter(|place| self.fit.is_told(&[*place]))?;
+        let place = self.fit.design.place(&Parameter::Mean).filter(|place| self.fit.is_observable(&[*place]))?;
         let std_um = self.fit.covariance(place, place).sqrt().hypot(self.second_order().amplitude_um(0));
         Some([self.fit.solved.coefficients[place], std_um])
     }
@@ -242,7 +143,7 @@ impl Found<'_> {
         let [mean, std] = self.mean().unwrap_or([f64::NAN; 2]);
         let about = "mean pre-travel and stylus, over the time of the campaign: reading less ring radius; holds the error of the ring's radius, \
              and a scale error common to X and Y, one to one";
-        let mut values = vec![value("pretravel_mean", mean, std, "um", about)];
+        let mut values = vec![NamedValue::new("pretravel_mean", mean, std, "um", about)];
         let Ranges { before, after, without_form, by_repeats, .. } = self.ranges;
         let held = if by_repeats { "a repeat" } else { "touches" };
         let of_ranges = [
@@ -255,32 +156,50 @@ impl Found<'_> {
             ),
         ];
         for (symbol, range, about) in of_ranges {
-            values.push(value(symbol, range.um, range.std_um, "um", &format!("range, mean over passes: {about}")));
+            values.push(NamedValue::new(
+                symbol,
+                range.um,
+                range.std_um,
+                "um",
+                &format!("range, mean over passes: {about}"),
+            ));
         }
         for lobe in lobes {
             let of = |number: f64| if lobe.observable { number } else { f64::NAN };
             let [along, across] = lobe.std_um();
             let order = lobe.order;
             let about = format!("amplitude of lobing of order {order}");
-            values.push(value(&format!("lobe_{order}_amplitude"), of(lobe.amplitude_um()), of(along), "um", &about));
+            values.push(NamedValue::new(
+                &format!("lobe_{order}_amplitude"),
+                of(lobe.amplitude_um()),
+                of(along),
+                "um",
+                &about,
+            ));
             let about = format!(
                 "phase of lobing of order {order}: A cos({order} direction + phase), probe's frame; null without \
                                  evidence of the order"
             );
             let evident = |number: f64| if lobe.evident { of(number) } else { f64::NAN };
             let std = (across / lobe.amplitude_um()).to_degrees();
-            values.push(value(&format!("lobe_{order}_phase"), evident(lobe.phase_deg()), evident(std), "deg", &about));
+            values.push(NamedValue::new(
+                &format!("lobe_{order}_phase"),
+                evident(lobe.phase_deg()),
+                evident(std),
+                "deg",
+                &about,
+            ));
         }
         for setup in &self.touches.setups {
             for (axis, symbol) in ["centre_x", "centre_y"].into_iter().enumerate() {
                 let parameter = Parameter::Centre { setup: *setup, axis };
-                let place = self.fit.design.place(&parameter).filter(|place| self.fit.is_told(&[*place]));
+                let place = self.fit.design.place(&parameter).filter(|place| self.fit.is_observable(&[*place]));
                 let [number, std] = place.map_or([f64::NAN; 2], |place| {
                     let moved = self.touches.centre_um[*setup][axis];
                     [moved + self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()]
                 });
                 let about = "centre of the ring, from the nominal one; holds lobing of order 1";
-                values.push(value(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
+                values.push(NamedValue::new(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
             }
         }
         let about = match self.weights.noise {
@@ -297,7 +216,7 @@ impl Found<'_> {
                 (noise, noise / (2.0 * self.fit.solved.dof as f64).sqrt())
             }
         };
-        values.push(value("touch_std", noise, std, "um", &about));
+        values.push(NamedValue::new("touch_std", noise, std, "um", &about));
         values
     }
 

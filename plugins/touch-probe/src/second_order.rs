@@ -19,12 +19,12 @@ pub(crate) struct SecondOrder {
 
 impl SecondOrder {
     /// Of what a fit found.
-    pub fn of(config: &TouchProbeConfig, fit: &Fitted) -> Self {
+    pub(crate) fn of(config: &TouchProbeConfig, fit: &Fitted) -> Self {
         let orders =
             fit.design.parameters.iter().filter_map(|parameter| lobing_order(parameter).or(form_order(parameter)));
         let highest = orders.max().unwrap_or(config.max_order);
         let amplitude = |pair: Option<[usize; 2]>| {
-            let places = pair.filter(|places| fit.is_told(places));
+            let places = pair.filter(|places| fit.is_observable(places));
             places.map_or(0.0, |[a, b]| fit.solved.coefficients[a].hypot(fit.solved.coefficients[b]))
         };
         let of = |pair: &dyn Fn(usize) -> Option<[usize; 2]>| {
@@ -36,7 +36,7 @@ impl SecondOrder {
     }
 
     /// Root sum of squares of what pairs of orders make of this order, in µm.
-    pub fn amplitude_um(&self, order: usize) -> f64 {
+    pub(crate) fn amplitude_um(&self, order: usize) -> f64 {
         let [lobing, form] = &self.amplitudes_um;
         let mut squares = 0.0;
         for (p, (lobe, own)) in lobing.iter().zip(form).enumerate() {
@@ -51,7 +51,7 @@ impl SecondOrder {
     }
 
     /// Variance of a reading by all orders from 2, in µm².
-    pub fn variance_um2(&self) -> f64 {
+    pub(crate) fn variance_um2(&self) -> f64 {
         let highest = 2 * self.amplitudes_um[0].len();
         (2..=highest).map(|order| 0.5 * self.amplitude_um(order).powi(2)).sum()
     }

@@ -2,11 +2,9 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    fault::Fault,
     model::diagnosis::LostOrders,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     points::{
         PointColumn,
         PointKind::{Label, Number},
@@ -22,7 +20,8 @@ use crate::{
     effects::{Missing, missing},
     held_out::ranges,
     noise::weights,
-    outcome::{Found, residual_rows, tables},
+    outcome::Found,
+    tables::{residual_rows, tables},
     touches::Touches,
 };
 
@@ -85,7 +84,7 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     /// Readings, in µm.
-    pub fn readings_um(&self) -> Vec<f64> {
+    pub(crate) fn readings_um(&self) -> Vec<f64> {
         self.touches.all.iter().map(|touch| touch.reading_um).collect()
     }
 }
@@ -102,7 +101,7 @@ impl PointSeparator for TouchProbe {
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let prepared = self.prepare(points)?;
         let readings = prepared.readings_um();
-        let (fit, mut outcome) = self.conclude(&prepared, &[], &Content::declared(), &readings)?;
+        let (fit, mut outcome) = self.fitted_outcome(&prepared, &[], &Content::declared(), &readings)?;
         outcome.tables.push(residual_rows(&self.0, &prepared.touches, &fit.residual_um, &fit.residual_um)?);
         Ok(outcome)
     }
@@ -204,7 +203,9 @@ impl TouchProbe {
             let moved = (0..self.0.setups.len()).map(|setup| {
                 [0, 1].map(|axis| {
                     let place = fit.design.place(&Parameter::Centre { setup, axis });
-                    place.filter(|place| fit.is_told(&[*place])).map_or(0.0, |place| fit.solved.coefficients[place])
+                    place
+                        .filter(|place| fit.is_observable(&[*place]))
+                        .map_or(0.0, |place| fit.solved.coefficients[place])
                 })
             });
             touches.recentre(&moved.collect::<Vec<_>>());
@@ -230,7 +231,7 @@ impl TouchProbe {
     fn has_enough(&self, points: &Points, prepared: &Prepared, fit: &Fitted) -> Result<()> {
         let count = prepared.touches.all.len();
         let orders = 2..=self.0.max_order;
-        let told = |order: usize| fit.design.pair(lobing_order, order).is_some_and(|places| fit.is_told(&places));
+        let told = |order: usize| fit.design.pair(lobing_order, order).is_some_and(|places| fit.is_observable(&places));
         if orders.clone().any(told) && fit.solved.dof > 0 {
             return Ok(());
         }
@@ -248,7 +249,7 @@ impl TouchProbe {
     }
 
     /// The result of a fit with more than is declared.
-    pub(crate) fn conclude(
+    pub(crate) fn fitted_outcome(
         &self,
         prepared: &Prepared,
         missing: &[Missing],

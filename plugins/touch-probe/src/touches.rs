@@ -1,6 +1,6 @@
 //! Touches of a ring, checked.
 
-use runout_core::{Error, Result, pipeline::error::known_names, points::Points};
+use runout_core::{Error, Result, fault::known_names, points::Points};
 
 use crate::config::TouchProbeConfig;
 
@@ -49,7 +49,7 @@ pub(crate) struct Touches {
 
 impl Touches {
     /// Reads the columns of points.
-    pub fn new(points: &Points, config: &TouchProbeConfig) -> Result<Self> {
+    pub(crate) fn new(points: &Points, config: &TouchProbeConfig) -> Result<Self> {
         let object = || points.input.display().to_string();
         let column =
             |name: &str| points.columns.iter().find(|column| column.name == name).map(|known| &known.values[..]);
@@ -118,7 +118,7 @@ impl Touches {
     }
 
     /// Counts angles and readings from centres that are moved by this, in µm: exact geometry, not its first order.
-    pub fn recentre(&mut self, moved_um: &[[f64; 2]]) {
+    pub(crate) fn recentre(&mut self, moved_um: &[[f64; 2]]) {
         for (centre, moved) in self.centre_um.iter_mut().zip(moved_um) {
             centre.iter_mut().zip(moved).for_each(|(centre, moved)| *centre += moved);
         }
@@ -182,7 +182,7 @@ impl Touches {
     }
 
     /// Touches of one setup and repeat, for all that there are.
-    pub fn passes(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn passes(&self) -> Vec<Vec<usize>> {
         let mut passes = Vec::new();
         for setup in &self.setups {
             for repeat in &self.repeats {

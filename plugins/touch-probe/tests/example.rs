@@ -24,7 +24,7 @@ fn registry() -> Registry {
 /// `RUNOUT_WRITE=1` writes the file instead of comparing it.
 #[test]
 fn the_touches_are_those_of_the_scenario() {
-    use runout_core::pipeline::registry::{Context, StageConfig};
+    use runout_core::pipeline::{Context, StageConfig};
     use runout_touch_probe::simulate::TouchProbeScenario;
     let text = std::fs::read_to_string(example("scenario.toml")).unwrap();
     let text: String =

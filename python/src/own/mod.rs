@@ -16,10 +16,10 @@ use pyo3::{exceptions::PyValueError, prelude::*};
 use runout_cli::Failure;
 use runout_core::{
     model::Parameter,
-    pipeline::{Registry, registry::Plugin},
+    pipeline::{Plugin, Registry},
     stage::Separator,
 };
-use runout_spindle::{effects, separators::closed_form::MethodConfig};
+use runout_spindle::{effects, separators::MethodConfig};
 
 use crate::work::Stop;
 use effect::OwnEffect;

@@ -6,8 +6,10 @@ use numpy::{Complex64, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::{exceptions::PyValueError, prelude::*};
 use runout_core::{
     Error, ErrorKind, Result,
+    effects::EffectCatalogue,
+    fault::Fault,
     model::foresight::Foresight,
-    pipeline::{effects::EffectCatalogue, error::Fault, registry::Context},
+    pipeline::Context,
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},
     spread::Projection,
@@ -15,7 +17,7 @@ use runout_core::{
 };
 use runout_spindle::{
     layout,
-    separators::closed_form::{ClosedForm, ClosedFormSeparator, MethodConfig},
+    separators::{ClosedForm, ClosedFormSeparator, MethodConfig},
 };
 
 use super::{Object, numbers};

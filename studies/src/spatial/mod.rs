@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use nalgebra::{DMatrix, DVector, Vector3};
 use runout_core::{
     Error, Result,
-    pipeline::registry::Context,
+    pipeline::Context,
     stage::{Outcome, PointSeparator},
     table::{Array, Float64Array, RecordBatch},
 };

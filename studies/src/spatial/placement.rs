@@ -2,11 +2,7 @@
 
 use std::fmt::Write as _;
 
-use runout_core::{
-    Error, Result,
-    pipeline::registry::Context,
-    stage::{NamedValue, PointSeparator},
-};
+use runout_core::{Error, Result, pipeline::Context, stage::PointSeparator, summary::NamedValue};
 use runout_spatial_error::{Query, SpatialErrorConfig};
 
 use super::{

@@ -13,7 +13,7 @@ use std::{
 const STARTED: Duration = Duration::from_secs(30);
 
 /// A running build of the example `many_command_lines`.
-pub struct Worker {
+pub(crate) struct Worker {
     process: Child,
     connection: TcpStream,
     /// What it prints of errors.
@@ -21,7 +21,7 @@ pub struct Worker {
 }
 
 /// What became of a command line.
-pub enum Answer {
+pub(crate) enum Answer {
     /// It ended with an exit status, and took this memory.
     Status { status: u32, memory_kb: u64 },
     /// The process ended.
@@ -35,7 +35,7 @@ impl Worker {
     ///
     /// # Errors
     /// When it does not start or does not connect.
-    pub fn start(program: &Path, folder: &Path) -> io::Result<Self> {
+    pub(crate) fn start(program: &Path, folder: &Path) -> io::Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", 0))?;
         listener.set_nonblocking(true)?;
         let path = folder.join("said");
@@ -68,7 +68,7 @@ impl Worker {
     ///
     /// # Errors
     /// When the process cannot be waited for.
-    pub fn give(&mut self, words: &[&str], longest: Duration) -> io::Result<Answer> {
+    pub(crate) fn give(&mut self, words: &[&str], longest: Duration) -> io::Result<Answer> {
         self.said.set_len(0)?;
         let number = |count: usize| u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes();
         let mut line = number(words.len()).to_vec();
@@ -98,7 +98,7 @@ impl Worker {
     ///
     /// # Errors
     /// When that cannot be read.
-    pub fn said(&mut self) -> io::Result<Vec<u8>> {
+    pub(crate) fn said(&mut self) -> io::Result<Vec<u8>> {
         let mut text = Vec::new();
         io::Seek::rewind(&mut self.said)?;
         self.said.read_to_end(&mut text)?;

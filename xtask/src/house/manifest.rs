@@ -10,13 +10,13 @@ use crate::process::Outcome;
 
 /// A crate: its folder below the root and the folders of the workspace's crates that its program text may import.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Member {
+pub(crate) struct Member {
     pub folder: String,
     pub uses: BTreeSet<String>,
 }
 
 /// All members of the workspace at `root`, in the order of the manifest. Dependencies of tests are left out.
-pub fn members(root: &Path) -> Outcome<Vec<Member>> {
+pub(crate) fn members(root: &Path) -> Outcome<Vec<Member>> {
     let workspace = Manifest::read(root)?;
     let shared: BTreeMap<&str, String> = workspace
         .entries("workspace.dependencies")

@@ -24,7 +24,7 @@ const HEAD_LINES: usize = 12;
 const REASON: &str = "//! Long because";
 
 /// Prints the graphs; fails on what the picture does not have.
-pub fn check(words: &[&str]) -> Outcome {
+pub(crate) fn check(words: &[&str]) -> Outcome {
     if !words.is_empty() {
         return Err("check-house takes nothing".into());
     }
@@ -34,7 +34,7 @@ pub fn check(words: &[&str]) -> Outcome {
 }
 
 /// The same without the graphs, for a longer list of checks.
-pub fn check_quietly() -> Outcome {
+pub(crate) fn check_quietly() -> Outcome {
     Findings::of(&root())?.verdict()
 }
 
@@ -148,7 +148,7 @@ fn reason(from: &str, to: &str) -> &'static str {
         ("plugins", "plugins") => "a plugin imports a plugin",
         ("formats", "plugins") => "a format knows a domain",
         ("core", "core") => "a crate of the core imports upwards",
-        ("core", _) => "the core imports what stands on it",
+        ("core", _) => "the core imports what depends on it",
         _ => "ARCHITECTURE.md does not have this arrow",
     }
 }

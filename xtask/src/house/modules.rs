@@ -9,11 +9,11 @@ use std::{
 use super::tokens::{Token, group_end, tokens};
 
 /// Names from the crate's root to a module or an item.
-pub type Name = Vec<String>;
+pub(crate) type Name = Vec<String>;
 
 /// Modules of one crate.
 #[derive(Debug, Default)]
-pub struct Modules {
+pub(crate) struct Modules {
     all: BTreeMap<Name, Module>,
 }
 
@@ -27,7 +27,7 @@ struct Module {
 
 /// Siblings that need each other, and how often each names the other.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Cycle {
+pub(crate) struct Cycle {
     /// The module that holds them, from the root; empty for the root itself.
     pub parent: String,
     /// Names of the modules, from the root.
@@ -38,7 +38,7 @@ pub struct Cycle {
 
 impl Modules {
     /// Reads the library at `src/lib.rs`, or the program at `src/main.rs`.
-    pub fn read(folder: &Path) -> Self {
+    pub(crate) fn read(folder: &Path) -> Self {
         let source = folder.join("src");
         let mut modules = Self::default();
         let root = ["lib.rs", "main.rs"].map(|name| source.join(name));
@@ -127,7 +127,7 @@ impl Modules {
     }
 
     /// For each module at the top what it takes from the others.
-    pub fn at_the_top(&self) -> BTreeMap<String, BTreeSet<String>> {
+    pub(crate) fn at_the_top(&self) -> BTreeMap<String, BTreeSet<String>> {
         let tops = self.all.keys().filter(|name| name.len() == 1).map(|name| (name[0].clone(), BTreeSet::new()));
         let mut top: BTreeMap<String, BTreeSet<String>> = tops.collect();
         for (from, to) in self.arrows().remove(&Name::new()).unwrap_or_default().into_keys() {
@@ -137,7 +137,7 @@ impl Modules {
     }
 
     /// Sets of siblings of which each needs each other, at every depth.
-    pub fn cycles(&self) -> Vec<Cycle> {
+    pub(crate) fn cycles(&self) -> Vec<Cycle> {
         let mut cycles = Vec::new();
         for (parent, arrows) in self.arrows() {
             let full = |name: &str| extended(&parent, name).join("::");

@@ -12,7 +12,7 @@ use crate::process::Outcome;
 
 /// What the block allows.
 #[derive(Debug, Default)]
-pub struct Picture {
+pub(crate) struct Picture {
     arrows: Vec<(String, String)>,
     /// Crates and two of their modules of which neither may take anything from the other.
     pub apart: Vec<(String, [String; 2])>,
@@ -22,7 +22,7 @@ pub struct Picture {
 
 impl Picture {
     /// Reads the block out of a document.
-    pub fn read(document: &str) -> Outcome<Self> {
+    pub(crate) fn read(document: &str) -> Outcome<Self> {
         let Some((_, rest)) = document.split_once("```house\n") else {
             return Err("ARCHITECTURE.md has no block ```house".into());
         };
@@ -49,12 +49,12 @@ impl Picture {
         Ok(picture)
     }
 
-    pub fn allows(&self, from: &str, to: &str) -> bool {
+    pub(crate) fn allows(&self, from: &str, to: &str) -> bool {
         self.arrows.iter().any(|arrow| matches(&arrow.0, from) && matches(&arrow.1, to))
     }
 
     /// Arrows that none of these needs.
-    pub fn unused<'a>(&'a self, arrows: &'a [(String, String)]) -> impl Iterator<Item = String> + 'a {
+    pub(crate) fn unused<'a>(&'a self, arrows: &'a [(String, String)]) -> impl Iterator<Item = String> + 'a {
         let needed =
             |arrow: &(String, String)| arrows.iter().any(|(from, to)| matches(&arrow.0, from) && matches(&arrow.1, to));
         self.arrows.iter().filter(move |arrow| !needed(arrow)).map(|(from, to)| format!("{from} -> {to}"))

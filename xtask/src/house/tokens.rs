@@ -1,19 +1,19 @@
 //! Words and marks of Rust text, without comments, literals and what is built for tests only.
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Token {
+pub(crate) enum Token {
     Word(String),
     Mark(char),
 }
 
 impl Token {
-    pub fn is_word(&self, word: &str) -> bool {
+    pub(crate) fn is_word(&self, word: &str) -> bool {
         matches!(self, Token::Word(own) if own == word)
     }
 }
 
 /// Tokens of a file, without items under `#[cfg(test)]`.
-pub fn tokens(text: &str) -> Vec<Token> {
+pub(crate) fn tokens(text: &str) -> Vec<Token> {
     without_tests(&split(text))
 }
 
@@ -119,7 +119,7 @@ fn without_tests(tokens: &[Token]) -> Vec<Token> {
 }
 
 /// Behind the bracket that closes the one at `start`.
-pub fn group_end(tokens: &[Token], start: usize) -> usize {
+pub(crate) fn group_end(tokens: &[Token], start: usize) -> usize {
     let mut depth = 0;
     for (place, token) in tokens.iter().enumerate().skip(start) {
         match token {

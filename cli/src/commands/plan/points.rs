@@ -1,4 +1,4 @@
-//! `runout plan` of measured points: what their layout tells, and what to add to it.
+//! `runout plan` of measured points: what is observable with their layout, and what to add to it.
 
 use runout_core::{
     pipeline::{
@@ -14,7 +14,7 @@ use crate::{args::PlanArgs, failure::Failure, reports::plan::PointReport};
 ///
 /// # Errors
 /// When it is not TOML.
-pub fn is_pipeline(sources: &Sources) -> Result<bool, Failure> {
+pub(crate) fn is_pipeline(sources: &Sources) -> Result<bool, Failure> {
     let document = Document::parse(sources)?;
     let keys = document.root().get_ref();
     Ok(keys.contains_key("separate") && !keys.contains_key("rig"))
@@ -24,7 +24,7 @@ pub fn is_pipeline(sources: &Sources) -> Result<bool, Failure> {
 ///
 /// # Errors
 /// When the pipeline is wrong, or has nothing to plan.
-pub fn report(args: &PlanArgs, sources: &Sources, registry: &Registry) -> Result<PointReport, Failure> {
+pub(crate) fn report(args: &PlanArgs, sources: &Sources, registry: &Registry) -> Result<PointReport, Failure> {
     let of_a_rig = [("--optimise", args.optimise.is_some()), ("--map", args.map.is_some())];
     if let Some((option, _)) = of_a_rig.iter().find(|(_, given)| *given) {
         let message = format!("{option} is for a rig; this is a pipeline of measured points");
@@ -33,7 +33,7 @@ pub fn report(args: &PlanArgs, sources: &Sources, registry: &Registry) -> Result
     let pipeline = Pipeline::from_sources(sources, registry)?;
     let nothing = || Failure::Name {
         message: format!("`{}` has nothing to plan", pipeline.separator),
-        help: "`runout check` says what it can and cannot tell".into(),
+        help: "`runout check` says what is and is not observable".into(),
     };
     let separator = pipeline.route.point_separator().ok_or_else(nothing)?;
     let mut notes = Vec::new();

@@ -5,7 +5,7 @@ use runout_core::pipeline::compare::{Comparison, ValueComparison};
 use super::{super::number::with_std, Page, Table, normalised, significant};
 
 /// Adds what was compared.
-pub fn page(mut page: Page, comparison: &Comparison) -> Page {
+pub(crate) fn page(mut page: Page, comparison: &Comparison) -> Page {
     let names: Vec<&str> = comparison.methods.iter().map(|method| method.method.as_str()).collect();
     page.line(format_args!("{}, compared with {}", names[1..].join(", "), comparison.reference));
     page.headed_table("Values (± is the standard uncertainty)", &values(comparison, &names));

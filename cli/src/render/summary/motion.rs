@@ -1,6 +1,6 @@
 //! Error motion of the axis.
 
-use runout_core::{evaluate::Value, pipeline::run::StationSummary};
+use runout_core::{standards::Value, summary::StationSummary};
 
 use super::{std_of, unit};
 use crate::render::{
@@ -12,7 +12,7 @@ use crate::render::{
 const KINDS: [&str; 3] = ["synchronous", "asynchronous", "total"];
 
 /// One row a direction, one column a kind of value: of a station with ±, of several from the lowest to the highest.
-pub fn section(page: &mut Page, stations: &[StationSummary]) {
+pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
     let Some(first) = stations.iter().flat_map(|station| &station.motion_values).find(|value| is_plot(value)) else {
         return;
     };

@@ -1,6 +1,6 @@
 //! Values of measured points.
 
-use runout_core::stage::NamedValue;
+use runout_core::summary::NamedValue;
 
 use super::{described, unit};
 use crate::render::{

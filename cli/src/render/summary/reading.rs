@@ -1,6 +1,6 @@
 //! Readings by themselves, where the layout separates nothing.
 
-use runout_core::{evaluate::reading::ReadingValues, pipeline::run::StationSummary};
+use runout_core::{reading::ReadingValues, summary::StationSummary};
 
 use super::FEW_STATIONS;
 use crate::render::{
@@ -13,7 +13,7 @@ use crate::render::{
 const SHOWN: usize = 5;
 
 /// Run-out, 1/rev and the largest harmonics of every reading.
-pub fn section(page: &mut Page, stations: &[StationSummary]) {
+pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
     let all = || stations.iter().flat_map(|station| station.readings.iter().map(move |reading| (station, reading)));
     let header = ["station", "setup", "sensor", "run-out TIR µm", "1/rev µm", "at °", "turns ± µm", "harmonics µm"];
     let mut table = Table::new(3, header);

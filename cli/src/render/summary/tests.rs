@@ -1,7 +1,7 @@
 use insta::assert_snapshot;
 use runout_core::{
-    evaluate::{Value, uncertainty::Uncertainty},
-    pipeline::run::{
+    standards::{Value, uncertainty::Uncertainty},
+    summary::{
         CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
         SurfaceSummary,
     },

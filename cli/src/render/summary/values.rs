@@ -1,8 +1,8 @@
 //! Values of all sections together, and limits.
 
 use runout_core::{
-    evaluate::Value,
-    pipeline::run::{Decision, LimitSummary, LimitValue, Summary},
+    standards::Value,
+    summary::{Decision, LimitSummary, LimitValue, Summary},
 };
 
 use super::{FEW_STATIONS, known, std_of, unit};
@@ -13,7 +13,7 @@ use crate::render::{
 };
 
 /// Peak-to-valley values of the whole part, unfiltered.
-pub fn part(page: &mut Page, summary: &Summary) {
+pub(crate) fn part(page: &mut Page, summary: &Summary) {
     let Some(part) = &summary.part else { return };
     let mut table = Table::new(2, ["value", "reference", ""]);
     let shown = |value: &&Value| ["CYLt", "Sa", "Sz"].contains(&&*value.symbol) && value.filter == "none";
@@ -29,7 +29,7 @@ pub fn part(page: &mut Page, summary: &Summary) {
 }
 
 /// What was found of each limit, by its worst value.
-pub fn limits(page: &mut Page, summary: &Summary) {
+pub(crate) fn limits(page: &mut Page, summary: &Summary) {
     let mut table = Table::new(1, ["limit", "values", "proven", "the worst", "95 % interval", "decision"]);
     for limit in &summary.limits {
         let worst = worst(limit);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Data, Unseen, subtract};
+use super::{Data, HeldOut, subtract};
 use crate::{
     Bias, Effect, Fit, Outcome, Remainder, Setting,
     diagnosis::Unexplained,
@@ -79,7 +79,7 @@ impl LinearFit {
     }
 
     /// Root mean square of points never fitted less what the fit predicts of them.
-    fn unseen_rms(&self, unseen: &Unseen) -> f64 {
+    fn held_out_rms_of(&self, unseen: &HeldOut) -> f64 {
         let mut left = unseen.values.clone();
         subtract(&mut left, &unseen.declared, &self.coefficients);
         for setting in &self.applied {
@@ -135,7 +135,7 @@ impl Fit for LinearFit {
         let unseen = self.data.unseen.iter().map(|unseen| Outcome {
             value: format!("rms of {}, never fitted", unseen.name),
             section: None,
-            number: self.unseen_rms(unseen),
+            number: self.held_out_rms_of(unseen),
             std: f64::NAN,
             unit: self.remainder.unit.clone(),
         });
@@ -224,8 +224,8 @@ impl Fit for LinearFit {
         far_worse(&self.groups).into_iter().map(report).collect()
     }
 
-    fn told_apart_by(&self, _effects: &[usize]) -> Option<String> {
-        self.data.told_apart_by.clone()
+    fn distinguished_by(&self, _effects: &[usize]) -> Option<String> {
+        self.data.distinguished_by.clone()
     }
 
     fn unexplained(&self) -> Vec<Unexplained> {

@@ -36,12 +36,12 @@ pub(super) struct UnderWay {
 }
 
 impl UnderWay {
-    pub fn now() -> MutexGuard<'static, Self> {
+    pub(crate) fn now() -> MutexGuard<'static, Self> {
         UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Removes a temporary file, and the folders made for it where nothing else came into them.
-    pub fn remove(&mut self, temporary: &Path) {
+    pub(crate) fn remove(&mut self, temporary: &Path) {
         self.files.retain(|file| file != temporary);
         // Nothing more can be done about a temporary file that will not go.
         let _ = fs::remove_file(temporary);
@@ -49,7 +49,7 @@ impl UnderWay {
     }
 
     /// Removes the folders that were made for a file, where nothing else came into them.
-    pub fn remove_made_folders(&mut self, file: &Path) {
+    pub(crate) fn remove_made_folders(&mut self, file: &Path) {
         for folder in file.ancestors().skip(1) {
             // Folders with something in them do not go.
             if !self.folders.contains(folder) || fs::remove_dir(folder).is_err() {
@@ -60,7 +60,7 @@ impl UnderWay {
     }
 
     /// Forgets a temporary file that has its name, and the folders above it: they stay.
-    pub fn committed(&mut self, temporary: &Path) {
+    pub(crate) fn committed(&mut self, temporary: &Path) {
         self.files.retain(|file| file != temporary);
         for folder in temporary.ancestors().skip(1) {
             if !self.folders.remove(folder) {
@@ -70,7 +70,7 @@ impl UnderWay {
     }
 
     /// Begins to give files their final names, which nothing can abandon from here on.
-    pub fn publish(&mut self, files: &[PendingFile]) -> Result<Publishing> {
+    pub(crate) fn publish(&mut self, files: &[PendingFile]) -> Result<Publishing> {
         let is_gone = |file: &&PendingFile| self.abandoning > 0 || !self.files.contains(&file.temporary);
         if let Some(gone) = files.iter().find(is_gone) {
             return Err(gone.failure(ABANDONED).of(ErrorKind::Interrupted));

@@ -1,11 +1,12 @@
 //! A pipeline, from TOML to stages that can only be valid.
 
 pub(super) mod candidate;
-pub mod diagnose;
+pub(crate) mod diagnose;
 pub(super) mod exports;
 mod route;
 mod schema;
 
+use runout_error::fault::{Fault, known_names};
 use std::path::{Path, PathBuf};
 
 use toml::de::DeValue;
@@ -16,7 +17,6 @@ pub use schema::{PlainTable, choice, pipeline_schema, plain_tables};
 
 use super::{
     document::{self, ConfigError, Document, Sources, Table, checked, required, table, tables},
-    error::{Fault, known_names},
     evaluate::{Evaluate, EvaluateConfig},
     registry::{Context, Registry},
 };
@@ -67,7 +67,7 @@ pub struct Pipeline {
     pub checks: Vec<Box<dyn Check>>,
     /// The tables of its result, also those that it may lack.
     pub tables: Vec<TableSpec>,
-    /// What the separator can tell with the rig.
+    /// What is observable by the separator with the rig.
     pub assessment: Option<Assessment>,
     /// Files that stages besides `[load]` name and read: inputs of the result too.
     pub named_files: Vec<PathBuf>,

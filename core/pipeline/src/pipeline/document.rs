@@ -2,6 +2,7 @@
 
 mod table;
 
+use runout_error::fault::{Diagnostic, Fault, Place};
 use std::{
     io::Read,
     ops::Range,
@@ -15,7 +16,6 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::error::{Diagnostic, Fault, Place};
 use runout_error::{Error, ErrorKind};
 use runout_turning::input_file::open_regular;
 
@@ -42,7 +42,7 @@ struct Part {
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Role {
     Main,
-    /// A file that stands for the table at a top-level key.
+    /// A file that replaces the table at a top-level key.
     Include(String),
     /// `value = …` for a path of keys.
     Override(String),
@@ -67,7 +67,7 @@ impl From<Diagnostic> for ConfigError {
 
 impl Sources {
     /// Reads a file, with overrides of the form `key.path=value`. Where the top-level `include_key` holds a string, it
-    /// names a file (relative to this one) that stands for the table.
+    /// names a file (relative to this one) that replaces the table.
     ///
     /// # Errors
     /// When a file cannot be read, or is not TOML where it has to be looked into.

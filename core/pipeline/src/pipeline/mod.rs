@@ -2,10 +2,10 @@
 
 pub mod batch;
 pub mod compare;
-pub mod config;
+mod config;
 pub mod diagnose;
 pub mod document;
-pub mod evaluate;
+mod evaluate;
 mod observer;
 mod ordered_collector;
 mod outdated;
@@ -13,19 +13,15 @@ mod pinpoint;
 mod point_run;
 mod read_ahead;
 mod record_reader;
-pub mod registry;
+mod registry;
 mod result;
 mod result_writer;
 pub mod run;
 mod station_summary;
 mod steadiness;
-pub mod tables;
+mod tables;
 mod turn_tables;
 mod undeclared;
 
-pub use crate::{effects, summary};
-pub use config::Pipeline;
-pub use registry::Registry;
-
-/// Faults of a configuration.
-pub use runout_error::fault as error;
+pub use config::{Candidate, INCLUDE_KEY, Pipeline, PlainTable, Route, choice, pipeline_schema, plain_tables};
+pub use registry::{Catalogue, Context, Plugin, Registry, StageConfig};

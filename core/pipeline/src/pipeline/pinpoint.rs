@@ -1,6 +1,6 @@
 //! The place of a mistake inside a table that was read without its places.
 //!
-//! What serde buffers before it knows what to make of it (an `enum` told apart by a key) loses the places of its keys: an
+//! What serde buffers before it knows what to make of it (an `enum` distinguished by a key) loses the places of its keys: an
 //! error then points at the whole table. Its message still says which key or value it means.
 
 use std::ops::Range;

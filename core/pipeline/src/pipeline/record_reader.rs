@@ -30,7 +30,7 @@ use runout_turning::{
 
 /// From recorded turns to the profiles of one station after the other.
 #[non_exhaustive]
-pub struct RecordReader<'a> {
+pub(crate) struct RecordReader<'a> {
     pub rig: &'a Rig,
     pub recording: &'a dyn Recording,
     pub conditioners: &'a [Box<dyn Conditioner>],
@@ -49,7 +49,7 @@ impl RecordReader<'_> {
     ///
     /// Each worker takes the next station, and waits only where it is too far ahead of the others: few results exist at a
     /// time.
-    pub fn run<T: Send>(
+    pub(crate) fn run<T: Send>(
         &self,
         threads: Option<NonZeroUsize>,
         observer: &dyn Observer,
@@ -200,7 +200,7 @@ fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String
 
 /// Separates a station, and refuses what is not a number where the layout could tell one, and a form that no part of
 /// `radius_mm` has.
-pub fn separate(separator: &dyn StationSeparator, station: &Station, radius_mm: f64) -> Result<Separation> {
+pub(crate) fn separate(separator: &dyn StationSeparator, station: &Station, radius_mm: f64) -> Result<Separation> {
     let separation = separator.separate(station)?;
     let width = separation.unknowns.len().max(1);
     let told = separation.estimate.iter().zip(&separation.observable);

@@ -1,5 +1,6 @@
 //! What is registered: explicit lists, filled by the program that uses the core.
 
+use runout_error::fault::{Fault, known_names};
 use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema};
@@ -7,10 +8,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use toml::{Spanned, de::DeTable};
 
-use super::{
-    document::{self, Table},
-    error::{Fault, known_names},
-};
+use super::document::{self, Table};
 use crate::{
     effects::EffectCatalogue,
     stage::{Check, Exporter, Loader, Preprocessor, Separator, Simulator},

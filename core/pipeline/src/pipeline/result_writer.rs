@@ -15,8 +15,8 @@ use super::{
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
     height_grid::HeightGrid,
-    stage::{About, Completed, Export, Exporter, NamedValue, PointSeparator, ResultInfo, Takes},
-    summary::{LostOrders, PartSummary, StationSummary, Summary, SurfaceSummary},
+    stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
+    summary::{LostOrders, NamedValue, PartSummary, StationSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_error::{Error, Result};
@@ -360,7 +360,7 @@ fn begun(pipeline: &Pipeline) -> Summary {
     }
 }
 
-/// What a rig that is not as declared looks like: a residual far above what the noise lets expect.
+/// What a rig that is not as declared looks like: a residual far above what is expected from noise.
 fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
     let beyond = stations.iter().filter(|station| station.is_misfit(stations.len()));
     let count = beyond.clone().count();

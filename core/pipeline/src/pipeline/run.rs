@@ -18,14 +18,11 @@ pub use super::{
     tables::StationTables,
 };
 use crate::stage::{Averager, Conditioner, Source, Station, StationSeparator};
-pub use crate::summary::{
-    CaptureSummary, Decision, Limit, LimitSummary, LimitValue, LostOrders, MotionTruth, PartSummary, PlacedValue,
-    RejectedTurnSummary, SectionSummary, StationSummary, Summary, SurfaceSummary,
-};
+use crate::summary::Summary;
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::threads;
 use runout_standards::Value;
-pub use runout_turning::station::StationResult;
+use runout_turning::station::StationResult;
 use runout_turning::{
     error_motion::{Centre, ErrorMotion},
     mains,

@@ -39,7 +39,7 @@ struct SensorCreep {
 
 impl Steadiness {
     /// Looks at the levels of a station's turns.
-    pub fn take(&mut self, station: &str, profiles: &[Profile], rig: &Rig) {
+    pub(crate) fn take(&mut self, station: &str, profiles: &[Profile], rig: &Rig) {
         self.stations += 1;
         self.sensors.resize(rig.sensors.len(), SensorCreep::default());
         let levels = |sensor: usize| -> Vec<Levels> {
@@ -75,7 +75,7 @@ impl Steadiness {
     }
 
     /// What is to be said of it.
-    pub fn warnings(mut self, rig: &Rig) -> impl Iterator<Item = String> {
+    pub(crate) fn warnings(mut self, rig: &Rig) -> impl Iterator<Item = String> {
         let creeping = self.creeping(rig);
         self.steps.sort_by(|a, b| b.0.total_cmp(&a.0));
         let shown: Vec<&str> = self.steps.iter().take(MOST_STEPS).map(|(_, text)| text.as_str()).collect();

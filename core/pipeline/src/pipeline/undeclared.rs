@@ -17,7 +17,7 @@ pub(super) struct Undeclared {
 
 impl Undeclared {
     /// Takes the forms of a station: what is at one angle of the part in all setups is in its form.
-    pub fn take(&mut self, result: &StationResult) {
+    pub(crate) fn take(&mut self, result: &StationResult) {
         for (unknown, quantity) in result.separation.unknowns.iter().enumerate() {
             let Quantity::Form(section) = quantity else { continue };
             let Some(at) = result.separation.sections.get(*section).filter(|at| at.gaps.is_empty()) else { continue };
@@ -28,7 +28,7 @@ impl Undeclared {
     }
 
     /// What to declare.
-    pub fn warning(mut self) -> Option<String> {
+    pub(crate) fn warning(mut self) -> Option<String> {
         self.found.sort_by(|a, b| b.1.depth_um.total_cmp(&a.1.depth_um));
         let (_, deepest) = self.found.first()?;
         let (from_deg, to_deg) = (deepest.from_deg.floor(), deepest.to_deg.ceil());

@@ -1,24 +1,26 @@
 //! The stages of a pipeline: one trait a file. A plugin implements one of them.
 
-pub mod check;
+mod check;
 mod evaluable;
 mod exporter;
 mod loader;
 mod overview;
 mod plan;
-pub mod points;
-pub mod preprocessor;
-pub mod separator;
+mod points;
+mod preprocessor;
+mod separator;
 mod simulator;
 
-pub use crate::summary::NamedValue;
-pub use check::{Check, Planned};
+pub use check::{Check, Planned, speeds_and_turns, speeds_of};
 pub use evaluable::{Evaluable, EvaluableKind, Form, OpenProfile, PlaneMap};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
 pub use overview::{Overview, Part, Section};
 pub use plan::{LayoutScore, NoiseGain, PointAddition, PointPlan};
-pub use points::{LinearModel, Outcome, PointDiagnosis, PointModel, PointSeparator};
-pub use preprocessor::{AverageRequest, Averager, Conditioner, Preprocessor};
-pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator};
+pub use points::{
+    LinearModel, Outcome, PointDiagnosis, PointModel, PointSeparator, far_below_noise, residual_table,
+    separate_declared,
+};
+pub use preprocessor::{AverageRequest, Averager, Conditioner, Preprocessor, sample_rate_hz};
+pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator, require_rig};
 pub use simulator::{Simulation, Simulator};

@@ -1,4 +1,4 @@
-//! What a layout of measured points tells and how well, and what to add to it.
+//! What is observable with a layout of measured points and how well, and what to add to it.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use runout_closed_loop::{
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// What a layout of measured points tells and how well, and what to add to it.
+/// What is observable with a layout of measured points and how well, and what to add to it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct PointPlan {
     /// Noise gain of what is solved for, by groups that the domain names ("location", "component"; "lobing", "form").
@@ -71,7 +71,7 @@ pub struct PointAddition {
     pub noise_gain: BTreeMap<String, Vec<NoiseGain>>,
     /// Effects, "effect target", that are blind as it is and would show with this.
     pub reveals: Vec<String>,
-    /// Confounded sets that would be told apart.
+    /// Confounded sets that would be distinguished.
     pub tells_apart: Vec<Vec<String>>,
 }
 

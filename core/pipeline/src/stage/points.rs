@@ -171,7 +171,7 @@ pub trait LinearModel: Send + Sync {
     ///
     /// # Errors
     /// When the points do not hold what it needs.
-    fn conclude(&self, points: &Points, fit: &LinearFit) -> Result<Outcome>;
+    fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome>;
 }
 
 impl<M: LinearModel> PointModel for M {
@@ -182,7 +182,7 @@ impl<M: LinearModel> PointModel for M {
     fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
         let terms = self.terms(points)?.with_known(&settings.known).considering(settings.effects.as_deref());
         let closed = closed_loop::diagnose(&terms, settings)?;
-        let mut after = self.conclude(points, &closed.after)?;
+        let mut after = self.outcome(points, &closed.after)?;
         after.tables.push(residual_rows(&terms, &closed.before, &closed.after)?);
         let mut diagnosis = closed.diagnosis;
         diagnosis.warnings.append(&mut after.remarks);
@@ -197,7 +197,7 @@ impl<M: LinearModel> PointModel for M {
 pub fn separate_declared(model: &impl LinearModel, points: &Points) -> Result<Outcome> {
     let terms = model.terms(points)?;
     let fit = terms.fit(&[])?;
-    let mut outcome = model.conclude(points, &fit)?;
+    let mut outcome = model.outcome(points, &fit)?;
     outcome.tables.push(residual_rows(&terms, &fit, &fit)?);
     Ok(outcome)
 }
@@ -236,22 +236,4 @@ fn residual_rows(terms: &LinearTerms, before: &LinearFit, after: &LinearFit) -> 
         column(&after.residual()),
     ])?;
     Ok(TableRows { table: spec.name, rows })
-}
-
-/// A value that needs no more than a name, a number and a unit.
-#[must_use]
-pub fn value(symbol: &str, value: f64, std: f64, unit: &str, about: &str) -> NamedValue {
-    let known = |number: f64| number.is_finite().then_some(number);
-    NamedValue {
-        symbol: symbol.into(),
-        of: None,
-        value: known(value),
-        std: known(std),
-        unit: unit.into(),
-        about: about.into(),
-        interval_95: None,
-        reference: None,
-        filter: None,
-        no_uncertainty: None,
-    }
 }

@@ -21,7 +21,7 @@ pub enum Separator {
 
 /// Separates the profiles of one station. Built for one rig, which it has checked.
 pub trait StationSeparator: Send + Sync {
-    /// What it can tell with its rig, for orders 1 to `max_order`.
+    /// What is observable with its rig, for orders 1 to `max_order`.
     ///
     /// # Errors
     /// When the rig does not fit the method.

@@ -50,6 +50,24 @@ pub struct NamedValue {
 }
 
 impl NamedValue {
+    /// A number under a name, with a unit; what is not finite is null.
+    #[must_use]
+    pub fn new(symbol: &str, value: f64, std: f64, unit: &str, about: &str) -> Self {
+        let known = |number: f64| number.is_finite().then_some(number);
+        Self {
+            symbol: symbol.into(),
+            of: None,
+            value: known(value),
+            std: known(std),
+            unit: unit.into(),
+            about: about.into(),
+            interval_95: None,
+            reference: None,
+            filter: None,
+            no_uncertainty: None,
+        }
+    }
+
     /// The same of one of several parts.
     #[must_use]
     pub fn of(self, of: impl Into<String>) -> Self {

@@ -1,6 +1,9 @@
 //! All subsets of contacts of small profiles.
 
-use runout_core::evaluate::roundness::{Points, Reference, Undetermined};
+use runout_core::standards::{
+    reference::{Reference, Undetermined},
+    roundness::Points,
+};
 
 use crate::profiles::{Profile, profile};
 

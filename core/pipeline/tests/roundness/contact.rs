@@ -1,6 +1,6 @@
 //! Contact conditions: what proves a reference circle.
 
-use runout_core::evaluate::roundness::{Circle, Reference};
+use runout_core::standards::{reference::Reference, roundness::Circle};
 
 use crate::profiles::{Profile, profile};
 

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use runout_core::evaluate::roundness::{Angles, Points};
+use runout_core::standards::roundness::{Angles, Points};
 
 pub struct Profile {
     pub kind: &'static str,

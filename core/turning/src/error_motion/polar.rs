@@ -79,7 +79,7 @@ pub(super) struct Synchronous {
     pub variance: Vec<f64>,
     /// Orders of the motion that count, both ends included.
     pub band: [usize; 2],
-    /// Orders of that band that the layout cannot tell.
+    /// Orders of that band that are not observable.
     pub lost: Vec<usize>,
     /// By how much declared forms may move the plot, peak to valley.
     pub bound: f64,
@@ -91,13 +91,18 @@ impl Synchronous {
     /// In a fixed direction 1/rev is centring and left out. In a radial one that turns, what is left of 1/rev (the part that
     /// turns against the spindle) is a 2/rev of the plot, and belongs to it. Tilt is residual: the fundamental is no part of
     /// it.
-    pub fn new(separation: &Separation, projection: &Projection, direction: Direction, z_mm: f64) -> Option<Self> {
+    pub(crate) fn new(
+        separation: &Separation,
+        projection: &Projection,
+        direction: Direction,
+        z_mm: f64,
+    ) -> Option<Self> {
         let lowest = if direction.rotates() && !direction.is_tilt() { 1 } else { 2 };
         Self::from_order(lowest, separation, projection, direction, z_mm)
     }
 
     /// The same, of orders from this one on: from 1, with the part of 1/rev that turns against the spindle.
-    pub fn from_order(
+    pub(crate) fn from_order(
         lowest: usize,
         separation: &Separation,
         projection: &Projection,
@@ -149,18 +154,18 @@ impl Synchronous {
         })
     }
 
-    /// Whether no order of the band can be told.
-    pub fn is_lost(&self) -> bool {
+    /// Whether no order of the band is observable.
+    pub(crate) fn is_lost(&self) -> bool {
         self.lost.len() > self.band[1].saturating_sub(self.band[0])
     }
 
     /// The coefficient of an order in a direction that does not turn.
-    pub fn harmonic(&self, order: usize) -> Option<Complex64> {
+    pub(crate) fn harmonic(&self, order: usize) -> Option<Complex64> {
         self.first.get(order).copied().filter(|_| self.second.is_none())
     }
 
     /// The plot on equal angles of the spindle from 0.
-    pub fn over_angle(&self, angles: &Angles) -> Vec<f64> {
+    pub(crate) fn over_angle(&self, angles: &Angles) -> Vec<f64> {
         let mut fourier = Fourier::new(angles.len());
         let mut plot = fourier.synthesise(self.first.iter().map(Complex64::conj)).to_vec();
         if let Some((factor, second)) = &self.second {
@@ -181,7 +186,7 @@ pub(super) struct Motion {
 
 impl Motion {
     /// x + z·ε_y, y − z·ε_x, or a tilt; along a line that was not separated, the sum of what was along x and y.
-    pub fn new(separation: &Separation, quantity: Quantity, z_mm: f64) -> Option<Self> {
+    pub(crate) fn new(separation: &Separation, quantity: Quantity, z_mm: f64) -> Option<Self> {
         if let Quantity::FaceMotion(place) = quantity {
             let mut terms = Self::new(separation, Quantity::Z, z_mm)?.terms;
             for (tilt, share) in face_shares(place, separation.azimuth()) {
@@ -211,16 +216,16 @@ impl Motion {
     }
 
     /// By how much declared forms may move it, peak to valley.
-    pub fn form_bound(&self, separation: &Separation) -> f64 {
+    pub(crate) fn form_bound(&self, separation: &Separation) -> f64 {
         self.terms.iter().map(|(unknown, _, factor)| factor.abs() * separation.bound_of(*unknown)).sum()
     }
 
-    pub fn lost_orders<'a>(&'a self, separation: &'a Separation) -> impl Iterator<Item = usize> + 'a {
+    pub(crate) fn lost_orders<'a>(&'a self, separation: &'a Separation) -> impl Iterator<Item = usize> + 'a {
         self.terms.iter().flat_map(|(unknown, ..)| separation.lost_orders(*unknown))
     }
 
     /// By order from 0.
-    pub fn coefficients(&self, separation: &Separation) -> Vec<Complex64> {
+    pub(crate) fn coefficients(&self, separation: &Separation) -> Vec<Complex64> {
         let mut sum = vec![Complex64::ZERO; separation.max_order() + 1];
         for (unknown, _, factor) in &self.terms {
             let values = separation.coefficients(*unknown);
@@ -230,7 +235,7 @@ impl Motion {
     }
 
     /// E|δ|² of an order, of this motion or of it and a multiple of another one; 0 where it is not known.
-    pub fn variance(&self, separation: &Separation, order: usize, other: Option<(Complex64, &Self)>) -> f64 {
+    pub(crate) fn variance(&self, separation: &Separation, order: usize, other: Option<(Complex64, &Self)>) -> f64 {
         let Some(covariance) = &separation.motion_covariance else { return 0.0 };
         let motions = separation.unknowns.iter().filter(|unknown| !unknown.is_form()).count();
         let others = other.iter().flat_map(|(multiple, motion)| {

@@ -21,7 +21,7 @@ const ANGLES_LOOKED_AT: usize = 3600;
 /// Two sensors nearer than this along z look at the same circle: a tenth of a usual spot size.
 const SAME_SECTION_MM: f64 = 0.1;
 
-/// `[rig]` as it stands in a file.
+/// `[rig]` as written in a file.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RigConfig {
@@ -39,7 +39,7 @@ pub struct RigConfig {
     pub interruptions: Vec<InterruptionConfig>,
 }
 
-/// One interruption as it stands in a file: from one part angle on, counter-clockwise, to another.
+/// One interruption as written in a file: from one part angle on, counter-clockwise, to another.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -53,7 +53,7 @@ pub struct InterruptionConfig {
     pub sections: Option<Vec<String>>,
 }
 
-/// One sensor as it stands in a file.
+/// One sensor as written in a file.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorConfig {
@@ -74,7 +74,7 @@ pub struct SensorConfig {
     /// Axial position relative to the spindle reference, in mm; the station's position is added to it.
     #[serde(default)]
     pub z_mm: f64,
-    /// The section of the part that it looks at; sensors of one section see the same circle. Axial sensors need a section of
+    /// The section of the part that it measures; sensors of one section see the same circle. Axial sensors need a section of
     /// their own: the face.
     #[serde(default = "default_section")]
     pub section: String,
@@ -86,7 +86,7 @@ pub struct SensorConfig {
     /// Unit of the recorded numbers.
     #[serde(default, skip_serializing_if = "is_default")]
     pub unit: Unit,
-    /// Displacement that one volt stands for, in µm; with `unit = "V"` or `"mV"`.
+    /// Displacement per volt, in µm; with `unit = "V"` or `"mV"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub um_per_volt: Option<f64>,
     /// Reading over displacement: 1.05 where the sensor reads 5 % too much. Readings are divided by it.
@@ -122,7 +122,7 @@ impl Default for SensorConfig {
     }
 }
 
-/// One setup as it stands in a file.
+/// One setup as written in a file.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SetupConfig {
@@ -279,7 +279,7 @@ impl SensorConfig {
                 return Err(fault.help("a reading that shrinks when the surface comes nearer has `sign = -1`"));
             }
             (None, true) => {
-                let fault = Fault::at("unit", "volts need `um_per_volt`, the displacement that one volt stands for");
+                let fault = Fault::at("unit", "volts need `um_per_volt`, the displacement per volt");
                 return Err(fault.help("take it from the sensor's certificate"));
             }
             (Some(_), false) => {

@@ -81,7 +81,7 @@ pub struct Meeting {
     pub z_mm: f64,
     /// Section ids with their stations, `a@s31`.
     pub sections: [String; 2],
-    /// Root mean square of their difference over the orders that both can tell, in µm.
+    /// Root mean square of their difference over the orders that are observable by both, in µm.
     pub rms_um: f64,
     /// Largest difference, in µm.
     pub max_um: f64,

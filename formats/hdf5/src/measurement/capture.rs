@@ -10,8 +10,8 @@ use runout_core::{
 use super::{
     ANGLE, INDEX, SAMPLES,
     extent::Extent,
-    line::{Line, each},
     samples::StoredSamples,
+    vector::{Vector, each},
 };
 use crate::node::{self, Place};
 
@@ -31,9 +31,9 @@ pub(crate) struct CaptureSource {
 #[derive(Debug)]
 pub(crate) enum Phase {
     /// Sample positions of the once-per-turn mark.
-    Index(Line),
+    Index(Vector),
     /// Angle of each sample.
-    Angle(Line),
+    Angle(Vector),
     /// The mark as an analogue trace.
     Trace(Trace, Marker),
     /// Nothing that was asked for.
@@ -46,7 +46,7 @@ pub(crate) enum Trace {
     /// A channel of the samples.
     Channel(usize),
     /// A dataset of its own.
-    Line(Line),
+    Vector(Vector),
 }
 
 impl CaptureSource {
@@ -66,22 +66,24 @@ impl CaptureSource {
 
     /// The bytes of the file that its numbers take, those in chunks `with_chunks` only.
     pub(super) fn extents(&self, with_chunks: bool) -> impl Iterator<Item = Extent> {
-        let line = match &self.phase {
-            Phase::Index(line) | Phase::Angle(line) | Phase::Trace(Trace::Line(line), _) => line.extents(with_chunks),
+        let vector = match &self.phase {
+            Phase::Index(vector) | Phase::Angle(vector) | Phase::Trace(Trace::Vector(vector), _) => {
+                vector.extents(with_chunks)
+            }
             Phase::Trace(Trace::Channel(_), _) | Phase::Unknown(_) => Vec::new(),
         };
-        Extent::of(&self.dataset, &self.samples_place, with_chunks).into_iter().chain(line)
+        Extent::of(&self.dataset, &self.samples_place, with_chunks).into_iter().chain(vector)
     }
 
     /// Sample positions at which turns begin, and the scan that says how to read the encoder.
     pub(crate) fn marks(&self) -> Result<(Vec<f64>, Option<EncoderScan>)> {
         match &self.phase {
-            Phase::Index(line) => Ok((positions(line, self.stored.samples)?, None)),
-            Phase::Angle(line) => {
+            Phase::Index(vector) => Ok((positions(vector, self.stored.samples)?, None)),
+            Phase::Angle(vector) => {
                 let mut scan = EncoderScan::default();
-                line.each(|angle_deg| {
+                vector.each(|angle_deg| {
                     scan.push(angle_deg).map_err(|fault| {
-                        let error = line.place().error(format!("sample {}: {fault}", fault.sample));
+                        let error = vector.place().error(format!("sample {}: {fault}", fault.sample));
                         match fault.help {
                             Some(help) => error.help(help),
                             None => error,
@@ -100,7 +102,7 @@ impl CaptureSource {
         let mut sample = 0;
         let place = match trace {
             Trace::Channel(_) => &self.samples_place,
-            Trace::Line(line) => line.place(),
+            Trace::Vector(vector) => vector.place(),
         };
         let mut take = |value: f64| {
             sample += 1;
@@ -116,7 +118,7 @@ impl CaptureSource {
                     |code| take(code * gain + zero),
                 )?;
             }
-            Trace::Line(line) => line.each(take)?,
+            Trace::Vector(vector) => vector.each(take)?,
         }
         let help = "set `threshold` and `hysteresis` of `marker` in [load] between its levels";
         scan.marks().map_err(|problem| place.error(problem).help(help))
@@ -133,22 +135,22 @@ fn neither(place: &Place) -> runout_core::Error {
 impl Phase {
     fn open(group: &Group, place: &Place, samples: usize) -> Result<Self> {
         if group.link_exists(ANGLE) {
-            let line = Line::open(group, place, ANGLE)?;
-            if line.length() != samples {
-                let problem = format!("expected an angle for each of {samples} samples, found {}", line.length());
-                return Err(line.place().error(problem));
+            let vector = Vector::open(group, place, ANGLE)?;
+            if vector.length() != samples {
+                let problem = format!("expected an angle for each of {samples} samples, found {}", vector.length());
+                return Err(vector.place().error(problem));
             }
-            return Ok(Self::Angle(line));
+            return Ok(Self::Angle(vector));
         }
         if !group.link_exists(INDEX) {
             return Ok(Self::Unknown(place.clone()));
         }
-        let line = Line::open(group, place, INDEX)?;
-        if line.length() > samples {
-            let problem = format!("expected fewer marks than the {samples} samples, found {}", line.length());
-            return Err(line.place().error(problem));
+        let vector = Vector::open(group, place, INDEX)?;
+        if vector.length() > samples {
+            let problem = format!("expected fewer marks than the {samples} samples, found {}", vector.length());
+            return Err(vector.place().error(problem));
         }
-        Ok(Self::Index(line))
+        Ok(Self::Index(vector))
     }
 
     /// Refuses a capture whose turns are not known.
@@ -173,19 +175,19 @@ impl Trace {
             );
             return Err(place.error(problem).help("correct `channel` of `marker` in [load]"));
         }
-        let line = Line::open(group, place, &marker.channel)?;
-        if line.length() != stored.samples {
-            let problem = format!("expected a value for each of {} samples, found {}", stored.samples, line.length());
-            return Err(line.place().error(problem));
+        let vector = Vector::open(group, place, &marker.channel)?;
+        if vector.length() != stored.samples {
+            let problem = format!("expected a value for each of {} samples, found {}", stored.samples, vector.length());
+            return Err(vector.place().error(problem));
         }
-        Ok(Self::Line(line))
+        Ok(Self::Vector(vector))
     }
 }
 
 /// Sample positions of marks.
-fn positions(line: &Line, samples: usize) -> Result<Vec<f64>> {
+fn positions(vector: &Vector, samples: usize) -> Result<Vec<f64>> {
     let mut marks: Vec<f64> = Vec::new();
-    line.each(|value| {
+    vector.each(|value| {
         let expected = match marks.last() {
             Some(last) if value <= *last => format!("a position above {last}"),
             _ if (-1.0..=samples as f64).contains(&value) => {
@@ -194,7 +196,7 @@ fn positions(line: &Line, samples: usize) -> Result<Vec<f64>> {
             }
             _ => format!("a sample position from 0 to {samples}"),
         };
-        Err(line.place().error(format!("mark {}: expected {expected}, found {value}", marks.len())))
+        Err(vector.place().error(format!("mark {}: expected {expected}, found {value}", marks.len())))
     })?;
     Ok(marks)
 }

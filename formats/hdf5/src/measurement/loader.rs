@@ -9,13 +9,11 @@ use hdf5_metno::{File, LocationType, dataset::Layout};
 use runout_core::{
     Error, ErrorKind, Result,
     checksum::Checksum,
+    fault::Fault,
     input_file::InputFile,
     marker::Marker,
     measurement::{Recording, SampleStream, StationKey, StationTruth},
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     rig::Rig,
     stage::{Loader, Request, Source, SourceKind},
 };

@@ -3,15 +3,15 @@
 mod capture;
 mod coding;
 mod extent;
-mod line;
-pub mod loader;
+pub(crate) mod loader;
 mod orientation;
 mod rows;
-pub mod samples;
+pub(crate) mod samples;
 mod stream;
 mod structure;
 mod truth;
-pub mod write;
+mod vector;
+pub(crate) mod write;
 
 pub(crate) use capture::{CaptureSource, Phase};
 

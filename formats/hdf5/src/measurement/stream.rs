@@ -15,9 +15,9 @@ use runout_core::{
 
 use super::{
     capture::{CaptureSource, Phase},
-    line::Line,
     rows::Rows,
     samples::SampleType,
+    vector::Vector,
 };
 use crate::node::Place;
 
@@ -44,7 +44,7 @@ pub(super) struct Hdf5Stream {
     read_columns: usize,
     columns: Vec<Column>,
     is_plain: bool,
-    encoder: Option<(Line, EncoderScan)>,
+    encoder: Option<(Vector, EncoderScan)>,
     block_samples: usize,
     next: usize,
     samples: usize,
@@ -92,7 +92,7 @@ impl Hdf5Stream {
             responses: Vec::new(),
         };
         let encoder = match (source.phase, scan) {
-            (Phase::Angle(line), Some(scan)) => Some((line, scan)),
+            (Phase::Angle(vector), Some(scan)) => Some((vector, scan)),
             _ => None,
         };
         let read = first_column..last_column + 1;
@@ -188,8 +188,8 @@ impl SampleStream for Hdf5Stream {
             SampleType::I32 => self.read::<i32>(&rows, &mut samples)?,
         }
         block.samples = samples;
-        if let Some((line, scan)) = &self.encoder {
-            block.angle_rev.extend(line.read(rows.clone())?.into_iter().map(|angle_deg| scan.turns(angle_deg)));
+        if let Some((vector, scan)) = &self.encoder {
+            block.angle_rev.extend(vector.read(rows.clone())?.into_iter().map(|angle_deg| scan.turns(angle_deg)));
         }
         self.next = rows.end;
         Ok(true)

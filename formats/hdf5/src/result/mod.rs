@@ -30,10 +30,8 @@ use hdf5_metno::{File, Group, types::VarLenUnicode};
 use runout_core::{
     Result,
     atomic_file::PendingFile,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     provenance::Input,
     stage::{Completed, Export, Exporter, ResultInfo, Takes},
     surface::Surface,

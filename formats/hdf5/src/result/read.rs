@@ -9,8 +9,8 @@ use hdf5_metno::{
 use runout_core::{
     Error, ErrorKind, Result,
     model::diagnosis::Diagnosis,
-    pipeline::summary::Summary,
     stage::About,
+    summary::Summary,
     surface::Surface,
     table::{ArrayRef, ColumnSpec, Figure, RecordBatch, TableSpec, numbers, texts},
 };

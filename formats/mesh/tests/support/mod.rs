@@ -11,15 +11,14 @@ use std::{
 use runout_core::{
     Complex64, Error,
     atomic_file::commit_all,
+    fault::Fault,
     height_grid::HeightGrid,
-    pipeline::{
-        error::Fault,
-        registry::{Context, Registry},
-        run::{LostOrders, StationResult, StationTables, Summary},
-    },
+    pipeline::{Context, Registry, run::StationTables},
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{About, Completed, Exporter, ResultInfo},
+    station::StationResult,
+    summary::{LostOrders, Summary},
     surface::Surface,
 };
 use toml::de::DeTable;

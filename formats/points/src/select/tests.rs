@@ -5,10 +5,8 @@ use std::{io::Write, path::Path, sync::Arc};
 use arrow_array::{ArrayRef, Float32Array, Int64Array, RecordBatch, StringArray};
 use parquet::arrow::ArrowWriter;
 use runout_core::{
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     stage::{Loader, Request, Source},
 };
 use serde::Deserialize;

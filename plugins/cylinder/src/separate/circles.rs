@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use runout_core::{
     Error, ErrorKind, Result,
-    pipeline::error::known_names,
+    fault::known_names,
     points::{Points, Trace},
     rig::Gaps,
     separation::SectionAt,

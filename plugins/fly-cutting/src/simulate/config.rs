@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -140,7 +140,7 @@ pub struct HarmonicConfig {
     pub phase_deg: f64,
 }
 
-/// `[[effect]]`: what happens besides. `declared` says whether the pipeline will be told of it.
+/// `[[effect]]`: what happens besides. `declared` says whether the pipeline declares it.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "plugin", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SimulatedEffect {
@@ -164,7 +164,7 @@ pub enum SimulatedEffect {
         /// Phase at the time 0, in degrees.
         #[serde(default)]
         phase_deg: f64,
-        /// Whether the pipeline will be told.
+        /// Whether the pipeline declares it.
         #[serde(default)]
         declared: bool,
     },
@@ -176,7 +176,7 @@ pub enum SimulatedEffect {
         /// Slope along y, in µrad.
         #[serde(default)]
         y_urad: f64,
-        /// Whether the pipeline will be told.
+        /// Whether the pipeline declares it.
         #[serde(default)]
         declared: bool,
     },
@@ -186,7 +186,7 @@ pub enum SimulatedEffect {
         order: usize,
         /// Height at the end of the map, in nm.
         amplitude_nm: f64,
-        /// Whether the pipeline will be told.
+        /// Whether the pipeline declares it.
         #[serde(default)]
         declared: bool,
     },
@@ -194,7 +194,7 @@ pub enum SimulatedEffect {
     FeedScale {
         /// Relative error, in µm/m.
         scale_um_per_m: f64,
-        /// Whether the pipeline will be told.
+        /// Whether the pipeline declares it.
         #[serde(default)]
         declared: bool,
     },
@@ -202,7 +202,7 @@ pub enum SimulatedEffect {
     NoseRadius {
         /// Actual less declared radius, in mm.
         change_mm: f64,
-        /// Whether the pipeline will be told.
+        /// Whether the pipeline declares it.
         #[serde(default)]
         declared: bool,
     },

@@ -16,11 +16,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use runout_core::{
     Result,
+    fault::Fault,
     height_grid::HeightGrid,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     stage::{Simulation, Simulator},
 };
 
@@ -111,8 +109,8 @@ impl StageConfig for FlyCuttingScenario {
 
     fn check(mut self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         self.checked()?;
-        let text =
-            toml::to_string(&self).map_err(|error| Fault::here(format!("the scenario cannot be told: {error}")))?;
+        let text = toml::to_string(&self)
+            .map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
         let text = format!("plugin = \"{}\"\n{text}", Self::NAME);
         let resolve = |path: PathBuf| context.path(&path);
         self.motion = self.motion.map(resolve);

@@ -33,7 +33,7 @@ const COLUMNS: [&str; 5] = ["x_um", "y_um", "z_um", "tilt_x_urad", "tilt_y_urad"
 
 impl Synchronous {
     /// Reads one station.
-    pub fn read(path: &Path, station: Option<&str>) -> Result<Self> {
+    pub(crate) fn read(path: &Path, station: Option<&str>) -> Result<Self> {
         let shown = path.display().to_string();
         let failure = |problem: String| Error::new("read the motion from", &shown, problem);
         let file = open_regular(path).map_err(|error| failure(error.to_string()))?;
@@ -76,7 +76,7 @@ impl Synchronous {
     }
 
     /// Between the angles measured, a straight line.
-    pub fn at(&self, angle: f64) -> Displacement {
+    pub(crate) fn at(&self, angle: f64) -> Displacement {
         let angle = angle.rem_euclid(TAU);
         let count = self.angles.len();
         let next = self.angles.partition_point(|known| *known <= angle);
@@ -95,7 +95,7 @@ impl Synchronous {
     }
 
     /// A bound of the height at a tool, in nm.
-    pub fn highest_nm(&self, radius_mm: f64) -> f64 {
+    pub(crate) fn highest_nm(&self, radius_mm: f64) -> f64 {
         let height =
             |at: &Displacement| 1e3 * at.z_um.abs() + radius_mm * (at.tilt_x_urad.abs() + at.tilt_y_urad.abs());
         self.motion.iter().map(height).fold(0.0, f64::max)

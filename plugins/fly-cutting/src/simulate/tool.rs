@@ -41,7 +41,7 @@ pub(super) struct Tip {
 }
 
 impl Machine {
-    pub fn new(scenario: &FlyCuttingScenario, synchronous: Option<Synchronous>, found: &[FoundLine]) -> Self {
+    pub(crate) fn new(scenario: &FlyCuttingScenario, synchronous: Option<Synchronous>, found: &[FoundLine]) -> Self {
         let FlyCuttingScenario { cut, grid, .. } = scenario;
         let turns_per_s = cut.speed_rpm / 60.0;
         let length_mm = grid.step_x_mm * (grid.columns - 1) as f64;
@@ -100,12 +100,12 @@ impl Machine {
     }
 
     /// Feed of a turn, in mm.
-    pub fn feed_mm(&self) -> f64 {
+    pub(crate) fn feed_mm(&self) -> f64 {
         self.feed_mm_per_s / self.turns_per_s
     }
 
     /// A bound of the height of the tool, in nm.
-    pub fn highest_nm(&self) -> f64 {
+    pub(crate) fn highest_nm(&self) -> f64 {
         let waves = self.waves.iter().map(|wave| match wave.direction {
             Direction::Axial => wave.amplitude.abs(),
             Direction::TiltX | Direction::TiltY => wave.amplitude.abs() * self.cutter_radius_mm,
@@ -117,7 +117,7 @@ impl Machine {
     }
 
     /// The angle within the turn at which the tool crosses a row.
-    pub fn crossing(&self, y_mm: f64) -> f64 {
+    pub(crate) fn crossing(&self, y_mm: f64) -> f64 {
         let at = |displaced_mm: f64| ((y_mm - displaced_mm) / self.cutter_radius_mm).clamp(-1.0, 1.0).asin();
         let mut angle = at(0.0);
         if let Some(motion) = &self.synchronous {
@@ -130,7 +130,7 @@ impl Machine {
     }
 
     /// The tip at an angle of a turn, in radians.
-    pub fn tip(&self, turn: f64, angle: f64) -> Tip {
+    pub(crate) fn tip(&self, turn: f64, angle: f64) -> Tip {
         let seconds = (turn + angle / TAU) / self.turns_per_s;
         let (sine, cosine) = angle.sin_cos();
         let r = self.cutter_radius_mm;

@@ -5,7 +5,7 @@ use std::path::Path;
 use runout_core::{
     measurement::{DefectKind, MemoryStream},
     numerics::fourier::Fourier,
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     profile::Profile,
     rig::{RigConfig, Rotation, SensorConfig, SetupConfig},
     stage::Preprocessor,

@@ -21,13 +21,13 @@ pub(super) struct Bridges {
 impl Bridges {
     /// Without a rig, no surface is interrupted. `length` equal angles make a turn; interruptions are wider by so much at
     /// each end.
-    pub fn new(rig: Option<&Rig>, capture: &Capture, length: usize, beyond_rad: f64) -> Self {
+    pub(crate) fn new(rig: Option<&Rig>, capture: &Capture, length: usize, beyond_rad: f64) -> Self {
         let bridge = |sensor: &usize| Bridge::new(rig?.gaps_seen(capture.setup, *sensor).widened(beyond_rad), length);
         Self { length, channels: capture.sensors.iter().map(bridge).collect() }
     }
 
     /// Bridges one turn, `[channel][angle]`.
-    pub fn cross(&self, grid: &mut [f64]) {
+    pub(crate) fn cross(&self, grid: &mut [f64]) {
         for (bridge, values) in self.channels.iter().zip(grid.chunks_exact_mut(self.length)) {
             if let Some(bridge) = bridge {
                 bridge.cross(values);
@@ -36,12 +36,12 @@ impl Bridges {
     }
 
     /// Whether anything is bridged.
-    pub fn any(&self) -> bool {
+    pub(crate) fn any(&self) -> bool {
         self.channels.iter().any(Option::is_some)
     }
 
     /// What bridging does not know, where anything is bridged.
-    pub fn warning(&self) -> Option<String> {
+    pub(crate) fn warning(&self) -> Option<String> {
         let bridges = || self.channels.iter().flatten();
         let longest_deg = bridges().map(|bridge| bridge.gaps.longest_rad().to_degrees()).fold(0.0, f64::max);
         let orders = bridges().map(|bridge| bridge.courses.len() / 2).min()?;
@@ -52,7 +52,7 @@ impl Bridges {
     }
 
     /// Whether a bridge of a channel spans everything between two parts of a turn.
-    pub fn span(&self, channel: usize, from_turn: f64, to_turn: f64) -> bool {
+    pub(crate) fn span(&self, channel: usize, from_turn: f64, to_turn: f64) -> bool {
         let bridge = self.channels.get(channel).and_then(Option::as_ref);
         bridge.is_some_and(|bridge| bridge.gaps.hold_all(TAU * from_turn, TAU * (to_turn - from_turn)))
     }

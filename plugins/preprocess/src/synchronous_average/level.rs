@@ -27,13 +27,13 @@ pub(super) struct Levelled {
 
 impl Levelled {
     /// For rows of motion on so many angles; `None` where there are none.
-    pub fn new(rows: Vec<usize>, angles: usize) -> Option<Self> {
+    pub(crate) fn new(rows: Vec<usize>, angles: usize) -> Option<Self> {
         let (levels, waiting) = (Vec::new(), VecDeque::new());
         (!rows.is_empty()).then_some(Self { rows, angles, levels, waiting, taken: 0 })
     }
 
     /// Takes the motion of a turn.
-    pub fn add(&mut self, motion: &[f64]) {
+    pub(crate) fn add(&mut self, motion: &[f64]) {
         let level = |row: &usize| {
             let values = &motion[row * self.angles..(row + 1) * self.angles];
             values.iter().sum::<f64>() / self.angles.max(1) as f64
@@ -43,7 +43,7 @@ impl Levelled {
     }
 
     /// The next turn without its level's slow course, where all turns around it are there, or at the `end`.
-    pub fn next(&mut self, end: bool) -> Option<Vec<f64>> {
+    pub(crate) fn next(&mut self, end: bool) -> Option<Vec<f64>> {
         let known = self.levels.len();
         if !end && (known < WINDOW || self.taken + BESIDE >= known) {
             return None;

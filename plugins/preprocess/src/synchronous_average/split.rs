@@ -44,7 +44,7 @@ struct Parts {
 
 impl Means {
     /// For `planned` turns at most; the last ones of a share are held out.
-    pub fn new(size: Size, planned: usize, held_out: Option<f64>, extremes: Option<Extremes>) -> Self {
+    pub(crate) fn new(size: Size, planned: usize, held_out: Option<f64>, extremes: Option<Extremes>) -> Self {
         let parts = held_out.filter(|_| planned >= 4).map(|share| {
             let last = ((share * planned as f64).round() as usize).clamp(2, planned - 2);
             let fitted = planned - last;
@@ -79,18 +79,18 @@ impl Means {
     }
 
     /// Turns taken.
-    pub fn turns(&self) -> usize {
+    pub(crate) fn turns(&self) -> usize {
         self.whole.turns() + self.pending
     }
 
     /// Where the next turn's readings are to be put, `[channel][angle]`.
-    pub fn next(&mut self) -> &mut [f64] {
+    pub(crate) fn next(&mut self) -> &mut [f64] {
         &mut self.waiting[self.pending * self.readings..][..self.readings]
     }
 
     /// Whether the harmonics of the next turn are looked at: parts look at each turn, the whole at as many of them as without parts,
     /// so that it is the same.
-    pub fn looks_at_next(&self) -> bool {
+    pub(crate) fn looks_at_next(&self) -> bool {
         self.parts.is_some() || self.whole_looks_at_next()
     }
 
@@ -100,7 +100,7 @@ impl Means {
 
     /// Takes a turn, whose readings are where the [next](Self::next) turn's are to be, with its
     /// harmonics, `[channel][order]`, and its motion.
-    pub fn add(&mut self, turn: &Turn, harmonics: &[Complex64], motion: &[f64]) {
+    pub(crate) fn add(&mut self, turn: &Turn, harmonics: &[Complex64], motion: &[f64]) {
         let looked_at = self.whole_looks_at_next();
         let taken = self.turns();
         let readings = &self.waiting[self.pending * self.readings..][..self.readings];
@@ -129,7 +129,7 @@ impl Means {
     }
 
     /// Takes the turns that wait into the sums; to be called after the last one.
-    pub fn sum_up(&mut self) {
+    pub(crate) fn sum_up(&mut self) {
         let turns = &self.waiting[..self.pending * self.readings];
         if turns.is_empty() {
             return;
@@ -143,22 +143,22 @@ impl Means {
     }
 
     /// How far the turns lie apart, where wanted.
-    pub fn spread(&mut self) -> Option<Spread> {
+    pub(crate) fn spread(&mut self) -> Option<Spread> {
         self.extremes.take().and_then(Extremes::spread)
     }
 
     /// Mean levels of the turns taken.
-    pub fn levels(&mut self) -> TurnLevels {
+    pub(crate) fn levels(&mut self) -> TurnLevels {
         std::mem::take(&mut self.levels)
     }
 
     /// The scatter without what the covariance is taken from.
-    pub fn scatter_beside(&self) -> Option<Vec<Complex64>> {
+    pub(crate) fn scatter_beside(&self) -> Option<Vec<Complex64>> {
         self.whole.scatter_beside()
     }
 
     /// The parts, beside the neighbours of the whole; `None` where too few turns are left to fill them.
-    pub fn split(&self, neighbours: Option<&Neighbours>) -> Option<Split> {
+    pub(crate) fn split(&self, neighbours: Option<&Neighbours>) -> Option<Split> {
         let parts = self.parts.as_ref().filter(|parts| parts.held_out.turns() > 0)?;
         let fitted = parts.fit.turns();
         let part = |mean: &Mean, turns| {

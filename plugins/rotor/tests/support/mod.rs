@@ -7,18 +7,11 @@ use std::f64::consts::PI;
 use runout_core::stage::{Loader, Outcome, PointSeparator, Request, Separator, Source};
 use runout_core::{
     Error,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     points::Points,
 };
-use runout_rotor::{
-    RotorModelConfig, RotorModesConfig, assemble,
-    equations::Equations,
-    modal::{Modal, Mode},
-    model::RotorModel,
-};
+use runout_rotor::{Equations, Modal, Mode, RotorModel, RotorModelConfig, RotorModesConfig, assemble};
 use std::path::Path;
 
 /// Steel, and a material that has nearly no mass.
@@ -32,7 +25,7 @@ materials = [
 pub fn equations(parts: &str) -> Equations {
     let model: RotorModel = toml::from_str(&format!("{MATERIALS}{parts}")).unwrap();
     model.check().unwrap();
-    assemble::equations("rotor.toml", &model).unwrap()
+    assemble("rotor.toml", &model).unwrap()
 }
 
 pub fn modal(parts: &str) -> Modal {

@@ -2,10 +2,8 @@
 
 use nalgebra::Vector3;
 use runout_core::{
-    pipeline::{
-        error::{Fault, known_names},
-        registry::{Context, StageConfig},
-    },
+    fault::{Fault, known_names},
+    pipeline::{Context, StageConfig},
     stage::Simulator,
 };
 use schemars::JsonSchema;

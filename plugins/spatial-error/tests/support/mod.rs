@@ -5,9 +5,10 @@
 use std::path::Path;
 
 use runout_core::{
-    pipeline::registry::Context,
+    pipeline::Context,
     points::{Column, Points, Trace},
-    stage::{NamedValue, Outcome},
+    stage::Outcome,
+    summary::NamedValue,
     table::RecordBatch,
 };
 use runout_spatial_error::{

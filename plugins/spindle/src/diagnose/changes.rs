@@ -33,7 +33,7 @@ const FIRST_ORDER: usize = 2;
 
 /// A reading that changed for good at some turn.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub(crate) struct Change {
     /// Index of the setup and the sensor in the rig.
     pub setup: usize,
     pub sensor: usize,
@@ -44,7 +44,7 @@ pub struct Change {
 }
 
 /// The changes in a station's turns.
-pub fn changes(selection: &Selection, station: &Station, creeping: &[Option<Creeping>]) -> Vec<Change> {
+pub(crate) fn changes(selection: &Selection, station: &Station, creeping: &[Option<Creeping>]) -> Vec<Change> {
     let in_setup = |(setup, id): (usize, &usize)| {
         let profile = station.profiles.iter().find(|profile| profile.setup == *id)?;
         let channel = |sensor: &usize| profile.sensors.iter().position(|found| found == sensor);
@@ -93,7 +93,7 @@ fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[O
 }
 
 /// Steps of the level of a sensor in a capture, but those of `known` changes.
-pub fn level_steps(selection: &Selection, stations: &[Station], known: &[&Change]) -> Vec<Unexplained> {
+pub(crate) fn level_steps(selection: &Selection, stations: &[Station], known: &[&Change]) -> Vec<Unexplained> {
     let rig = &selection.rig;
     let mut found = Vec::new();
     for station in stations {
@@ -277,7 +277,7 @@ fn norm_sqr(values: &[Complex64]) -> f64 {
 
 impl Change {
     /// Puts the change into the uncertainty of the reading.
-    pub fn widen(&self, readings: &mut Readings) {
+    pub(crate) fn widen(&self, readings: &mut Readings) {
         let sensors = readings.count / readings.turns.len().max(1);
         for matrices in [&mut readings.covariance, &mut readings.scatter].into_iter().flatten() {
             let Some(matrix) = matrices.get_mut(self.setup) else { continue };
@@ -287,7 +287,7 @@ impl Change {
     }
 
     /// What is said of it.
-    pub fn said(&self, selection: &Selection) -> Unexplained {
+    pub(crate) fn said(&self, selection: &Selection) -> Unexplained {
         let squares: Vec<f64> = self.by.iter().map(Complex64::norm_sqr).collect();
         let sum: f64 = squares.iter().sum();
         // Orders that hold all but a twentieth of it.

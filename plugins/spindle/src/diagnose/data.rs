@@ -1,4 +1,4 @@
-//! What a spindle model is fitted to: averaged readings, their weights, what noise lets expect of them.
+//! What a spindle model is fitted to: averaged readings, their weights, what is expected of them from noise.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ use crate::{
 const FLOOR_SMOOTHING: usize = 4;
 
 /// Everything about a measurement that no effect changes.
-pub struct Shared {
+pub(crate) struct Shared {
     pub selection: Selection,
     /// As declared.
     pub layout: Layout,
@@ -40,14 +40,14 @@ pub struct Shared {
 
 impl Shared {
     /// What single turns show of the effect of an id.
-    pub fn turn_evidence(&self, id: &str) -> Option<TurnEvidence> {
+    pub(crate) fn turn_evidence(&self, id: &str) -> Option<TurnEvidence> {
         self.kinds.iter().find(|kind| kind.about().id == id)?.turn_evidence()
     }
 }
 
 /// An effect at one of its targets.
 #[derive(Debug, Clone)]
-pub struct Place {
+pub(crate) struct Place {
     /// Index into the kinds of effects.
     pub kind: usize,
     /// Index of the sensor or setup.
@@ -59,7 +59,7 @@ pub struct Place {
 ///
 /// # Errors
 /// When there is no such effect.
-pub fn altered(
+pub(crate) fn altered(
     layout: &Layout,
     kinds: &[Arc<dyn SpindleEffect>],
     places: &[Place],
@@ -77,12 +77,12 @@ pub fn altered(
 }
 
 impl Shared {
-    pub fn kind(&self, place: usize) -> &dyn SpindleEffect {
+    pub(crate) fn kind(&self, place: usize) -> &dyn SpindleEffect {
         &*self.kinds[self.places[place].kind]
     }
 
     /// What the user should know of the data.
-    pub fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.data.iter().any(|station| station.weights.is_none()) {
             warnings.push("there is no scatter over the turns to measure the noise by: record more turns".into());
@@ -99,7 +99,7 @@ impl Shared {
 }
 
 /// One station's readings.
-pub struct StationData {
+pub(crate) struct StationData {
     pub name: String,
     /// The turns that are fitted.
     pub part: Part,
@@ -160,7 +160,7 @@ fn variances(readings: &Readings) -> Vec<f64> {
 }
 
 /// What the single turns of a station show, and their average does not.
-pub struct TurnObservations {
+pub(crate) struct TurnObservations {
     /// What their levels say of each sensor's creep.
     pub creeping: Vec<Option<Creeping>>,
     /// Changes within a setup.
@@ -171,7 +171,12 @@ pub struct TurnObservations {
 
 impl TurnObservations {
     /// `creeping` is what the levels of all stations say of each sensor.
-    pub fn new(selection: &Selection, layout: &Layout, station: &Station, creeping: Vec<Option<Creeping>>) -> Self {
+    pub(crate) fn new(
+        selection: &Selection,
+        layout: &Layout,
+        station: &Station,
+        creeping: Vec<Option<Creeping>>,
+    ) -> Self {
         let max_order = station.profiles.iter().map(Profile::max_order).min().unwrap_or(0);
         Self {
             changes: changes::changes(selection, station, &creeping),
@@ -183,7 +188,7 @@ impl TurnObservations {
 
 impl StationData {
     /// All turns and orders.
-    pub fn whole(
+    pub(crate) fn whole(
         selection: &Selection,
         layout: &Layout,
         station: &Station,
@@ -211,7 +216,7 @@ impl StationData {
     }
 
     /// The turns to fit and those held out, low orders only; all turns where none are held out.
-    pub fn split(
+    pub(crate) fn split(
         selection: &Selection,
         layout: &Layout,
         station: &Station,
@@ -276,7 +281,7 @@ impl StationData {
     }
 
     /// Effects as they act on the turns fitted, or on those held out: a creep differs between setups and slows down.
-    pub fn altered(&self, alterations: &Alterations, turns: Part) -> Alterations {
+    pub(crate) fn altered(&self, alterations: &Alterations, turns: Part) -> Alterations {
         let mut altered = alterations.clone();
         for (sensor, creeping) in altered.sensors.iter_mut().zip(&self.seen.creeping) {
             sensor.creep_shares = creeping.as_ref().map_or_else(Vec::new, |creeping| creeping.shares(turns, self.part));
@@ -285,7 +290,7 @@ impl StationData {
     }
 
     /// What effects leave of the drifts and lines that single turns show, in standard uncertainties.
-    pub fn beside_averages(&self, alterations: &Alterations) -> Vec<f64> {
+    pub(crate) fn beside_averages(&self, alterations: &Alterations) -> Vec<f64> {
         let creeps =
             self.creeps.iter().map(|(sensor, creep, std)| (creep - alterations.sensors[*sensor].creep_um) / std);
         let lines = self.seen.lines.iter().enumerate().map(|(number, line)| {
@@ -303,19 +308,19 @@ impl StationData {
     }
 
     /// The readings, with the uncertainty that they have where some effects are applied.
-    pub fn readings(&self, alterations: &Alterations) -> &Readings {
+    pub(crate) fn readings(&self, alterations: &Alterations) -> &Readings {
         self.freed(alterations).map_or(&self.readings, |freed| &freed.readings)
     }
 
     /// The covariance of the averages where a drift that single turns show is not taken out of them: its saw-tooth is in the averages, and
     /// belongs to their uncertainty.
-    pub fn with_drifts(&self, alterations: &Alterations) -> Option<&Vec<Vec<Complex64>>> {
+    pub(crate) fn with_drifts(&self, alterations: &Alterations) -> Option<&Vec<Vec<Complex64>>> {
         let stays = self.creeps.iter().any(|(sensor, ..)| alterations.sensors[*sensor].creep_um == 0.0);
         self.unsteadied.as_ref().filter(|_| stays)
     }
 
     /// Share of the variance at an order from 1 that lost orders carry into it.
-    pub fn carried(&self, order: usize, alterations: &Alterations) -> f64 {
+    pub(crate) fn carried(&self, order: usize, alterations: &Alterations) -> f64 {
         let carried = self.freed(alterations).map_or(&self.carried, |freed| &freed.carried);
         carried.get(order - 1).copied().unwrap_or(0.0)
     }
@@ -325,7 +330,7 @@ impl StationData {
     }
 
     /// W of an order from 1 for displacements: that of the readings times what they respond with.
-    pub fn weights_of(&self, order: usize, layout: &Layout, alterations: &Alterations) -> Blocks {
+    pub(crate) fn weights_of(&self, order: usize, layout: &Layout, alterations: &Alterations) -> Blocks {
         let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order);
         let setups = self.readings.turns.len();
         let unweighted = || Blocks::identity(self.readings.count / setups, setups);
@@ -336,7 +341,7 @@ impl StationData {
 
     /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals: `corrected` are the
     /// readings as displacements, with their weights.
-    pub fn floor_std(
+    pub(crate) fn floor_std(
         &self,
         layout: &Layout,
         alterations: &Alterations,

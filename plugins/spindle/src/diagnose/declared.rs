@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use runout_core::{
     Result,
+    effects::EffectCatalogue,
     model::{Effect, Setting, closed_loop::Settings},
-    pipeline::effects::EffectCatalogue,
     profile::Profile,
     stage::{Station, StationDiagnosis, StationModel},
 };

@@ -20,7 +20,7 @@ const ALIKE: f64 = 4.0;
 
 /// One sensor's creep in the captures of a station.
 #[derive(Debug, Clone)]
-pub struct Creeping {
+pub(crate) struct Creeping {
     /// Of all stations.
     pub creep: Arc<Creep>,
     /// Place among the creep's captures of the station's first setup.
@@ -43,16 +43,16 @@ struct Capture {
 
 impl Creeping {
     /// Places among the creep's captures of the station's setups.
-    pub fn captures(&self) -> Range<usize> {
+    pub(crate) fn captures(&self) -> Range<usize> {
         self.first..self.first + self.setups.len()
     }
 
-    pub fn certain(&self) -> bool {
+    pub(crate) fn certain(&self) -> bool {
         self.creep.certain
     }
 
     /// Creep over one turn of a setup, in µm.
-    pub fn in_turn(&self, setup: usize, turn: usize) -> f64 {
+    pub(crate) fn in_turn(&self, setup: usize, turn: usize) -> f64 {
         let start = self.setups.get(setup).and_then(|capture| capture.starts.get(turn)).copied().unwrap_or(turn as f64);
         self.creep.over(self.first + setup, start, start + 1.0)
     }
@@ -92,7 +92,7 @@ impl Creeping {
     }
 
     /// The reference creep and its standard uncertainty as one of the stations tells it, in µm a turn.
-    pub fn observed(&self, part: Part) -> (f64, f64) {
+    pub(crate) fn observed(&self, part: Part) -> (f64, f64) {
         let creep = self.reference(part);
         let rate = self.creep.rates.get(self.creep.largest()).copied().unwrap_or(0.0);
         let share = if rate == 0.0 { 1.0 } else { creep / rate };
@@ -100,14 +100,14 @@ impl Creeping {
     }
 
     /// Mean creep a turn in each setup, over the reference of the turns that are fitted to.
-    pub fn shares(&self, of: Part, reference: Part) -> Vec<f64> {
+    pub(crate) fn shares(&self, of: Part, reference: Part) -> Vec<f64> {
         let reference = self.reference(reference);
         let share = |setup| if reference == 0.0 { 1.0 } else { self.mean(setup, of) / reference };
         (0..self.setups.len()).map(share).collect()
     }
 
     /// Takes out of the scatter of single turns by how much their creep differs.
-    pub fn take_out_of_scatter(&self, readings: &mut Readings, sensor: usize, part: Part) {
+    pub(crate) fn take_out_of_scatter(&self, readings: &mut Readings, sensor: usize, part: Part) {
         if !self.certain() {
             return;
         }
@@ -134,7 +134,7 @@ impl Creeping {
 
 /// Which turns of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub(crate) enum Part {
     /// Those that the loop fits.
     Fitted,
     /// Those that it does not.
@@ -144,7 +144,7 @@ pub enum Part {
 }
 
 /// Takes out of the covariance of a profile's mean what drifts that are certain put into it: over the record they are no noise.
-pub fn steady(
+pub(crate) fn steady(
     profile: &mut Profile,
     neighbours: Option<&Neighbours>,
     selection: &Selection,
@@ -165,7 +165,7 @@ pub fn steady(
 }
 
 /// What the levels of the turns say of each sensor's creep, `[station][sensor]`.
-pub fn creeping(selection: &Selection, stations: &[Station]) -> Vec<Vec<Option<Creeping>>> {
+pub(crate) fn creeping(selection: &Selection, stations: &[Station]) -> Vec<Vec<Option<Creeping>>> {
     let of_capture = |sensor: usize, station: &Station, setup: &usize| -> Option<Levels> {
         let profile = station.profiles.iter().find(|profile| profile.setup == *setup)?;
         let channel = profile.sensors.iter().position(|known| *known == sensor)?;
@@ -240,7 +240,13 @@ fn held_out(creeping: &Creeping, selection: &Selection, station: &Station, senso
 }
 
 /// Creep of a turn at an order, for what happens within turns.
-pub fn in_turn(creeping: Option<&Creeping>, setup: usize, turn: usize, order: usize, angles: usize) -> Complex64 {
+pub(crate) fn in_turn(
+    creeping: Option<&Creeping>,
+    setup: usize,
+    turn: usize,
+    order: usize,
+    angles: usize,
+) -> Complex64 {
     let creep_um = creeping.filter(|known| known.certain()).map_or(0.0, |known| known.in_turn(setup, turn));
     creep_um * crate::effects::creep(order, angles)
 }

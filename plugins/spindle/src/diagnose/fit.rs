@@ -106,9 +106,9 @@ impl SpindleFit {
         self.stations.iter().zip(&other.stations).flat_map(move |(solved, there)| {
             (1..=solved.corrected.max_order.min(there.corrected.max_order)).flat_map(move |order| {
                 self.layout.unknowns.iter().enumerate().map(move |(unknown, quantity)| {
-                    let value = there.estimate.told(order, unknown);
+                    let value = there.estimate.observable_value(order, unknown);
                     let value = if mirrored && quantity.is_form() { value.conj() } else { value };
-                    solved.estimate.told(order, unknown) - value
+                    solved.estimate.observable_value(order, unknown) - value
                 })
             })
         })
@@ -254,7 +254,7 @@ impl Fit for SpindleFit {
             self.layout.forms().flat_map(move |unknown| {
                 (2..=solved.corrected.max_order).flat_map(move |order| {
                     let observable = solved.operators.observable(order)[unknown];
-                    let value = if observable { solved.estimate.told(order, unknown) } else { LOST };
+                    let value = if observable { solved.estimate.observable_value(order, unknown) } else { LOST };
                     [value.re, value.im]
                 })
             })
@@ -347,7 +347,7 @@ impl Fit for SpindleFit {
         found
     }
 
-    fn told_apart_by(&self, effects: &[usize]) -> Option<String> {
+    fn distinguished_by(&self, effects: &[usize]) -> Option<String> {
         let on = |effect: &usize| self.shared.kind(*effect).about().acts_on;
         let of_sensors = [ActsOn::Sensor, ActsOn::SensorPair, ActsOn::SensorCopy];
         let more = if effects.iter().all(|effect| of_sensors.contains(&on(effect))) {

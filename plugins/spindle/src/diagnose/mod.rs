@@ -263,7 +263,7 @@ pub fn diagnose(
 /// The same on a model; of the stations, their splits are not needed any more.
 fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Result<StationDiagnosis> {
     let changes: Vec<&Change> = model.traced.data.iter().flat_map(|station| &station.seen.changes).collect();
-    // What a sensor or its neighbour lacks in all setups cannot be told from what happened to it in one.
+    // What a sensor or its neighbour lacks in all setups cannot be distinguished from what happened to it in one.
     let sensors = &model.traced.selection.rig.sensors;
     let section = |sensor: usize| sensors.get(sensor).map(|sensor| sensor.section);
     let slipped = |place: &data::Place| {

@@ -5,7 +5,7 @@ use runout_core::Complex64;
 use crate::solve::apply;
 
 /// Matrix (`[row][column]`) times each order's readings, into a harmonic array of the same shape.
-pub fn project(
+pub(crate) fn project(
     matrices: &[Vec<Complex64>],
     harmonics: &[Complex64],
     count: usize,
@@ -18,7 +18,7 @@ pub fn project(
 }
 
 /// The same where some readings are 0 at all orders: those that an effect leaves alone.
-pub fn project_some(
+pub(crate) fn project_some(
     matrices: &[Vec<Complex64>],
     harmonics: &[Complex64],
     count: usize,

@@ -13,7 +13,7 @@ const ANGLE_DECIMALS: i32 = 6;
 const DIGITS: usize = 9;
 
 /// Lines `setups.1.part_deg = 100.184` for one of the keys; `target` is the index of a sensor or a setup of the selection.
-pub fn lines(selection: &Selection, alterations: &Alterations, key: RigKey, target: usize) -> Vec<String> {
+pub(crate) fn lines(selection: &Selection, alterations: &Alterations, key: RigKey, target: usize) -> Vec<String> {
     let rig = &selection.rig;
     // Where channels or setups are swapped, their ids are to be exchanged, and the entry is the one of the true place.
     let sensor = || format!("sensors.{}", selection.sensors[alterations.places[target]]);

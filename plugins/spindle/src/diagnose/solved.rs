@@ -44,7 +44,7 @@ impl Shared {
 }
 
 impl Solved {
-    pub fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
+    pub(crate) fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
         let mut corrected = data.readings(alterations).clone();
         if let Some(covariance) = data.with_drifts(alterations) {
             corrected.covariance = Some(covariance.clone());
@@ -139,13 +139,13 @@ fn axial(
 
 impl Solved {
     /// How an unknown moves with a parameter, by order from 2: its operator on the readings' partials.
-    pub fn moved_by<'a>(
+    pub(crate) fn moved_by<'a>(
         &'a self,
         partial: &'a [Complex64],
         unknown: usize,
     ) -> impl Iterator<Item = (usize, Complex64)> + 'a {
         let count = self.corrected.count;
-        self.told_orders(unknown).map(move |order| {
+        self.observable_orders(unknown).map(move |order| {
             let row = &self.operators.orders[order - 1].operator[unknown * count..(unknown + 1) * count];
             let readings = &partial[order * count..(order + 1) * count];
             (order, row.iter().zip(readings).map(|(a, b)| a * b).sum())
@@ -153,20 +153,20 @@ impl Solved {
     }
 
     /// How the unknowns of order 1 move with a parameter.
-    pub fn first_moved(&self, partial: &[Complex64]) -> Vec<Complex64> {
+    pub(crate) fn first_moved(&self, partial: &[Complex64]) -> Vec<Complex64> {
         let count = self.corrected.count;
         apply(&self.operators.orders[0].operator, &partial[count..2 * count])
     }
 
-    /// How z at 1/rev moves with a parameter, where it can be told.
-    pub fn first_moved_by(&self, partial: &[Complex64], layout: &Layout) -> Option<Complex64> {
+    /// How z at 1/rev moves with a parameter, where it is observable.
+    pub(crate) fn first_moved_by(&self, partial: &[Complex64], layout: &Layout) -> Option<Complex64> {
         let z = layout.unknowns.iter().position(|unknown| *unknown == Quantity::Z)?;
         let place = layout.first_order_unknowns().iter().position(|unknown| *unknown == FirstOrder::Axial)?;
         self.operators.observable(1)[z].then(|| self.first_moved(partial)[place])
     }
 
-    /// Orders from 2 at which an unknown can be told.
-    fn told_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
+    /// Orders from 2 at which an unknown is observable.
+    fn observable_orders(&self, unknown: usize) -> impl Iterator<Item = usize> + '_ {
         (2..=self.corrected.max_order).filter(move |order| self.operators.observable(*order)[unknown])
     }
 }

@@ -23,7 +23,7 @@ const NARROW: f64 = 0.2;
 
 /// What a station's residual says of a stranger: only orders at which a reading is redundant show one, and only a reading that explains
 /// it better than the others is named.
-pub fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexplained> {
+pub(crate) fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexplained> {
     let count = solved.corrected.count;
     let mut total = 0.0;
     // What each reading would have to hold to explain the residual, and how much it would.
@@ -114,7 +114,7 @@ fn undecided(redundant: &[usize], sensors: &[&str]) -> String {
 
 /// Squares (µm²) that an unweighted fit leaves of each setup's readings, and their complex degrees of freedom: the trace of
 /// I − A·P over them.
-pub fn captures(solved: &Solved, setups: usize) -> Vec<Group> {
+pub(crate) fn captures(solved: &Solved, setups: usize) -> Vec<Group> {
     let count = solved.corrected.count;
     let sensors = (count / setups.max(1)).max(1);
     let mut groups = vec![Group { squares: 0.0, freedom: 0.0 }; setups];

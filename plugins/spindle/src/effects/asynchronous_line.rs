@@ -7,7 +7,7 @@ use runout_core::Complex64;
 use super::{About, ActsOn, Alterations, MOST_LINES, Predicted, SpindleEffect, TurnEvidence};
 
 /// A line of the turns' spectrum.
-pub struct AsynchronousLine {
+pub(crate) struct AsynchronousLine {
     /// Its place among those that were found, the largest first.
     pub number: usize,
 }

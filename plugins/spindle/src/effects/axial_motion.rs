@@ -10,7 +10,7 @@ use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_a
 const LARGEST_UM: f64 = 200.0;
 
 /// Axial error motion of one order.
-pub struct AxialMotion {
+pub(crate) struct AxialMotion {
     /// Per turn.
     pub order: usize,
 }

@@ -87,7 +87,7 @@ pub fn creep(order: usize, angles: usize) -> Complex64 {
 }
 
 /// One reading over the turn, for what is not linear in its harmonics.
-pub struct Curve {
+pub(crate) struct Curve {
     turn: Fourier,
     fine: Fourier,
 }
@@ -95,12 +95,12 @@ pub struct Curve {
 impl Curve {
     /// On as many angles as the readings have, or four times as many.
     #[must_use]
-    pub fn new(samples_per_rev: usize) -> Self {
+    pub(crate) fn new(samples_per_rev: usize) -> Self {
         Self { turn: Fourier::new(samples_per_rev), fine: Fourier::new(samples_per_rev * OVERSAMPLING) }
     }
 
     /// Harmonics of a function of angle and value; products of two orders do not fold, since the grid is fine.
-    pub fn mapped(
+    pub(crate) fn mapped(
         &mut self,
         harmonics: impl ExactSizeIterator<Item = Complex64>,
         map: impl Fn(f64, f64) -> f64,

@@ -7,7 +7,7 @@ use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
 use crate::layout::Layout;
 
 /// Even orders of motion keep their sign.
-pub struct EvenOrderMotion;
+pub(crate) struct EvenOrderMotion;
 
 impl SpindleEffect for EvenOrderMotion {
     fn about(&self) -> About {

@@ -6,7 +6,7 @@ use runout_core::{Complex64, model::diagnosis::Estimated};
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
 
 /// A sensor's bandwidth.
-pub struct FilterAttenuation;
+pub(crate) struct FilterAttenuation;
 
 impl SpindleEffect for FilterAttenuation {
     fn about(&self) -> About {

@@ -31,8 +31,8 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64,
+    effects::EffectEntry,
     model::{Parameter, diagnosis::Estimated},
-    pipeline::effects::EffectEntry,
 };
 
 pub use crate::alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, Transfer};

@@ -76,10 +76,12 @@ impl<'a> Predicted<'a> {
             })
             .collect();
         for order in 1..readings.len() / count {
-            let of = |unknown: Option<usize>| unknown.map_or(Complex64::ZERO, |unknown| estimate.told(order, unknown));
+            let of = |unknown: Option<usize>| {
+                unknown.map_or(Complex64::ZERO, |unknown| estimate.observable_value(order, unknown))
+            };
             let mut motion = [Complex64::ZERO; 4];
             for (unknown, shares) in &motions {
-                let value = estimate.told(order, *unknown);
+                let value = estimate.observable_value(order, *unknown);
                 motion.iter_mut().zip(shares).for_each(|(sum, share)| *sum += value * *share);
             }
             let [x, y, tilt_x, tilt_y] = motion;

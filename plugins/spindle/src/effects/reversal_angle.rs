@@ -5,7 +5,7 @@ use runout_core::Complex64;
 use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, parameter};
 
 /// The part's angle in a setup.
-pub struct ReversalAngle;
+pub(crate) struct ReversalAngle;
 
 impl SpindleEffect for ReversalAngle {
     fn about(&self) -> About {

@@ -7,7 +7,7 @@ use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
 use crate::layout::Layout;
 
 /// Exact geometry.
-pub struct SecondOrderGeometry;
+pub(crate) struct SecondOrderGeometry;
 
 impl SpindleEffect for SecondOrderGeometry {
     fn about(&self) -> About {

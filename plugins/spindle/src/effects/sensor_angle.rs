@@ -7,7 +7,7 @@ use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleE
 use crate::layout::{Layout, View};
 
 /// A sensor's angle.
-pub struct SensorAngle;
+pub(crate) struct SensorAngle;
 
 impl SpindleEffect for SensorAngle {
     fn about(&self) -> About {

@@ -8,7 +8,7 @@ use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
 use crate::layout::{Layout, UM_PER_MM_URAD};
 
 /// A sensor's axial position.
-pub struct SensorAxialPosition {
+pub(crate) struct SensorAxialPosition {
     /// Whether the form there is taken to be another one.
     pub sees_another_circle: bool,
 }

@@ -5,7 +5,7 @@ use runout_core::Complex64;
 use super::{About, ActsOn, Alterations, Predicted, RigKey, SpindleEffect, parameter};
 
 /// A sensor's relative gain.
-pub struct SensorGain;
+pub(crate) struct SensorGain;
 
 impl SpindleEffect for SensorGain {
     fn about(&self) -> About {

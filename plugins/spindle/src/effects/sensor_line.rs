@@ -7,7 +7,7 @@ use runout_core::Complex64;
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, TurnEvidence};
 
 /// A line of the turns' spectrum in one channel.
-pub struct SensorLine {
+pub(crate) struct SensorLine {
     /// Its place among those that were found, the largest first.
     pub number: usize,
 }

@@ -9,7 +9,7 @@ use super::{About, ActsOn, Alterations, Predicted, RigKey, SpindleEffect, parame
 const LARGEST: f64 = 0.1;
 
 /// A sensor's characteristic.
-pub struct SensorNonlinearity;
+pub(crate) struct SensorNonlinearity;
 
 impl SpindleEffect for SensorNonlinearity {
     fn about(&self) -> About {

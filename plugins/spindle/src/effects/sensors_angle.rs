@@ -5,7 +5,7 @@ use runout_core::Complex64;
 use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, parameter};
 
 /// The angle of all sensors in a setup.
-pub struct SensorsAngle;
+pub(crate) struct SensorsAngle;
 
 impl SpindleEffect for SensorsAngle {
     fn about(&self) -> About {

@@ -6,7 +6,7 @@ use runout_core::{Complex64, model::diagnosis::Estimated};
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
 
 /// The size of the motion in a setup.
-pub struct SetupMotionChange;
+pub(crate) struct SetupMotionChange;
 
 impl SpindleEffect for SetupMotionChange {
     fn about(&self) -> About {

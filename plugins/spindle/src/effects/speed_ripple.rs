@@ -9,7 +9,7 @@ use super::{
 };
 
 /// Uneven speed of one order.
-pub struct SpeedRipple {
+pub(crate) struct SpeedRipple {
     /// Per turn.
     pub order: usize,
     /// Whether each setup has one of its own, or all have the same.

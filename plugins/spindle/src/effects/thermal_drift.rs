@@ -7,7 +7,7 @@ use runout_core::Complex64;
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, TurnEvidence, creep, parameter};
 
 /// A sensor's drift.
-pub struct ThermalDrift;
+pub(crate) struct ThermalDrift;
 
 impl SpindleEffect for ThermalDrift {
     fn about(&self) -> About {

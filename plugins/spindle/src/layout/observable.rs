@@ -1,4 +1,4 @@
-//! What a layout can tell at each order.
+//! What is observable with a layout at each order.
 
 use runout_core::{
     Complex64,
@@ -9,22 +9,22 @@ use runout_core::{
 use super::{FirstOrder, Layout, NULL_TOLERANCE, UM_PER_MM_URAD};
 
 impl Layout {
-    /// Whether each unknown can be told at an order.
+    /// Whether each unknown is observable at an order.
     ///
     /// At order 1 form is 0 by definition and motion is its counter-rotating part; both are lost where one clamping
     /// cannot tell eccentricity from co-rotating motion even in principle (A₁ is deficient), or no sensor pair tells
     /// the counter-rotating part.
     #[must_use]
     pub fn observable(&self, order: usize) -> Vec<bool> {
-        self.told(&self.factor(order), order)
+        self.observable_unknowns(&self.factor(order), order)
     }
 
     /// [`observable`](Self::observable) with an order's matrix.
     pub(crate) fn observable_with(&self, matrix: &[Complex64], order: usize) -> Vec<bool> {
-        self.told(&self.factor_matrix(self.unknowns.len(), matrix), order)
+        self.observable_unknowns(&self.factor_matrix(self.unknowns.len(), matrix), order)
     }
 
-    fn told(&self, qr: &PivotedQr, order: usize) -> Vec<bool> {
+    fn observable_unknowns(&self, qr: &PivotedQr, order: usize) -> Vec<bool> {
         let mut observable = qr.observable(NULL_TOLERANCE);
         if order == 1 {
             let unknowns = self.first_order_unknowns();
@@ -66,7 +66,7 @@ impl Layout {
         })
     }
 
-    /// What can be told at orders 1 to `max_order`, with plain (unweighted) least squares; motion at the spindle's
+    /// What is observable at orders 1 to `max_order`, with plain (unweighted) least squares; motion at the spindle's
     /// reference, with the carriage at 0.
     #[must_use]
     pub fn assess(&self, max_order: usize) -> Assessment {
@@ -77,7 +77,7 @@ impl Layout {
 
     fn assess_order(&self, order: usize) -> OrderAssessment {
         let qr = self.factor(order);
-        let observable = self.told(&qr, order);
+        let observable = self.observable_unknowns(&qr, order);
         let covariance = qr.covariance();
         let gains = self.to_reference(self.mean_z_mm).spread(&covariance);
         let told = observable.iter().zip(gains);

@@ -16,7 +16,7 @@ pub struct System {
     pub columns: usize,
     /// `[reading][unknown]`.
     pub matrix: Vec<Complex64>,
-    /// Whether each of the layout's unknowns can be told.
+    /// Whether each of the layout's unknowns is observable.
     pub observable: Vec<bool>,
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use runout_core::{
     Result,
-    model::foresight::{self, Foresight, Unseen},
+    model::foresight::{self, Foresight, NotVisible},
     rig::Rig,
 };
 
@@ -31,11 +31,11 @@ pub struct Change {
     pub rig: Rig,
     /// Blind effects ("effect target") that would show.
     pub reveals: Vec<String>,
-    /// Confounded sets of which every two members would be told apart.
+    /// Confounded sets of which every two members would be distinguished.
     pub tells_apart: Vec<Vec<String>>,
 }
 
-/// Additions that make effects visible or tell them apart.
+/// Additions that make effects visible or distinguish them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Changes {
     /// The cheapest for each blind effect and confounded set: a clamping of the part, then one with the sensors turned
@@ -72,7 +72,7 @@ pub fn foresee(
     let traceless = model(mistakes)?.traceless_mistakes()?;
     foresight
         .blind_to
-        .extend(traceless.into_iter().map(|blind| Unseen { bias: vec![blind.bias_per_unit.clone()], blind }));
+        .extend(traceless.into_iter().map(|blind| NotVisible { bias: vec![blind.bias_per_unit.clone()], blind }));
     Ok(foresight)
 }
 

@@ -38,7 +38,7 @@ const ANGLES: usize = 128;
 
 /// The campaign in words.
 #[must_use]
-pub fn words() -> String {
+pub(crate) fn words() -> String {
     format!(
         "form {FORM_UM} µm and motion {MOTION_UM} µm, {TILT_URAD} µrad rms (orders 2-{MAX_ORDER}, falling with 1/order), \
          {ECCENTRICITY_UM} µm off centre, sensor noise {NOISE_UM} µm and asynchronous motion {ASYNCHRONOUS_UM} µm rms, \
@@ -48,7 +48,7 @@ pub fn words() -> String {
 
 /// One station, with phases that are drawn once for all.
 #[must_use]
-pub fn station(selection: &Selection) -> Station {
+pub(crate) fn station(selection: &Selection) -> Station {
     let rig = &selection.rig;
     // Motion keeps its sign whatever a separator assumes.
     let layout = Layout::new(rig, false);

@@ -31,7 +31,7 @@ const REPORTED: usize = 5;
 
 /// Draws between two words of progress.
 const DRAWS_A_STEP: usize = 2000;
-/// How often [`optimise`] tells of its progress.
+/// How often [`optimise`] reports its progress.
 pub const PROGRESS_STEPS: usize = DRAWS / DRAWS_A_STEP + REFINED;
 
 /// What to look for.

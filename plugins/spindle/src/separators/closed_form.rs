@@ -4,16 +4,14 @@ use std::{f64::consts::TAU, marker::PhantomData};
 
 use runout_core::{
     Complex64, Result,
+    effects::EffectCatalogue,
+    fault::Fault,
     model::foresight::Foresight,
-    pipeline::{
-        effects::EffectCatalogue,
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     rig::Rig,
     separation::{Assessment, Quantity, Sensitivity, Separation},
     spread::Projection,
-    stage::{Separator, Station, StationModel, StationSeparator, separator::require_rig},
+    stage::{Separator, Station, StationModel, StationSeparator, require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -12,7 +12,7 @@ const LOOKED_AT: usize = 12;
 
 /// Notes on z, the faces and the declared forms of a rig.
 #[must_use]
-pub fn notes(rig: &Rig, assessment: &Assessment) -> Vec<String> {
+pub fn face_notes(rig: &Rig, assessment: &Assessment) -> Vec<String> {
     let mut notes = along_the_axis(rig, assessment);
     notes.extend(declared(rig));
     notes

@@ -9,13 +9,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use runout_core::{
     Complex64,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     rig::Rig,
     separation::Quantity,
-    stage::{Separator, separator::require_rig},
+    stage::{Separator, require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;

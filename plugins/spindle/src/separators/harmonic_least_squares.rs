@@ -2,16 +2,14 @@
 
 use runout_core::{
     Result,
+    effects::EffectCatalogue,
+    fault::Fault,
     model::foresight::Foresight,
-    pipeline::{
-        effects::EffectCatalogue,
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    pipeline::{Context, StageConfig},
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},
     spread::Projection,
-    stage::{Separator, Station, StationModel, StationSeparator, separator::require_rig},
+    stage::{Separator, Station, StationModel, StationSeparator, require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -109,7 +107,7 @@ impl HarmonicLeastSquares {
 impl StationSeparator for HarmonicLeastSquares {
     fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
         let mut assessment = self.layout.assess(max_order);
-        assessment.notes.extend(face_notes::notes(&self.selection.rig, &assessment));
+        assessment.notes.extend(face_notes(&self.selection.rig, &assessment));
         self.selection.tell(&mut assessment);
         Ok(assessment)
     }

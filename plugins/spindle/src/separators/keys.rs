@@ -1,6 +1,6 @@
 //! Keys that separators share.
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 
 /// What a switch is without its key.
 pub(super) fn yes() -> bool {

@@ -1,13 +1,20 @@
 //! Separators: each gives one linear operator an order; solving, second-order geometry and uncertainty are those of
 //! `solve`.
 
-pub mod closed_form;
-pub mod donaldson_reversal;
-pub mod face_notes;
+mod closed_form;
+mod donaldson_reversal;
+mod face_notes;
 pub mod four_sensor_reversal;
-pub mod harmonic_least_squares;
+mod harmonic_least_squares;
 mod keys;
-pub mod multi_step;
+mod multi_step;
 mod one_direction;
 mod station;
-pub mod three_point;
+mod three_point;
+
+pub use closed_form::{ClosedForm, ClosedFormSeparator, Method, MethodConfig};
+pub use donaldson_reversal::DonaldsonReversal;
+pub use face_notes::face_notes;
+pub use harmonic_least_squares::{HarmonicLeastSquares, HarmonicLeastSquaresConfig, Weighting};
+pub use multi_step::MultiStep;
+pub use three_point::ThreePoint;

@@ -7,7 +7,7 @@ use crate::layout::Layout;
 
 /// One sensor in each of one or two sections, looking along the same direction.
 #[derive(Debug, Clone)]
-pub struct OneDirection {
+pub(crate) struct OneDirection {
     /// The sensor of each section.
     sensors: Vec<usize>,
     setups: usize,
@@ -15,7 +15,7 @@ pub struct OneDirection {
 
 impl OneDirection {
     /// The first sensor of the rig, and one of another section that looks along the same direction.
-    pub fn choose(rig: &Rig) -> Vec<usize> {
+    pub(crate) fn choose(rig: &Rig) -> Vec<usize> {
         let mut sections = sections_with(rig, 1).into_iter();
         let first = sections.next().and_then(|sensors| sensors.first().copied());
         let along = |sensor: &usize| {
@@ -31,7 +31,7 @@ impl OneDirection {
     ///
     /// # Errors
     /// When the rig is another one.
-    pub fn new(rig: &Rig) -> Result<Self, String> {
+    pub(crate) fn new(rig: &Rig) -> Result<Self, String> {
         let sensors: Vec<usize> = (0..rig.sensors.len()).collect();
         let [first, rest @ ..] = &rig.sensors[..] else { return Err("needs a sensor".into()) };
         match rest {
@@ -59,7 +59,7 @@ impl OneDirection {
 
     /// The operator from what each section's readings, one a setup, say of form and of motion along the sensor:
     /// `split` gets e^{±in(θ'−β)} of each setup and gives two rows over the setups.
-    pub fn operator(
+    pub(crate) fn operator(
         &self,
         layout: &Layout,
         order: usize,

@@ -134,6 +134,6 @@ impl ClosedForm for ThreePoint {
     }
 
     fn notes(&self) -> Vec<String> {
-        vec!["one clamping: 1/rev motion cannot be told from eccentricity".into()]
+        vec!["one clamping: 1/rev motion cannot be distinguished from eccentricity".into()]
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::{Complex64, pipeline::error::Fault};
+use runout_core::{Complex64, fault::Fault};
 
 use super::{
     check,
@@ -41,7 +41,7 @@ const MOST_TONES: usize = 2_000;
 const AFRESH: u64 = 256;
 
 impl Asynchronous {
-    pub fn new(config: &AsynchronousConfig, sample_rate_hz: f64, samples: u64) -> Result<Self, Fault> {
+    pub(crate) fn new(config: &AsynchronousConfig, sample_rate_hz: f64, samples: u64) -> Result<Self, Fault> {
         let mut asynchronous = Self { tones: Vec::new(), scales: [0.0; 5], lines: Vec::new() };
         for (index, line) in config.lines.iter().enumerate() {
             asynchronous.add_line(line).map_err(|fault| fault.under_item("lines", index))?;
@@ -105,7 +105,7 @@ impl Asynchronous {
         Ok(asynchronous)
     }
 
-    pub fn add_line(&mut self, line: &LineConfig) -> Result<(), Fault> {
+    pub(crate) fn add_line(&mut self, line: &LineConfig) -> Result<(), Fault> {
         check::positive("order", line.order)?;
         check::finite("amplitude_um", line.amplitude_um)?;
         check::finite("direction_deg", line.direction_deg)?;
@@ -128,14 +128,14 @@ impl Asynchronous {
     }
 
     /// No displacement across the axis (µm) and no tilt (µrad) is larger.
-    pub fn bounds(&self) -> (f64, f64) {
+    pub(crate) fn bounds(&self) -> (f64, f64) {
         let tones: f64 = self.tones.iter().map(|tone| tone.amplitude).sum();
         let lines: f64 = self.lines.iter().map(|line| line.amplitude_um[0].hypot(line.amplitude_um[1])).sum();
         (tones * self.scales[0].hypot(self.scales[1]) + lines, tones * self.scales[2].hypot(self.scales[3]))
     }
 
     /// The motion in one capture.
-    pub fn capture(&self, seed: u64, setup: usize, station: usize) -> Wandering {
+    pub(crate) fn capture(&self, seed: u64, setup: usize, station: usize) -> Wandering {
         let mut wandering = Wandering {
             cycles_per_sample: self.tones.iter().map(|tone| tone.cycles_per_sample).collect(),
             amplitudes: [const { Vec::new() }; 5],
@@ -169,7 +169,7 @@ pub(super) struct Wandering {
 
 impl Wandering {
     /// Adds the motion at `count` samples from `start`; `turns` are the spindle's whole turns and the rest.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         start: u64,
         count: usize,

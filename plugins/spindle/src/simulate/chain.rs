@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 
 use super::{
     check,
@@ -61,7 +61,7 @@ impl Drift {
 }
 
 impl Chain {
-    pub fn new(noise_um: f64, sign: f64, converter: Converter) -> Self {
+    pub(crate) fn new(noise_um: f64, sign: f64, converter: Converter) -> Self {
         Self {
             gain: 1.0,
             quadratic_per_um: 0.0,
@@ -76,7 +76,7 @@ impl Chain {
     }
 
     /// Lowest and highest reading that can be recorded, in µm, the sign already applied.
-    pub fn limits_um(&self) -> Option<[f64; 2]> {
+    pub(crate) fn limits_um(&self) -> Option<[f64; 2]> {
         let [low, high] = self.converter.limits_um()?;
         Some(if self.sign < 0.0 { [-high, -low] } else { [low, high] })
     }
@@ -95,14 +95,14 @@ pub(super) struct Channel<'a> {
 
 impl<'a> Channel<'a> {
     /// In a setup; `phase` gives that of the line of an effect, in periods.
-    pub fn new(chain: &'a Chain, random: ChaCha8Rng, setup: usize, phase: impl Fn(usize) -> f64) -> Self {
+    pub(crate) fn new(chain: &'a Chain, random: ChaCha8Rng, setup: usize, phase: impl Fn(usize) -> f64) -> Self {
         let phases = chain.pick_ups.iter().map(|pick_up| phase(pick_up.item)).collect();
         Self { chain, random, setup, phases, filters: chain.filters.clone(), started: false }
     }
 
     /// The recorded reading of a displacement `turns` nominal turns after the capture began, both in µm, at a sample and with the
     /// spindle at its angle in turns, whole ones and the rest.
-    pub fn record(&mut self, displacement_um: f64, turns: f64, sample: u64, angle: (f64, f64)) -> f64 {
+    pub(crate) fn record(&mut self, displacement_um: f64, turns: f64, sample: u64, angle: (f64, f64)) -> f64 {
         let chain = self.chain;
         let curved = displacement_um * (chain.quadratic_per_um + displacement_um * chain.cubic_per_um2);
         let mut value = chain.gain * (displacement_um + displacement_um * curved);
@@ -139,7 +139,7 @@ pub(super) enum Converter {
 }
 
 impl Converter {
-    pub fn new(config: &RecordingConfig) -> Result<Self, Fault> {
+    pub(crate) fn new(config: &RecordingConfig) -> Result<Self, Fault> {
         let highest = match config.format {
             SampleFormat::F64 | SampleFormat::F32 => {
                 if config.range_um.is_some() {
@@ -190,7 +190,7 @@ struct Section {
 
 impl LowPass {
     /// The analogue prototype by the bilinear transform, its cut-off put back where it was (tan πf/fs for f).
-    pub fn butterworth(order: usize, cutoff_hz: f64, sample_rate_hz: f64) -> Result<Self, Fault> {
+    pub(crate) fn butterworth(order: usize, cutoff_hz: f64, sample_rate_hz: f64) -> Result<Self, Fault> {
         if !(1..=8).contains(&order) {
             return Err(Fault::at("order", format!("expected an order from 1 to 8, found {order}")));
         }

@@ -1,6 +1,6 @@
 //! Checks that many keys share.
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 
 pub(super) fn finite(key: &str, value: f64) -> Result<(), Fault> {
     if value.is_finite() { Ok(()) } else { Err(Fault::at(key, format!("expected a finite number, found {value}"))) }

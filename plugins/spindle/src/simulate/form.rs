@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::{Complex64, pipeline::error::Fault};
+use runout_core::{Complex64, fault::Fault};
 
 use super::{
     check,
@@ -40,7 +40,7 @@ const WAVELENGTHS: [f64; 2] = [1.0, 1.618];
 
 impl Form {
     /// `sections_mm` are the z of all sections that are measured; `orders` is the first order that cannot be sampled.
-    pub fn new(config: &FormConfig, seed: u64, sections_mm: &[f64], orders: usize) -> Result<Self, Fault> {
+    pub(crate) fn new(config: &FormConfig, seed: u64, sections_mm: &[f64], orders: usize) -> Result<Self, Fault> {
         check::not_negative("rms_um", config.rms_um)?;
         check::finite("slope", config.slope)?;
         check::positive("wavelength_mm", config.wavelength_mm)?;
@@ -109,7 +109,7 @@ impl Form {
     }
 
     /// Harmonics of the circle at z, in µm, from order 0.
-    pub fn at(&self, z_mm: f64) -> Vec<Complex64> {
+    pub(crate) fn at(&self, z_mm: f64) -> Vec<Complex64> {
         let mut harmonics = vec![Complex64::ZERO; self.orders()];
         for band in &self.bands {
             let turned = Complex64::cis(band.twist_rad_per_mm * z_mm);
@@ -121,7 +121,7 @@ impl Form {
     }
 
     /// The same at a z for each lane, into memory that is kept.
-    pub fn fill<const L: usize>(&self, z_mm: &[f64; L], harmonics: &mut Vec<Phasor<L>>) {
+    pub(crate) fn fill<const L: usize>(&self, z_mm: &[f64; L], harmonics: &mut Vec<Phasor<L>>) {
         harmonics.clear();
         harmonics.resize(self.orders(), Phasor::ZERO);
         for band in &self.bands {
@@ -137,12 +137,12 @@ impl Form {
     }
 
     /// Whether there are grooves.
-    pub fn is_grooved(&self) -> bool {
+    pub(crate) fn is_grooved(&self) -> bool {
         !self.grooves.is_empty()
     }
 
     /// How deep the grooves are where the part's angle is that of a number, in µm.
-    pub fn groove_um(&self, toward: Complex64) -> f64 {
+    pub(crate) fn groove_um(&self, toward: Complex64) -> f64 {
         let turn = toward.arg() / TAU;
         let here = self.grooves.iter().filter(|groove| (turn - groove.from).rem_euclid(1.0) <= groove.width);
         here.map(|groove| groove.depth_um).sum()
@@ -154,12 +154,12 @@ impl Form {
     }
 
     /// No |h| is larger, in µm.
-    pub fn bound_um(&self) -> f64 {
+    pub(crate) fn bound_um(&self) -> f64 {
         self.bands.iter().map(|band| series::bound(&band.harmonics)).sum()
     }
 
     /// No |dh/dα| is larger, in µm/rad.
-    pub fn slope_bound_um(&self) -> f64 {
+    pub(crate) fn slope_bound_um(&self) -> f64 {
         let values = self.bands.iter().flat_map(|band| band.harmonics.iter().enumerate());
         values.map(|(order, value)| order as f64 * value.norm()).sum()
     }

@@ -35,7 +35,7 @@ impl Reach {
     /// Displacement, form, and slope per rad may each be this part of the radius.
     const LARGEST: f64 = 0.1;
 
-    pub fn fits(&self, radius_um: f64) -> bool {
+    pub(crate) fn fits(&self, radius_um: f64) -> bool {
         [self.displacement, self.form, self.slope * Self::LARGEST]
             .iter()
             .all(|length| *length <= Self::LARGEST * radius_um)
@@ -43,7 +43,7 @@ impl Reach {
 
     /// Newton steps to the root. Their slope leaves h′ out, so that each leaves at most the part `q` of the error before;
     /// within [`fits`](Self::fits) q stays below 0.2. A fixed number makes samples independent of their neighbours.
-    pub fn steps(&self, radius_um: f64) -> usize {
+    pub(crate) fn steps(&self, radius_um: f64) -> usize {
         // |h′ · across / |q|²| and the curvature of |q|, where |q| has shrunk as far as it may.
         let q = (self.slope + 0.5 * self.displacement) * self.displacement / (0.8 * radius_um).powi(2);
         let mut error = self.form + self.displacement;

@@ -32,10 +32,8 @@ mod tests;
 
 use runout_core::{
     Result,
-    pipeline::{
-        error::Fault,
-        registry::{Context, StageConfig},
-    },
+    fault::Fault,
+    pipeline::{Context, StageConfig},
     rig::Rig,
     stage::{Simulation, Simulator},
 };
@@ -78,7 +76,8 @@ pub fn simulator(config: &SpindleConfig) -> std::result::Result<SpindleSimulator
         effect.apply(&mut world, index).map_err(|fault| fault.under_item("effect", index))?;
     }
     let world = world.completed()?;
-    let text = toml::to_string(config).map_err(|error| Fault::here(format!("the scenario cannot be told: {error}")))?;
+    let text = toml::to_string(config)
+        .map_err(|error| Fault::here(format!("the scenario cannot be written as text: {error}")))?;
     Ok(SpindleSimulator { world, scenario: format!("plugin = \"{}\"\n{text}", SpindleConfig::NAME) })
 }
 

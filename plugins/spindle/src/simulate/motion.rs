@@ -1,6 +1,6 @@
 //! Synchronous error motion of the spindle's axis.
 
-use runout_core::{Complex64, pipeline::error::Fault};
+use runout_core::{Complex64, fault::Fault};
 
 use super::{
     check,
@@ -20,7 +20,7 @@ pub(super) type Displacement<const L: usize> = [[f64; L]; 5];
 
 impl Motion {
     /// `orders` is the first order that cannot be sampled.
-    pub fn new(config: &MotionConfig, seed: u64, orders: usize) -> Result<Self, Fault> {
+    pub(crate) fn new(config: &MotionConfig, seed: u64, orders: usize) -> Result<Self, Fault> {
         check::finite("slope", config.slope)?;
         let rms = [
             ("x_rms_um", config.x_rms_um),
@@ -66,14 +66,14 @@ impl Motion {
     }
 
     /// At spindle angles Φ; `turn` is e^{iΦ}.
-    pub fn at<const L: usize>(&self, turn: &Phasor<L>) -> Displacement<L> {
+    pub(crate) fn at<const L: usize>(&self, turn: &Phasor<L>) -> Displacement<L> {
         let backwards = turn.conj();
         self.axes.each_ref().map(|axis| axis.as_slice().sum(&backwards))
     }
 
     /// What a separation can find of it: of order 1 only the part that turns against the spindle, since the part that
     /// turns with it is how the workpiece is clamped. Along the axis it finds all.
-    pub fn error_motion(&self, direction: f64) -> Self {
+    pub(crate) fn error_motion(&self, direction: f64) -> Self {
         let [mut x, mut y, mut tilt_x, mut tilt_y, z] = self.axes.clone();
         keep_counter_rotating(&mut x, &mut y, direction);
         // A tilt (εx, εy) displaces the axis at z by z·(εy, −εx).

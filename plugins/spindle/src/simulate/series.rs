@@ -14,7 +14,7 @@ pub(super) struct Phasor<const L: usize> {
 
 impl<const L: usize> Phasor<L> {
     /// e^{i·2π·turns}; exact to rounding while |turns| stays near 1.
-    pub fn of_turns(turns: &[f64; L]) -> Self {
+    pub(crate) fn of_turns(turns: &[f64; L]) -> Self {
         let mut phasor = Self::ZERO;
         for lane in 0..L {
             (phasor.im[lane], phasor.re[lane]) = (std::f64::consts::TAU * turns[lane]).sin_cos();
@@ -22,16 +22,16 @@ impl<const L: usize> Phasor<L> {
         phasor
     }
 
-    pub const ZERO: Self = Self { re: [0.0; L], im: [0.0; L] };
+    pub(crate) const ZERO: Self = Self { re: [0.0; L], im: [0.0; L] };
 
-    pub fn conj(mut self) -> Self {
+    pub(crate) fn conj(mut self) -> Self {
         for value in &mut self.im {
             *value = -*value;
         }
         self
     }
 
-    pub fn times(&self, factor: Complex64) -> Self {
+    pub(crate) fn times(&self, factor: Complex64) -> Self {
         let mut product = Self::ZERO;
         for lane in 0..L {
             product.re[lane] = self.re[lane] * factor.re - self.im[lane] * factor.im;

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 
 use super::{
     check,
@@ -51,7 +51,7 @@ const HAIR: f64 = 1e-9;
 const WOBBLES: usize = 6;
 
 impl Course {
-    pub fn new(config: &RecordingConfig) -> Result<Self, Fault> {
+    pub(crate) fn new(config: &RecordingConfig) -> Result<Self, Fault> {
         let within = |key: &str, value: usize, first: usize| {
             if (first..=MOST).contains(&value) {
                 Ok(value as f64)
@@ -80,7 +80,7 @@ impl Course {
     }
 
     /// In some setups, or in all.
-    pub fn add_ripple(&mut self, ripple: Ripple, setups: Option<Vec<usize>>) -> Result<(), Fault> {
+    pub(crate) fn add_ripple(&mut self, ripple: Ripple, setups: Option<Vec<usize>>) -> Result<(), Fault> {
         match setups {
             None => self.ripples.push(ripple),
             Some(setups) => self.in_setups.extend(setups.into_iter().map(|setup| (setup, ripple))),
@@ -100,12 +100,12 @@ impl Course {
     }
 
     /// Samples in the capture: those of the ramps last twice as long, and one more closes the last turn.
-    pub fn samples(&self) -> u64 {
+    pub(crate) fn samples(&self) -> u64 {
         (self.length() + self.start_up + self.run_down).round() as u64 + 1
     }
 
     /// One capture's course: wandering of the speed as chance has it.
-    pub fn spin(&self, seed: u64, setup: usize, station: usize) -> Spin {
+    pub(crate) fn spin(&self, seed: u64, setup: usize, station: usize) -> Spin {
         let mut course = self.clone();
         let in_setup = self.in_setups.iter().filter(|(place, _)| *place == setup);
         course.ripples.extend(in_setup.map(|(_, ripple)| *ripple));
@@ -164,7 +164,7 @@ impl Spin {
     /// The spindle's angle at a sample: whole turns since the first mark, and the rest in turns.
     ///
     /// Kept apart, so that the rest does not lose digits to the turns before it.
-    pub fn turns(&self, sample: u64) -> (f64, f64) {
+    pub(crate) fn turns(&self, sample: u64) -> (f64, f64) {
         let Course { samples_per_rev, margin, .. } = self.course;
         let path = self.path(sample as f64) - margin;
         let whole = (path / samples_per_rev).floor();
@@ -173,7 +173,7 @@ impl Spin {
     }
 
     /// Fractional sample positions of whole turns, as many as lie within the capture.
-    pub fn marks(&self) -> Vec<f64> {
+    pub(crate) fn marks(&self) -> Vec<f64> {
         let last = (self.course.samples() - 1) as f64;
         let marks = (0..=self.course.turns).map(|turn| self.mark(turn as f64));
         // Rounding may put the closing mark a hair behind the last sample.

@@ -36,7 +36,7 @@ pub(super) struct Slip {
 }
 
 impl Slip {
-    pub fn has_happened(&self, (whole, rest): (f64, f64)) -> bool {
+    pub(crate) fn has_happened(&self, (whole, rest): (f64, f64)) -> bool {
         self.after_turns.is_none_or(|turns| whole + rest >= turns)
     }
 }
@@ -51,12 +51,12 @@ pub(super) struct Acting {
 
 impl Acting {
     /// Those that happen in a setup.
-    pub fn all(strangers: &[Stranger], setup: usize) -> Vec<Self> {
+    pub(crate) fn all(strangers: &[Stranger], setup: usize) -> Vec<Self> {
         let here = strangers.iter().filter(|stranger| stranger.setups.get(setup).is_some_and(|here| *here));
         here.map(|stranger| Self { kind: stranger.kind, held_um: None }).collect()
     }
 
-    pub fn slip(&self) -> Option<Slip> {
+    pub(crate) fn slip(&self) -> Option<Slip> {
         match self.kind {
             Kind::Slip { slip } => Some(slip),
             _ => None,
@@ -64,7 +64,7 @@ impl Acting {
     }
 
     /// What is seen instead of `seen_um`, the spindle at `turns` (whole and rest), the part at e^{iα} under the sensor.
-    pub fn act(&mut self, seen_um: f64, turns: (f64, f64), toward: Complex64) -> f64 {
+    pub(crate) fn act(&mut self, seen_um: f64, turns: (f64, f64), toward: Complex64) -> f64 {
         match self.kind {
             Kind::Dent { depth_um, part_rad, width_rad } => {
                 let from_middle = (toward.arg() - part_rad + PI).rem_euclid(TAU) - PI;

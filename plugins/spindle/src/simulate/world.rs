@@ -2,8 +2,8 @@
 
 use runout_core::{
     Complex64,
+    fault::Fault,
     measurement::StationKey,
-    pipeline::error::Fault,
     rig::{Calibration, Rig, Sensor},
 };
 
@@ -89,7 +89,7 @@ const MOST_PARTS: usize = 4_096;
 
 impl World {
     /// Without effects.
-    pub fn new<E>(config: &Scenario<E>) -> Result<Self, Fault> {
+    pub(crate) fn new<E>(config: &Scenario<E>) -> Result<Self, Fault> {
         let rig = config.rig.clone().check().map_err(|fault| fault.under("rig"))?;
         if rig.sensors.len() > MOST_PARTS || rig.setups.len() > MOST_PARTS {
             return Err(Fault::at("rig", format!("more than {MOST_PARTS} sensors or setups cannot be simulated")));
@@ -171,7 +171,7 @@ impl World {
     }
 
     /// The world after the last change to it.
-    pub fn completed(mut self) -> Result<Self, Fault> {
+    pub(crate) fn completed(mut self) -> Result<Self, Fault> {
         let reach = self.reach();
         if self.geometry == Geometry::Exact && !reach.fits(self.radius_um) {
             let message = format!(
@@ -185,17 +185,17 @@ impl World {
     }
 
     /// The first order that the sampling cannot carry.
-    pub fn orders(&self) -> usize {
+    pub(crate) fn orders(&self) -> usize {
         self.samples_per_rev.div_ceil(2)
     }
 
     /// Where the clamping's offset is given: the first section of the first station, in mm.
-    pub fn clamping_z_mm(&self) -> f64 {
+    pub(crate) fn clamping_z_mm(&self) -> f64 {
         self.rig.section_z_mm(0) + self.stations.first().map_or(0.0, |station| station.z_mm)
     }
 
     /// The part's axis under a sensor, in the part's own coordinates, in µm.
-    pub fn clamped_at(&self, setup: &TrueSetup, sensor: &TrueSensor, z_mm: f64) -> Complex64 {
+    pub(crate) fn clamped_at(&self, setup: &TrueSetup, sensor: &TrueSensor, z_mm: f64) -> Complex64 {
         let Some(clamping) = setup.clamping.get(sensor.section) else { return Complex64::ZERO };
         clamping.offset_um + clamping.tilt_urad * (UM_PER_MM_URAD * (z_mm - self.clamping_z_mm()))
     }

@@ -3,13 +3,13 @@
 use runout_core::Complex64;
 
 /// Matrix (`[row][col]`) times vector.
-pub fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
+pub(crate) fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
     matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
 }
 
 /// A square matrix over the readings that is 0 from one setup to another.
 #[derive(Debug, Clone)]
-pub struct Blocks {
+pub(crate) struct Blocks {
     size: usize,
     /// `[setup][sensor][sensor]`.
     entries: Vec<Complex64>,
@@ -18,13 +18,13 @@ pub struct Blocks {
 impl Blocks {
     /// Of blocks with `size` rows each, `[setup][sensor][sensor]`.
     #[must_use]
-    pub fn new(size: usize, entries: Vec<Complex64>) -> Self {
+    pub(crate) fn new(size: usize, entries: Vec<Complex64>) -> Self {
         Self { size, entries }
     }
 
     /// 1 on the diagonal.
     #[must_use]
-    pub fn identity(size: usize, setups: usize) -> Self {
+    pub(crate) fn identity(size: usize, setups: usize) -> Self {
         let mut entries = vec![Complex64::ZERO; size * size * setups];
         for block in entries.chunks_exact_mut(size * size) {
             block.iter_mut().step_by(size + 1).for_each(|entry| *entry = Complex64::ONE);
@@ -34,13 +34,13 @@ impl Blocks {
 
     /// Rows of a block.
     #[must_use]
-    pub fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         self.size
     }
 
     /// `[setup][sensor][sensor]`.
     #[must_use]
-    pub fn entries(&self) -> &[Complex64] {
+    pub(crate) fn entries(&self) -> &[Complex64] {
         &self.entries
     }
 
@@ -50,7 +50,7 @@ impl Blocks {
 
     /// B·A for A, `[reading][column]`.
     #[must_use]
-    pub fn times(&self, matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
+    pub(crate) fn times(&self, matrix: &[Complex64], columns: usize) -> Vec<Complex64> {
         let mut product = vec![Complex64::ZERO; matrix.len()];
         let length = self.size * columns;
         let parts = matrix.chunks_exact(length).zip(product.chunks_exact_mut(length));
@@ -66,7 +66,7 @@ impl Blocks {
 
     /// M·B for M, `[row][reading]`.
     #[must_use]
-    pub fn after(&self, rows: &[Complex64]) -> Vec<Complex64> {
+    pub(crate) fn after(&self, rows: &[Complex64]) -> Vec<Complex64> {
         let readings = self.entries.len() / self.size;
         let mut product = vec![Complex64::ZERO; rows.len()];
         for (row, target) in rows.chunks_exact(readings).zip(product.chunks_exact_mut(readings)) {
@@ -82,7 +82,7 @@ impl Blocks {
 
     /// Each reading's column times a factor.
     #[must_use]
-    pub fn with_columns_scaled(mut self, factor: impl Fn(usize) -> Complex64) -> Self {
+    pub(crate) fn with_columns_scaled(mut self, factor: impl Fn(usize) -> Complex64) -> Self {
         let size = self.size;
         for (setup, block) in self.entries.chunks_exact_mut(size * size).enumerate() {
             for row in block.chunks_exact_mut(size) {
@@ -94,7 +94,7 @@ impl Blocks {
 }
 
 /// I − A·P, `[reading][reading]`.
-pub fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usize) -> Vec<Complex64> {
+pub(crate) fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usize) -> Vec<Complex64> {
     let width = operator.len() / count;
     let mut left = vec![Complex64::ZERO; count * count];
     for (row, (target, entries)) in left.chunks_exact_mut(count).zip(matrix.chunks_exact(width)).enumerate() {

@@ -15,7 +15,7 @@ use super::{
 /// The share of a residual's χ² that angles of the setups take away which are as well known as the readings say: the angles δ of
 /// least Σ|W·(r − Σ δₖ·sₖ)|²/f + Σ δₖ²/2σₖ², f the mean of |W·r|² that noise leaves of a complex degree of freedom. sₖ is what the fit
 /// leaves of −i·n·u, u the readings of setup k at order n. 0 where all angles are known.
-pub fn explained_share(
+pub(crate) fn explained_share(
     operators: &Operators,
     readings: &Readings,
     linear: &[Complex64],

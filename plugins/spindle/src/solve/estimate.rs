@@ -4,13 +4,13 @@ use runout_core::Complex64;
 
 /// The unknowns at all orders, motion at the sensors' mean z.
 #[derive(Debug, Clone)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     pub width: usize,
     /// First-order unknowns, as [`Layout::first_order_unknowns`] lists them.
     pub first: Vec<Complex64>,
     /// `[order][unknown]` from order 0; order 1 holds the motion that turns against the spindle.
     pub(super) values: Vec<Complex64>,
-    pub(super) told: Vec<bool>,
+    pub(super) observable: Vec<bool>,
     /// What form may be at lost orders, likewise; empty where none is lost.
     pub(super) likely: Vec<Complex64>,
     /// How far the last pass has moved the readings, rms.
@@ -18,17 +18,17 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// An unknown at an order, 0 where it cannot be told.
+    /// An unknown at an order, 0 where it is not observable.
     #[must_use]
-    pub fn told(&self, order: usize, unknown: usize) -> Complex64 {
+    pub(crate) fn observable_value(&self, order: usize, unknown: usize) -> Complex64 {
         let index = order * self.width + unknown;
-        if self.told[index] { self.values[index] } else { Complex64::ZERO }
+        if self.observable[index] { self.values[index] } else { Complex64::ZERO }
     }
 
     /// A form at an order; where it is lost, what it may be: for what exact geometry carries into other orders, and for no result.
     #[must_use]
-    pub fn likely_form(&self, order: usize, unknown: usize) -> Complex64 {
+    pub(crate) fn likely_form(&self, order: usize, unknown: usize) -> Complex64 {
         let index = order * self.width + unknown;
-        if self.told[index] { self.values[index] } else { self.likely.get(index).copied().unwrap_or_default() }
+        if self.observable[index] { self.values[index] } else { self.likely.get(index).copied().unwrap_or_default() }
     }
 }

@@ -19,7 +19,7 @@ use crate::layout::{Layout, View};
 const MOTION_ORDERS: usize = 256;
 
 /// Adds the covariance of what lost orders carry into others to that of the readings.
-pub fn widen(layout: &Layout, part_radius_mm: f64, readings: &mut Readings) {
+pub(crate) fn widen(layout: &Layout, part_radius_mm: f64, readings: &mut Readings) {
     if readings.covariance.is_none() && readings.scatter.is_none() {
         return;
     }

@@ -24,7 +24,7 @@ const SURELY_INDEPENDENT: f64 = 1e5;
 
 /// The linear solution of one order: unknowns = operator · readings.
 #[derive(Debug, Clone)]
-pub struct OrderOperator {
+pub(crate) struct OrderOperator {
     /// `[unknown][reading]`.
     pub operator: Vec<Complex64>,
     /// Independent columns of the layout's matrix.
@@ -33,7 +33,7 @@ pub struct OrderOperator {
 
 /// Linear solutions of all orders; entry 0 belongs to order 1 and its own unknowns.
 #[derive(Debug, Clone)]
-pub struct Operators {
+pub(crate) struct Operators {
     /// From order 1.
     pub orders: Vec<OrderOperator>,
     /// The equations of each order, from order 1.
@@ -45,7 +45,7 @@ pub struct Operators {
 impl Operators {
     /// Least squares for all orders to `max_order`, with W of each order where readings are weighted.
     #[must_use]
-    pub fn least_squares(layout: &Layout, max_order: usize, weights: Option<Vec<Blocks>>) -> Self {
+    pub(crate) fn least_squares(layout: &Layout, max_order: usize, weights: Option<Vec<Blocks>>) -> Self {
         let systems = layout.systems(max_order);
         let orders = match &weights {
             Some(weights) => weighted(layout, &systems, weights),
@@ -54,9 +54,9 @@ impl Operators {
         Self { orders, systems, weights }
     }
 
-    /// Whether each unknown can be told at an order from 1.
+    /// Whether each unknown is observable at an order from 1.
     #[must_use]
-    pub fn observable(&self, order: usize) -> &[bool] {
+    pub(crate) fn observable(&self, order: usize) -> &[bool] {
         &self.systems[order - 1].observable
     }
 }

@@ -18,7 +18,7 @@ use super::{
 
 /// Of all orders from 1, for readings with the covariance Σ, unknowns P·readings of the equations A, and weights W.
 #[derive(Debug, Clone, Default)]
-pub struct Propagation {
+pub(crate) struct Propagation {
     /// P·Σ·Pᴴ of each order, `[unknown][unknown]`, order 1 with its own unknowns.
     pub covariance: Vec<Vec<Complex64>>,
     /// Mean of |residual|² of each order: the trace of (I − A·P)·Σ·(I − A·P)ᴴ.
@@ -31,7 +31,7 @@ pub struct Propagation {
 impl Propagation {
     /// `None` where the readings' covariance is not known.
     #[must_use]
-    pub fn of(readings: &Readings, operators: &Operators) -> Option<Self> {
+    pub(crate) fn of(readings: &Readings, operators: &Operators) -> Option<Self> {
         let setups = readings.covariance.as_ref()?;
         let size = readings.count / setups.len().max(1);
         let block = size * size;

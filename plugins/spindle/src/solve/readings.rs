@@ -6,7 +6,7 @@ use crate::{layout::Layout, selection::Selection};
 
 /// Averaged readings of one station: Re Σ uₙ e^{−inΦ}, with their covariance.
 #[derive(Debug, Clone)]
-pub struct Readings {
+pub(crate) struct Readings {
     /// Number of readings: sensors times setups.
     pub count: usize,
     /// Highest order that all profiles hold.
@@ -34,7 +34,7 @@ pub struct Readings {
 
 /// Which scatter of the turns weights are taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scatter {
+pub(crate) enum Scatter {
     /// That of all turns: the closed loop takes drifts and lines out of it.
     OfAll,
     /// Where it is known, that without the neighbours which the covariance is taken from: then weights do not know its noise.
@@ -46,7 +46,7 @@ impl Readings {
     ///
     /// # Errors
     /// When a setup or a sensor of the rig is missing, or the profiles' angles differ.
-    pub fn gather(selection: &Selection, layout: &Layout, station: &Station, scatter: Scatter) -> Result<Self> {
+    pub(crate) fn gather(selection: &Selection, layout: &Layout, station: &Station, scatter: Scatter) -> Result<Self> {
         let object = || format!("station {}", station.name);
         let rig = &selection.rig;
         let sensors = rig.sensors.len();
@@ -107,7 +107,7 @@ impl Readings {
     }
 
     /// Adds to the covariance of the averages what tones near whole orders put into them.
-    pub fn add_near_tones(&mut self) {
+    pub(crate) fn add_near_tones(&mut self) {
         let sensors = self.count / self.turns.len().max(1);
         for (matrices, tones) in self.covariance.iter_mut().flatten().zip(&self.near_tones) {
             for (order, leak) in tones.iter().filter(|(order, _)| *order <= self.max_order) {
@@ -121,7 +121,7 @@ impl Readings {
 
     /// Whether angles of setups against each other are known to a part of a sample only.
     #[must_use]
-    pub fn has_uncertain_angles(&self) -> bool {
+    pub(crate) fn has_uncertain_angles(&self) -> bool {
         // The angle of one setup is what all angles are counted from.
         self.turns.len() > 1 && self.angle_std_rad.iter().any(|std_rad| *std_rad > 0.0)
     }
@@ -130,7 +130,7 @@ impl Readings {
     /// δ, order n is off by −i·n·δ·u, in all channels together.
     ///
     /// Weights do not have it: it repeats in every turn, and scatter does not show it.
-    pub fn add_angle_uncertainty(&mut self) {
+    pub(crate) fn add_angle_uncertainty(&mut self) {
         if !self.has_uncertain_angles() {
             return;
         }
@@ -150,7 +150,7 @@ impl Readings {
     }
 
     /// Leaves out the orders above `max_order`.
-    pub fn truncate(&mut self, max_order: usize) {
+    pub(crate) fn truncate(&mut self, max_order: usize) {
         if max_order >= self.max_order {
             return;
         }
@@ -164,7 +164,7 @@ impl Readings {
 
     /// The readings of one order.
     #[must_use]
-    pub fn order(&self, order: usize) -> &[Complex64] {
+    pub(crate) fn order(&self, order: usize) -> &[Complex64] {
         &self.mean[order * self.count..(order + 1) * self.count]
     }
 }

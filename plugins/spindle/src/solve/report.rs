@@ -13,7 +13,7 @@ use crate::layout::ToReference;
 impl Solver<'_> {
     /// The solution of a station at the spindle's reference, with its covariance.
     #[must_use]
-    pub fn report(
+    pub(crate) fn report(
         &self,
         station: &Station,
         operators: &Operators,

@@ -1,4 +1,4 @@
-//! What a solution leaves of the readings, beside what noise lets expect.
+//! What a solution leaves of the readings, beside what is expected from noise.
 
 use runout_core::{
     Complex64,
@@ -12,8 +12,8 @@ use super::{
     readings::Readings,
 };
 
-/// What the solution leaves of linear readings, `[order][reading]`, and what noise lets expect of that.
-pub fn residual(
+/// What the solution leaves of linear readings, `[order][reading]`, and what is expected of that from noise.
+pub(crate) fn residual(
     operators: &Operators,
     readings: &Readings,
     linear: &[Complex64],
@@ -22,7 +22,7 @@ pub fn residual(
     let count = readings.count;
     let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
     let mut orders: Option<[usize; 2]> = None;
-    // Weighted as the fit is; set against what the covariance lets expect of it.
+    // Weighted as the fit is; set against its value expected from the covariance.
     let (mut weighted, mut weighted_expected) = (0.0, 0.0);
     for (index, (OrderOperator { operator, rank }, system)) in
         operators.orders.iter().zip(&operators.systems).enumerate()
@@ -66,7 +66,7 @@ pub fn residual(
 }
 
 /// What the solution leaves of each of the linear readings `[order][reading]`, at the orders that are redundant.
-pub fn by_reading(operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Vec<ReadingResidual> {
+pub(crate) fn by_reading(operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Vec<ReadingResidual> {
     let count = readings.count;
     let of = |place: &usize| ReadingResidual { place: *place, harmonics: Vec::with_capacity(operators.orders.len()) };
     let mut found: Vec<_> = readings.places.iter().map(of).collect();

@@ -22,7 +22,7 @@ const SETTLED_UM: f64 = 1e-9;
 const ROUNDS: usize = 2;
 
 /// Computes what exact geometry adds to linear readings.
-pub struct SecondOrder<'a> {
+pub(crate) struct SecondOrder<'a> {
     layout: &'a Layout,
     radius_um: f64,
     turn: Fourier,
@@ -35,7 +35,7 @@ pub struct SecondOrder<'a> {
 }
 
 impl<'a> SecondOrder<'a> {
-    pub fn new(layout: &'a Layout, part_radius_mm: f64, samples_per_rev: usize) -> Self {
+    pub(crate) fn new(layout: &'a Layout, part_radius_mm: f64, samples_per_rev: usize) -> Self {
         let turns = (0..samples_per_rev).map(|step| step as f64 / samples_per_rev as f64);
         Self {
             layout,
@@ -49,12 +49,12 @@ impl<'a> SecondOrder<'a> {
     }
 
     /// Part angles where lines meet the profile at the last estimate, in rad, `[reading][angle]`.
-    pub fn met_rad(&self) -> &[f64] {
+    pub(crate) fn met_rad(&self) -> &[f64] {
         &self.met_rad
     }
 
     /// Writes the excess over the linear readings, coefficients of e^{−inΦ}, to `excess` (`[order][reading]`).
-    pub fn excess(&mut self, estimate: &Estimate, excess: &mut [Complex64]) {
+    pub(crate) fn excess(&mut self, estimate: &Estimate, excess: &mut [Complex64]) {
         let layout = self.layout;
         let count = layout.readings.len();
         let max_order = excess.len() / count - 1;
@@ -138,7 +138,7 @@ impl<'a> SecondOrder<'a> {
                 if order == 0 {
                     Complex64::ZERO
                 } else {
-                    estimate.told(order, unknown).conj() * layout.motion_sign(setup, order)
+                    estimate.observable_value(order, unknown).conj() * layout.motion_sign(setup, order)
                 }
             });
             let curve = self.turn.synthesise(harmonics);

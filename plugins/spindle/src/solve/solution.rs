@@ -48,7 +48,7 @@ const CANCELLING: f64 = 30.0;
 const UNSETTLED_UM: f64 = 5e-4;
 
 /// Solves one station.
-pub struct Solver<'a> {
+pub(crate) struct Solver<'a> {
     pub selection: &'a Selection,
     pub layout: &'a Layout,
     pub second_order: bool,
@@ -59,7 +59,7 @@ impl Solver<'_> {
     ///
     /// # Errors
     /// When the station's profiles do not fit the rig.
-    pub fn separate(
+    pub(crate) fn separate(
         &self,
         station: &Station,
         method: impl FnOnce(&Readings) -> Operators,
@@ -92,7 +92,7 @@ impl Solver<'_> {
         Ok((separation, readings))
     }
 
-    /// What a large eccentricity carries into orders that are told, of what is not: a surface that goes sideways by e turns
+    /// What a large eccentricity carries into orders that are observable, of what is not: a surface that goes sideways by e turns
     /// under the sensor by e/R, and order n is then seen by n·e/R of its amplitude one order lower and higher.
     fn carried(&self, readings: &Readings, separation: &Separation) -> Option<String> {
         let width = separation.unknowns.len();
@@ -106,13 +106,14 @@ impl Solver<'_> {
         let mut worst: f64 = 0.0;
         for (unknown, _) in self.layout.circles() {
             let at = |order: usize| order * width + unknown;
-            let told = |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
+            let observable =
+                |order: &usize| (2..=readings.max_order).contains(order) && separation.observable[at(*order)];
             for order in 2..=readings.max_order {
-                if !told(&order) {
+                if !observable(&order) {
                     continue;
                 }
                 let amplitude_um = separation.estimate[at(order)].norm();
-                for near in [order - 1, order + 1].iter().filter(|near| told(near)) {
+                for near in [order - 1, order + 1].iter().filter(|near| observable(near)) {
                     let ratio = 0.5 * order as f64 * share * amplitude_um / separation.variance[at(*near)].sqrt();
                     worst = worst.max(ratio);
                 }
@@ -128,7 +129,7 @@ impl Solver<'_> {
 
     /// Solves, adds what exact geometry and `beyond` add to linear readings at that solution, and solves again until it
     /// settles. Gives the solution and the linear readings, `[order][reading]`.
-    pub fn iterate(
+    pub(crate) fn iterate(
         &self,
         readings: &Readings,
         operators: &Operators,
@@ -223,7 +224,11 @@ impl Solver<'_> {
     ///
     /// # Errors
     /// When the station's profiles do not fit the rig.
-    pub fn sensitivity(&self, station: &Station, method: impl FnOnce(&Readings) -> Operators) -> Result<Sensitivity> {
+    pub(crate) fn sensitivity(
+        &self,
+        station: &Station,
+        method: impl FnOnce(&Readings) -> Operators,
+    ) -> Result<Sensitivity> {
         let mut readings = Readings::gather(self.selection, self.layout, station, Scatter::Beside)?;
         weights::smooth_by_order(&mut readings);
         let operators = method(&readings);
@@ -247,11 +252,11 @@ impl Solver<'_> {
     fn estimate(&self, operators: &Operators, readings: &[Complex64], max_order: usize) -> Estimate {
         let (width, count) = (self.layout.unknowns.len(), self.layout.readings.len());
         let mut values = vec![Complex64::ZERO; (max_order + 1) * width];
-        let mut told = vec![true; (max_order + 1) * width];
+        let mut observable = vec![true; (max_order + 1) * width];
         let mut first = Vec::new();
         for order in 1..=max_order {
             let solution = apply(&operators.orders[order - 1].operator, &readings[order * count..(order + 1) * count]);
-            told[order * width..(order + 1) * width].copy_from_slice(operators.observable(order));
+            observable[order * width..(order + 1) * width].copy_from_slice(operators.observable(order));
             if order == 1 {
                 let motion = self.first_order_motion(&solution);
                 values[width..2 * width].copy_from_slice(&motion);
@@ -264,25 +269,25 @@ impl Solver<'_> {
                 let most = CANCELLING * read.map(|reading| reading.norm()).fold(0.0, f64::max);
                 let cancels = |(quantity, value): (&Quantity, &Complex64)| !quantity.is_tilt() && value.norm() > most;
                 if self.layout.unknowns.iter().zip(&solution).any(cancels) {
-                    told[order * width..(order + 1) * width].fill(false);
+                    observable[order * width..(order + 1) * width].fill(false);
                 }
             }
         }
-        let likely = self.likely_forms(&values, &told, readings, max_order);
-        Estimate { width, first, values, told, likely, moved_um: 0.0 }
+        let likely = self.likely_forms(&values, &observable, readings, max_order);
+        Estimate { width, first, values, observable, likely, moved_um: 0.0 }
     }
 
     /// Form at lost orders: what the section's readings have in common, less the share that motion has at the orders beside it.
     fn likely_forms(
         &self,
         values: &[Complex64],
-        told: &[bool],
+        observable: &[bool],
         readings: &[Complex64],
         max_order: usize,
     ) -> Vec<Complex64> {
         let (layout, count) = (self.layout, self.layout.readings.len());
         let width = layout.unknowns.len();
-        let is_lost = |order: usize, form: usize| !told[order * width + form];
+        let is_lost = |order: usize, form: usize| !observable[order * width + form];
         let lost: Vec<(usize, usize)> =
             (2..=max_order).flat_map(|order| layout.circles().map(move |(form, _)| (order, form))).collect();
         let lost: Vec<(usize, usize)> = lost.into_iter().filter(|(order, form)| is_lost(*order, *form)).collect();
@@ -344,7 +349,7 @@ impl Solver<'_> {
     }
 
     /// The operator of an order, with the unknowns of orders from 2 as rows.
-    pub fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
+    pub(crate) fn order_operator(&self, operators: &Operators, order: usize, count: usize) -> Vec<Complex64> {
         self.named_alike(&operators.orders[order - 1].operator, order, count)
     }
 

@@ -22,7 +22,7 @@ const SAMPLES_A_CHANNEL: f64 = 10.0;
 
 /// Replaces each order's scatter by the mean over its neighbours, and its covariance by the mean over
 /// [those beside it](profile::smooth_by_order).
-pub fn smooth_by_order(readings: &mut Readings) {
+pub(crate) fn smooth_by_order(readings: &mut Readings) {
     let sensors = readings.count / readings.turns.len().max(1);
     let both = [
         (&mut readings.scatter, profile::smooth as fn(&mut [Complex64], usize)),
@@ -40,7 +40,7 @@ pub fn smooth_by_order(readings: &mut Readings) {
 ///
 /// `None` where there is no scatter to weigh by (one turn, or turns that are all alike).
 #[must_use]
-pub fn whitening(readings: &Readings) -> Option<Vec<Blocks>> {
+pub(crate) fn whitening(readings: &Readings) -> Option<Vec<Blocks>> {
     let setups = readings.scatter.as_ref()?;
     let sensors = readings.count / setups.len().max(1);
     let block = sensors * sensors;

@@ -7,7 +7,7 @@ use std::path::Path;
 use runout_core::{
     inspection::Inspection,
     measurement::{Recording, SampleStream, StationTruth},
-    pipeline::registry::{Context, StageConfig},
+    pipeline::{Context, StageConfig},
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     stage::{AverageRequest, Preprocessor, Station},
 };

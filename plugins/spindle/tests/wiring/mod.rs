@@ -13,7 +13,7 @@ use runout_spindle::{
     effects,
     layout::Layout,
     selection::Selection,
-    separators::harmonic_least_squares::{HarmonicLeastSquares, Weighting},
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::SpindleConfig,
 };
 

@@ -6,8 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use runout_core::{
-    evaluate::straightness::about_lsli_um,
     points::{Column, Points, Trace},
+    standards::straightness::about_lsli_um,
 };
 
 /// Waves: amplitude in µm, length in mm, phase in rad.

@@ -5,7 +5,8 @@
 use std::f64::consts::TAU;
 
 use runout_core::{
-    stage::{NamedValue, Outcome},
+    stage::Outcome,
+    summary::NamedValue,
     table::{ArrayRef, RecordBatch},
 };
 use runout_touch_probe::{

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Height maps.
-pub const DOMAIN: Domain = Domain { name: "fly-cutting", draw };
+pub(crate) const DOMAIN: Domain = Domain { name: "fly-cutting", draw };
 
 /// Where a surface is measured.
 struct Layout {

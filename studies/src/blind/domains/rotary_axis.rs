@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// R-tests.
-pub const DOMAIN: Domain = Domain { name: "rotary-axis", draw };
+pub(crate) const DOMAIN: Domain = Domain { name: "rotary-axis", draw };
 
 /// Places of the balls along an axis' own frame, in mm: two across, one along.
 struct Layout {

@@ -1,6 +1,6 @@
 //! Machines whose error over the travel is measured, drawn by chance.
 
-use runout_core::{Error, Result, pipeline::registry::Context};
+use runout_core::{Error, Result, pipeline::Context};
 use runout_spatial_error::{
     Query, SpatialErrorConfig,
     simulate::{Layout, Scenario, SimulatedEffect},
@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Readings of a tracker over the travel.
-pub const DOMAIN: Domain = Domain { name: "spatial-error", draw };
+pub(crate) const DOMAIN: Domain = Domain { name: "spatial-error", draw };
 
 const EFFECTS: [&str; 6] = ["scale", "squareness", "positioning", "straightness", "angular", "thermal-drift"];
 const STRANGERS: [&str; 2] = ["step", "displaced-box"];

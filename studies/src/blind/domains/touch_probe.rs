@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Touch-trigger probes.
-pub const DOMAIN: Domain = Domain { name: "touch-probe", draw };
+pub(crate) const DOMAIN: Domain = Domain { name: "touch-probe", draw };
 
 /// How ring and probe are turned, in degrees.
 struct Layout {

@@ -6,7 +6,8 @@ use runout_core::{
         closed_loop::Settings,
         diagnosis::{Added, Diagnosis, Verdict},
     },
-    stage::{NamedValue, PointModel},
+    stage::PointModel,
+    summary::NamedValue,
 };
 
 use super::{Campaign, Planted, True};

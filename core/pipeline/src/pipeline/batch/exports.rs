@@ -1,5 +1,6 @@
 //! The exporters of a batch: what `[[export]]` names, below the folder of the data set.
 
+use runout_error::fault::Fault;
 use std::path::PathBuf;
 
 use toml::{Spanned, de::DeValue};
@@ -9,7 +10,6 @@ use crate::{
     atomic_file::resolved,
     pipeline::{
         document::{self, Sources, Table},
-        error::Fault,
         registry::{Context, Registry},
     },
     stage::{Exporter, Takes},

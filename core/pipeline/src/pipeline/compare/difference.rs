@@ -27,7 +27,7 @@ pub(super) fn quantities(
     scatter: &Scatter,
 ) -> Vec<QuantityComparison> {
     // Values stand side by side in one plane: that of the first method that cannot move to another.
-    let fixed = estimates.iter().find(|one| one.tells_motion() && !one.tells_tilt());
+    let fixed = estimates.iter().find(|one| one.has_motion() && !one.tells_tilt());
     let plane_mm = fixed.or(estimates.first()).map_or(0.0, |one| one.motion_z_mm);
     let estimates: Vec<Estimates> =
         estimates.into_iter().map(|one| one.moved_to(plane_mm, scatter).unwrap_or(one)).collect();
@@ -86,7 +86,8 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
         Quantity::Form(section) => Some(section),
         _ => None,
     };
-    let told: Vec<Option<(Complex64, f64)>> = (1..=one.max_order()).map(|order| one.told(order, unknown)).collect();
+    let told: Vec<Option<(Complex64, f64)>> =
+        (1..=one.max_order()).map(|order| one.observable_value(order, unknown)).collect();
     let counted = || told.iter().skip(first_order(quantity) - 1).flatten();
     let ront = |section: usize| result.values.get(section)?.iter().find(|value| value.symbol == "RONt");
     Some(MethodValue {
@@ -122,8 +123,10 @@ fn difference(name: &str, quantity: Quantity, pair: [&Estimates; 2], scatter: &S
         } else if let Some(other) = pair[1].moved_to(planes[0], scatter) {
             pair[1] = moved.insert(other);
         } else {
-            let reason =
-                format!("told at z = {} mm and at z = {} mm, and neither method tells tilt", planes[0], planes[1]);
+            let reason = format!(
+                "given at z = {} mm and at z = {} mm, and tilt is observable by neither method",
+                planes[0], planes[1]
+            );
             return Some(Difference { method: name.to_owned(), not_compared: Some(reason), ..Difference::default() });
         }
     }
@@ -134,7 +137,7 @@ fn difference(name: &str, quantity: Quantity, pair: [&Estimates; 2], scatter: &S
 fn compared(quantity: Quantity, pair: [&Estimates; 2], unknowns: [usize; 2], scatter: &Scatter) -> Difference {
     let max_order = pair[0].max_order().min(pair[1].max_order());
     let told = |order: usize| {
-        let both = Some((pair[0].told(order, unknowns[0])?, pair[1].told(order, unknowns[1])?));
+        let both = Some((pair[0].observable_value(order, unknowns[0])?, pair[1].observable_value(order, unknowns[1])?));
         both.filter(|_| order >= first_order(quantity))
     };
     let size = rms((1..=max_order).filter_map(told).map(|((a, _), (b, _))| a.norm_sqr().max(b.norm_sqr())).sum());

@@ -17,7 +17,7 @@ pub(super) struct Scatter {
 }
 
 impl Scatter {
-    pub fn of(station: &Station) -> Self {
+    pub(crate) fn of(station: &Station) -> Self {
         let capture = |profile: &Profile| {
             let channels = profile.channels();
             let mut covariance = profile.covariance.clone();
@@ -30,7 +30,7 @@ impl Scatter {
     }
 
     /// row · Σ · rowᴴ at an order; NaN where a reading that counts has no covariance.
-    pub fn variance(&self, order: usize, row: &[Complex64]) -> f64 {
+    pub(crate) fn variance(&self, order: usize, row: &[Complex64]) -> f64 {
         let mut rest = row;
         let mut sum = 0.0;
         for (channels, covariance) in &self.captures {
@@ -55,61 +55,61 @@ impl Scatter {
 #[derive(Clone)]
 pub(super) struct Estimates {
     pub unknowns: Vec<Quantity>,
-    /// Where x and y are told.
+    /// Where x and y are observable.
     pub motion_z_mm: f64,
     /// `[order][unknown]`, NaN where lost.
     values: Vec<Complex64>,
     variance: Vec<f64>,
-    told: Vec<bool>,
+    observable: Vec<bool>,
     sensitivity: Sensitivity,
 }
 
 impl Estimates {
-    pub fn new(separation: &Separation, sensitivity: Sensitivity) -> Self {
+    pub(crate) fn new(separation: &Separation, sensitivity: Sensitivity) -> Self {
         Self {
             unknowns: separation.unknowns.clone(),
             motion_z_mm: separation.motion_z_mm,
             values: separation.estimate.clone(),
             variance: separation.variance.clone(),
-            told: separation.observable.clone(),
+            observable: separation.observable.clone(),
             sensitivity,
         }
     }
 
-    pub fn max_order(&self) -> usize {
+    pub(crate) fn max_order(&self) -> usize {
         (self.values.len() / self.unknowns.len().max(1)).saturating_sub(1)
     }
 
-    pub fn position(&self, quantity: Quantity) -> Option<usize> {
+    pub(crate) fn position(&self, quantity: Quantity) -> Option<usize> {
         self.unknowns.iter().position(|unknown| *unknown == quantity)
     }
 
-    /// The estimate and its variance, where the order is told.
-    pub fn told(&self, order: usize, unknown: usize) -> Option<(Complex64, f64)> {
+    /// The estimate and its variance, where the order is observable.
+    pub(crate) fn observable_value(&self, order: usize, unknown: usize) -> Option<(Complex64, f64)> {
         let index = order * self.unknowns.len() + unknown;
-        (*self.told.get(index)?).then(|| (self.values[index], self.variance[index]))
+        (*self.observable.get(index)?).then(|| (self.values[index], self.variance[index]))
     }
 
-    pub fn row(&self, order: usize, unknown: usize) -> &[Complex64] {
+    pub(crate) fn row(&self, order: usize, unknown: usize) -> &[Complex64] {
         let start = (order * self.unknowns.len() + unknown) * self.sensitivity.readings;
         &self.sensitivity.operator[start..start + self.sensitivity.readings]
     }
 
-    pub fn tells_motion(&self) -> bool {
+    pub(crate) fn has_motion(&self) -> bool {
         self.unknowns.iter().any(|unknown| !unknown.is_form())
     }
 
-    pub fn tells_tilt(&self) -> bool {
+    pub(crate) fn tells_tilt(&self) -> bool {
         self.unknowns.iter().any(|unknown| unknown.is_tilt())
     }
 
-    pub fn in_plane(&self, z_mm: f64) -> bool {
+    pub(crate) fn in_plane(&self, z_mm: f64) -> bool {
         (self.motion_z_mm - z_mm).abs() <= SAME_PLANE_MM
     }
 
     /// The same with x and y at another z: x(z) = X + z·E_y, y(z) = Y − z·E_x; lost where the tilt is. `None` where
-    /// no tilt is told.
-    pub fn moved_to(&self, z_mm: f64, scatter: &Scatter) -> Option<Self> {
+    /// no tilt is observable.
+    pub(crate) fn moved_to(&self, z_mm: f64, scatter: &Scatter) -> Option<Self> {
         if self.in_plane(z_mm) {
             return Some(self.clone());
         }
@@ -124,9 +124,9 @@ impl Estimates {
             let (tilt, lever) = (self.position(tilt), factor * distance);
             for order in 0..=self.max_order() {
                 let index = order * width + shift;
-                let turned = tilt.and_then(|tilt| Some((self.told(order, tilt)?.0, self.row(order, tilt))));
-                let (Some((value, row)), true) = (turned, self.told[index]) else {
-                    moved.told[index] = false;
+                let turned = tilt.and_then(|tilt| Some((self.observable_value(order, tilt)?.0, self.row(order, tilt))));
+                let (Some((value, row)), true) = (turned, self.observable[index]) else {
+                    moved.observable[index] = false;
                     continue;
                 };
                 moved.values[index] += value * lever;

@@ -12,6 +12,7 @@ mod methods;
 mod points;
 mod report;
 
+use runout_error::fault::Fault;
 use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
@@ -27,7 +28,6 @@ pub use report::{
 use super::{
     Pipeline, Registry,
     config::{Route, exports::spare_inputs},
-    error::Fault,
     evaluate::Evaluate,
     observer::Observer,
     record_reader::{RecordReader, separate},

@@ -3,6 +3,7 @@
 //! E_n = |a − b| / (2·√(u_a² + u_b²)) (ISO 13528:2022, 9.7, with expanded uncertainties of k = 2). The methods share readings: the
 //! difference scatters less than independent results would, and scatter alone keeps E_n below 1 all the more.
 
+use runout_error::fault::Fault;
 use std::{collections::BTreeSet, path::PathBuf};
 
 use super::{
@@ -15,13 +16,12 @@ use crate::{
         Pipeline, Registry,
         config::{Route, exports::spare_inputs},
         document::{Document, Sources},
-        error::Fault,
         evaluate::Evaluated,
         registry::Context,
     },
     points::PointColumn,
-    stage::{NamedValue, Outcome, PointSeparator, Request, Source},
-    summary::LostOrders,
+    stage::{Outcome, PointSeparator, Request, Source},
+    summary::{LostOrders, NamedValue},
 };
 use runout_error::{Error, Result};
 use runout_table::{Array, Float64Array, TableRows};

@@ -39,7 +39,7 @@ pub struct Comparison {
     pub warnings: Vec<String>,
 }
 
-/// What a method can tell with the rig.
+/// What is observable by a method with the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[non_exhaustive]
 pub struct MethodSummary {
@@ -47,7 +47,7 @@ pub struct MethodSummary {
     pub method: String,
     /// Ids of the sensors and setups that it does not use.
     pub unused: Vec<String>,
-    /// Orders at which one of its unknowns cannot be told.
+    /// Orders at which one of its unknowns is not observable.
     pub lost_orders: LostOrders,
     /// What the user should know.
     pub notes: Vec<String>,
@@ -67,7 +67,7 @@ pub struct StationComparison {
 }
 
 impl StationComparison {
-    /// The same without what is told order by order.
+    /// The same without what is given order by order.
     #[must_use]
     pub fn without_orders(mut self) -> Self {
         for quantity in &mut self.quantities {
@@ -78,7 +78,7 @@ impl StationComparison {
     }
 }
 
-/// One unknown, by every method that tells it.
+/// One unknown, by every method by which it is observable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct QuantityComparison {
     /// "form", "x", "y", "tilt_x", "tilt_y".
@@ -101,15 +101,15 @@ pub struct MethodValue {
     /// Place of the section, or of the plane whose displacement x and y are, in mm; null for tilt. Methods that tell
     /// tilt give x and y in the plane of the first method that does not.
     pub z_mm: Option<f64>,
-    /// Root mean square over the angles, of the orders that are told.
+    /// Root mean square over the angles, of the observable orders.
     pub rms: f64,
     /// Standard uncertainty at any one angle, from the covariance of the averages; null without one.
     pub std: Option<f64>,
     /// Peak-to-valley roundness deviation about the least-squares circle, of a form, in µm.
     pub ront_um: Option<f64>,
-    /// True error of a form (root mean square over orders from 2 that are told), where the recording carries the truth.
+    /// True error of a form (root mean square over observable orders from 2), where the recording carries the truth.
     pub truth_rms_error_um: Option<f64>,
-    /// Orders that cannot be told.
+    /// Orders that are not observable.
     pub lost_orders: Vec<usize>,
     /// Order by order.
     pub harmonics: Harmonics,
@@ -135,11 +135,11 @@ pub struct Difference {
     pub not_compared: Option<String>,
     /// Plane in which x and y were compared, in mm.
     pub z_mm: Option<f64>,
-    /// How many orders both tell.
+    /// How many orders are observable by both.
     pub orders_compared: usize,
-    /// Root mean square of the difference over the angles, of the orders that both tell.
+    /// Root mean square of the difference over the angles, of the orders that are observable by both.
     pub rms: Option<f64>,
-    /// What the covariance of the averages lets expect of it, from the joint covariance; null without one.
+    /// Its value expected from the covariance of the averages, from the joint covariance; null without one.
     pub expected_rms: Option<f64>,
     /// Share of the orders compared with E_n ≤ 1: 0.982 is what scatter alone gives. Null without a covariance.
     pub share_within: Option<f64>,
@@ -159,7 +159,7 @@ pub struct Worst {
     pub e_n: f64,
 }
 
-/// Differences by order from 1; null where one of the two cannot tell the order.
+/// Differences by order from 1; null where the order is not observable by one of the two.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DifferenceOrders {
     /// |c of the method − c of the reference|.

@@ -21,7 +21,7 @@ pub struct Candidate {
 pub struct Method {
     /// Its plugin's name, with a number where there are several.
     pub name: String,
-    /// What it can tell.
+    /// What is observable by it.
     pub assessment: Assessment,
     /// Profiles to form and motion.
     pub separator: Box<dyn StationSeparator>,

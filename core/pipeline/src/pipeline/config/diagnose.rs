@@ -16,7 +16,7 @@ use runout_error::fault::{Fault, known_names};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct DiagnoseConfig {
+pub(crate) struct DiagnoseConfig {
     /// "all", or a list of effect ids.
     #[serde(default)]
     pub effects: Effects,
@@ -47,7 +47,7 @@ const MEMORY_GB: f64 = 4.0;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(untagged)]
 #[non_exhaustive]
-pub enum Effects {
+pub(crate) enum Effects {
     /// "all".
     Word(AllEffects),
     /// Ids.
@@ -58,7 +58,7 @@ pub enum Effects {
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum AllEffects {
+pub(crate) enum AllEffects {
     /// Every effect that the toolkit knows.
     All,
 }
@@ -98,7 +98,7 @@ pub struct Diagnose {
     pub path: Option<PathBuf>,
     /// Memory that the loop may take, in GB.
     pub memory_gb: f64,
-    /// Where the corrected rig goes, where it is asked for: a file of TOML that can stand for `[rig]`.
+    /// Where the corrected rig goes, where it is asked for: a file of TOML that can replace `[rig]`.
     pub write_rig: Option<PathBuf>,
 }
 

@@ -1,5 +1,6 @@
 //! The files that a pipeline writes: exporters of `run` and of `diagnose`, none of which writes over another file.
 
+use runout_error::fault::Fault;
 use std::path::{Path, PathBuf};
 
 use toml::{Spanned, de::DeValue};
@@ -9,7 +10,6 @@ use crate::{
     atomic_file::resolved,
     pipeline::{
         document::{self, Sources, Table},
-        error::Fault,
         registry::{Context, Registry},
     },
     stage::{Exporter, Takes},
@@ -77,7 +77,7 @@ pub(crate) struct Exporting<'a> {
 
 impl Exporting<'_> {
     /// The exporters, none of which writes over what is read or what another file is for.
-    pub fn exports(&self, tables: &[Table], sources: &Sources) -> Result<Exports, Fault> {
+    pub(crate) fn exports(&self, tables: &[Table], sources: &Sources) -> Result<Exports, Fault> {
         let Self { registry, context, diagnose, .. } = self;
         let mut exports = Exports::default();
         let files = sources.files().map(|file| (resolved(file), "read as configuration")).collect();

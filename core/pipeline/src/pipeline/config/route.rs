@@ -3,7 +3,6 @@
 use crate::{
     pipeline::{
         document::{self, Table, table},
-        error::Fault,
         registry::Registry,
         tables::{self, StationTables},
     },
@@ -14,6 +13,7 @@ use crate::{
     },
 };
 use runout_closed_loop::Effect;
+use runout_error::fault::Fault;
 use runout_table::TableSpec;
 use runout_turning::{
     rig::Rig,
@@ -128,7 +128,7 @@ pub(super) fn points(separator: Separator, separate_table: &Table, root: &Table)
     }
 }
 
-/// The route of recorded turns, and what its separator can tell.
+/// The route of recorded turns, and what is observable by its separator.
 pub(super) fn turns(
     preprocessors: Vec<(Preprocessor, Table)>,
     separator: Separator,

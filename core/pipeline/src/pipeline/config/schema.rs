@@ -70,7 +70,7 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
     })
 }
 
-/// Schema of a stage's table: one of the plugins, told apart by `plugin`.
+/// Schema of a stage's table: one of the plugins, distinguished by `plugin`.
 #[must_use]
 pub fn choice<S>(catalogue: &Catalogue<S>) -> Value {
     let one = |plugin: &Plugin<S>| {

@@ -1,4 +1,4 @@
-//! The rig that declares what a diagnosis found, as a file that can stand for `[rig]`.
+//! The rig that declares what a diagnosis found, as a file that can replace `[rig]`.
 
 use std::{
     fmt::Write,

@@ -1,5 +1,6 @@
 //! Tables that know their places: read into types, with faults that point into the text.
 
+use runout_error::fault::{Fault, Place, Step, known_names};
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
@@ -8,10 +9,7 @@ use toml::{
     de::{DeTable, DeValue, ValueDeserializer},
 };
 
-use crate::pipeline::{
-    error::{Fault, Place, Step, known_names},
-    pinpoint::pinpoint,
-};
+use crate::pipeline::pinpoint::pinpoint;
 
 /// A table whose every key and value knows its place.
 pub type Table<'a> = Spanned<DeTable<'a>>;

@@ -2,8 +2,8 @@
 
 use super::{Evaluate, Group, open_profile, plane_map};
 use crate::{
-    stage::{Evaluable, EvaluableKind, NamedValue},
-    summary::PlacedValue,
+    stage::{Evaluable, EvaluableKind},
+    summary::{NamedValue, PlacedValue},
 };
 use runout_error::Result;
 use runout_standards::Value;

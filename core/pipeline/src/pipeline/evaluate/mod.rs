@@ -19,10 +19,7 @@ mod texture;
 mod wall;
 
 pub(super) use areal::add_areal;
-pub use config::{
-    ArealConfig, ArealFilter, Evaluate, EvaluateConfig, FacePlaceConfig, FormRemoval, Group, Groups, Propagation,
-    TextureConfig,
-};
+pub(crate) use config::{ArealFilter, Evaluate, EvaluateConfig, FormRemoval, Group};
 pub(super) use evaluables::Evaluated;
 pub(super) use generatrix::add_generatrices;
 pub(super) use limit::decide;

@@ -21,7 +21,7 @@ pub(super) struct Content {
 }
 
 impl Content {
-    pub fn note(&mut self, result: &StationResult) {
+    pub(crate) fn note(&mut self, result: &StationResult) {
         let separation = &result.separation;
         let highest = separation.max_order();
         for (unknown, quantity) in separation.unknowns.iter().enumerate() {
@@ -39,7 +39,7 @@ impl Content {
         self.highest_on_angles = self.highest_on_angles.max(highest.min(fourier::max_order(result.angles)));
     }
 
-    pub fn about(&self, summary: &Summary) -> About {
+    pub(crate) fn about(&self, summary: &Summary) -> About {
         let lowest = usize::from(!self.level_known);
         let lost_form: BTreeSet<_> = self.lost_form.iter().chain(&summary.lost_orders.form).collect();
         let lost_motion: BTreeSet<_> = self.lost_motion.iter().chain(&summary.lost_orders.motion).collect();

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::{stage::NamedValue, summary::Summary};
+use crate::summary::{NamedValue, Summary};
 use runout_closed_loop::diagnosis::Correction;
 use runout_error::Result;
 use runout_standards::{Value, uncertainty::Uncertainty};
@@ -107,7 +107,7 @@ pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
 
 /// The table of a domain's own values; `of_form` where the result has form, whose values are in the table `values`.
 #[must_use]
-pub fn named_values(of_form: bool) -> TableSpec {
+pub(crate) fn named_values(of_form: bool) -> TableSpec {
     let interval = |name: &str, about: &str| {
         ColumnSpec::number(name, "the column unit", format!("{about}; null where none is stated")).or_null()
     };
@@ -137,7 +137,7 @@ pub fn named_values(of_form: bool) -> TableSpec {
 ///
 /// # Errors
 /// Never in practice: the columns are of one length.
-pub fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRows> {
+pub(crate) fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRows> {
     let spec = named_values(of_form);
     let rows = spec.rows(vec![
         texts(values.iter().map(|value| &value.symbol)),
@@ -157,7 +157,7 @@ pub fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRow
 
 /// The table of the effects that a result is corrected for.
 #[must_use]
-pub fn corrections() -> TableSpec {
+pub(crate) fn corrections() -> TableSpec {
     TableSpec::new(
         "corrections",
         "effects that the results are corrected for, one row a parameter",
@@ -180,7 +180,7 @@ pub fn corrections() -> TableSpec {
 ///
 /// # Errors
 /// Never in practice: the columns are of one length.
-pub fn correction_rows(effects: &[Correction]) -> Result<Option<TableRows>> {
+pub(crate) fn correction_rows(effects: &[Correction]) -> Result<Option<TableRows>> {
     if effects.is_empty() {
         return Ok(None);
     }

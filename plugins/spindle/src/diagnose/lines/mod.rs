@@ -28,7 +28,7 @@ const IN_ALL: f64 = 0.5;
 
 /// A line, and what it does to the averages.
 #[derive(Debug, Clone)]
-pub struct Line {
+pub(crate) struct Line {
     pub(super) order: f64,
     pub(super) order_std: f64,
     pub(super) amplitude_um: f64,
@@ -61,14 +61,14 @@ pub(super) struct OfSensor {
 impl Line {
     /// The first of the sensors that it is of, or the axis, and χ² of the turns fitted that it explains there, beyond what its
     /// parameters would of noise.
-    pub fn row(&self) -> (Option<usize>, f64) {
+    pub(crate) fn row(&self) -> (Option<usize>, f64) {
         let expected = self.expected / self.sensors.len().max(1) as f64;
         let beyond = self.of().map(|sensor| self.sensors[sensor].explained - expected).sum::<f64>();
         (self.target(), beyond.max(0.0))
     }
 
     /// χ² of the turns that are held out, without it and with it.
-    pub fn held_out(&self) -> [f64; 2] {
+    pub(crate) fn held_out(&self) -> [f64; 2] {
         [0, 1].map(|with| self.of().map(|sensor| self.sensors[sensor].held_out[with]).sum())
     }
 
@@ -89,12 +89,12 @@ impl Line {
     }
 
     /// Its leak into the mean over some turns.
-    pub fn leak(&self, part: Part) -> &[Complex64] {
+    pub(crate) fn leak(&self, part: Part) -> &[Complex64] {
         &self.leak[part as usize]
     }
 
     /// Takes a leak out of the readings of the sensors that have the line.
-    pub fn take_out(&self, leak: &[Complex64], layout: &Layout, mean: &mut [Complex64]) {
+    pub(crate) fn take_out(&self, leak: &[Complex64], layout: &Layout, mean: &mut [Complex64]) {
         let count = layout.readings.len();
         for (index, reading) in layout.readings.iter().enumerate() {
             if self.of().any(|sensor| sensor == reading.sensor) {
@@ -115,7 +115,7 @@ impl Line {
 }
 
 /// The lines of a station, the largest first.
-pub fn lines(selection: &Selection, layout: &Layout, station: &Station, orders: usize) -> Vec<Line> {
+pub(crate) fn lines(selection: &Selection, layout: &Layout, station: &Station, orders: usize) -> Vec<Line> {
     let capture = |id: &usize| {
         let profile = station.profiles.iter().find(|profile| profile.setup == *id)?;
         let split = profile.split.as_ref()?;

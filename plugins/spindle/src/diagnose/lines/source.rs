@@ -17,7 +17,7 @@ const DIRECTION: f64 = 1e-3;
 
 /// Where a line comes from.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Source {
+pub(crate) enum Source {
     /// A motion of the axis; `common` where all channels have it with the same amplitude and phase, as by pick-up in all of them.
     Motion { common: bool },
     /// These channels; `motion` where a displacement along them would look the same.

@@ -11,7 +11,7 @@ use crate::effects::MOST_LINES;
 const ALONE: f64 = 4.0;
 /// And this many times the spectrum's median.
 const PROMINENT: f64 = 25.0;
-/// Slower than this, in orders, it cannot be told from wandering.
+/// Slower than this, in orders, it cannot be distinguished from wandering.
 pub(super) const SLOWEST: f64 = 0.25;
 /// Bins of the windowed spectrum (of 1/turns) to both sides that belong to a peak.
 const WIDTH: f64 = 3.0;

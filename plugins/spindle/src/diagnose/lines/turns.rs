@@ -25,7 +25,7 @@ pub(super) enum Fixed {
 
 impl Capture<'_> {
     /// Order of a line in this capture.
-    pub fn order(&self, line: f64, fixed: Fixed) -> f64 {
+    pub(crate) fn order(&self, line: f64, fixed: Fixed) -> f64 {
         match fixed {
             Fixed::Order => line,
             Fixed::Time { turn_samples } => line * self.turn_samples / turn_samples,
@@ -41,7 +41,7 @@ impl Capture<'_> {
     }
 
     /// By how many periods a line of a fixed order and one of another kind come apart over the turns.
-    pub fn apart(&self, line: f64, fixed: Fixed) -> f64 {
+    pub(crate) fn apart(&self, line: f64, fixed: Fixed) -> f64 {
         let each = (0..self.turns.count())
             .map(|turn| self.periods(turn, line, fixed) - self.periods(turn, line, Fixed::Order));
         let (low, high) =
@@ -50,13 +50,13 @@ impl Capture<'_> {
     }
 
     /// What a line does to turns.
-    pub fn shape(&self, line: f64, fixed: Fixed, orders: usize) -> Shape {
+    pub(crate) fn shape(&self, line: f64, fixed: Fixed, orders: usize) -> Shape {
         let order = self.order(line, fixed);
         Shape { sides: (0..orders).map(|harmonic| sides(order, harmonic as f64)).collect() }
     }
 
     /// Phase of a line at the start of a turn.
-    pub fn phase(&self, turn: usize, line: f64, fixed: Fixed) -> Complex64 {
+    pub(crate) fn phase(&self, turn: usize, line: f64, fixed: Fixed) -> Complex64 {
         Complex64::cis(TAU * self.periods(turn, line, fixed).fract())
     }
 }
@@ -69,7 +69,7 @@ pub(super) struct Shape {
 
 impl Shape {
     /// Coefficients cₙ of Re(a e^{iνθ}) for a = 1 and a = i, the line beginning at a phase.
-    pub fn at(&self, phase: Complex64, harmonic: usize) -> [Complex64; 2] {
+    pub(crate) fn at(&self, phase: Complex64, harmonic: usize) -> [Complex64; 2] {
         let [forward, backward] = self.sides[harmonic];
         let (forward, backward) = (phase * forward, phase.conj() * backward);
         [forward + backward, Complex64::I * (forward - backward)]
@@ -92,7 +92,7 @@ pub(super) struct Amplitudes {
 }
 
 impl Amplitudes {
-    pub fn new(captures: &[Capture], line: f64, fixed: Fixed) -> Self {
+    pub(crate) fn new(captures: &[Capture], line: f64, fixed: Fixed) -> Self {
         let mut all = Self { found: Vec::new(), explained: Vec::new() };
         for capture in captures {
             let (turns, low) = (capture.fitted, capture.turns.orders);
@@ -138,7 +138,7 @@ impl Amplitudes {
     }
 
     /// Sum of squares that they explain.
-    pub fn all_explained(&self) -> f64 {
+    pub(crate) fn all_explained(&self) -> f64 {
         self.explained.iter().flatten().sum()
     }
 }

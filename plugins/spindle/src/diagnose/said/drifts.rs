@@ -17,7 +17,7 @@ use crate::{
 const ONE_DISPLACEMENT: f64 = 0.1;
 
 /// Says a drift that was found by what it is over the capture, its rate, and its time constant where that is determined.
-pub fn say(diagnosis: &mut Diagnosis, shared: &Shared) {
+pub(crate) fn say(diagnosis: &mut Diagnosis, shared: &Shared) {
     let rig = &shared.selection.rig;
     let mut drifts = vec![0.0; rig.sensors.len()];
     let creeps = |added: &&mut Added| shared.turn_evidence(&added.effect) == Some(TurnEvidence::Levels);

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Says each line that was found by its order, frequency and amplitude, and what it may be.
-pub fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
+pub(crate) fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Station]) {
     let sensors = &shared.selection.rig.sensors;
     let id = |sensor: &usize| sensors.get(*sensor).map_or_else(String::new, |sensor| sensor.id.clone());
     // The line of the motion, which one that few sensors show may be as well.
@@ -121,7 +121,7 @@ fn whole_order(diagnosis: &Diagnosis, stations: &[Station]) -> Option<String> {
     let found = orders.find_map(|order| Some((order, mains::near(order as f64 * turns_hz, resolution_hz)?)));
     found.map(|(order, mains)| {
         format!(
-            "order {order} is mains ({mains:.0} Hz) at this speed: pick-up at a whole order cannot be told from what repeats every turn; measure at another speed"
+            "order {order} is mains ({mains:.0} Hz) at this speed: pick-up at a whole order cannot be distinguished from what repeats every turn; measure at another speed"
         )
     })
 }

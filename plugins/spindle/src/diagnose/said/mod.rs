@@ -3,5 +3,5 @@
 mod drifts;
 mod lines;
 
-pub use drifts::say as say_drifts;
-pub use lines::say as say_lines;
+pub(crate) use drifts::say as say_drifts;
+pub(crate) use lines::say as say_lines;

@@ -1,4 +1,4 @@
-//! The scenario as it stands in a file.
+//! The scenario as written in a file.
 
 mod motion;
 mod part;
@@ -98,7 +98,7 @@ pub struct RecordingConfig {
     pub speed_wobble_percent: f64,
     /// Samples before the first mark and after the last one, so that no turn lies at the very end.
     pub margin_samples: usize,
-    /// How the recording tells the spindle's angle.
+    /// How the recording gives the spindle's angle.
     pub phase: Phase,
     /// Type of the samples.
     pub format: SampleFormat,

@@ -1,6 +1,6 @@
 //! Mistakes in the rig: what is recorded is sound, and the rig as it is stated is not what was there.
 
-use runout_core::{pipeline::error::Fault, rig::Rotation};
+use runout_core::{fault::Fault, rig::Rotation};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

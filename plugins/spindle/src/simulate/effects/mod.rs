@@ -8,7 +8,7 @@ mod setups;
 mod spindle;
 mod strangers;
 
-use runout_core::pipeline::error::{Fault, known_names};
+use runout_core::fault::{Fault, known_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ pub use strangers::{Backlash, Dent, SlippedProbe, Step};
 
 use super::world::World;
 
-/// `[[effect]]`: one entry, named by `plugin`. `declared = false` says that the separation is not told of it; true is refused.
+/// `[[effect]]`: one entry, named by `plugin`. `declared = false` says that the separation does not declare it; true is refused.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "plugin", rename_all = "kebab-case")]
 pub enum Effect {
@@ -86,7 +86,7 @@ pub enum Effect {
 
 /// What every effect can do.
 trait Acts {
-    /// Whether the scenario says that the separation will be told of it.
+    /// Whether the scenario says that the separation declares it.
     fn declared(&self) -> bool;
 
     /// Changes the world; `index` is the effect's place in the list.

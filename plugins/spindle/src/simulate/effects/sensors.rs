@@ -1,6 +1,6 @@
 //! Effects of a sensor.
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

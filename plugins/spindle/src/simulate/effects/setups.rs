@@ -2,7 +2,7 @@
 
 use runout_core::{
     Complex64,
-    pipeline::error::{Fault, known_names},
+    fault::{Fault, known_names},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Effects of the whole rig: how the spindle moves and turns.
 
-use runout_core::pipeline::error::Fault;
+use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

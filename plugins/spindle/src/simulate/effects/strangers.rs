@@ -1,6 +1,6 @@
 //! What the closed loop does not know: it must say that something is left, and not blame another effect.
 
-use runout_core::{Complex64, pipeline::error::Fault};
+use runout_core::{Complex64, fault::Fault};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

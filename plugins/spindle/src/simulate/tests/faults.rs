@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use runout_core::pipeline::{
+    Catalogue, Plugin,
     document::{Document, Sources},
-    registry::{Catalogue, Plugin},
 };
 
 use super::*;

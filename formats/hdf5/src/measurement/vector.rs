@@ -1,4 +1,4 @@
-//! A line of numbers: one value a mark or a sample, also where a program has written it as a matrix of one row or column.
+//! A vector of numbers: one value a mark or a sample, also where a program has written it as a matrix of one row or column.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ const SCAN: usize = 65_536;
 
 /// A dataset with one dimension that counts.
 #[derive(Debug)]
-pub(crate) struct Line {
+pub(crate) struct Vector {
     dataset: Dataset,
     place: Place,
     length: usize,
@@ -35,7 +35,7 @@ enum Shape {
     Row,
 }
 
-impl Line {
+impl Vector {
     /// Opens a dataset of the group.
     pub(crate) fn open(group: &Group, place: &Place, name: &str) -> Result<Self> {
         let (dataset, place) = node::dataset(group, place, name)?;
