@@ -70,6 +70,9 @@ impl Angles {
         let turned = all.map(|((cos, sin), aside)| {
             let square = aside * aside;
             let (less, across) = (1.0 - 0.5 * square, aside * (1.0 - square / 6.0));
+            // Directions have the length 1 but for rounding.
+            let scale = (less * less + across * across).sqrt().recip();
+            let (less, across) = (scale * less, scale * across);
             (less * cos - across * sin, less * sin + across * cos)
         });
         self.cos.clear();

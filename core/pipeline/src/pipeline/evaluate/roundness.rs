@@ -36,9 +36,14 @@ impl Form {
         let drawn = self.drawn_about(filter, references, propagation);
         let drawn = drawn.into_iter().map(Some).chain(std::iter::repeat(None));
         let found = self.about(filter, references).into_iter().zip(drawn);
-        let mut found: Vec<(f64, Option<Uncertainty>)> = found
-            .map(|(value, drawn)| (value, drawn.and_then(|(about, known)| Some(known?.moved(value - about)))))
-            .collect();
+        let found = found.zip(&labels).map(|((value, drawn), label)| {
+            let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
+            // Where noise alone puts the value above its interval, which contacts hold the circle is no matter.
+            let holds = |known: &Uncertainty| (known.interval_95[0]..=known.interval_95[1]).contains(&value);
+            let both = known.as_ref().is_some_and(|known| has_kinks(label) && holds(known));
+            (value, if both { known.map(|known| known.on_both_sides(value)) } else { known })
+        });
+        let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
         if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
             let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
             let reference = Reference::LeastSquares.symbol();
