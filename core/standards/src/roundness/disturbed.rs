@@ -17,6 +17,8 @@ use crate::{
 #[derive(Debug, Clone)]
 pub struct Disturbed<'a> {
     reference: Reference,
+    /// Whether crests lie between the angles.
+    between: bool,
     angles: &'a Angles,
     form_um: &'a [f64],
     radius_mm: f64,
@@ -38,8 +40,8 @@ pub struct Disturbed<'a> {
 }
 
 impl<'a> Disturbed<'a> {
-    /// `usual_um` is about the largest error of a draw; errors have no orders 0 and 1. `None` where the profile has no such
-    /// circle.
+    /// `usual_um` is about the largest error of a draw; errors have no orders 0 and 1. Crests are those between the angles where
+    /// `between`, else the highest and lowest at an angle. `None` where the profile has no such circle.
     #[must_use]
     pub fn new(
         reference: Reference,
@@ -47,33 +49,35 @@ impl<'a> Disturbed<'a> {
         form_um: &'a [f64],
         radius_mm: f64,
         usual_um: f64,
+        between: bool,
     ) -> Option<Self> {
         let (mut points, mut crests) = (Points::default(), Crests::default());
         let of_angles = reference == Reference::LeastSquares;
-        if of_angles {
+        if of_angles || !between {
             points.set_profile(angles, form_um, radius_mm);
         } else {
             set_crests(&mut points, &mut crests, angles, form_um, radius_mm);
         }
         let circle = points.reference(reference)?;
         let raw: Vec<f64> = points.deviations_um(&circle).collect();
-        if of_angles {
+        if of_angles && between {
             crests.set_all(&raw);
         }
-        let deviations = if of_angles { &crests.heights } else { &raw };
+        let deviations = if of_angles && between { &crests.heights } else { &raw };
         let near = Near::new(deviations, circle.deviation_um, usual_um);
         let ends = Course::of(deviations.iter().copied());
         let about = Course { squares: Course::of(raw.iter().copied()).squares, ..ends }.into();
         let count = form_um.len();
-        let mut with_beside: Vec<usize> = near.points.iter().flat_map(|point| around(*point, count)).collect();
+        let mut with_beside: Vec<usize> = near.points.iter().flat_map(|point| beside(between, *point, count)).collect();
         with_beside.sort_unstable();
         with_beside.dedup();
         let place = |point: usize| with_beside.binary_search(&point).unwrap_or_default() as u32;
-        let places = near.points.iter().map(|point| around(*point, count).map(place)).collect();
+        let places = near.points.iter().map(|point| beside(between, *point, count).map(place)).collect();
         // Errors of orders from 2 on are at right angles to what moves LSCI, on all of the circle.
         let stays = of_angles && raw.iter().all(|deviation| !deviation.is_nan());
         Some(Self {
             reference,
+            between,
             angles,
             form_um,
             radius_mm,
@@ -100,7 +104,9 @@ impl<'a> Disturbed<'a> {
     /// Values of the profile with errors in it. About other circles than LSCI, RONq is that of the points looked at, or NaN.
     pub fn values(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         match (self.reference, &self.fixed) {
-            (Reference::LeastSquares, Some(fixed)) => Some(fixed.between(drawn)),
+            (Reference::LeastSquares, Some(fixed)) => {
+                Some(if self.between { fixed.between(drawn) } else { fixed.values(drawn) })
+            }
             (Reference::LeastSquares, None) => self.of_all(drawn),
             _ => self
                 .of_near(drawn)
@@ -135,8 +141,9 @@ impl<'a> Disturbed<'a> {
 
     /// From the points looked at; `None` where others could touch.
     fn of_near(&mut self, drawn: &DrawnErrors) -> Option<Values> {
-        let (form_um, step_rad) = (self.form_um, self.step_rad());
-        let heights = |point: &usize| around(*point, form_um.len()).map(|point| form_um[point] + drawn.at(point));
+        let (form_um, step_rad, between) = (self.form_um, self.step_rad(), self.between);
+        let heights =
+            |point: &usize| beside(between, *point, form_um.len()).map(|point| form_um[point] + drawn.at(point));
         self.crests.set(self.near.points.iter().map(heights), step_rad);
         self.touching((1.0 + LIFT) * drawn.largest_um())
     }
@@ -171,14 +178,27 @@ impl<'a> Disturbed<'a> {
             let circle = self.points.reference(self.reference)?;
             self.drawn_um.clear();
             self.drawn_um.extend(self.points.deviations_um(&circle));
-            self.crests.set_all(&self.drawn_um);
+            let between = self.between;
+            let count = self.drawn_um.len();
+            let drawn_um = &self.drawn_um;
+            let heights = (0..count).map(|point| beside(between, point, count).map(|point| drawn_um[point]));
+            self.crests.set(heights, TAU / count as f64);
             let ends = Course::of(self.crests.heights.iter().copied());
             return Some(Course { squares: Course::of(self.drawn_um.iter().copied()).squares, ..ends }.into());
         }
-        set_crests(&mut self.points, &mut self.crests, self.angles, &self.drawn_um, self.radius_mm);
+        if self.between {
+            set_crests(&mut self.points, &mut self.crests, self.angles, &self.drawn_um, self.radius_mm);
+        } else {
+            self.points.set_profile(self.angles, &self.drawn_um, self.radius_mm);
+        }
         let circle = self.points.reference(self.reference)?;
         Some(self.points.values(&circle))
     }
+}
+
+/// A point's number between those of its neighbours; thrice its own where crests lie at the angles.
+fn beside(between: bool, point: usize, count: usize) -> [usize; 3] {
+    if between { around(point, count) } else { [point; 3] }
 }
 
 /// Takes a profile with its crests where they are.
@@ -217,7 +237,7 @@ mod tests {
                     form[20..40].fill(f64::NAN);
                 }
                 for reference in Reference::ALL {
-                    let mut disturbed = Disturbed::new(reference, &angles, &form, 30.0, 10.0 * size).unwrap();
+                    let mut disturbed = Disturbed::new(reference, &angles, &form, 30.0, 10.0 * size, true).unwrap();
                     for _ in 0..20 {
                         let errors = wave(size);
                         let drawn: Vec<f64> = form.iter().zip(&errors).map(|(form, error)| form + error).collect();

@@ -20,6 +20,10 @@ use runout_standards::{
 /// Of so many points that may come to touch, errors cost as much as those of whole profiles.
 const MOST_POINTS: usize = 64;
 
+/// Share of noise in the form found from which on errors are drawn as whole profiles: crests between few angles are then
+/// crests of noise, which draws of the true form do not have.
+const MOST_NOISE: f64 = 0.25;
+
 /// Draws of what is filtered robustly, point by point and some times over.
 const DRAWS_OF_ROBUST: usize = 64;
 
@@ -96,7 +100,7 @@ impl Form {
         let profile_um = self.profile(filter, &mut fourier);
         let usual_um = errors.largest_um(LARGEST);
         let about = |reference: &Reference| {
-            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um))
+            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um, true))
         };
         let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
         let mut errors = errors.profiles();
@@ -134,7 +138,7 @@ impl Form {
     }
 
     /// The same with errors drawn at the points that may come to touch, and RONq in closed form; `None` where the section is interrupted,
-    /// errors are no small part of it, or such points are many.
+    /// much of the form found is noise, or such points are many.
     fn drawn_where_they_touch(
         &self,
         filter: &Filter,
@@ -143,7 +147,9 @@ impl Form {
         if !self.at.gaps.is_empty() {
             return None;
         }
-        let (angles, variance) = (self.drawn_angles(filter), self.widened(filter));
+        let variance = self.widened(filter);
+        let few = quick_length(DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).min(self.angles);
+        let angles = Angles::shared(few);
         if !variance.iter().skip(2).any(|variance| *variance > 0.0) {
             return None;
         }
@@ -151,13 +157,16 @@ impl Form {
         let profile_um = self.profile(filter, &mut fourier);
         let harmonics = filter.harmonics(&self.harmonics);
         let errors = LikelyErrors::new(self.likely(), &harmonics, &variance, DRAWS, &self.noise, &mut fourier);
+        if errors.share_of_noise() > MOST_NOISE {
+            return None;
+        }
         let largest_um = errors.largest_um(LARGEST);
         let mut found = Vec::new();
         for reference in references {
             let is_fixed = *reference == Reference::LeastSquares;
             // Points twice the largest error below an extreme do not reach it where the centre stays.
             let usual_um = if is_fixed { 0.5 * largest_um } else { largest_um };
-            let mut circle = Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um)?;
+            let mut circle = Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um, false)?;
             if circle.points().len() > MOST_POINTS {
                 return None;
             }
