@@ -142,6 +142,13 @@ impl Fourier {
     }
 }
 
+/// A number of samples, at least so many, for a quick transform.
+#[must_use]
+pub fn quick_length(at_least: usize) -> usize {
+    let power = at_least.next_power_of_two().max(8);
+    [5 * (power / 8), 3 * (power / 4), power].into_iter().find(|count| *count >= at_least).unwrap_or(power)
+}
+
 /// Highest order below Nyquist on `length` samples a turn.
 #[must_use]
 pub fn max_order(length: usize) -> usize {

@@ -82,6 +82,12 @@ impl Noise {
     pub fn new(orders: usize, seed: u64) -> Self {
         Self { seed, orders }
     }
+
+    /// Numbers that have nothing in common with these but the table, and are these for 0.
+    #[must_use]
+    pub(crate) fn another(&self, number: u64) -> Self {
+        Self { seed: if number == 0 { self.seed } else { bits(self.seed, u64::MAX - number) }, ..*self }
+    }
 }
 
 /// A source of noise, the same for all profiles that have a part of it.

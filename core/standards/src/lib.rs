@@ -7,6 +7,7 @@ pub mod drawn;
 mod errors;
 mod errors_at;
 pub mod gaps;
+mod likely;
 pub mod mean_deviation;
 mod near;
 pub mod open_errors;

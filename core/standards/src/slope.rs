@@ -4,7 +4,11 @@ use std::{borrow::Cow, f64::consts::TAU};
 
 use super::{near::Ranked, uncertainty::DrawnErrors};
 use crate::gaps::Gaps;
-use runout_numerics::{Complex64, fourier::Fourier, interpolation::Curve};
+use runout_numerics::{
+    Complex64,
+    fourier::{Fourier, quick_length},
+    interpolation::Curve,
+};
 
 /// Angles a wave of the highest order at which the slope is looked at first.
 const POINTS_A_WAVE: usize = 16;
@@ -23,7 +27,7 @@ pub fn steepest_um_per_rad(harmonics: &[Complex64], gaps: &Gaps) -> f64 {
     let slopes: Vec<Complex64> =
         harmonics.iter().enumerate().map(|(order, value)| Complex64::I * order as f64 * value).collect();
     let highest = highest_that_counts(&slopes);
-    let count = smooth(POINTS_A_WAVE * highest.max(1));
+    let count = quick_length(POINTS_A_WAVE * highest.max(1));
     let mut fourier = Fourier::new(count);
     let on_angles = fourier.synthesise(slopes.iter().copied());
     let curve = Curve::new(&slopes, on_angles);
@@ -57,12 +61,6 @@ fn highest_that_counts(series: &[Complex64]) -> usize {
     });
     let below = above.take_while(|above| *above <= ROUNDING * all).count();
     series.len().saturating_sub(below + 1)
-}
-
-/// A number of angles, at least so many, for a quick transform.
-fn smooth(at_least: usize) -> usize {
-    let power = at_least.next_power_of_two().max(8);
-    [5 * (power / 8), 3 * (power / 4), power].into_iter().find(|count| *count >= at_least).unwrap_or(power)
 }
 
 /// The largest of some numbers, without sign; NaN of nothing but NaN.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
+pub use crate::likely::{Likely, LikelyErrors, likely_forms};
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 
@@ -12,8 +13,8 @@ use runout_numerics::{Complex64, fourier::Fourier};
 pub const DRAWS: usize = 400;
 /// The largest error of a few hundred drawn profiles is about so many standard deviations.
 pub const LARGEST: f64 = 5.0;
-/// Share of errors in a mean square below which they are small.
-const SMALL_SHARE: f64 = 0.05;
+/// Neighbouring orders from which the noise of one is taken together.
+const ORDERS_TOGETHER: f64 = 5.0;
 /// Share of the draws below the interval, and above it.
 const TAIL: f64 = 0.025;
 /// Amplitude of noise that 5 % of all are above, in standard deviations of its real part as they are known from so many real
@@ -134,7 +135,30 @@ pub fn without_noise(harmonics: &[Complex64], variance: &[f64]) -> Vec<Complex64
 pub fn monte_carlo_of(
     draws: usize,
     transforms: usize,
+    draw: impl FnMut(bool, &mut Vec<f64>),
+) -> Vec<(f64, Option<Uncertainty>)> {
+    all_draws(draws, transforms, draw, summed_up)
+}
+
+/// The same where what is drawn is what the truth may be ([`LikelyErrors`]): the interval is from the draws' 2.5 % point to their
+/// 97.5 % point.
+pub fn likely_values_of(
+    draws: usize,
+    transforms: usize,
+    draw: impl FnMut(bool, &mut Vec<f64>),
+) -> Vec<(f64, Option<Uncertainty>)> {
+    let likely = |drawn: &mut [f64], value: f64| {
+        let known = summed_up(drawn, value);
+        Uncertainty { interval_95: [point(drawn, TAIL), point(drawn, 1.0 - TAIL)], ..known }
+    };
+    all_draws(draws, transforms, draw, likely)
+}
+
+fn all_draws(
+    draws: usize,
+    transforms: usize,
     mut draw: impl FnMut(bool, &mut Vec<f64>),
+    sum_up: impl Fn(&mut [f64], f64) -> Uncertainty,
 ) -> Vec<(f64, Option<Uncertainty>)> {
     let transforms = transforms.max(1) as f64;
     let mut found = Vec::new();
@@ -150,7 +174,7 @@ pub fn monte_carlo_of(
         |value: f64, drawn: &[f64]| value.is_finite() && drawn.len() > 1 && drawn.iter().all(|draw| draw.is_finite());
     let pairs = found.into_iter().zip(results);
     let uncertainty =
-        |value: f64, drawn: &mut [f64]| known(value, drawn).then(|| summed_up(drawn, value).of_transforms(transforms));
+        |value: f64, drawn: &mut [f64]| known(value, drawn).then(|| sum_up(drawn, value).of_transforms(transforms));
     pairs.map(|(value, mut drawn)| (value, uncertainty(value, &mut drawn))).collect()
 }
 
@@ -178,26 +202,47 @@ pub fn monte_carlo<const N: usize>(
     all?.try_into().ok()
 }
 
-/// The uncertainty of a root mean square about a centre that errors do not move, in closed form, from the harmonics and the variance
-/// E|δ|² of each by order from 0; those below 2 are taken as exact. `None` where no variance is known, or errors are more than a
-/// twentieth of the mean square.
+/// The uncertainty of a root mean square about a centre that errors do not move, in closed form, from the harmonics, the variance
+/// E|δ|² of each, the same as wide as it is badly known, and its real degrees of freedom (0: exact), by order from 0; orders below 2 are
+/// taken as exact. `None` where no variance is known.
 ///
-/// q² = ½ Σ |cₙ|². With errors its mean is q² + ½ Σ σₙ² and its variance ½ Σ |cₙ|²σₙ² + ¼ Σ σₙ⁴; as one of many orders it is normal.
+/// q² = ½ Σ |cₙ|² holds ½ Σ σₙ² of errors in the mean, which the interval takes off. About the truth it has the variance ½ Σ |tₙ|²σₙ² + ¼ Σ σₙ⁴, of
+/// which what was found tells ½ Σ |cₙ|²σₙ² − ¼ Σ σₙ⁴; as one of many orders it is normal.
 #[must_use]
-pub fn of_rms(harmonics: &[Complex64], variance: &[f64], rms: f64) -> Option<Uncertainty> {
-    let (mut shift, mut spread) = (0.0, 0.0);
-    for (harmonic, variance) in harmonics.iter().zip(variance).skip(2).filter(|(_, variance)| **variance > 0.0) {
-        shift += 0.5 * variance;
-        spread += 0.5 * harmonic.norm_sqr() * variance + 0.25 * variance * variance;
+pub fn of_rms(
+    harmonics: &[Complex64],
+    variance: &[f64],
+    widened: &[f64],
+    freedom: &[usize],
+    rms: f64,
+) -> Option<Uncertainty> {
+    let (mut noise, mut spread, mut fourth, mut unknown) = (0.0, 0.0, 0.0, 0.0);
+    let orders = harmonics.iter().zip(variance).zip(widened).zip(freedom);
+    for (((harmonic, variance), widened), freedom) in orders.skip(2).filter(|(((_, variance), _), _)| **variance > 0.0)
+    {
+        noise += 0.5 * variance;
+        spread += 0.5 * harmonic.norm_sqr() * widened;
+        fourth += 0.25 * variance * variance;
+        if *freedom > 0 {
+            unknown += 0.5 * ORDERS_TOGETHER * variance * variance / *freedom as f64;
+        }
     }
-    let square = rms * rms;
-    if !(shift > 0.0 && shift < SMALL_SHARE * square) {
+    if noise <= 0.0 {
         return None;
     }
-    let reach = NORMAL_95 * spread.sqrt();
-    let [low, high] = [-reach, reach].map(|reach| (square + shift + reach).max(0.0).sqrt());
-    let interval_95 = [(2.0 * rms - high).max(0.0), 2.0 * rms - low];
-    Some(Uncertainty { std: (high - low) / (2.0 * NORMAL_95), interval_95, draws: 0 })
+    let middle = rms * rms - noise;
+    // Chance may leave less than a part of what noise alone has.
+    let reach = NORMAL_95 * ((spread - fourth).max(0.5 * fourth) + unknown).sqrt();
+    let interval_95 = [-reach, reach].map(|reach| (middle + reach).max(0.0).sqrt());
+    Some(Uncertainty { std: (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95), interval_95, draws: 0 })
+}
+
+/// Value at a share of sorted draws.
+fn point(sorted: &[f64], share: f64) -> f64 {
+    let position = share * (sorted.len().saturating_sub(1)) as f64;
+    let below = position.floor() as usize;
+    let at = |index: usize| sorted.get(index).or(sorted.last()).copied().unwrap_or(f64::NAN);
+    at(below) + (at(below + 1) - at(below)) * position.fract()
 }
 
 fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
@@ -205,16 +250,10 @@ fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
     let count = draws.len().max(1) as f64;
     let mean = draws.iter().sum::<f64>() / count;
     let squares: f64 = draws.iter().map(|draw| (draw - mean).powi(2)).sum();
-    let point = |share: f64| {
-        let position = share * (draws.len().saturating_sub(1)) as f64;
-        let below = position.floor() as usize;
-        let [low, high] = [below, below + 1].map(|index| draws.get(index).copied().unwrap_or(value));
-        low + (high - low) * position.fract()
-    };
     let floor = if draws.first().is_some_and(|lowest| *lowest >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
     Uncertainty {
         std: (squares / (count - 1.0).max(1.0)).sqrt(),
-        interval_95: [(2.0 * value - point(1.0 - TAIL)).max(floor), 2.0 * value - point(TAIL)],
+        interval_95: [(2.0 * value - point(draws, 1.0 - TAIL)).max(floor), 2.0 * value - point(draws, TAIL)],
         draws: draws.len(),
     }
 }

@@ -1,7 +1,10 @@
 //! A profile whose errors are drawn again and again.
 
+use std::f64::consts::TAU;
+
 use super::{
     Angles, FixedCentre, Points, Reference, Values,
+    crests::{Crests, LIFT, around},
     warm::{Found, Warm},
 };
 use crate::{
@@ -9,15 +12,22 @@ use crate::{
     uncertainty::DrawnErrors,
 };
 
-/// A profile about one reference circle. Only points that may come to touch it are looked at, where that is certain.
+/// A profile about one reference circle, with its [crests between the angles](super::crests). Only points that may come to touch it are looked
+/// at, where that is certain.
 #[derive(Debug, Clone)]
 pub struct Disturbed<'a> {
     reference: Reference,
+    /// Whether crests lie between the angles.
+    between: bool,
     angles: &'a Angles,
     form_um: &'a [f64],
     radius_mm: f64,
     near: Near,
     near_angles: Angles,
+    /// The points near the ends and those beside them, ascending.
+    with_beside: Vec<usize>,
+    /// Of each point near the ends its own place and those beside it among these.
+    places: Vec<[u32; 3]>,
     /// Centre of the circle about the profile itself.
     centre_um: [f64; 2],
     about: Values,
@@ -26,11 +36,12 @@ pub struct Disturbed<'a> {
     search: Option<Warm>,
     points: Points,
     drawn_um: Vec<f64>,
+    crests: Crests,
 }
 
 impl<'a> Disturbed<'a> {
-    /// `usual_um` is about the largest error of a draw; errors have no orders 0 and 1. `None` where the profile has no such
-    /// circle.
+    /// `usual_um` is about the largest error of a draw; errors have no orders 0 and 1. Crests are those between the angles where
+    /// `between`, else the highest and lowest at an angle. `None` where the profile has no such circle.
     #[must_use]
     pub fn new(
         reference: Reference,
@@ -38,28 +49,49 @@ impl<'a> Disturbed<'a> {
         form_um: &'a [f64],
         radius_mm: f64,
         usual_um: f64,
+        between: bool,
     ) -> Option<Self> {
-        let mut points = Points::default();
-        points.set_profile(angles, form_um, radius_mm);
+        let (mut points, mut crests) = (Points::default(), Crests::default());
+        let of_angles = reference == Reference::LeastSquares;
+        if of_angles || !between {
+            points.set_profile(angles, form_um, radius_mm);
+        } else {
+            set_crests(&mut points, &mut crests, angles, form_um, radius_mm);
+        }
         let circle = points.reference(reference)?;
-        let deviations: Vec<f64> = points.deviations_um(&circle).collect();
-        let near = Near::new(&deviations, circle.deviation_um, usual_um);
-        let about = Course::of(deviations.iter().copied()).into();
+        let raw: Vec<f64> = points.deviations_um(&circle).collect();
+        if of_angles && between {
+            crests.set_all(&raw);
+        }
+        let deviations = if of_angles && between { &crests.heights } else { &raw };
+        let near = Near::new(deviations, circle.deviation_um, usual_um);
+        let ends = Course::of(deviations.iter().copied());
+        let about = Course { squares: Course::of(raw.iter().copied()).squares, ..ends }.into();
+        let count = form_um.len();
+        let mut with_beside: Vec<usize> = near.points.iter().flat_map(|point| beside(between, *point, count)).collect();
+        with_beside.sort_unstable();
+        with_beside.dedup();
+        let place = |point: usize| with_beside.binary_search(&point).unwrap_or_default() as u32;
+        let places = near.points.iter().map(|point| beside(between, *point, count).map(place)).collect();
         // Errors of orders from 2 on are at right angles to what moves LSCI, on all of the circle.
-        let stays = reference == Reference::LeastSquares && deviations.iter().all(|deviation| !deviation.is_nan());
+        let stays = of_angles && raw.iter().all(|deviation| !deviation.is_nan());
         Some(Self {
             reference,
+            between,
             angles,
             form_um,
             radius_mm,
             near_angles: angles.select(&near.points),
             near,
+            with_beside,
+            places,
             centre_um: [circle.x_um, circle.y_um],
             about,
-            fixed: stays.then(|| FixedCentre::new(deviations)),
+            fixed: stays.then(|| FixedCentre::new(raw)),
             search: Warm::new(reference),
             points,
             drawn_um: Vec::new(),
+            crests,
         })
     }
 
@@ -72,43 +104,58 @@ impl<'a> Disturbed<'a> {
     /// Values of the profile with errors in it. About other circles than LSCI, RONq is that of the points looked at, or NaN.
     pub fn values(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         match (self.reference, &self.fixed) {
-            (Reference::LeastSquares, Some(fixed)) => Some(fixed.values(drawn)),
+            (Reference::LeastSquares, Some(fixed)) => {
+                Some(if self.between { fixed.between(drawn) } else { fixed.values(drawn) })
+            }
             (Reference::LeastSquares, None) => self.of_all(drawn),
-            _ => self.of_near(drawn).or_else(|| self.anew(drawn.largest_um())).or_else(|| self.of_all(drawn)),
+            _ => self
+                .of_near(drawn)
+                .or_else(|| self.anew((1.0 + LIFT) * drawn.largest_um()))
+                .or_else(|| self.of_all(drawn)),
         }
     }
 
-    /// The points that may come to touch.
+    /// The points that may come to touch, and those beside them.
     #[must_use]
     pub fn points(&self) -> &[usize] {
-        &self.near.points
+        &self.with_beside
     }
 
     /// Values of the profile with these errors at its [`points`](Self::points), where no error is above `largest_um`; RONq is NaN.
     /// `None` where other points could touch, or about LSCI of an interrupted profile.
     pub fn values_at(&mut self, errors_um: &[f64], largest_um: f64) -> Option<Values> {
-        if let Some(fixed) = &self.fixed {
-            return Some(fixed.values_at(&self.near.points, errors_um));
-        }
+        let form_um = self.fixed.as_ref().map_or(self.form_um, FixedCentre::deviations);
         self.drawn_um.clear();
-        let errors = self.near.points.iter().zip(errors_um);
-        self.drawn_um.extend(errors.map(|(point, error)| self.form_um[*point] + error));
+        self.drawn_um.extend(self.with_beside.iter().zip(errors_um).map(|(point, error)| form_um[*point] + error));
+        let (drawn_um, step_rad) = (&self.drawn_um, self.step_rad());
+        self.crests.set(self.places.iter().map(|places| places.map(|place| drawn_um[place as usize])), step_rad);
+        if self.fixed.is_some() {
+            let ends = Course::of(self.crests.heights.iter().copied());
+            return Some(Course { squares: f64::NAN, points: self.form_um.len(), ..ends }.into());
+        }
         if self.reference == Reference::LeastSquares {
             return None;
         }
-        self.touching(largest_um).or_else(|| self.anew(largest_um))
+        self.touching((1.0 + LIFT) * largest_um).or_else(|| self.anew((1.0 + LIFT) * largest_um))
     }
 
     /// From the points looked at; `None` where others could touch.
     fn of_near(&mut self, drawn: &DrawnErrors) -> Option<Values> {
-        self.drawn_um.clear();
-        self.drawn_um.extend(self.near.points.iter().map(|point| self.form_um[*point] + drawn.at(*point)));
-        self.touching(drawn.largest_um())
+        let (form_um, step_rad, between) = (self.form_um, self.step_rad(), self.between);
+        let heights =
+            |point: &usize| beside(between, *point, form_um.len()).map(|point| form_um[point] + drawn.at(point));
+        self.crests.set(self.near.points.iter().map(heights), step_rad);
+        self.touching((1.0 + LIFT) * drawn.largest_um())
+    }
+
+    /// Between two angles.
+    fn step_rad(&self) -> f64 {
+        TAU / self.form_um.len() as f64
     }
 
     /// From the contacts of the last draw.
     fn touching(&mut self, largest_um: f64) -> Option<Values> {
-        self.points.set_profile(&self.near_angles, &self.drawn_um, self.radius_mm);
+        self.crests.set_profile(&self.near_angles, &mut self.points, self.radius_mm);
         let Found { values, place, ends_um } = self.search.as_mut()?.values(&self.points, self.centre_um)?;
         let moved = (place[0] - self.centre_um[0]).hypot(place[1] - self.centre_um[1]);
         self.near.suffice(ends_um, moved, largest_um).then_some(values)
@@ -126,17 +173,43 @@ impl<'a> Disturbed<'a> {
     fn of_all(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         self.drawn_um.clear();
         self.drawn_um.extend(self.form_um.iter().zip(drawn.iter()).map(|(form, error)| form + error));
-        self.points.set_profile(self.angles, &self.drawn_um, self.radius_mm);
+        if self.reference == Reference::LeastSquares {
+            self.points.set_profile(self.angles, &self.drawn_um, self.radius_mm);
+            let circle = self.points.reference(self.reference)?;
+            self.drawn_um.clear();
+            self.drawn_um.extend(self.points.deviations_um(&circle));
+            let between = self.between;
+            let count = self.drawn_um.len();
+            let drawn_um = &self.drawn_um;
+            let heights = (0..count).map(|point| beside(between, point, count).map(|point| drawn_um[point]));
+            self.crests.set(heights, TAU / count as f64);
+            let ends = Course::of(self.crests.heights.iter().copied());
+            return Some(Course { squares: Course::of(self.drawn_um.iter().copied()).squares, ..ends }.into());
+        }
+        if self.between {
+            set_crests(&mut self.points, &mut self.crests, self.angles, &self.drawn_um, self.radius_mm);
+        } else {
+            self.points.set_profile(self.angles, &self.drawn_um, self.radius_mm);
+        }
         let circle = self.points.reference(self.reference)?;
         Some(self.points.values(&circle))
     }
 }
 
+/// A point's number between those of its neighbours; thrice its own where crests lie at the angles.
+fn beside(between: bool, point: usize, count: usize) -> [usize; 3] {
+    if between { around(point, count) } else { [point; 3] }
+}
+
+/// Takes a profile with its crests where they are.
+fn set_crests(points: &mut Points, crests: &mut Crests, angles: &Angles, form_um: &[f64], radius_mm: f64) {
+    crests.set_all(form_um);
+    crests.set_profile(angles, points, radius_mm);
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
-
-    use std::f64::consts::TAU;
 
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -164,7 +237,7 @@ mod tests {
                     form[20..40].fill(f64::NAN);
                 }
                 for reference in Reference::ALL {
-                    let mut disturbed = Disturbed::new(reference, &angles, &form, 30.0, 10.0 * size).unwrap();
+                    let mut disturbed = Disturbed::new(reference, &angles, &form, 30.0, 10.0 * size, true).unwrap();
                     for _ in 0..20 {
                         let errors = wave(size);
                         let drawn: Vec<f64> = form.iter().zip(&errors).map(|(form, error)| form + error).collect();
@@ -175,9 +248,18 @@ mod tests {
                             assert!((at.ront_um - quick.ront_um).abs() < 1e-9, "{reference:?} {size} {at:?} {quick:?}");
                             assert!((at.ronp_um - quick.ronp_um).abs() < 1e-9, "{reference:?} {size} {at:?} {quick:?}");
                         }
-                        let mut points = Points::default();
-                        points.set_profile(&angles, &drawn, 30.0);
-                        let slow = points.values(&points.reference(reference).unwrap());
+                        let (mut points, mut crests) = (Points::default(), Crests::default());
+                        let slow: Values = if reference == Reference::LeastSquares {
+                            points.set_profile(&angles, &drawn, 30.0);
+                            let circle = points.reference(reference).unwrap();
+                            let deviations: Vec<f64> = points.deviations_um(&circle).collect();
+                            crests.set_all(&deviations);
+                            let squares = Course::of(deviations.into_iter()).squares;
+                            Course { squares, ..Course::of(crests.heights.iter().copied()) }.into()
+                        } else {
+                            set_crests(&mut points, &mut crests, &angles, &drawn, 30.0);
+                            points.values(&points.reference(reference).unwrap())
+                        };
                         // Form²/R is neglected about LSCI.
                         let exact = if reference == Reference::LeastSquares { 2e-3 * size } else { 1e-9 };
                         assert!(

@@ -1,6 +1,9 @@
 //! Deviations about a centre that errors do not move.
 
-use super::Values;
+use super::{
+    Values,
+    crests::{LIFT, around, lifted},
+};
 use crate::{
     near::{Course, Ranked},
     uncertainty::DrawnErrors,
@@ -13,6 +16,8 @@ use runout_numerics::lanes::product;
 pub struct FixedCentre {
     deviations: Vec<f64>,
     squares: f64,
+    /// The most that a crest between the angles is above its highest point.
+    rise: f64,
     highest: Ranked,
     /// Of the deviations with the other sign.
     lowest: Ranked,
@@ -25,21 +30,20 @@ impl FixedCentre {
         let highest = Ranked::new(deviations.iter().copied());
         let lowest = Ranked::new(deviations.iter().map(|deviation| -deviation));
         let squares = product(&deviations, &deviations);
-        Self { deviations, squares, highest, lowest }
+        let rise = |point: usize| (crest_at(&deviations, point) - deviations[point]).abs();
+        let rise = (0..deviations.len()).map(rise).fold(0.0, f64::max);
+        Self { deviations, squares, rise, highest, lowest }
+    }
+
+    /// The deviations.
+    pub(super) fn deviations(&self) -> &[f64] {
+        &self.deviations
     }
 
     /// Values of the deviations themselves.
     #[must_use]
     pub fn about(&self) -> Values {
         Course::of(self.deviations.iter().copied()).into()
-    }
-
-    /// Values of the deviations with errors added at these points, where the ends lie; RONq is NaN.
-    #[must_use]
-    pub fn values_at(&self, points: &[usize], errors: &[f64]) -> Values {
-        let disturbed = points.iter().zip(errors).map(|(point, error)| self.deviations[*point] + error);
-        let Course { low, high, .. } = Course::of(disturbed);
-        Course { low, high, squares: f64::NAN, points: self.deviations.len() }.into()
     }
 
     /// Values of the deviations with errors added.
@@ -50,13 +54,53 @@ impl FixedCentre {
         let low = self.lowest.highest(drawn.largest_um(), |point| -(all[point] + drawn.at(point)));
         let [errors, others] = drawn.parts();
         let course = if let (Some((high, _)), Some((low, _))) = (high, low) {
-            let crossed = product(all, errors) + product(&all[errors.len()..], others);
-            let squares = self.squares + 2.0 * crossed + drawn.squares_um2();
-            Course { low: -low, high, squares, points: all.len() }
+            Course { low: -low, high, squares: self.squares_with(drawn), points: all.len() }
         } else {
             let (first, rest) = all.split_at(errors.len());
             Course::with_errors(first, errors).and(Course::with_errors(rest, others))
         };
         course.into()
     }
+
+    /// The same with [crests between the angles](super::crests).
+    #[must_use]
+    pub(super) fn between(&self, drawn: &DrawnErrors) -> Values {
+        let all = &self.deviations[..];
+        let at = |point: usize| all[point] + drawn.at(point);
+        let crest = |point: usize| lifted(around(point, all.len()).map(at));
+        // Crests of a sum exceed those of the deviations by no more.
+        let rise = self.rise + LIFT * drawn.largest_um();
+        let high = self.highest.highest(drawn.largest_um() + rise, crest);
+        let low = self.lowest.highest(drawn.largest_um() + rise, |point| -crest(point));
+        let [low, high] = if let (Some((high, _)), Some((low, _))) = (high, low) {
+            [-low, high]
+        } else {
+            let [errors, others] = drawn.parts();
+            let (first, rest) = all.split_at(errors.len());
+            let ends = Course::with_errors(first, errors).and(Course::with_errors(rest, others));
+            let (mut low, mut high) = (ends.low, ends.high);
+            for (point, (deviation, error)) in all.iter().zip(drawn.iter()).enumerate() {
+                let height = deviation + error;
+                if height > ends.high - rise {
+                    high = high.max(crest(point));
+                } else if height < ends.low + rise {
+                    low = low.min(crest(point));
+                }
+            }
+            [low, high]
+        };
+        Course { low, high, squares: self.squares_with(drawn), points: all.len() }.into()
+    }
+
+    /// Sum of squares of the deviations with errors added.
+    fn squares_with(&self, drawn: &DrawnErrors) -> f64 {
+        let [errors, others] = drawn.parts();
+        let crossed = product(&self.deviations, errors) + product(&self.deviations[errors.len()..], others);
+        self.squares + 2.0 * crossed + drawn.squares_um2()
+    }
+}
+
+/// The crest at a point.
+fn crest_at(deviations: &[f64], point: usize) -> f64 {
+    lifted(around(point, deviations.len()).map(|point| deviations[point]))
 }

@@ -16,6 +16,7 @@
 //! ```
 
 mod circumscribed;
+mod crests;
 mod determine;
 mod disturbed;
 mod equal_heights;

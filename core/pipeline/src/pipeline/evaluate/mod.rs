@@ -133,4 +133,6 @@ mod coverage_tests;
 #[cfg(test)]
 mod evaluable_tests;
 #[cfg(test)]
+mod likely_tests;
+#[cfg(test)]
 mod tests;

@@ -6,20 +6,23 @@ use super::{Filter, Label, POINTS_A_WAVE, config::Propagation, section::Form};
 use runout_numerics::{
     Complex64,
     filter::{Degree, Smoother, robust_gaussian},
-    fourier::Fourier,
+    fourier::{Fourier, quick_length},
 };
 use runout_standards::{
     Value,
     roundness::{Angles, Disturbed, Points, Reference, Series, Values},
     slope::{Drawn, steepest_um_per_rad},
     uncertainty::{
-        Covariance, DRAWS, Errors, ErrorsAt, LARGEST, TURNS_OF_A_DRAW, Uncertainty, extreme, monte_carlo_of, of_rms,
-        stand_in,
+        DRAWS, Errors, LARGEST, LikelyErrors, TURNS_OF_A_DRAW, Uncertainty, extreme, likely_values_of, of_rms, stand_in,
     },
 };
 
 /// Of so many points that may come to touch, errors cost as much as those of whole profiles.
 const MOST_POINTS: usize = 64;
+
+/// Share of noise in the form found from which on errors are drawn as whole profiles: crests between few angles are then
+/// crests of noise, which draws of the true form do not have.
+const MOST_NOISE: f64 = 0.25;
 
 /// Draws of what is filtered robustly, point by point and some times over.
 const DRAWS_OF_ROBUST: usize = 64;
@@ -39,7 +42,10 @@ impl Form {
         let found = self.about(filter, references).into_iter().zip(drawn);
         let found = found.zip(&labels).map(|((value, drawn), label)| {
             let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
-            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
+            // Where noise alone puts the value above its interval, which contacts hold the circle is no matter.
+            let holds = |known: &Uncertainty| (known.interval_95[0]..=known.interval_95[1]).contains(&value);
+            let both = known.as_ref().is_some_and(|known| has_kinks(label) && holds(known));
+            (value, if both { known.map(|known| known.on_both_sides(value)) } else { known })
         });
         let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
         if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
@@ -83,17 +89,24 @@ impl Form {
         {
             return found;
         }
-        let Some(mut errors) = self.errors(filter) else { return Vec::new() };
+        let (variance, noise) = (self.widened(filter), &self.noise);
+        if !variance.iter().skip(2).any(|variance| *variance > 0.0) {
+            return Vec::new();
+        }
         let angles = self.drawn_angles(filter);
         let mut fourier = Fourier::new(angles.len());
+        let harmonics = filter.harmonics(&self.harmonics);
+        let errors = LikelyErrors::new(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
         let profile_um = self.profile(filter, &mut fourier);
-        let usual_um = LARGEST * errors.std_um();
+        let usual_um = errors.largest_um(LARGEST);
         let about = |reference: &Reference| {
-            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um))
+            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um, true))
         };
         let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
-        monte_carlo_of(DRAWS, DRAWS.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
-            let drawn = disturbed.then(|| errors.turned(&mut fourier));
+        let mut errors = errors.profiles();
+        let transforms = errors.transforms();
+        let mut found = likely_values_of(DRAWS, transforms, |disturbed, found| {
+            let drawn = disturbed.then(|| errors.draw(&mut fourier));
             for (reference, circle) in &mut circles {
                 let values = match (circle, &drawn) {
                     (Some(circle), Some(drawn)) => circle.values(drawn),
@@ -102,17 +115,30 @@ impl Form {
                 };
                 add_values(values, *reference, found);
             }
-        })
+        });
+        self.state_rms(filter, references, &mut found);
+        found
+    }
+
+    /// States the uncertainty of RONq in closed form where the section is not interrupted.
+    fn state_rms(&self, filter: &Filter, references: &[Reference], found: &mut [(f64, Option<Uncertainty>)]) {
+        let of_references = references.iter().flat_map(|reference| roundness_labels(*reference));
+        let place = of_references.zip(found).find(|(label, _)| label.symbol == "RONq");
+        if let Some((_, (ronq_um, known))) = place.filter(|_| self.at.gaps.is_empty()) {
+            let harmonics = filter.harmonics(&self.harmonics);
+            let (variance, widened) = (filter.variance(&self.variance), self.widened(filter));
+            *known = of_rms(&harmonics, &variance, &widened, &self.freedom, *ronq_um);
+        }
     }
 
     /// Angles on which errors are drawn.
     fn drawn_angles(&self, filter: &Filter) -> Rc<Angles> {
         let waves = filter.highest(self.held.highest);
-        Angles::shared((DRAWN_POINTS_A_WAVE * waves).next_power_of_two().min(self.angles))
+        Angles::shared(quick_length(DRAWN_POINTS_A_WAVE * waves))
     }
 
     /// The same with errors drawn at the points that may come to touch, and RONq in closed form; `None` where the section is interrupted,
-    /// errors are no small part of it, or such points are many.
+    /// much of the form found is noise, or such points are many.
     fn drawn_where_they_touch(
         &self,
         filter: &Filter,
@@ -121,25 +147,34 @@ impl Form {
         if !self.at.gaps.is_empty() {
             return None;
         }
-        let (angles, variance) = (self.drawn_angles(filter), self.widened(filter));
+        let variance = self.widened(filter);
+        let few = quick_length(DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).min(self.angles);
+        let angles = Angles::shared(few);
+        if !variance.iter().skip(2).any(|variance| *variance > 0.0) {
+            return None;
+        }
         let mut fourier = Fourier::new(angles.len());
         let profile_um = self.profile(filter, &mut fourier);
-        let covariance = Covariance::new(&variance, &mut fourier)?;
-        let largest_um = LARGEST * covariance.std_um();
+        let harmonics = filter.harmonics(&self.harmonics);
+        let errors = LikelyErrors::new(self.likely(), &harmonics, &variance, DRAWS, &self.noise, &mut fourier);
+        if errors.share_of_noise() > MOST_NOISE {
+            return None;
+        }
+        let largest_um = errors.largest_um(LARGEST);
         let mut found = Vec::new();
         for reference in references {
             let is_fixed = *reference == Reference::LeastSquares;
             // Points twice the largest error below an extreme do not reach it where the centre stays.
             let usual_um = if is_fixed { 0.5 * largest_um } else { largest_um };
-            let mut circle = Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um)?;
+            let mut circle = Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um, false)?;
             if circle.points().len() > MOST_POINTS {
                 return None;
             }
-            let mut errors = ErrorsAt::new(&covariance, circle.points(), &self.noise);
+            let mut errors = errors.at(circle.points(), &mut fourier);
             let mut certain = true;
             // As wide as from whole profiles: draws about a form that holds its noise scatter too little.
             let transforms = DRAWS.div_ceil(TURNS_OF_A_DRAW);
-            let mut values = monte_carlo_of(DRAWS, transforms, |disturbed, found| {
+            let values = likely_values_of(DRAWS, transforms, |disturbed, found| {
                 let values = if disturbed { circle.values_at(errors.draw(), largest_um) } else { Some(circle.about()) };
                 certain &= values.is_some();
                 add_values(values, *reference, found);
@@ -147,11 +182,9 @@ impl Form {
             if !certain {
                 return None;
             }
-            if let (true, Some((ronq_um, known))) = (is_fixed, values.last_mut()) {
-                *known = Some(of_rms(&filter.harmonics(&self.harmonics), &variance, *ronq_um)?);
-            }
             found.extend(values);
         }
+        self.state_rms(filter, references, &mut found);
         Some(found)
     }
 

@@ -1,12 +1,15 @@
 //! Values of one section around the part.
 
+use std::cell::OnceCell;
+
 use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
     roundness::{Angles, Points, Reference},
     uncertainty::{
-        DRAWS, Errors, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, monte_carlo_of, noise_95, seed, student_95,
+        DRAWS, Errors, Likely, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, likely_forms, monte_carlo_of, noise_95,
+        seed, student_95,
     },
 };
 use runout_turning::{
@@ -75,13 +78,15 @@ pub(super) struct Form {
     /// Of noise.
     pub(super) variance: Vec<f64>,
     /// Real degrees of freedom behind it, by order; 0 where it is taken as exact.
-    freedom: Vec<usize>,
+    pub(super) freedom: Vec<usize>,
     pub(super) held: Content,
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
     pub(super) at: SectionAt,
     /// What its errors are drawn from, for all of its values.
     pub(super) noise: Noise,
+    /// What the true form may be.
+    likely: OnceCell<Vec<Likely>>,
 }
 
 impl Form {
@@ -108,6 +113,7 @@ impl Form {
             angles: result.angles,
             radius_mm,
             noise: Noise::new(held.highest + 1, seed(&[&result.station, &at.id])),
+            likely: OnceCell::new(),
             held,
             at,
         })
@@ -117,7 +123,8 @@ impl Form {
     fn exactly(&self, harmonics: &[Complex64]) -> Self {
         let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
         let (freedom, held, at) = (self.freedom.clone(), self.held.clone(), self.at.clone());
-        Self { harmonics, equivalents, variance, freedom, held, at, ..*self }
+        let likely = OnceCell::new();
+        Self { harmonics, equivalents, variance, freedom, held, at, likely, ..*self }
     }
 
     fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
@@ -225,6 +232,11 @@ impl Form {
         let mut form_um = fourier.synthesise(filter.harmonics(&self.harmonics)).to_vec();
         self.at.gaps.blank(&mut form_um);
         form_um
+    }
+
+    /// What the true form may be, given the one found.
+    pub(super) fn likely(&self) -> &[Likely] {
+        self.likely.get_or_init(|| likely_forms(&self.harmonics, &self.variance, 2))
     }
 
     /// Variances as wide as they are badly known, behind a filter.
