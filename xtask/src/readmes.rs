@@ -91,7 +91,7 @@ fn shown(text: &str) -> Vec<(usize, &str)> {
                 }
             }
             (None, Some((_, held))) if !line.trim().is_empty() && !line.contains(LEFT_OUT) => {
-                held.push((index + 1, line))
+                held.push((index + 1, line));
             }
             (None, _) => {}
         }

@@ -334,7 +334,7 @@ mod tests {
         let mut noise = |power: f64| (0.5 * power).sqrt() * Complex64::new(normal(), normal());
         let harmonics: Vec<Complex64> = (0..900)
             .map(|order| match order {
-                0..10 => 1000.0 / Complex64::from(order as f64 + 1.0),
+                0..10 => 1000.0 / Complex64::from(f64::from(order) + 1.0),
                 50 => Complex64::from(30.0),
                 500.. => noise(2.0),
                 _ => noise(1.0),
@@ -389,7 +389,7 @@ mod tests {
             let found = draws.iter().sum::<f64>() / 4000.0;
             let squares = draws.iter().map(|draw| (draw - found).powi(2)).sum::<f64>() / 4000.0;
             assert!((found - mean).abs() < 4.0 * (square / independent).sqrt(), "{found} {mean}");
-            assert!((squares / square - 1.0).abs() < 4.0 * (2.0 / independent as f64).sqrt(), "{squares} {square}");
+            assert!((squares / square - 1.0).abs() < 4.0 * (2.0 / independent).sqrt(), "{squares} {square}");
             assert!(draws.iter().all(|draw| draw.abs() < 1.5 * errors.largest_um(5.0)));
         }
     }

@@ -75,7 +75,7 @@ mod tests {
     fn a_crest_between_angles_is_that_of_the_wave() {
         for step in 0..20 {
             let wave: Vec<f64> =
-                (0..6).map(|index| (TAU * (index as f64 + 0.05 * f64::from(step)) / 6.0).cos()).collect();
+                (0..6).map(|index| (TAU * (f64::from(index) + 0.05 * f64::from(step)) / 6.0).cos()).collect();
             let mut all = Crests::default();
             all.set_all(&wave);
             let (low, high) =
