@@ -24,7 +24,7 @@ use serde::Deserialize;
 /// `plugin = "markdown"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Markdown {
+pub(crate) struct Markdown {
     /// The file to write.
     path: PathBuf,
 }
@@ -91,7 +91,7 @@ impl Export for Page {
 ///
 /// # Errors
 /// When the traces cannot be read, or the page cannot be written.
-pub fn page(traces: &Path, page: &Path) -> std::result::Result<(), Box<dyn Error>> {
+pub(crate) fn page(traces: &Path, page: &Path) -> std::result::Result<(), Box<dyn Error>> {
     let mut registry = runout_cli::builtin::registry();
     registry.exporters.add(Plugin::of::<Markdown>());
     let (traces, page) = (traces.display(), page.display());

@@ -22,7 +22,7 @@ use serde::Deserialize;
 /// `plugin = "plane"`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Plane {
+pub(crate) struct Plane {
     /// Standard uncertainty of a point's height, in µm.
     std_um: f64,
 }
@@ -96,7 +96,7 @@ impl PointSeparator for Plane {
 ///
 /// # Errors
 /// When the points cannot be read, or determine no plane.
-pub fn flatness(points: &Path, out: &Path) -> Result<Summary, Box<dyn Error>> {
+pub(crate) fn flatness(points: &Path, out: &Path) -> Result<Summary, Box<dyn Error>> {
     let mut registry: Registry = runout_cli::builtin::registry();
     registry.separators.add(Plugin::of::<Plane>());
     let (points, out) = (points.display(), out.display());

@@ -10,7 +10,7 @@ use runout_core::{pipeline::Pipeline, summary::Summary};
 ///
 /// # Errors
 /// When the recording cannot be read, or the folder cannot be written to.
-pub fn separate(recording: &Path, out: &Path) -> Result<Summary, Box<dyn Error>> {
+pub(crate) fn separate(recording: &Path, out: &Path) -> Result<Summary, Box<dyn Error>> {
     let (recording, out) = (recording.display(), out.display());
     let configuration = format!(
         r#"

@@ -25,7 +25,7 @@ const BLOCK_ELEMENTS: usize = 1 << 17;
 /// `plugin = "arrays"`: stands for a recording that is handed over with the pipeline.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Arrays {}
+pub(crate) struct Arrays {}
 
 impl StageConfig for Arrays {
     type Stage = Box<dyn Loader>;
@@ -140,14 +140,14 @@ fn scan(angle_deg: &PyReadonlyArray1<'_, f64>, samples: usize) -> PyResult<Encod
 
 /// A station with its captures by the id of the setup.
 #[derive(FromPyObject)]
-pub struct Station {
+pub(crate) struct Station {
     name: String,
     z_mm: f64,
     captures: HashMap<String, Py<Capture>>,
 }
 
 /// Opens arrays.
-pub struct ArrayLoader {
+pub(crate) struct ArrayLoader {
     /// In the order in which they are to be worked on.
     pub stations: Vec<Station>,
 }

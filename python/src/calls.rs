@@ -27,7 +27,7 @@ use crate::{
 
 /// The pipeline of a call: a file or a text, what to change in it, the recording where it is in memory, and plugins in Python.
 #[derive(FromPyObject)]
-pub struct Job {
+pub(crate) struct Job {
     path: Option<PathBuf>,
     text: String,
     folder: PathBuf,
@@ -69,7 +69,7 @@ type Answer = (String, Vec<Table>, Option<Surface>);
 /// Runs a pipeline.
 #[pyfunction]
 #[pyo3(signature = (job, threads = None, progress = None, surface = false))]
-pub fn run(
+pub(crate) fn run(
     py: Python<'_>,
     job: Job,
     threads: Option<NonZeroUsize>,
@@ -89,7 +89,7 @@ pub fn run(
 /// Runs the closed loop on a pipeline.
 #[pyfunction]
 #[pyo3(signature = (job, threads = None, progress = None, surface = false))]
-pub fn diagnose(
+pub(crate) fn diagnose(
     py: Python<'_>,
     job: Job,
     threads: Option<NonZeroUsize>,
@@ -126,7 +126,7 @@ fn answer(
 /// Compares separators on the same data.
 #[pyfunction]
 #[pyo3(signature = (job, methods, threads = None, progress = None))]
-pub fn compare(
+pub(crate) fn compare(
     py: Python<'_>,
     mut job: Job,
     methods: Vec<String>,
@@ -172,7 +172,7 @@ fn comparison(
 
 /// Says what a pipeline can do.
 #[pyfunction]
-pub fn check(py: Python<'_>, mut job: Job) -> PyResult<String> {
+pub(crate) fn check(py: Python<'_>, mut job: Job) -> PyResult<String> {
     let stop = Stop::default();
     let of_job = stop.clone();
     watched(py, None, &stop, move |_| {
@@ -184,12 +184,12 @@ pub fn check(py: Python<'_>, mut job: Job) -> PyResult<String> {
 
 /// The document that a command of the program prints with `--json`.
 #[pyfunction]
-pub fn document(py: Python<'_>, words: Vec<OsString>) -> PyResult<String> {
+pub(crate) fn document(py: Python<'_>, words: Vec<OsString>) -> PyResult<String> {
     watched(py, None, &Stop::default(), move |_| json(&documents::of_command(words, &builtin::registry())?))
 }
 
 /// The program: prints, and gives its exit status.
 #[pyfunction]
-pub fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+pub(crate) fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
     py.detach(|| runout_cli::status_of(words, &builtin::registry()))
 }

@@ -17,7 +17,7 @@ use crate::{interruptible::interrupted, work::Stop};
 
 /// What is kept of a result.
 #[derive(Debug, Default)]
-pub struct Kept {
+pub(crate) struct Kept {
     /// Tables with their rows, piece by piece.
     pub tables: Vec<(TableSpec, Vec<RecordBatch>)>,
     /// Form over angle and z, where it was made.
@@ -26,7 +26,7 @@ pub struct Kept {
 
 /// Keeps what a run gives, and refuses to complete an interrupted one: the files of all exporters appear together or not at all.
 #[derive(Debug, Clone, Default)]
-pub struct Collector {
+pub(crate) struct Collector {
     /// What was kept.
     pub kept: Arc<Mutex<Kept>>,
     /// Whether the surface is asked for.
@@ -37,7 +37,7 @@ pub struct Collector {
 
 impl Collector {
     /// What was kept, once the run is over.
-    pub fn take(&self) -> Kept {
+    pub(crate) fn take(&self) -> Kept {
         std::mem::take(&mut *self.kept.lock().unwrap_or_else(PoisonError::into_inner))
     }
 

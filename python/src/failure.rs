@@ -4,7 +4,7 @@ use pyo3::{exceptions::PyRuntimeError, prelude::*};
 use runout_cli::Failure;
 
 /// The exception that the package raises for a failure.
-pub fn exception(py: Python<'_>, failure: &Failure) -> PyErr {
+pub(crate) fn exception(py: Python<'_>, failure: &Failure) -> PyErr {
     let document = failure.document().to_string();
     let made = py.import("runout.errors").and_then(|errors| errors.call_method1("from_document", (document,)));
     match made {
@@ -14,6 +14,6 @@ pub fn exception(py: Python<'_>, failure: &Failure) -> PyErr {
 }
 
 /// The exception for a fault of the program itself.
-pub fn fault(message: &str) -> PyErr {
+pub(crate) fn fault(message: &str) -> PyErr {
     PyRuntimeError::new_err(format!("{message}; please report this as a fault of runout"))
 }

@@ -12,12 +12,12 @@ use runout_core::{
 use crate::work::Stop;
 
 /// The error of work that stops.
-pub fn interrupted(object: &str) -> Error {
+pub(crate) fn interrupted(object: &str) -> Error {
     Error::new("read", object, "the work was interrupted").of(ErrorKind::Interrupted)
 }
 
 /// A loader, and whether to stop.
-pub struct Interruptible {
+pub(crate) struct Interruptible {
     /// What loads.
     pub loader: Box<dyn Loader>,
     /// Whether to stop.

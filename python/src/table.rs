@@ -119,14 +119,14 @@ impl Table {
 /// The figures that tables declare, as HTML with pictures in it; each figure has so many panels at most.
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value, reason = "what Python gives is owned")]
-pub fn figures(py: Python<'_>, tables: Vec<Py<Table>>, panels: usize) -> PyResult<String> {
+pub(crate) fn figures(py: Python<'_>, tables: Vec<Py<Table>>, panels: usize) -> PyResult<String> {
     let drawn = tables.iter().map(|table| (&table.get().spec, &table.get().batches[..]));
     py.detach(|| runout_figures::fragment(drawn, panels)).map_err(|error| exception(py, &Failure::Work(error)))
 }
 
 /// Form over the part's angle and z.
 #[pyclass(frozen, get_all, module = "runout._native")]
-pub struct Surface {
+pub(crate) struct Surface {
     /// Nominal radius, in mm.
     radius_mm: f64,
     /// Angles of the part, in degrees.
@@ -144,7 +144,7 @@ impl Surface {
     ///
     /// # Errors
     /// When the grid has not as many deviations as rings and angles say.
-    pub fn new(py: Python<'_>, surface: surface::Surface) -> PyResult<Self> {
+    pub(crate) fn new(py: Python<'_>, surface: surface::Surface) -> PyResult<Self> {
         let (rings, angles) = (surface.z_mm.len(), surface.angles);
         let angle_deg: Vec<f64> = (0..angles).map(|index| 360.0 * index as f64 / angles as f64).collect();
         let deviation_um = PyArray1::from_vec(py, surface.deviation_um).reshape([rings, angles])?;

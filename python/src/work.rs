@@ -25,7 +25,7 @@ const STACK_BYTES: usize = 8 << 20;
 
 /// Whether work is to stop, and what Python code in it raised.
 #[derive(Debug, Clone, Default)]
-pub struct Stop(Arc<State>);
+pub(crate) struct Stop(Arc<State>);
 
 #[derive(Debug, Default)]
 struct State {
@@ -35,7 +35,7 @@ struct State {
 
 impl Stop {
     /// Whether it is.
-    pub fn is_set(&self) -> bool {
+    pub(crate) fn is_set(&self) -> bool {
         self.0.is_set.load(Ordering::Relaxed)
     }
 
@@ -44,7 +44,7 @@ impl Stop {
     }
 
     /// Stops because of an exception; the first of several is the one that the call raises.
-    pub fn raise(&self, error: PyErr) {
+    pub(crate) fn raise(&self, error: PyErr) {
         self.0.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         self.set();
     }
@@ -61,7 +61,7 @@ enum Event<T> {
 }
 
 /// Watches work, for the callback.
-pub struct Watch<T> {
+pub(crate) struct Watch<T> {
     events: Sender<Event<T>>,
 }
 
@@ -80,7 +80,7 @@ impl<T: Send> Observer for Watch<T> {
 ///
 /// # Errors
 /// When the work fails, the callback or a plugin raises, or Python was interrupted.
-pub fn watched<T: Send + 'static>(
+pub(crate) fn watched<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
     stop: &Stop,

@@ -11,13 +11,13 @@ use std::{
 
 /// A file that every folder of data holds.
 #[allow(dead_code, reason = "not every test takes one")]
-pub fn file(place: &str) -> Option<PathBuf> {
+pub(crate) fn file(place: &str) -> Option<PathBuf> {
     find(place, "skipped")
 }
 
 /// A file that some folders hold: a test without it is counted apart.
 #[allow(dead_code, reason = "not every test takes one")]
-pub fn optional_file(place: &str) -> Option<PathBuf> {
+pub(crate) fn optional_file(place: &str) -> Option<PathBuf> {
     find(place, "not compared")
 }
 

@@ -125,7 +125,7 @@ const FILES: [Public; 10] = [
 ];
 
 /// Brings every file that is not there yet, from the network or from a folder.
-pub fn bring(from: Option<&Path>) -> Outcome {
+pub(crate) fn bring(from: Option<&Path>) -> Outcome {
     // The examples' pipelines name this folder, wherever cargo builds.
     let folder = root().join("target/data");
     let missing = all(&FILES, &folder, from)?;

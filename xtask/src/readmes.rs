@@ -15,7 +15,7 @@ const LEFT_OUT: &str = "…";
 
 /// Runs the commands of all examples' READMEs by a program, in a copy of the examples below a folder, and names each line that a README
 /// shows as printed and no command of it prints. Words: `FOLDER PROGRAM`.
-pub fn check(words: &[&str]) -> Outcome {
+pub(crate) fn check(words: &[&str]) -> Outcome {
     let [folder, program] = words else { return Err("usage: cargo xtask check-readmes FOLDER PROGRAM".into()) };
     let folder = Path::new(folder);
     run_examples(folder, Path::new(program), &|_| Ok(()))?;

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// What the READMEs' commands begin with.
-pub const PROGRAM: &str = "target/release/runout";
+pub(crate) const PROGRAM: &str = "target/release/runout";
 
 /// Runs the commands of all examples' READMEs in a copy of the repository's examples, by the release program or another one. The
 /// folder then holds what they wrote, and what they printed as `NUMBER.txt`.

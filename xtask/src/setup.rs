@@ -28,7 +28,7 @@ pub(crate) fn cargo(arguments: &[&str]) -> Outcome<Command> {
 }
 
 /// The CMake to use, with the rest in place.
-pub fn ready() -> Outcome<PathBuf> {
+pub(crate) fn ready() -> Outcome<PathBuf> {
     compiler()?;
     cmake()
 }

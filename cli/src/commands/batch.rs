@@ -19,7 +19,7 @@ use crate::{args::BatchArgs, failure::Failure, progress::Progress, render};
 ///
 /// # Errors
 /// When the command line or the configuration is wrong, or the data set cannot be written; after the report, when a recording failed.
-pub fn execute(args: &BatchArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+pub(crate) fn execute(args: &BatchArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let sources = Sources::read(&args.pipeline.pipeline, &args.pipeline.overrides.set, INCLUDE_KEY)?;
     let recordings = recordings(&args.recordings, args.name_folders).map_err(|error| Failure::Name {
         message: error.to_string(),

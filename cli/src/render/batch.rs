@@ -13,7 +13,7 @@ const DIGITS: usize = 5;
 
 /// The report.
 #[must_use]
-pub fn text(report: &BatchReport) -> String {
+pub(crate) fn text(report: &BatchReport) -> String {
     let mut page = Page::default();
     page.line(&report.title);
     let mut counts = vec![format!("{} run", count(report.done, "recording"))];

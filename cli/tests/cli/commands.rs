@@ -76,7 +76,7 @@ fn check_names_the_orders_that_fixed_sensors_lose() {
     assert_eq!(report["orders"][3]["noise_gain"][0], Value::Null);
 }
 
-pub const SCENARIO: &str = r#"title = "Small campaign"
+pub(crate) const SCENARIO: &str = r#"title = "Small campaign"
 plugin = "spindle"
 output = "shaft.h5"
 seed = 7

@@ -6,7 +6,7 @@ use assert_cmd::cargo::cargo_bin_cmd;
 use tempfile::TempDir;
 
 /// A four-sensor rig with the part reversed and the sensors reversed too.
-pub const RIG: &str = r#"part_radius_mm = 30.0
+pub(crate) const RIG: &str = r#"part_radius_mm = 30.0
 sensors = [
   { id = "S1", angle_deg = 0,  z_mm = 200, section = "a" },
   { id = "S2", angle_deg = 90, z_mm = 200, section = "a" },
@@ -20,7 +20,7 @@ setups = [
 "#;
 
 /// Everything behind the rig.
-pub const STAGES: &str = r#"
+pub(crate) const STAGES: &str = r#"
 [load]
 plugin = "hdf5"
 path = "shaft.h5"
@@ -38,12 +38,12 @@ path = "out"
 "#;
 
 /// A pipeline with nothing wrong in it.
-pub fn pipeline() -> String {
+pub(crate) fn pipeline() -> String {
     format!("title = \"Turned shaft\"\n\n[rig]\n{RIG}{STAGES}")
 }
 
 /// What a run of the program gave.
-pub struct Ran {
+pub(crate) struct Ran {
     pub status: i32,
     pub stdout: String,
     pub stderr: String,
@@ -51,17 +51,17 @@ pub struct Ran {
 
 impl Ran {
     /// All of it, for a snapshot.
-    pub fn shown(&self) -> String {
+    pub(crate) fn shown(&self) -> String {
         format!("exit status: {}\n--- stdout\n{}--- stderr\n{}", self.status, self.stdout, self.stderr)
     }
 }
 
 /// A folder of its own.
-pub struct Folder(TempDir);
+pub(crate) struct Folder(TempDir);
 
 impl Folder {
     /// With these files.
-    pub fn with(files: &[(&str, &str)]) -> Self {
+    pub(crate) fn with(files: &[(&str, &str)]) -> Self {
         let folder = Self(TempDir::new().unwrap());
         for (name, text) in files {
             fs::write(folder.path().join(name), text).unwrap();
@@ -69,12 +69,12 @@ impl Folder {
         folder
     }
 
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.0.path()
     }
 
     /// Runs the program here: no path of the machine can come into its words.
-    pub fn run(&self, arguments: &[&str]) -> Ran {
+    pub(crate) fn run(&self, arguments: &[&str]) -> Ran {
         let mut command = cargo_bin_cmd!("runout");
         let output = command.current_dir(self.path()).env_remove("COLUMNS").args(arguments).output().unwrap();
         Ran {

@@ -21,7 +21,7 @@ pub(super) struct Near {
 impl Near {
     /// From deviations about a reference whose radius exceeds the nominal one by `level_um`; missing points are NaN.
     /// `usual_um` is about the largest error of a draw.
-    pub fn new(deviations_um: &[f64], level_um: f64, usual_um: f64) -> Self {
+    pub(crate) fn new(deviations_um: &[f64], level_um: f64, usual_um: f64) -> Self {
         let Course { low, high, .. } = Course::of(deviations_um.iter().copied());
         let margin_um = MARGIN * usual_um;
         let is_near = |point: &usize| {
@@ -33,7 +33,7 @@ impl Near {
     }
 
     /// Whether no other point can touch: the ends are now there, the centre has moved by so much, no error is larger.
-    pub fn suffice(&self, ends_um: [f64; 2], moved_um: f64, largest_um: f64) -> bool {
+    pub(crate) fn suffice(&self, ends_um: [f64; 2], moved_um: f64, largest_um: f64) -> bool {
         let nearer = (ends_um[0] - self.ends_um[0]).max(self.ends_um[1] - ends_um[1]).max(0.0);
         nearer + moved_um + largest_um <= self.margin_um
     }
@@ -53,7 +53,7 @@ const RANKED: usize = 256;
 
 impl Ranked {
     /// Of heights, of which missing ones are NaN.
-    pub fn new(heights: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn new(heights: impl Iterator<Item = f64>) -> Self {
         let there = heights.zip(0..).filter(|(height, _)| !height.is_nan());
         let mut first: Vec<(f64, u32)> = there.collect();
         let descending = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
@@ -68,7 +68,7 @@ impl Ranked {
 
     /// The highest of `disturbed` heights, none of which is above its own by more than `largest`, and its place. `None`
     /// where points that are not ranked could be higher, or there is none.
-    pub fn highest(&self, largest: f64, disturbed: impl Fn(usize) -> f64) -> Option<(f64, usize)> {
+    pub(crate) fn highest(&self, largest: f64, disturbed: impl Fn(usize) -> f64) -> Option<(f64, usize)> {
         let (mut best, mut place) = (f64::NEG_INFINITY, None);
         for (height, point) in &self.first {
             if height + largest < best {
@@ -96,7 +96,7 @@ pub(super) struct Course {
 
 impl Course {
     /// Missing values are NaN, and so are the ends where nothing is there.
-    pub fn of(deviations: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn of(deviations: impl Iterator<Item = f64>) -> Self {
         let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
         for deviation in deviations.filter(|deviation| !deviation.is_nan()) {
             (low, high) = (low.min(deviation), high.max(deviation));
@@ -110,7 +110,7 @@ impl Course {
     }
 
     /// Of two parts together.
-    pub fn and(self, other: Self) -> Self {
+    pub(crate) fn and(self, other: Self) -> Self {
         Self {
             low: self.low.min(other.low),
             high: self.high.max(other.high),
@@ -120,17 +120,17 @@ impl Course {
     }
 
     /// Root mean square.
-    pub fn rms(&self) -> f64 {
+    pub(crate) fn rms(&self) -> f64 {
         (self.squares / self.points as f64).sqrt()
     }
 
     /// Of drawn values less what they are above their deviations; none is missing.
-    pub fn less(drawn: &[f64], offset: &[f64]) -> Self {
+    pub(crate) fn less(drawn: &[f64], offset: &[f64]) -> Self {
         Self::of_both(drawn, offset, |drawn, offset| drawn - offset)
     }
 
     /// Of deviations with errors added; none is missing.
-    pub fn with_errors(deviations: &[f64], errors: &[f64]) -> Self {
+    pub(crate) fn with_errors(deviations: &[f64], errors: &[f64]) -> Self {
         Self::of_both(deviations, errors, |deviation, error| deviation + error)
     }
 

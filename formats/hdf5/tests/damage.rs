@@ -8,7 +8,7 @@ use runout_hdf5::{WriteOptions, inspect};
 use crate::double::{Memory, load, noise, read, rig, write};
 
 /// Everything that can be read of the file, for comparison.
-pub fn contents(path: &std::path::Path) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
+pub(crate) fn contents(path: &std::path::Path) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
     let rig = rig();
     let recording = load(path, &rig)?;
     let mut all = Vec::new();

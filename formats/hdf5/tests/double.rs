@@ -12,10 +12,10 @@ use runout_core::{
 };
 use runout_hdf5::{Hdf5Config, WriteOptions, write_measurement};
 
-pub const TURN: usize = 50;
+pub(crate) const TURN: usize = 50;
 
 /// Two sensors, the second of them turned round, and two setups.
-pub fn rig() -> Rig {
+pub(crate) fn rig() -> Rig {
     let sensor = |id: &str, sign| SensorConfig {
         id: id.into(),
         angle_deg: 0.0,
@@ -36,7 +36,7 @@ pub fn rig() -> Rig {
 }
 
 /// Numbers between −1 and 1 without a pattern (the multiplicative generator of Park and Miller, 1988).
-pub fn noise(seed: u64) -> impl Iterator<Item = f64> {
+pub(crate) fn noise(seed: u64) -> impl Iterator<Item = f64> {
     let mut state = seed % 2_147_483_646 + 1;
     std::iter::repeat_with(move || {
         state = state * 16_807 % 2_147_483_647;
@@ -44,7 +44,7 @@ pub fn noise(seed: u64) -> impl Iterator<Item = f64> {
     })
 }
 
-pub struct Memory {
+pub(crate) struct Memory {
     pub stations: Vec<StationKey>,
     /// `[station][setup]`.
     pub captures: Vec<Vec<MemoryStream>>,
@@ -52,7 +52,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    pub fn new(rig: &Rig, stations: &[(&str, f64)], samples: usize, encoder: bool) -> Self {
+    pub(crate) fn new(rig: &Rig, stations: &[(&str, f64)], samples: usize, encoder: bool) -> Self {
         let stations: Vec<StationKey> =
             stations.iter().map(|(name, z_mm)| StationKey { name: (*name).into(), z_mm: *z_mm }).collect();
         let captures = stations
@@ -111,21 +111,21 @@ impl Recording for Memory {
     }
 }
 
-pub fn write(recording: &Memory, rig: &Rig, path: &Path, options: &WriteOptions) -> Result<PathBuf> {
+pub(crate) fn write(recording: &Memory, rig: &Rig, path: &Path, options: &WriteOptions) -> Result<PathBuf> {
     write_measurement(recording, rig, path, options, &mut |_| {})
 }
 
-pub fn load(path: &Path, rig: &Rig) -> Result<Box<dyn Recording>> {
+pub(crate) fn load(path: &Path, rig: &Rig) -> Result<Box<dyn Recording>> {
     load_marked(path, rig, None)
 }
 
 /// The same, with the mark as an analogue trace.
-pub fn load_marked(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Box<dyn Recording>> {
+pub(crate) fn load_marked(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Box<dyn Recording>> {
     load_as(rig, Hdf5Config { path: path.to_owned(), marker, follow_links: false })
 }
 
 /// The same, with other settings.
-pub fn load_as(rig: &Rig, config: Hdf5Config) -> Result<Box<dyn Recording>> {
+pub(crate) fn load_as(rig: &Rig, config: Hdf5Config) -> Result<Box<dyn Recording>> {
     let context = Context { folder: Path::new(""), rig: Some(rig) };
     let loader = config.check(&context).unwrap();
     match loader.open(&Request { rig: Some(rig), columns: &[] })? {
@@ -135,14 +135,14 @@ pub fn load_as(rig: &Rig, config: Hdf5Config) -> Result<Box<dyn Recording>> {
 }
 
 /// A capture read to its end.
-pub struct Read {
+pub(crate) struct Read {
     pub capture: Capture,
     pub samples: Vec<f64>,
     pub angle_rev: Vec<f64>,
     pub blocks: usize,
 }
 
-pub fn read(recording: &dyn Recording, station: usize, setup: usize) -> Result<Read> {
+pub(crate) fn read(recording: &dyn Recording, station: usize, setup: usize) -> Result<Read> {
     let mut stream = recording.open(station, setup)?;
     let capture = stream.capture().clone();
     let mut read = Read { capture, samples: Vec::new(), angle_rev: Vec::new(), blocks: 0 };
@@ -158,6 +158,6 @@ pub fn read(recording: &dyn Recording, station: usize, setup: usize) -> Result<R
 }
 
 /// The message of what has to fail.
-pub fn message<T>(result: Result<T>) -> String {
+pub(crate) fn message<T>(result: Result<T>) -> String {
     result.err().map(|error| error.to_string()).unwrap_or_default()
 }

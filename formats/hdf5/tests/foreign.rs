@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Runs a script of `tests/foreign`; false where there is no h5py.
-pub fn python(script: &str, arguments: &[&Path]) -> bool {
+pub(crate) fn python(script: &str, arguments: &[&Path]) -> bool {
     let interpreter = std::env::var("RUNOUT_PYTHON").unwrap_or_else(|_| "python3".into());
     let required = std::env::var("RUNOUT_REQUIRE_FOREIGN").is_ok_and(|value| value == "1");
     let ready = Command::new(&interpreter).args(["-c", "import h5py, numpy"]).output();

@@ -26,7 +26,7 @@ fn marker(channel: &str, edge: Edge) -> Marker {
 }
 
 /// Reads both setups of a file and compares them with what every file holds; marks begin at this place of the first turn.
-pub fn holds_the_readings(path: &Path, marker: Option<Marker>, first: f64) {
+pub(crate) fn holds_the_readings(path: &Path, marker: Option<Marker>, first: f64) {
     let shown = path.display();
     let recording = load_marked(path, &rig(), marker).unwrap();
     for setup in 0..2 {

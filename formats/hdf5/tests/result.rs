@@ -19,10 +19,10 @@ use runout_core::{
 };
 use runout_hdf5::{ResultConfig, inspect};
 
-pub const ANGLES: usize = 8;
+pub(crate) const ANGLES: usize = 8;
 
 /// Form of section `a` at orders 0 to 2, order 1 lost, and x without tilt.
-pub fn station(name: &str) -> StationResult {
+pub(crate) fn station(name: &str) -> StationResult {
     let number = Complex64::new;
     StationResult {
         station: name.into(),
@@ -57,7 +57,7 @@ pub fn station(name: &str) -> StationResult {
     }
 }
 
-pub fn summary() -> Summary {
+pub(crate) fn summary() -> Summary {
     Summary {
         title: "Shaft".into(),
         provenance: Provenance {
@@ -95,7 +95,7 @@ pub fn summary() -> Summary {
     }
 }
 
-pub fn begin(path: &Path) -> (StationTables, Box<dyn Export>) {
+pub(crate) fn begin(path: &Path) -> (StationTables, Box<dyn Export>) {
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ResultConfig { path: path.to_owned() }.check(&context).unwrap();
     let tables = StationTables::new(None, None);
@@ -105,7 +105,7 @@ pub fn begin(path: &Path) -> (StationTables, Box<dyn Export>) {
 }
 
 /// Writes a result of two stations.
-pub fn write(path: &Path) {
+pub(crate) fn write(path: &Path) {
     let (mut tables, mut export) = begin(path);
     for name in ["s1", "s2"] {
         tables.write(&station(name), &mut *export).unwrap();

@@ -147,7 +147,7 @@ impl Alteration {
 
     /// The reading but for the trace's offset and slope.
     #[cfg(test)]
-    pub fn reading(&self, place: &Place, content: &Content) -> f64 {
+    pub(crate) fn reading(&self, place: &Place, content: &Content) -> f64 {
         (1.0 + self.gain) * self.seen(place, content)
     }
 

@@ -149,7 +149,7 @@ pub(crate) struct TracesFit {
 impl TracesFit {
     /// What everything that is fitted leaves of a column.
     #[cfg(test)]
-    pub fn outside(&self, column: &[f64]) -> Vec<f64> {
+    pub(crate) fn outside(&self, column: &[f64]) -> Vec<f64> {
         self.design.left(column)
     }
 

@@ -18,7 +18,7 @@ const USUAL_ORDERS: usize = 512;
 const STEP: f64 = 1e-3;
 
 /// An effect whose transfer is a Python object's.
-pub struct OwnEffect(Arc<Described>);
+pub(crate) struct OwnEffect(Arc<Described>);
 
 struct Described {
     about: &'static str,
@@ -30,7 +30,7 @@ struct Described {
 
 impl OwnEffect {
     /// With what its parameters are.
-    pub fn new(about: &'static str, parameters: Vec<Parameter>, object: Arc<Object>) -> Self {
+    pub(crate) fn new(about: &'static str, parameters: Vec<Parameter>, object: Arc<Object>) -> Self {
         Self(Arc::new(Described { about, parameters, object, orders: AtomicUsize::new(USUAL_ORDERS) }))
     }
 }

@@ -23,12 +23,12 @@ use runout_spindle::{effects, separators::MethodConfig};
 
 use crate::work::Stop;
 use effect::OwnEffect;
-pub use separator::Layout;
+pub(crate) use separator::Layout;
 use separator::OwnSeparator;
 
 /// A Python object that is a plugin of one call.
 #[derive(FromPyObject)]
-pub struct Own {
+pub(crate) struct Own {
     name: String,
     about: String,
     /// Name, unit and tolerance of each parameter of an effect; `None` of a separator.
@@ -40,7 +40,7 @@ pub struct Own {
 ///
 /// # Errors
 /// When a name is taken.
-pub fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) -> Result<(), Failure> {
+pub(crate) fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) -> Result<(), Failure> {
     for Own { name, about, parameters, plugin } in plugins {
         let taken = registry.separators.iter().any(|known| known.name == name)
             || registry.effects.iter().any(|known| known.name == name);

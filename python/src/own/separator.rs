@@ -27,7 +27,7 @@ const FIRST_ORDER: usize = 2;
 
 /// What a formula gets: the rig as it reads form and motion.
 #[pyclass(frozen, get_all, module = "runout._native")]
-pub struct Layout {
+pub(crate) struct Layout {
     /// Orders that are asked for, ascending from 2.
     orders: Py<PyArray1<i64>>,
     /// What is solved for: quantity, and the section of a form.
@@ -167,7 +167,7 @@ impl ClosedForm for Shared {
 }
 
 /// A separator whose formula is a Python object.
-pub struct OwnSeparator {
+pub(crate) struct OwnSeparator {
     solving: ClosedFormSeparator,
     formula: Arc<Formula>,
 }
@@ -177,7 +177,7 @@ impl OwnSeparator {
     ///
     /// # Errors
     /// When a key has a value that cannot be, or no formula takes the rig.
-    pub fn new(
+    pub(crate) fn new(
         config: &MethodConfig<Object>,
         context: &Context,
         object: &Arc<Object>,

@@ -15,7 +15,7 @@ struct Trace {
 }
 
 /// A cylindricity plot (`.pltx`) as `trace`, `kind`, `z_mm`, `angle_deg`, `deviation_um`, each to 1e-6.
-pub fn traces(pltx: &[u8]) -> Outcome<String> {
+pub(crate) fn traces(pltx: &[u8]) -> Outcome<String> {
     let mut text = String::from("trace,kind,z_mm,angle_deg,deviation_um\n");
     for trace in read(pltx)? {
         for [angle, z_mm, deviation_mm] in trace.points {
@@ -27,7 +27,7 @@ pub fn traces(pltx: &[u8]) -> Outcome<String> {
 }
 
 /// One circle of such a plot as `angle_deg`, `form_um`.
-pub fn circle(pltx: &[u8], name: &str) -> Outcome<String> {
+pub(crate) fn circle(pltx: &[u8], name: &str) -> Outcome<String> {
     let traces = read(pltx)?;
     let trace =
         traces.into_iter().find(|trace| trace.name == name).ok_or_else(|| format!("there is no circle {name}"))?;
@@ -75,7 +75,7 @@ fn read(pltx: &[u8]) -> Outcome<Vec<Trace>> {
 }
 
 /// Phase and radius as NmmQuad writes them, as `phase_deg`, `radius_counts`, `deviation_counts`: the digits stay as they are.
-pub fn quadrature(table: &[u8]) -> Outcome<String> {
+pub(crate) fn quadrature(table: &[u8]) -> Outcome<String> {
     let table = std::str::from_utf8(table).map_err(|error| error.to_string())?;
     let mut lines = table.lines();
     match lines.next() {

@@ -181,7 +181,7 @@ fn long_files(root: &Path, members: &[Member]) -> Vec<(PathBuf, usize)> {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(crate) mod tests {
     use std::{
         fs,
         ops::Deref,
@@ -192,7 +192,7 @@ pub mod tests {
     use super::Findings;
 
     /// A folder of its own, gone with the value.
-    pub struct Tree(PathBuf);
+    pub(crate) struct Tree(PathBuf);
 
     impl Deref for Tree {
         type Target = Path;
@@ -208,7 +208,7 @@ pub mod tests {
     }
 
     /// A folder of its own with these files.
-    pub fn tree(files: &[(&str, &str)]) -> Tree {
+    pub(crate) fn tree(files: &[(&str, &str)]) -> Tree {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let folder = std::env::temp_dir().join(format!("runout-xtask-{}-{count}", std::process::id()));

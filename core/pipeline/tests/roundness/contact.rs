@@ -8,7 +8,7 @@ use crate::profiles::{Profile, profile};
 const TOLERANCE_UM: f64 = 2e-9;
 
 /// Distances from the centre and directions to the points that are there.
-pub fn seen(profile: &Profile, circle: &Circle) -> Vec<(usize, f64, f64)> {
+pub(crate) fn seen(profile: &Profile, circle: &Circle) -> Vec<(usize, f64, f64)> {
     let from = |[x, y]: [f64; 2]| (x - circle.x_um, y - circle.y_um);
     let places = profile.places().into_iter().map(|(index, place)| (index, from(place)));
     places.map(|(index, (x, y))| (index, x.hypot(y), y.atan2(x))).collect()
@@ -19,7 +19,7 @@ fn extremes(seen: &[(usize, f64, f64)]) -> (f64, f64) {
 }
 
 /// Checks one reference circle; says what does not hold.
-pub fn check(profile: &Profile, reference: Reference) -> Result<(), String> {
+pub(crate) fn check(profile: &Profile, reference: Reference) -> Result<(), String> {
     let points = profile.points();
     let circle = points.reference(reference).ok_or("none found")?;
     let seen = seen(profile, &circle);
@@ -101,7 +101,7 @@ fn contact_conditions_hold_on_ten_thousand_profiles() {
 }
 
 /// Deviations up to a third of the radius: what a polar plot about a small base circle looks like.
-pub fn plot(seed: u64) -> Profile {
+pub(crate) fn plot(seed: u64) -> Profile {
     let mut plot = profile(seed, 4..=12);
     let largest =
         plot.form_um.iter().filter(|form| form.is_finite()).fold(0.0, |largest: f64, form| largest.max(form.abs()));

@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use runout_core::standards::roundness::{Angles, Points};
 
-pub struct Profile {
+pub(crate) struct Profile {
     pub kind: &'static str,
     pub angles: Vec<f64>,
     pub form_um: Vec<f64>,
@@ -15,7 +15,7 @@ pub struct Profile {
 
 impl Profile {
     /// Coordinates and index of the points that are there, in µm.
-    pub fn places(&self) -> Vec<(usize, [f64; 2])> {
+    pub(crate) fn places(&self) -> Vec<(usize, [f64; 2])> {
         let points = self.form_um.iter().zip(&self.angles).enumerate().filter(|(_, (form, _))| form.is_finite());
         let radius = 1e3 * self.radius_mm;
         points
@@ -23,7 +23,7 @@ impl Profile {
             .collect()
     }
 
-    pub fn points(&self) -> Points {
+    pub(crate) fn points(&self) -> Points {
         let mut points = Points::default();
         points.set_profile(&self.angles.iter().copied().collect::<Angles>(), &self.form_um, self.radius_mm);
         points
@@ -31,7 +31,7 @@ impl Profile {
 }
 
 /// Profile `seed` with a number of points from `sizes`.
-pub fn profile(seed: u64, sizes: std::ops::RangeInclusive<usize>) -> Profile {
+pub(crate) fn profile(seed: u64, sizes: std::ops::RangeInclusive<usize>) -> Profile {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let count = rng.random_range(sizes);
     let radius_mm = 10_f64.powf(rng.random_range(-0.5..2.5));

@@ -32,20 +32,20 @@ pub(super) struct About {
 }
 
 impl About {
-    pub fn new(axis: &Axis, radius_um: f64, half_um: f64) -> Self {
+    pub(crate) fn new(axis: &Axis, radius_um: f64, half_um: f64) -> Self {
         let [a, b] = [axis[2] / half_um, axis[3] / half_um];
         Self { axis: *axis, slopes: [a, b], length: 1.0 + a * a + b * b, radius_um, half_um }
     }
 
     /// Distance of a point from the axis less R.
     #[inline(always)]
-    pub fn deviation(&self, point: [f64; 4]) -> f64 {
+    pub(crate) fn deviation(&self, point: [f64; 4]) -> f64 {
         self.with_slopes(point).0
     }
 
     /// The same, and its derivatives by the axis.
     #[inline(always)]
-    pub fn with_slopes(&self, [u, v, level, zeta]: [f64; 4]) -> (f64, Axis) {
+    pub(crate) fn with_slopes(&self, [u, v, level, zeta]: [f64; 4]) -> (f64, Axis) {
         let Self { axis, slopes: [a, b], length, radius_um: radius, half_um } = *self;
         let [x, y] = [axis[0] + axis[2] * zeta, axis[1] + axis[3] * zeta];
         let [q_x, q_y] = [radius * u - x, radius * v - y];
@@ -61,47 +61,47 @@ impl About {
 }
 
 impl Columns {
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.levels.len()
     }
 
-    pub fn push(&mut self, [u, v, level, zeta]: [f64; 4]) {
+    pub(crate) fn push(&mut self, [u, v, level, zeta]: [f64; 4]) {
         self.u.push(u);
         self.v.push(v);
         self.levels.push(level);
         self.zeta.push(zeta);
     }
 
-    pub fn reserve(&mut self, more: usize) {
+    pub(crate) fn reserve(&mut self, more: usize) {
         for column in [&mut self.u, &mut self.v, &mut self.levels, &mut self.zeta] {
             column.reserve(more);
         }
     }
 
-    pub fn at(&self, point: usize) -> [f64; 4] {
+    pub(crate) fn at(&self, point: usize) -> [f64; 4] {
         [self.u[point], self.v[point], self.levels[point], self.zeta[point]]
     }
 
     /// The levels w; NaN where a point is missing.
-    pub fn levels(&self) -> &[f64] {
+    pub(crate) fn levels(&self) -> &[f64] {
         &self.levels
     }
 
     /// Deviation of each point from an axis; NaN where it is missing.
-    pub fn deviations(&self, about: &About) -> Vec<f64> {
+    pub(crate) fn deviations(&self, about: &About) -> Vec<f64> {
         let mut deviations = Vec::new();
         self.fill(about, &mut deviations);
         deviations
     }
 
     /// The same into memory that is there.
-    pub fn fill(&self, about: &About, deviations: &mut Vec<f64>) {
+    pub(crate) fn fill(&self, about: &About, deviations: &mut Vec<f64>) {
         deviations.resize(self.len(), 0.0);
         vectorised(Deviations { columns: self, about, out: deviations });
     }
 
     /// Sums for the least-squares cylinder, of the points that are there.
-    pub fn squares(&self, about: &About) -> Squares {
+    pub(crate) fn squares(&self, about: &About) -> Squares {
         vectorised(SquaresOf { columns: self, about })
     }
 }

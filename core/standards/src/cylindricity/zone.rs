@@ -34,7 +34,12 @@ pub(super) struct Zone {
 
 impl Zone {
     /// `None` where the points do not fix an axis.
-    pub fn new(points: &Points, forms_um: impl Iterator<Item = f64>, cylinder: &Cylinder, near: &Near) -> Option<Self> {
+    pub(crate) fn new(
+        points: &Points,
+        forms_um: impl Iterator<Item = f64>,
+        cylinder: &Cylinder,
+        near: &Near,
+    ) -> Option<Self> {
         let frame = points.frame(&points.axis_of(cylinder)?);
         let (mut all, mut offset_um) = (Cloud::default(), Vec::with_capacity(points.len()));
         all.reserve(points.len());
@@ -55,7 +60,7 @@ impl Zone {
 
     /// Values about the minimum zone of these sections, of the same points; CYLq is not looked for. `None` where the search has
     /// to begin anew.
-    pub fn values(&mut self, drawn: &[Section]) -> Option<Values> {
+    pub(crate) fn values(&mut self, drawn: &[Section]) -> Option<Values> {
         let forms = drawn.iter().flat_map(|section| section.form_um);
         let (_, levels) = self.all.columns_mut();
         levels.iter_mut().zip(forms.zip(&self.offset_um)).for_each(|(level, (form, offset))| *level = form + offset);

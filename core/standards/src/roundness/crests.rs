@@ -35,7 +35,7 @@ pub(super) struct Crests {
 
 impl Crests {
     /// Of heights and the neighbours of each, steps of so many rad apart.
-    pub fn set(&mut self, heights: impl Iterator<Item = [f64; 3]>, step_rad: f64) {
+    pub(crate) fn set(&mut self, heights: impl Iterator<Item = [f64; 3]>, step_rad: f64) {
         self.heights.clear();
         self.aside.clear();
         for heights in heights {
@@ -46,14 +46,14 @@ impl Crests {
     }
 
     /// Of all heights of a turn.
-    pub fn set_all(&mut self, heights: &[f64]) {
+    pub(crate) fn set_all(&mut self, heights: &[f64]) {
         let count = heights.len();
         let each = (0..count).map(|index| around(index, count).map(|index| heights[index]));
         self.set(each, std::f64::consts::TAU / count as f64);
     }
 
     /// Puts them among points, at their angles beside these.
-    pub fn set_profile(&mut self, angles: &Angles, points: &mut Points, radius_mm: f64) {
+    pub(crate) fn set_profile(&mut self, angles: &Angles, points: &mut Points, radius_mm: f64) {
         self.angles.set_aside(angles, &self.aside);
         points.set_profile(&self.angles, &self.heights, radius_mm);
     }

@@ -28,7 +28,7 @@ pub(super) struct Found {
 
 impl Warm {
     /// `None` for LSCI, which needs no search.
-    pub fn new(reference: Reference) -> Option<Self> {
+    pub(crate) fn new(reference: Reference) -> Option<Self> {
         match reference {
             Reference::LeastSquares => None,
             Reference::MinimumZone => Some(Self::Zone(Chebyshev::new(true, true))),
@@ -39,7 +39,7 @@ impl Warm {
 
     /// Values about the circle with its centre near a place. Of a zone, the heights' shares are those at the place given, which errs by
     /// deviation²/R times what the place moves. `None` where the search has to begin anew.
-    pub fn values(&mut self, points: &Points, near: [f64; 2]) -> Option<Found> {
+    pub(crate) fn values(&mut self, points: &Points, near: [f64; 2]) -> Option<Found> {
         let reach = points.radius_um + points.span_um;
         let limits = near.map(|near| (near - reach, near + reach));
         let place = match self {

@@ -23,23 +23,23 @@ use runout_core::{
 };
 use toml::de::DeTable;
 
-pub const RADIUS_MM: f64 = 15.0;
-pub const ANGLES: usize = 360;
+pub(crate) const RADIUS_MM: f64 = 15.0;
+pub(crate) const ANGLES: usize = 360;
 
 /// A lobed, bent and waisted part; in µm.
-pub fn deviation_um(angle: f64, z_mm: f64) -> f64 {
+pub(crate) fn deviation_um(angle: f64, z_mm: f64) -> f64 {
     let along = (z_mm - 12.0) / 12.0;
     3.0 * (3.0 * angle + 0.5).cos() + 1.5 * (11.0 * angle).sin() * along + 4.0 * along * along * (angle - 0.3).cos()
         - 2.0 * (1.0 - along * along)
         + 0.4 * (40.0 * angle).cos()
 }
 
-pub fn angle(index: usize) -> f64 {
+pub(crate) fn angle(index: usize) -> f64 {
     TAU * index as f64 / ANGLES as f64
 }
 
 /// On rings at uneven distances.
-pub fn surface() -> Surface {
+pub(crate) fn surface() -> Surface {
     let z_mm = vec![0.0, 2.0, 5.0, 6.0, 9.0, 13.0, 14.5, 18.0, 22.0, 24.0];
     let deviation_um = z_mm.iter().flat_map(|z| (0..ANGLES).map(|index| deviation_um(angle(index), *z))).collect();
     Surface {
@@ -54,7 +54,7 @@ pub fn surface() -> Surface {
 
 /// What the mesh of [`surface`] must enclose when its deviations are drawn `scale` times larger, in mm³: prisms between
 /// rings, each with the polygon area ½ sin(Δα) Σ rᵢ rᵢ₊₁, by the prismatoid's rule.
-pub fn volume_mm3(surface: &Surface, scale: f64) -> f64 {
+pub(crate) fn volume_mm3(surface: &Surface, scale: f64) -> f64 {
     let radius = |deviation: f64| surface.radius_mm + 1e-3 * scale * deviation;
     let rings: Vec<Vec<f64>> =
         (0..surface.z_mm.len()).map(|ring| surface.ring(ring).iter().map(|value| radius(*value)).collect()).collect();
@@ -70,12 +70,12 @@ pub fn volume_mm3(surface: &Surface, scale: f64) -> f64 {
 }
 
 /// Builds an exporter as a pipeline does, from the keys of its table.
-pub fn exporter(registry: &Registry, toml: &str, folder: &Path) -> Result<Box<dyn Exporter>, Fault> {
+pub(crate) fn exporter(registry: &Registry, toml: &str, folder: &Path) -> Result<Box<dyn Exporter>, Fault> {
     registry.exporters.build(&DeTable::parse(toml).unwrap(), &Context { folder, rig: None })
 }
 
 /// Runs an exporter over a surface.
-pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<PathBuf>, Error> {
     let title = "Waisted part\nwith a second line";
     let mut tables = StationTables::new(None, None);
     let mut export = exporter.begin(&tables.info(title))?;
@@ -94,7 +94,7 @@ pub fn export(exporter: &dyn Exporter, surface: Option<&Surface>) -> Result<Vec<
 }
 
 /// A height map of 4 × 3 mm with a hole: 1 µm a mm along x, with waves of 0.1 µm.
-pub fn heights() -> HeightGrid {
+pub(crate) fn heights() -> HeightGrid {
     let (columns, rows) = (41, 31);
     let height_nm = |index: usize| {
         let [x, y] = [0.1 * (index % columns) as f64, 0.1 * (index / columns) as f64];
@@ -113,7 +113,7 @@ pub fn heights() -> HeightGrid {
 }
 
 /// Runs an exporter over heights.
-pub fn export_heights(exporter: &dyn Exporter, heights: &HeightGrid) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn export_heights(exporter: &dyn Exporter, heights: &HeightGrid) -> Result<Vec<PathBuf>, Error> {
     let export = exporter.begin(&ResultInfo::default())?;
     let (summary, about) = (Summary { title: "Flat".into(), ..Summary::default() }, About::default());
     let result = Completed {
@@ -158,7 +158,7 @@ fn station() -> StationResult {
 }
 
 /// Names in a folder.
-pub fn names(folder: &Path) -> Vec<String> {
+pub(crate) fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> =
         std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
@@ -166,13 +166,13 @@ pub fn names(folder: &Path) -> Vec<String> {
 }
 
 /// Says that a foreign program is not there; fails where it has to be.
-pub fn skip(what: &str) {
+pub(crate) fn skip(what: &str) {
     assert!(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_none_or(|value| value != "1"), "{what}");
     eprintln!("skipped: {what}");
 }
 
 /// What trimesh sees in a mesh file, as JSON; `None` where it is not installed.
-pub fn trimesh(file: &Path) -> Option<serde_json::Value> {
+pub(crate) fn trimesh(file: &Path) -> Option<serde_json::Value> {
     let python = std::env::var_os("RUNOUT_PYTHON").unwrap_or_else(|| "python3".into());
     let there = Command::new(&python).args(["-c", "import trimesh"]).output().is_ok_and(|found| found.status.success());
     if !there {
@@ -185,7 +185,7 @@ pub fn trimesh(file: &Path) -> Option<serde_json::Value> {
 }
 
 /// One watertight piece, as trimesh loads it, with and without its merging of vertices; and for MeshLab where it is installed.
-pub fn closed(found: &serde_json::Value) {
+pub(crate) fn closed(found: &serde_json::Value) {
     for way in ["as_written", "merged"] {
         let solid = &found[way];
         for key in ["watertight", "winding_consistent", "is_volume"] {
@@ -206,7 +206,7 @@ pub fn closed(found: &serde_json::Value) {
 }
 
 /// The JSON that a foreign program printed.
-pub fn report(output: &Output) -> serde_json::Value {
+pub(crate) fn report(output: &Output) -> serde_json::Value {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use runout_core::points::{Column, Points, Trace};
 
 /// A part: (angle about its axis in rad, height along it in mm) to form in µm.
-pub struct Part<'a> {
+pub(crate) struct Part<'a> {
     pub radius_um: f64,
     /// Where the axis passes z = 0, in µm.
     pub through_um: [f64; 2],
@@ -17,7 +17,7 @@ pub struct Part<'a> {
 
 impl Part<'_> {
     /// Radius at which the ray of an angle at a height meets the surface, in µm.
-    pub fn radius_seen_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
+    pub(crate) fn radius_seen_um(&self, angle_rad: f64, z_mm: f64) -> f64 {
         let mut reach = self.radius_um;
         for _ in 0..60 {
             reach -= self.above_um([reach * angle_rad.cos(), reach * angle_rad.sin(), 1e3 * z_mm]);
@@ -37,7 +37,7 @@ impl Part<'_> {
 }
 
 /// A recording: traces of (height in mm, angle in rad), with uniform noise of a standard deviation.
-pub struct Recording<'a> {
+pub(crate) struct Recording<'a> {
     pub part: Part<'a>,
     pub nominal_mm: f64,
     pub noise_um: f64,
@@ -47,7 +47,7 @@ pub struct Recording<'a> {
 }
 
 impl<'a> Recording<'a> {
-    pub fn of(part: Part<'a>, nominal_mm: f64, noise_um: f64, seed: u64) -> Self {
+    pub(crate) fn of(part: Part<'a>, nominal_mm: f64, noise_um: f64, seed: u64) -> Self {
         let (columns, traces) = (std::array::from_fn(|_| Vec::new()), Vec::new());
         Self { part, nominal_mm, noise_um, seed, columns, traces }
     }
@@ -57,7 +57,7 @@ impl<'a> Recording<'a> {
         (self.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     }
 
-    pub fn trace(mut self, id: &str, kind: &str, places: impl IntoIterator<Item = (f64, f64)>) -> Self {
+    pub(crate) fn trace(mut self, id: &str, kind: &str, places: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let start = self.columns[0].len();
         for (z_mm, angle_rad) in places {
             let noise = 12.0_f64.sqrt() * self.noise_um * self.uniform();
@@ -70,11 +70,11 @@ impl<'a> Recording<'a> {
     }
 
     /// A circle of even angles.
-    pub fn circle(self, id: &str, z_mm: f64, points: usize) -> Self {
+    pub(crate) fn circle(self, id: &str, z_mm: f64, points: usize) -> Self {
         self.trace(id, "circle", around(z_mm, points))
     }
 
-    pub fn points(self) -> Points {
+    pub(crate) fn points(self) -> Points {
         let columns = ["z_mm", "angle_deg", "deviation_um"].into_iter().zip(self.columns);
         let columns = columns.map(|(name, values)| Column { name: name.into(), values }).collect();
         Points { input: "simulated.csv".into(), columns, traces: self.traces, ..Points::default() }
@@ -82,6 +82,6 @@ impl<'a> Recording<'a> {
 }
 
 /// Even angles at one height.
-pub fn around(z_mm: f64, points: usize) -> impl Iterator<Item = (f64, f64)> {
+pub(crate) fn around(z_mm: f64, points: usize) -> impl Iterator<Item = (f64, f64)> {
     (0..points).map(move |point| (z_mm, TAU * point as f64 / points as f64))
 }

@@ -13,43 +13,44 @@ use runout_core::{
 use runout_fly_cutting::{FlyCutting, FlyCuttingConfig, simulate::FlyCuttingScenario};
 
 /// The paper's cut.
-pub const CUT: &str = "nose_radius_mm = 6.0\nfeed_um_per_rev = 8.3\ncutter_radius_mm = 250.0\nspeed_rpm = 390.0\n";
+pub(crate) const CUT: &str =
+    "nose_radius_mm = 6.0\nfeed_um_per_rev = 8.3\ncutter_radius_mm = 250.0\nspeed_rpm = 390.0\n";
 
 /// A scenario of the paper's cut on a square of 4 mm.
-pub fn scenario(side: usize, more: &str) -> FlyCuttingScenario {
+pub(crate) fn scenario(side: usize, more: &str) -> FlyCuttingScenario {
     let step_mm = 4.0 / side as f64;
     let grid = format!("[grid]\nrows = {side}\ncolumns = {side}\nstep_x_mm = {step_mm}\nstep_y_mm = {step_mm}\n");
     of(&format!("{more}\n[cut]\n{CUT}{grid}"))
 }
 
-pub fn of(text: &str) -> FlyCuttingScenario {
+pub(crate) fn of(text: &str) -> FlyCuttingScenario {
     toml::from_str(text).unwrap()
 }
 
-pub fn separator(text: &str) -> FlyCutting {
+pub(crate) fn separator(text: &str) -> FlyCutting {
     toml::from_str::<FlyCuttingConfig>(text).unwrap().separator().unwrap()
 }
 
-pub fn run(grid: HeightGrid, separator: &FlyCutting) -> Outcome {
+pub(crate) fn run(grid: HeightGrid, separator: &FlyCutting) -> Outcome {
     separator.separate(&grid.points("map.h5".into())).unwrap()
 }
 
-pub fn diagnose(grid: HeightGrid, separator: &FlyCutting) -> PointDiagnosis {
+pub(crate) fn diagnose(grid: HeightGrid, separator: &FlyCutting) -> PointDiagnosis {
     let settings = Settings { max_added: 40, ..Settings::default() };
     separator.model().unwrap().diagnose(&grid.points("map.h5".into()), &settings).unwrap()
 }
 
-pub fn value(outcome: &Outcome, symbol: &str, of: Option<&str>) -> f64 {
+pub(crate) fn value(outcome: &Outcome, symbol: &str, of: Option<&str>) -> f64 {
     let found = outcome.values.iter().find(|value| value.symbol == symbol && value.of.as_deref() == of);
     found.unwrap().value.unwrap()
 }
 
-pub fn parameter(added: &Added, name: &str) -> [f64; 2] {
+pub(crate) fn parameter(added: &Added, name: &str) -> [f64; 2] {
     let found = added.parameters.iter().find(|parameter| parameter.name == name).unwrap();
     [found.value, found.std.unwrap_or(f64::NAN)]
 }
 
-pub fn told(diagnosis: &Diagnosis) -> String {
+pub(crate) fn told(diagnosis: &Diagnosis) -> String {
     let added: Vec<String> = diagnosis
         .added
         .iter()

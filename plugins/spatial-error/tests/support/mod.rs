@@ -17,17 +17,17 @@ use runout_spatial_error::{
 };
 
 /// A separator from TOML.
-pub fn separator(text: &str) -> SpatialError {
+pub(crate) fn separator(text: &str) -> SpatialError {
     try_separator(text).unwrap()
 }
 
-pub fn try_separator(text: &str) -> Result<SpatialError, String> {
+pub(crate) fn try_separator(text: &str) -> Result<SpatialError, String> {
     let config: SpatialErrorConfig = toml::from_str(text).map_err(|error| error.to_string())?;
     config.separator(&Context { folder: Path::new("."), rig: None }).map_err(|fault| fault.to_string())
 }
 
 /// Points from columns.
-pub fn points(columns: &[(&str, Vec<f64>)]) -> Points {
+pub(crate) fn points(columns: &[(&str, Vec<f64>)]) -> Points {
     let count = columns[0].1.len();
     Points {
         input: "test.csv".into(),
@@ -38,7 +38,7 @@ pub fn points(columns: &[(&str, Vec<f64>)]) -> Points {
 }
 
 /// Points of places and readings.
-pub fn readings(places: &[[f64; 3]], values: &[[f64; 3]]) -> Points {
+pub(crate) fn readings(places: &[[f64; 3]], values: &[[f64; 3]]) -> Points {
     let of = |all: &[[f64; 3]], axis: usize| all.iter().map(|one| one[axis]).collect::<Vec<f64>>();
     points(&[
         ("x_mm", of(places, 0)),
@@ -50,29 +50,29 @@ pub fn readings(places: &[[f64; 3]], values: &[[f64; 3]]) -> Points {
     ])
 }
 
-pub fn table(outcome: &Outcome, name: &str) -> RecordBatch {
+pub(crate) fn table(outcome: &Outcome, name: &str) -> RecordBatch {
     outcome.tables.iter().find(|table| table.table == name).unwrap().rows.clone()
 }
 
-pub fn column(rows: &RecordBatch, name: &str) -> Vec<f64> {
+pub(crate) fn column(rows: &RecordBatch, name: &str) -> Vec<f64> {
     let column = rows.column_by_name(name).unwrap_or_else(|| panic!("no column {name}"));
     let data = column.to_data();
     data.buffer::<f64>(0)[..column.len()].to_vec()
 }
 
-pub fn flags(rows: &RecordBatch, name: &str) -> Vec<bool> {
+pub(crate) fn flags(rows: &RecordBatch, name: &str) -> Vec<bool> {
     let column = rows.column_by_name(name).unwrap();
     let data = column.to_data();
     let bits = data.buffers()[0].as_slice();
     (0..column.len()).map(|index| bits[index / 8] >> (index % 8) & 1 == 1).collect()
 }
 
-pub fn value<'a>(outcome: &'a Outcome, symbol: &str, of: Option<&str>) -> &'a NamedValue {
+pub(crate) fn value<'a>(outcome: &'a Outcome, symbol: &str, of: Option<&str>) -> &'a NamedValue {
     outcome.values.iter().find(|value| value.symbol == symbol && value.of.as_deref() == of).unwrap()
 }
 
 /// A machine with a travel of 600 × 400 × 350 mm and a smooth field, 120 places, each read twice in an order at random.
-pub fn scenario(seed: u64) -> Scenario {
+pub(crate) fn scenario(seed: u64) -> Scenario {
     Scenario {
         layout: Layout::Grid { from_mm: [0.0; 3], to_mm: [600.0, 400.0, 350.0], counts: [6, 5, 4] },
         passes: 2,

@@ -16,7 +16,7 @@ use runout_spindle::simulate::{self, SpindleConfig};
 
 /// `docs/physics.md` section 4: sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm, motion 1.5 µm rms, 8 µm off
 /// centre.
-pub fn campaign(seed: u64, effects: &str) -> SpindleConfig {
+pub(crate) fn campaign(seed: u64, effects: &str) -> SpindleConfig {
     let sensor = |id: &str, angle_deg: f64, z_mm: f64, section: &str| SensorConfig {
         id: id.into(),
         angle_deg,
@@ -52,12 +52,12 @@ pub fn campaign(seed: u64, effects: &str) -> SpindleConfig {
 }
 
 /// The station that a campaign records, a fifth of its turns held out, and its truth.
-pub fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
+pub(crate) fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     averaged_behind(None, config, rig)
 }
 
 /// The same of recordings that are changed on their way.
-pub fn averaged_from(
+pub(crate) fn averaged_from(
     config: &SpindleConfig,
     rig: &Rig,
     change: impl FnMut(Box<dyn SampleStream + '_>) -> Box<dyn SampleStream + '_>,
@@ -66,7 +66,7 @@ pub fn averaged_from(
 }
 
 /// The same behind a low-pass.
-pub fn averaged_behind(cutoff_hz: Option<f64>, config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
+pub(crate) fn averaged_behind(cutoff_hz: Option<f64>, config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     averaged_through(cutoff_hz, config, rig, |input| input)
 }
 

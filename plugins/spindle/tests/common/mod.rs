@@ -14,7 +14,7 @@ use runout_core::{
 };
 
 /// A rig from sensors (angle in degrees, z in mm, section) and setups (part, sensors in degrees).
-pub fn rig(sensors: &[(f64, f64, &str)], setups: &[(f64, f64)]) -> Rig {
+pub(crate) fn rig(sensors: &[(f64, f64, &str)], setups: &[(f64, f64)]) -> Rig {
     let sensors = sensors.iter().enumerate().map(|(index, (angle_deg, z_mm, section))| SensorConfig {
         id: format!("S{}", index + 1),
         angle_deg: *angle_deg,
@@ -39,19 +39,19 @@ pub fn rig(sensors: &[(f64, f64, &str)], setups: &[(f64, f64)]) -> Rig {
 }
 
 /// The paper's four sensors, at L1 = 100 mm and L2 = 30 mm further.
-pub const FOUR_SENSORS: [(f64, f64, &str); 4] =
+pub(crate) const FOUR_SENSORS: [(f64, f64, &str); 4] =
     [(0.0, 100.0, "a"), (90.0, 100.0, "a"), (0.0, 130.0, "b"), (90.0, 130.0, "b")];
 
 /// A sum of cosines: (order, amplitude, phase).
-pub type Sum = Vec<(usize, f64, f64)>;
+pub(crate) type Sum = Vec<(usize, f64, f64)>;
 
 /// Its value at an angle.
-pub fn value(sum: &Sum, angle: f64) -> f64 {
+pub(crate) fn value(sum: &Sum, angle: f64) -> f64 {
     sum.iter().map(|(order, amplitude, phase)| amplitude * (*order as f64 * angle + phase).cos()).sum()
 }
 
 /// A pseudo-random sum over orders 2..=highest.
-pub fn random_sum(seed: u64, highest: usize, size: f64) -> Sum {
+pub(crate) fn random_sum(seed: u64, highest: usize, size: f64) -> Sum {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut next = move || {
         state ^= state << 13;
@@ -63,13 +63,13 @@ pub fn random_sum(seed: u64, highest: usize, size: f64) -> Sum {
 }
 
 /// Form of each section and motion x, y, tilt x, tilt y (µm and µrad).
-pub struct Truth {
+pub(crate) struct Truth {
     pub form_um: Vec<Sum>,
     pub motion: [Sum; 4],
 }
 
 /// Averaged readings by the linear equation of `docs/physics.md` section 1, sample by sample.
-pub fn linear_station(rig: &Rig, truth: &Truth, samples: usize, eccentricity_um: f64) -> Station {
+pub(crate) fn linear_station(rig: &Rig, truth: &Truth, samples: usize, eccentricity_um: f64) -> Station {
     let profiles = rig.setups.iter().enumerate().map(|(setup, clamping)| {
         let channels: Vec<Vec<f64>> = rig
             .sensors
@@ -96,7 +96,7 @@ pub fn linear_station(rig: &Rig, truth: &Truth, samples: usize, eccentricity_um:
 }
 
 /// A profile of one turn.
-pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
+pub(crate) fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
     let mut fourier = Fourier::new(samples);
     let orders = fourier.max_order() + 1;
     let mut mean = vec![Complex64::ZERO; orders * channels.len()];
@@ -126,7 +126,7 @@ pub fn profile(setup: usize, channels: &[Vec<f64>], samples: usize) -> Profile {
 }
 
 /// Readings that no form and motion explain, so that methods have something to weigh.
-pub fn disturb(station: &mut Station) {
+pub(crate) fn disturb(station: &mut Station) {
     for (setup, profile) in station.profiles.iter_mut().enumerate() {
         for (index, entry) in profile.mean.iter_mut().enumerate() {
             *entry += Complex64::from_polar(0.01, (index * (setup + 3)) as f64);
@@ -135,7 +135,7 @@ pub fn disturb(station: &mut Station) {
 }
 
 /// Error of one order of an unknown against the sum of cosines that is true, in µm or µrad.
-pub fn coefficient_error(separation: &Separation, unknown: usize, order: usize, truth: &Sum) -> f64 {
+pub(crate) fn coefficient_error(separation: &Separation, unknown: usize, order: usize, truth: &Sum) -> f64 {
     let (_, amplitude, phase) = truth.iter().find(|(known, ..)| *known == order).copied().unwrap_or((order, 0.0, 0.0));
     // cos(nα + φ) is Re e^{iφ} e^{+inα}, and Re e^{−iφ} e^{−inΦ}.
     let turned = if separation.unknowns[unknown].is_form() { phase } else { -phase };

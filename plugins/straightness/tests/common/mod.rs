@@ -11,11 +11,11 @@ use runout_core::{
 };
 
 /// Waves: amplitude in µm, length in mm, phase in rad.
-pub type Waves = Vec<[f64; 3]>;
+pub(crate) type Waves = Vec<[f64; 3]>;
 
 /// A campaign.
 #[derive(Clone)]
-pub struct Campaign {
+pub(crate) struct Campaign {
     pub part: Waves,
     pub slide: Waves,
     pub noise_um: f64,
@@ -27,7 +27,7 @@ pub struct Campaign {
 
 /// How one trace is taken.
 #[derive(Clone, Default)]
-pub struct Shot {
+pub(crate) struct Shot {
     pub reversed: bool,
     /// The probe is at z + shift where the file says z.
     pub shift_mm: f64,
@@ -41,12 +41,12 @@ pub struct Shot {
     pub chip: bool,
 }
 
-pub fn value(waves: &Waves, z: f64) -> f64 {
+pub(crate) fn value(waves: &Waves, z: f64) -> f64 {
     waves.iter().map(|[amplitude, length, phase]| amplitude * (TAU * z / length + phase).sin()).sum()
 }
 
 /// A ground part with lay, on a smooth slide.
-pub fn ground(seed: u64, repeats: [usize; 2]) -> Campaign {
+pub(crate) fn ground(seed: u64, repeats: [usize; 2]) -> Campaign {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut wave = |amplitude: f64, length: f64| [amplitude, length, random.random_range(0.0..TAU)];
     let mut part = vec![wave(0.8, 170.0), wave(0.3, 41.0)];
@@ -60,13 +60,13 @@ pub fn ground(seed: u64, repeats: [usize; 2]) -> Campaign {
 }
 
 impl Campaign {
-    pub fn id(&self, trace: usize) -> String {
+    pub(crate) fn id(&self, trace: usize) -> String {
         let reversed = self.traces[trace].reversed;
         let number = self.traces[..=trace].iter().filter(|shot| shot.reversed == reversed).count();
         format!("{}-{number}", if reversed { "reversed" } else { "initial" })
     }
 
-    pub fn points(&self) -> Points {
+    pub(crate) fn points(&self) -> Points {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed + 1_000_000);
         let noise = Normal::new(0.0, self.noise_um).unwrap();
         let (mut z_mm, mut reading_um, mut flag) = (Vec::new(), Vec::new(), Vec::new());
@@ -107,7 +107,7 @@ impl Campaign {
     }
 
     /// Root mean square errors of part and slide on these positions.
-    pub fn errors(&self, z_mm: &[f64], found: [&[f64]; 2]) -> [f64; 2] {
+    pub(crate) fn errors(&self, z_mm: &[f64], found: [&[f64]; 2]) -> [f64; 2] {
         let of = |found: &[f64], waves: &Waves| {
             let truth: Vec<f64> = z_mm.iter().map(|z| value(waves, *z)).collect();
             let truth = about_lsli_um(z_mm, &truth);
@@ -117,6 +117,6 @@ impl Campaign {
     }
 }
 
-pub fn rms(values: &[f64]) -> f64 {
+pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }

@@ -113,7 +113,7 @@ fn digits(text: &str) -> usize {
 ///
 /// # Errors
 /// When `[load]` has no such path.
-pub fn of_recording(sources: &Sources, recording: &Path) -> std::result::Result<Sources, ConfigError> {
+pub(crate) fn of_recording(sources: &Sources, recording: &Path) -> std::result::Result<Sources, ConfigError> {
     let document = Document::parse(sources)?;
     let load = document.root().get_ref().get("load").and_then(|load| load.get_ref().as_table());
     let text = |key: &str| load.and_then(|load| load.get(key)).and_then(|value| value.get_ref().as_str());

@@ -32,7 +32,7 @@ pub fn recording_column() -> ColumnSpec {
 
 /// The table of all control charts.
 #[must_use]
-pub fn table() -> TableSpec {
+pub(crate) fn table() -> TableSpec {
     let value =
         |name: &str, about: &str| ColumnSpec::number(name, "", format!("{about}, in the unit of the series")).or_null();
     let limit = |name: &str, about: &str| value(name, about).repeating();

@@ -43,7 +43,7 @@ const OF_HELIX: &str = "no errors are drawn for the helix";
 ///
 /// # Errors
 /// When the rings are not at equal distances.
-pub fn add_areal(
+pub(crate) fn add_areal(
     part: &mut PartSummary,
     surface: &Surface,
     uncertain: &Uncertain,

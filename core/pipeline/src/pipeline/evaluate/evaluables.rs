@@ -20,7 +20,7 @@ impl Evaluated {
     ///
     /// # Errors
     /// When a height map cannot be evaluated as it is asked for.
-    pub fn of(evaluables: &[Evaluable], evaluate: &Evaluate) -> Result<Self> {
+    pub(crate) fn of(evaluables: &[Evaluable], evaluate: &Evaluate) -> Result<Self> {
         let mut all = Self::default();
         for one in evaluables {
             match one {
@@ -39,12 +39,12 @@ impl Evaluated {
     }
 
     /// As values of a result.
-    pub fn named(&self) -> impl Iterator<Item = NamedValue> + '_ {
+    pub(crate) fn named(&self) -> impl Iterator<Item = NamedValue> + '_ {
         self.values.iter().map(|(of, value)| NamedValue::standard(of, value))
     }
 
     /// With their places, for limits: what a value is of stands for its section.
-    pub fn placed(&self) -> impl Iterator<Item = PlacedValue<'_>> {
+    pub(crate) fn placed(&self) -> impl Iterator<Item = PlacedValue<'_>> {
         self.values.iter().map(|(of, value)| PlacedValue { station: None, section: Some(of), z_mm: None, value })
     }
 }

@@ -21,27 +21,27 @@ pub(super) struct Filter {
 
 impl Filter {
     /// Everything passes, or what is below a cut-off of a Gaussian.
-    pub fn low_pass(cutoff_upr: Option<f64>) -> Self {
+    pub(crate) fn low_pass(cutoff_upr: Option<f64>) -> Self {
         Self::round(Kind::Gaussian, None, cutoff_upr)
     }
 
     /// What is between two cut-offs, as far as there are any.
-    pub fn round(kind: Kind, above_upr: Option<f64>, below_upr: Option<f64>) -> Self {
+    pub(crate) fn round(kind: Kind, above_upr: Option<f64>, below_upr: Option<f64>) -> Self {
         Self { name: round_name(kind, above_upr, below_upr), kind, band: Band { above_upr, below_upr } }
     }
 
     /// The robust Gaussian's name and the band of the Gaussian with its cut-off, which it is not: no weight on orders.
-    pub fn robust(cutoff_upr: f64) -> Self {
+    pub(crate) fn robust(cutoff_upr: f64) -> Self {
         Self { name: robust_name(cutoff_upr), ..Self::low_pass(Some(cutoff_upr)) }
     }
 
     /// The same filter by this name for values that no order of a turn is taken from or left out of: along the axis.
-    pub fn along_axis(&self) -> Self {
+    pub(crate) fn along_axis(&self) -> Self {
         Self { name: self.name.clone(), kind: self.kind, band: Band::default() }
     }
 
     /// What lies between λs and λc along the circumference of a radius.
-    pub fn between(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>, radius_mm: f64) -> Self {
+    pub(crate) fn between(lambda_s_mm: Option<f64>, lambda_c_mm: Option<f64>, radius_mm: f64) -> Self {
         let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
         let band = Band { above_upr: lambda_c_mm.map(upr), below_upr: lambda_s_mm.map(upr) };
         Self { name: between_name(lambda_s_mm, lambda_c_mm), kind: Kind::Gaussian, band }
@@ -62,24 +62,24 @@ impl Filter {
     }
 
     /// What lies between λc and λf, the waviness; without λf, all that is longer than λc.
-    pub fn waviness(lambda_c_mm: f64, lambda_f_mm: Option<f64>, radius_mm: f64) -> Self {
+    pub(crate) fn waviness(lambda_c_mm: f64, lambda_f_mm: Option<f64>, radius_mm: f64) -> Self {
         let upr = |wavelength_mm| upr(wavelength_mm, radius_mm);
         let band = Band { above_upr: lambda_f_mm.map(upr), below_upr: Some(upr(lambda_c_mm)) };
         Self { name: waviness_name(lambda_c_mm, lambda_f_mm), kind: Kind::Gaussian, band }
     }
 
     /// Harmonics behind the filter.
-    pub fn harmonics(&self, harmonics: &[Complex64]) -> Vec<Complex64> {
+    pub(crate) fn harmonics(&self, harmonics: &[Complex64]) -> Vec<Complex64> {
         harmonics.iter().enumerate().map(|(order, harmonic)| harmonic * self.weight(order)).collect()
     }
 
     /// Variances behind the filter.
-    pub fn variance(&self, variance: &[f64]) -> Vec<f64> {
+    pub(crate) fn variance(&self, variance: &[f64]) -> Vec<f64> {
         variance.iter().enumerate().map(|(order, variance)| variance * self.weight(order).norm_sqr()).collect()
     }
 
     /// Orders between the cut-offs, from 2 to at most `highest`.
-    pub fn band_upr(&self, highest: usize) -> [usize; 2] {
+    pub(crate) fn band_upr(&self, highest: usize) -> [usize; 2] {
         let low = self.band.above_upr.map_or(2, |cutoff| (cutoff.ceil() as usize).max(2));
         let high = self.band.below_upr.map_or(highest, |cutoff| (cutoff.floor() as usize).min(highest));
         [low.min(high), high]
@@ -87,19 +87,19 @@ impl Filter {
 
     /// Whether a hundredth or more passes of an order of which something before has taken half of the power, 29 % of the
     /// amplitude. What lets everything pass asks for nothing.
-    pub fn asks_for_more_than(&self, half_power_upr: f64) -> bool {
+    pub(crate) fn asks_for_more_than(&self, half_power_upr: f64) -> bool {
         self.band.below_upr.is_some_and(|cutoff| self.passes(half_power_upr, cutoff) >= MATTERS)
     }
 
     /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there
     /// are.
-    pub fn reaches_above(&self, order: usize) -> bool {
+    pub(crate) fn reaches_above(&self, order: usize) -> bool {
         self.band.below_upr.is_some_and(|cutoff| self.passes((order + 1) as f64, cutoff) >= REACHES)
     }
 
     /// The highest order of which it passes a thousandth or more, 3.157 times its cut-off for a Gaussian; `None` where
     /// everything passes.
-    pub fn reach_upr(&self) -> Option<usize> {
+    pub(crate) fn reach_upr(&self) -> Option<usize> {
         self.band.below_upr.map(|cutoff| {
             // Every low-pass falls with the order.
             let passes = |order: usize| self.passes(order as f64, cutoff) >= REACHES;
@@ -116,12 +116,12 @@ impl Filter {
     }
 
     /// The highest order that it passes, of those up to `highest`.
-    pub fn highest(&self, highest: usize) -> usize {
+    pub(crate) fn highest(&self, highest: usize) -> usize {
         (0..=highest).rev().find(|order| self.weight(*order).norm() >= MATTERS).unwrap_or(0)
     }
 
     /// Those of the lost orders that it would pass.
-    pub fn lost(&self, lost: &[usize]) -> Vec<usize> {
+    pub(crate) fn lost(&self, lost: &[usize]) -> Vec<usize> {
         lost.iter().copied().filter(|order| self.weight(*order).norm() >= MATTERS).collect()
     }
 }

@@ -32,7 +32,7 @@ const CENTRED: &str = "texture along the axis is of centred sections: displaceme
 
 /// Adds texture values of the profiles through all sections at the angles asked for. Sections count where they were measured,
 /// not where the surface is interpolated. `placed` says that centres and mean radii are known.
-pub fn add_generatrices(
+pub(crate) fn add_generatrices(
     part: &mut PartSummary,
     uncertain: &Uncertain,
     radius_mm: f64,

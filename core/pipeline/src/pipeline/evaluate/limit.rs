@@ -46,7 +46,7 @@ fn missing(value: &Value) -> Option<String> {
 }
 
 /// Holds all values against all limits. Besides, what the user should know: limits that name no value.
-pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> (Vec<LimitSummary>, Vec<String>) {
+pub(crate) fn decide(limits: &[Limit], all: &[PlacedValue]) -> (Vec<LimitSummary>, Vec<String>) {
     let mut remarks = Vec::new();
     let decide = |limit: &Limit| {
         let named = all.iter().filter(|PlacedValue { section, value, .. }| {

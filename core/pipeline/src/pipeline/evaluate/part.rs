@@ -9,7 +9,7 @@ const MOST_ANGLES: usize = 720;
 
 /// Cylindricity of sections about a nominal radius; `None` where they do not lie at two heights. `placed` says that their
 /// centres and mean radii are known relative to each other, which only a measuring machine tells.
-pub fn part_summary(
+pub(crate) fn part_summary(
     sections: &[surface::Section],
     angles: usize,
     evaluate: &Evaluate,

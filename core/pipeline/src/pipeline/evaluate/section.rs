@@ -18,7 +18,12 @@ use runout_turning::{
 };
 
 /// The values of a section whose nominal radius is known.
-pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<Value> {
+pub(crate) fn section_values(
+    result: &StationResult,
+    section: usize,
+    evaluate: &Evaluate,
+    radius_mm: f64,
+) -> Vec<Value> {
     let Some(form) = Form::of(result, section, radius_mm) else { return Vec::new() };
     let mut values = form.values(evaluate);
     let equivalents: Vec<Vec<Value>> =
@@ -37,7 +42,12 @@ pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluat
 }
 
 /// Why a section does not have the reference circles that are asked for, each with its reason: an interruption may leave an arc.
-pub fn missing_circles(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<String> {
+pub(crate) fn missing_circles(
+    result: &StationResult,
+    section: usize,
+    evaluate: &Evaluate,
+    radius_mm: f64,
+) -> Vec<String> {
     let form = Form::of(result, section, radius_mm).filter(|form| !form.at.gaps.is_empty());
     let Some(form) = form.filter(|_| evaluate.has(Group::Roundness)) else { return Vec::new() };
     let profile_um = form.profile(&Filter::low_pass(None), &mut Fourier::new(form.angles));

@@ -9,7 +9,7 @@ use runout_error::fault::Fault;
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct ArealConfig {
+pub(crate) struct ArealConfig {
     /// F-operator: what is taken off before the filters; without it `cylinder`.
     pub form: Option<FormRemoval>,
     /// Degree of `polynomial` along the axis, 0 to 8; without it 2.
@@ -26,7 +26,7 @@ pub struct ArealConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum FormRemoval {
+pub(crate) enum FormRemoval {
     /// Nothing but the mean.
     None,
     /// A line along the axis, the same all around: radius and taper. Of a height map its plane, without the key.
@@ -43,7 +43,7 @@ pub enum FormRemoval {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum ArealFilter {
+pub(crate) enum ArealFilter {
     /// ISO 16610-61.
     #[default]
     Gaussian,

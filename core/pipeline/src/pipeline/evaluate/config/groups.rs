@@ -61,7 +61,7 @@ impl Group {
 /// Groups of values as they stand in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Groups {
+pub(crate) enum Groups {
     /// "all".
     All,
     /// A list.

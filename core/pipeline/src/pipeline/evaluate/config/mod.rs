@@ -7,10 +7,10 @@ mod motion;
 mod names;
 mod texture;
 
-pub use areal::{ArealConfig, ArealFilter, FormRemoval};
-pub use groups::{Group, Groups};
-pub use motion::{CentreConfig, FacePlaceConfig};
-pub use texture::TextureConfig;
+pub(crate) use areal::{ArealConfig, ArealFilter, FormRemoval};
+pub(crate) use groups::{Group, Groups};
+pub(crate) use motion::{CentreConfig, FacePlaceConfig};
+pub(crate) use texture::TextureConfig;
 
 use areal::Areal;
 use groups::GroupsSchema;
@@ -32,7 +32,7 @@ use runout_turning::{
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct EvaluateConfig {
+pub(crate) struct EvaluateConfig {
     /// Groups of values, or "all"; without it `roundness`, `straightness`, `texture`, `cylindricity` and `error-motion`, as far as what
     /// the separator offers gives them. Of "all", what a run cannot give (areal values and twist of a single section) is left out.
     #[schemars(with = "Option<GroupsSchema>")]
@@ -83,7 +83,7 @@ pub struct EvaluateConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Propagation {
+pub(crate) enum Propagation {
     /// RONq in closed form, extremes from errors drawn at the points that may come to touch; whole profiles are drawn where this is not
     /// exact enough (an interruption, large errors, many such points).
     #[default]

@@ -10,7 +10,7 @@ use runout_turning::{azimuth::FacePlace, error_motion::Centre};
 /// A place of a face.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct FacePlaceConfig {
+pub(crate) struct FacePlaceConfig {
     /// Distance from the axis, in mm.
     pub radius_mm: f64,
     /// Angle from x towards y, in degrees.

@@ -11,7 +11,7 @@ use runout_standards::texture::Kind;
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct TextureConfig {
+pub(crate) struct TextureConfig {
     /// Profiles: R (roughness, λs to λc), P (primary, from λs on), W (waviness, λc to λf). Without it R. R and W need λc.
     pub profiles: Option<Vec<Kind>>,
     /// λf, the longest wavelength of W, in mm; without it W has all that is longer than λc.
