@@ -12,7 +12,7 @@ use crate::{
     uncertainty::DrawnErrors,
 };
 
-/// A profile about one reference circle, with its [crests between the angles](super::crests). Only points that may come to touch it are looked
+/// A profile about one reference circle, with its crests between the angles. Only points that may come to touch it are looked
 /// at, where that is certain.
 #[derive(Debug, Clone)]
 pub struct Disturbed<'a> {
