@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 use runout_numerics::{Complex64, fourier::Fourier};
 
 use crate::{
-    errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW},
+    errors::{Errors, Noise, TURNS_OF_A_DRAW},
     errors_at::{Covariance, ErrorsAt},
 };
 
@@ -148,146 +148,73 @@ fn signal_of(quantile: f64, found: f64) -> f64 {
     low
 }
 
-/// The true profile less the one found as the form may be by one set of weights, on equal angles: a mean, and errors about it.
-struct Part {
-    mean_um: Vec<f64>,
+/// The form as it may be by one set of weights, on equal angles: its mean, and errors about it.
+pub struct LikelyForm {
+    /// Its mean, in µm.
+    pub mean_um: Vec<f64>,
+    /// Of all draws, those that are to be made of it.
+    pub draws: usize,
     /// Variance of the errors, by order from 0.
     variance: Vec<f64>,
-    /// Sum of those of the form found.
-    all: f64,
-    draws: usize,
+    /// Variance of the noise of the form found.
+    of_noise: f64,
     noise: Noise,
 }
 
-/// The true profile less the one found, on equal angles.
-pub struct LikelyErrors {
-    parts: Vec<Part>,
+/// The forms that so many draws are to be made of, on the angles that `fourier` has. Harmonics and their variances are those behind a filter.
+#[must_use]
+pub fn forms_to_draw(
+    likely: &[Likely],
+    harmonics: &[Complex64],
+    variance: &[f64],
+    draws: usize,
+    noise: &Noise,
+    fourier: &mut Fourier,
+) -> Vec<LikelyForm> {
+    let of_noise = sum_of_known(variance);
+    let form = |(number, likely): (usize, &Likely)| {
+        let mean = harmonics.iter().zip(&likely.weights).map(|(harmonic, weight)| harmonic * weight);
+        let variance = variance.iter().zip(&likely.weights).map(|(noise, weight)| noise * weight).collect();
+        let (mean_um, noise) = (fourier.synthesise(mean).to_vec(), noise.another(number as u64));
+        LikelyForm { mean_um, variance, of_noise, draws: (likely.share * draws as f64).round() as usize, noise }
+    };
+    likely.iter().enumerate().map(form).collect()
 }
 
-impl LikelyErrors {
-    /// As the form may be, for so many draws, on the angles that `fourier` has. Harmonics and their variances are those behind a filter.
+/// Sum of the variances that are known, of orders from 2 on.
+fn sum_of_known(variance: &[f64]) -> f64 {
+    variance.iter().skip(2).filter(|variance| **variance > 0.0).sum()
+}
+
+impl LikelyForm {
+    /// Standard deviation of an error at any one angle.
     #[must_use]
-    pub fn new(
-        likely: &[Likely],
-        harmonics: &[Complex64],
-        variance: &[f64],
-        draws: usize,
-        noise: &Noise,
-        fourier: &mut Fourier,
-    ) -> Self {
-        let all = variance.iter().skip(2).filter(|variance| **variance > 0.0).sum();
-        let part = |(number, likely): (usize, &Likely)| {
-            let mean = harmonics.iter().zip(&likely.weights).map(|(harmonic, weight)| harmonic * (weight - 1.0));
-            let variance = variance.iter().zip(&likely.weights).map(|(noise, weight)| noise * weight).collect();
-            let (mean_um, noise) = (fourier.synthesise(mean).to_vec(), noise.another(number as u64));
-            Part { mean_um, variance, all, draws: (likely.share * draws as f64).round() as usize, noise }
-        };
-        Self { parts: likely.iter().enumerate().map(part).collect() }
+    pub fn std_um(&self) -> f64 {
+        (0.5 * sum_of_known(&self.variance)).sqrt()
     }
 
-    /// About the largest at any angle, errors about the mean being no larger than so many standard deviations. Mean and errors are independent.
-    #[must_use]
-    pub fn largest_um(&self, deviations: f64) -> f64 {
-        let largest = |part: &Part| {
-            let known = part.variance.iter().skip(2).filter(|variance| **variance > 0.0);
-            let std_um = (0.5 * known.sum::<f64>()).sqrt();
-            part.mean_um.iter().map(|mean| mean.abs()).fold(0.0, f64::max).hypot(deviations * std_um)
-        };
-        self.parts.iter().map(largest).fold(0.0, f64::max)
-    }
-
-    /// The largest share that the form found has of noise, not of form, in the variance of its errors.
+    /// The share that the form found has of noise, not of form, in the variance of its errors.
     #[must_use]
     pub fn share_of_noise(&self) -> f64 {
-        let known = |variance: &[f64]| variance.iter().skip(2).filter(|variance| **variance > 0.0).sum::<f64>();
-        self.parts.iter().map(|part| 1.0 - known(&part.variance) / part.all).fold(0.0, f64::max)
+        1.0 - sum_of_known(&self.variance) / self.of_noise
     }
 
-    /// Draws of whole profiles.
+    /// Draws of the errors as whole profiles; `None` where the form is exact.
     #[must_use]
-    pub fn profiles(&self) -> LikelyProfiles<'_> {
-        let errors = |part: &Part| Errors::sharing(&part.variance, 2, &part.noise);
-        LikelyProfiles {
-            parts: self.parts.iter().map(|part| (part, errors(part))).collect(),
-            drawn_um: Vec::new(),
-            taken: 0,
-        }
+    pub fn errors(&self) -> Option<Errors> {
+        Errors::sharing(&self.variance, 2, &self.noise)
     }
 
-    /// Draws at some of the angles, by their numbers.
+    /// Draws of the errors at some of the angles, by their numbers; `None` where the form is exact.
     #[must_use]
-    pub fn at(&self, points: &[usize], fourier: &mut Fourier) -> LikelyAt {
-        let part = |part: &Part| {
-            let covariance = Covariance::new(&part.variance, fourier);
-            let errors = covariance.map(|covariance| ErrorsAt::new(&covariance, points, &part.noise));
-            (points.iter().map(|point| part.mean_um[*point]).collect(), errors, part.draws)
-        };
-        LikelyAt { parts: self.parts.iter().map(part).collect(), drawn_um: Vec::new(), taken: 0 }
+    pub fn errors_at(&self, points: &[usize], fourier: &mut Fourier) -> Option<ErrorsAt> {
+        Some(ErrorsAt::new(&Covariance::new(&self.variance, fourier)?, points, &self.noise))
     }
-}
 
-/// The part from which a draw by its number is taken.
-fn part_of<T>(parts: &[T], draws: impl Fn(&T) -> usize, mut draw: usize) -> usize {
-    let place = parts.iter().position(|part| {
-        let is_here = draw < draws(part);
-        draw = draw.saturating_sub(draws(part));
-        is_here
-    });
-    place.unwrap_or(parts.len().saturating_sub(1))
-}
-
-/// Draws of whole profiles.
-pub struct LikelyProfiles<'a> {
-    parts: Vec<(&'a Part, Option<Errors>)>,
-    drawn_um: Vec<f64>,
-    taken: usize,
-}
-
-impl LikelyProfiles<'_> {
-    /// How many transforms the draws come from.
+    /// How many transforms its draws come from as whole profiles.
     #[must_use]
     pub fn transforms(&self) -> usize {
-        self.parts.iter().map(|(part, _)| part.draws.div_ceil(TURNS_OF_A_DRAW)).sum()
-    }
-
-    /// The next draw.
-    pub fn draw(&mut self, fourier: &mut Fourier) -> DrawnErrors<'_> {
-        let place = part_of(&self.parts, |(part, _)| part.draws, self.taken);
-        self.taken += 1;
-        self.drawn_um.clear();
-        match self.parts.get_mut(place) {
-            Some((part, Some(errors))) => {
-                let drawn = errors.turned(fourier);
-                self.drawn_um.extend(part.mean_um.iter().zip(drawn.iter()).map(|(mean, error)| mean + error));
-            }
-            Some((part, None)) => self.drawn_um.extend_from_slice(&part.mean_um),
-            None => {}
-        }
-        DrawnErrors::new(&self.drawn_um)
-    }
-}
-
-/// Draws at some angles.
-pub struct LikelyAt {
-    parts: Vec<(Vec<f64>, Option<ErrorsAt>, usize)>,
-    drawn_um: Vec<f64>,
-    taken: usize,
-}
-
-impl LikelyAt {
-    /// The next draw.
-    pub fn draw(&mut self) -> &[f64] {
-        let place = part_of(&self.parts, |(.., draws)| *draws, self.taken);
-        self.taken += 1;
-        self.drawn_um.clear();
-        match self.parts.get_mut(place) {
-            Some((mean_um, Some(errors), _)) => {
-                self.drawn_um.extend(mean_um.iter().zip(errors.draw()).map(|(mean, error)| mean + error));
-            }
-            Some((mean_um, None, _)) => self.drawn_um.extend_from_slice(mean_um),
-            None => {}
-        }
-        &self.drawn_um
+        self.draws.div_ceil(TURNS_OF_A_DRAW)
     }
 }
 
@@ -364,33 +291,37 @@ mod tests {
         assert!(exact.len() == 1 && exact[0].weights.iter().all(|weight| (weight - 1.0).abs() < 1e-12));
     }
 
-    /// Draws have the mean and the variance of what the form may be, as whole profiles and at points.
+    /// The form has the mean and the variance of what it may be, as whole profiles and at points.
     #[test]
     fn draws_are_about_what_the_form_may_be() {
         let (harmonics, variance) = (vec![Complex64::new(3.0, 1.0); 6], vec![0.5; 6]);
         let likely = [Likely { weights: vec![1.0, 1.0, 0.8, 0.6, 0.0, 0.4], share: 1.0 }];
         let mut fourier = Fourier::new(64);
-        let errors = LikelyErrors::new(&likely, &harmonics, &variance, 4000, &Noise::new(6, 1), &mut fourier);
+        let forms = forms_to_draw(&likely, &harmonics, &variance, 4000, &Noise::new(6, 1), &mut fourier);
+        let [form] = &forms[..] else { panic!("one set of weights, one form") };
         let angle = std::f64::consts::TAU * 5.0 / 64.0;
-        let mean: f64 = [(2, 0.2), (3, 0.4), (4, 1.0), (5, 0.6)]
+        let level = 3.0 + (Complex64::new(3.0, 1.0) * Complex64::cis(angle)).re;
+        let mean: f64 = [(2, 0.8), (3, 0.6), (5, 0.4)]
             .iter()
-            .map(|(n, less)| -less * (Complex64::new(3.0, 1.0) * Complex64::cis(f64::from(*n) * angle)).re)
+            .map(|(n, weight)| weight * (Complex64::new(3.0, 1.0) * Complex64::cis(f64::from(*n) * angle)).re)
             .sum();
+        assert!((form.mean_um[5] - level - mean).abs() < 1e-12);
         let square: f64 = 0.25 * (0.8 + 0.6 + 0.4);
-        let mut at = errors.at(&[5, 9], &mut fourier);
-        let mut profiles = errors.profiles();
+        assert!((form.std_um().powi(2) - square).abs() < 1e-12);
+        assert!((form.share_of_noise() - (1.0 - 1.8 / 4.0)).abs() < 1e-12);
+        assert_eq!((form.draws, form.transforms()), (4000, 160));
+        let mut at = form.errors_at(&[5, 9], &mut fourier).unwrap();
+        let mut profiles = form.errors().unwrap();
         let (mut of_points, mut of_profiles) = (Vec::new(), Vec::new());
         for _ in 0..4000 {
             of_points.push(at.draw()[0]);
-            of_profiles.push(profiles.draw(&mut fourier).at(5));
+            of_profiles.push(profiles.turned(&mut fourier).at(5));
         }
-        assert_eq!(profiles.transforms(), 160);
         for (draws, independent) in [(of_points, 4000.0_f64), (of_profiles, 400.0)] {
             let found = draws.iter().sum::<f64>() / 4000.0;
             let squares = draws.iter().map(|draw| (draw - found).powi(2)).sum::<f64>() / 4000.0;
-            assert!((found - mean).abs() < 4.0 * (square / independent).sqrt(), "{found} {mean}");
+            assert!(found.abs() < 4.0 * (square / independent).sqrt(), "{found}");
             assert!((squares / square - 1.0).abs() < 4.0 * (2.0 / independent).sqrt(), "{squares} {square}");
-            assert!(draws.iter().all(|draw| draw.abs() < 1.5 * errors.largest_um(5.0)));
         }
     }
 }

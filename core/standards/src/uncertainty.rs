@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
-pub use crate::likely::{Likely, LikelyErrors, likely_forms};
+pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms};
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 
@@ -140,7 +140,7 @@ pub fn monte_carlo_of(
     all_draws(draws, transforms, draw, summed_up)
 }
 
-/// The same where what is drawn is what the truth may be ([`LikelyErrors`]): the interval is from the draws' 2.5 % point to their
+/// The same where what is drawn is what the truth may be ([`LikelyForm`]): the interval is from the draws' 2.5 % point to their
 /// 97.5 % point.
 pub fn likely_values_of(
     draws: usize,

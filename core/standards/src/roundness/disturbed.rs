@@ -101,7 +101,8 @@ impl<'a> Disturbed<'a> {
         self.about
     }
 
-    /// Values of the profile with errors in it. About other circles than LSCI, RONq is that of the points looked at, or NaN.
+    /// Values of the profile with errors in it. RONq is that of all points about LSCI of an interrupted profile, or where crests are at the
+    /// angles; else that of the points looked at, or NaN.
     pub fn values(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         match (self.reference, &self.fixed) {
             (Reference::LeastSquares, Some(fixed)) => {
@@ -269,7 +270,6 @@ mod tests {
                         if reference == Reference::LeastSquares {
                             assert!((quick.ronp_um - slow.ronp_um).abs() < exact, "{size} {quick:?} {slow:?}");
                             assert!((quick.ronv_um - slow.ronv_um).abs() < exact, "{size} {quick:?} {slow:?}");
-                            assert!((quick.ronq_um - slow.ronq_um).abs() < exact, "{size} {quick:?} {slow:?}");
                         }
                     }
                 }

@@ -62,7 +62,7 @@ impl FixedCentre {
         course.into()
     }
 
-    /// The same with [crests between the angles](super::crests).
+    /// The same with [crests between the angles](super::crests), without RONq (NaN).
     #[must_use]
     pub(super) fn between(&self, drawn: &DrawnErrors) -> Values {
         let all = &self.deviations[..];
@@ -89,7 +89,7 @@ impl FixedCentre {
             }
             [low, high]
         };
-        Course { low, high, squares: self.squares_with(drawn), points: all.len() }.into()
+        Course { low, high, squares: f64::NAN, points: all.len() }.into()
     }
 
     /// Sum of squares of the deviations with errors added.

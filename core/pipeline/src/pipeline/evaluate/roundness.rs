@@ -13,12 +13,23 @@ use runout_standards::{
     roundness::{Angles, Disturbed, Points, Reference, Series, Values},
     slope::{Drawn, steepest_um_per_rad},
     uncertainty::{
-        DRAWS, Errors, LARGEST, LikelyErrors, TURNS_OF_A_DRAW, Uncertainty, extreme, likely_values_of, of_rms, stand_in,
+        DRAWS, Errors, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, extreme, forms_to_draw, likely_values_of,
+        of_rms, stand_in,
     },
 };
 
 /// Of so many points that may come to touch, errors cost as much as those of whole profiles.
-const MOST_POINTS: usize = 64;
+const MOST_POINTS: usize = 128;
+
+/// Points are looked at that are within four times this share of the largest error from the ends. Draws for which that is too little look at
+/// all. Twice the largest error suffices where the centre stays; MICI and MCCI have centres that move farther than that of MZCI.
+fn reach(reference: Reference) -> f64 {
+    match reference {
+        Reference::LeastSquares => 0.5,
+        Reference::MinimumZone => 0.75,
+        Reference::MaximumInscribed | Reference::MinimumCircumscribed => 1.2,
+    }
+}
 
 /// Share of noise in the form found from which on errors are drawn as whole profiles: crests between few angles are then
 /// crests of noise, which draws of the true form do not have.
@@ -95,24 +106,39 @@ impl Form {
         }
         let angles = self.drawn_angles(filter);
         let mut fourier = Fourier::new(angles.len());
-        let harmonics = filter.harmonics(&self.harmonics);
-        let errors = LikelyErrors::new(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
         let profile_um = self.profile(filter, &mut fourier);
-        let usual_um = errors.largest_um(LARGEST);
-        let about = |reference: &Reference| {
-            (*reference, Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um, true))
+        let harmonics = filter.harmonics(&self.harmonics);
+        let mut forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
+        forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
+        let circle = |reference: Reference, form_um, largest_um: f64| {
+            Disturbed::new(reference, &angles, form_um, self.radius_mm, reach(reference) * largest_um, true)
         };
-        let mut circles: Vec<(Reference, Option<Disturbed>)> = references.iter().map(about).collect();
-        let mut errors = errors.profiles();
-        let transforms = errors.transforms();
+        let mut of_forms: Vec<_> = forms
+            .iter()
+            .map(|form| {
+                let largest_um = LARGEST * form.std_um();
+                let circles: Vec<_> =
+                    references.iter().map(|reference| circle(*reference, &form.mean_um, largest_um)).collect();
+                (form.errors(), circles)
+            })
+            .collect();
+        let transforms = forms.iter().map(LikelyForm::transforms).sum();
+        let mut places = places_of(&forms);
         let mut found = likely_values_of(DRAWS, transforms, |disturbed, found| {
-            let drawn = disturbed.then(|| errors.draw(&mut fourier));
-            for (reference, circle) in &mut circles {
-                let values = match (circle, &drawn) {
-                    (Some(circle), Some(drawn)) => circle.values(drawn),
-                    (Some(circle), None) => Some(circle.about()),
-                    (None, _) => None,
-                };
+            if !disturbed {
+                for reference in references {
+                    let about = circle(*reference, &profile_um, 0.0).map(|circle| circle.about());
+                    add_values(about, *reference, found);
+                }
+                return;
+            }
+            let Some((errors, circles)) = places.next().and_then(|place| of_forms.get_mut(place)) else { return };
+            let drawn = errors.as_mut().map(|errors| errors.turned(&mut fourier));
+            for (reference, circle) in references.iter().zip(circles) {
+                let values = circle.as_mut().and_then(|circle| match &drawn {
+                    Some(drawn) => circle.values(drawn),
+                    None => Some(circle.about()),
+                });
                 add_values(values, *reference, found);
             }
         });
@@ -154,28 +180,42 @@ impl Form {
             return None;
         }
         let mut fourier = Fourier::new(angles.len());
-        let profile_um = self.profile(filter, &mut fourier);
         let harmonics = filter.harmonics(&self.harmonics);
-        let errors = LikelyErrors::new(self.likely(), &harmonics, &variance, DRAWS, &self.noise, &mut fourier);
-        if errors.share_of_noise() > MOST_NOISE {
+        let forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, &self.noise, &mut fourier);
+        if forms.iter().any(|form| form.share_of_noise() > MOST_NOISE) {
             return None;
         }
-        let largest_um = errors.largest_um(LARGEST);
+        let profile_um = self.profile(filter, &mut fourier);
+        let circle = |reference: Reference, form_um, largest_um: f64| {
+            Disturbed::new(reference, &angles, form_um, self.radius_mm, reach(reference) * largest_um, false)
+        };
         let mut found = Vec::new();
         for reference in references {
-            let is_fixed = *reference == Reference::LeastSquares;
-            // Points twice the largest error below an extreme do not reach it where the centre stays.
-            let usual_um = if is_fixed { 0.5 * largest_um } else { largest_um };
-            let mut circle = Disturbed::new(*reference, &angles, &profile_um, self.radius_mm, usual_um, false)?;
-            if circle.points().len() > MOST_POINTS {
-                return None;
+            let mut of_forms = Vec::new();
+            for form in &forms {
+                let largest_um = LARGEST * form.std_um();
+                let circle = circle(*reference, &form.mean_um, largest_um)?;
+                if circle.points().len() > MOST_POINTS {
+                    return None;
+                }
+                let errors = form.errors_at(circle.points(), &mut fourier);
+                of_forms.push((largest_um, errors, circle));
             }
-            let mut errors = errors.at(circle.points(), &mut fourier);
-            let mut certain = true;
+            let about = circle(*reference, &profile_um, 0.0)?.about();
+            let (mut places, mut certain) = (places_of(&forms), true);
             // As wide as from whole profiles: draws about a form that holds its noise scatter too little.
             let transforms = DRAWS.div_ceil(TURNS_OF_A_DRAW);
             let values = likely_values_of(DRAWS, transforms, |disturbed, found| {
-                let values = if disturbed { circle.values_at(errors.draw(), largest_um) } else { Some(circle.about()) };
+                if !disturbed {
+                    add_values(Some(about), *reference, found);
+                    return;
+                }
+                let of_form = places.next().and_then(|place| of_forms.get_mut(place));
+                let Some((largest_um, errors, circle)) = of_form else { return };
+                let values = match errors {
+                    Some(errors) => circle.values_at(errors.draw(), *largest_um),
+                    None => Some(circle.about()),
+                };
                 certain &= values.is_some();
                 add_values(values, *reference, found);
             });
@@ -230,6 +270,14 @@ impl Form {
         let found = found.collect();
         self.labelled(labels, found, &filter)
     }
+}
+
+/// Which of the forms each draw is of.
+fn places_of(forms: &[LikelyForm]) -> impl Iterator<Item = usize> + '_ {
+    let last = forms.len().saturating_sub(1);
+    let places = forms.iter().enumerate().flat_map(|(place, form)| std::iter::repeat_n(place, form.draws));
+    // Shares are rounded to whole draws.
+    places.chain(std::iter::repeat(last))
 }
 
 /// RONt, and about LSCI RONp, RONv and RONq.
