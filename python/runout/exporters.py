@@ -41,7 +41,7 @@ class Gltf:
     """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
 
     colour_range_um: Union[float, None] = None
-    """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
 
     magnification: Union[float, None] = None
     """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
@@ -61,7 +61,7 @@ class Obj:
     """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
 
     colour_range_um: Union[float, None] = None
-    """Deviation that the two strongest colours stand for, ± µm; without it the largest deviation."""
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
 
     magnification: Union[float, None] = None
     """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Literal, Union
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Rig:
-    """`[rig]` as it stands in a file."""
+    """`[rig]` as written in a file."""
 
     interruptions: Union[Sequence[Mapping[str, Any]], None] = None
     """Where the surface is interrupted: a keyway, a cross hole. Readings there are bridged, and no value is taken there."""
