@@ -271,6 +271,9 @@ fn what_has_no_uncertainty_is_said_with_the_reason() {
     let unknown = || Err("one trace only".to_owned());
     let mzli = said(unknown(), "values = ['straightness']\nreferences = ['MZCI']");
     assert_eq!(mzli, ["guideway: no uncertainty of STRt about MZLI: one trace only"]);
+    let both =
+        Evaluated::of(&[profile(unknown()), profile(unknown())], &evaluate("references = ['MZCI']").unwrap()).unwrap();
+    assert_eq!(both.remarks, ["guideway, guideway: no uncertainty of STRt about MZLI: one trace only"], "said once");
     let texture = said(unknown(), "values = ['texture']\nlambda_c_mm = 40.0");
     assert!(texture[0].ends_with(" values: one trace only") && texture.len() == 1, "{texture:?}");
     let known = OpenErrors { std_um: vec![1e-3; POINTS], ..OpenErrors::default() };

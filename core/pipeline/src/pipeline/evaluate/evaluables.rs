@@ -21,21 +21,18 @@ impl Evaluated {
     /// # Errors
     /// When a height map cannot be evaluated as it is asked for.
     pub(crate) fn of(evaluables: &[Evaluable], evaluate: &Evaluate) -> Result<Self> {
-        let mut all = Self::default();
+        let (mut all, mut remarks) = (Self::default(), Remarks::default());
         for one in evaluables {
-            match one {
-                Evaluable::ClosedProfiles(_) => {}
-                Evaluable::OpenProfile(profile) => all.add(&profile.of, open_profile::values(profile, evaluate)),
-                Evaluable::HeightMap(map) => all.add(&map.of, plane_map::values(map, evaluate)?),
-            }
+            let (of, (values, said)) = match one {
+                Evaluable::ClosedProfiles(_) => continue,
+                Evaluable::OpenProfile(profile) => (&profile.of, open_profile::values(profile, evaluate)),
+                Evaluable::HeightMap(map) => (&map.of, plane_map::values(map, evaluate)?),
+            };
+            said.into_iter().chain(unknown(&values)).for_each(|sentence| remarks.add(of, sentence));
+            all.values.extend(values.into_iter().map(|value| (of.clone(), value)));
         }
+        all.remarks = remarks.sentences();
         Ok(all)
-    }
-
-    fn add(&mut self, of: &str, (values, remarks): (Vec<Value>, Vec<String>)) {
-        self.remarks.extend(remarks.into_iter().map(|remark| format!("{of}: {remark}")));
-        self.remarks.extend(unknown(of, &values));
-        self.values.extend(values.into_iter().map(|value| (of.to_owned(), value)));
     }
 
     /// As values of a result.
@@ -49,11 +46,28 @@ impl Evaluated {
     }
 }
 
+/// Sentences, each with what it is said of.
+#[derive(Default)]
+struct Remarks(Vec<(Vec<String>, String)>);
+
+impl Remarks {
+    fn add(&mut self, of: &str, sentence: String) {
+        match self.0.iter_mut().find(|(_, known)| *known == sentence) {
+            Some((all, _)) => all.push(of.to_owned()),
+            None => self.0.push((vec![of.to_owned()], sentence)),
+        }
+    }
+
+    fn sentences(self) -> Vec<String> {
+        self.0.into_iter().map(|(all, sentence)| format!("{}: {sentence}", all.join(", "))).collect()
+    }
+}
+
 /// Values that one sentence names, at most.
 const MOST_NAMED: usize = 8;
 
 /// Says of which values no uncertainty is stated, and why: a sentence for each reason.
-fn unknown(of: &str, values: &[Value]) -> Vec<String> {
+fn unknown(values: &[Value]) -> Vec<String> {
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for value in values {
         let Some(reason) = value.no_uncertainty.as_deref() else { continue };
@@ -65,7 +79,7 @@ fn unknown(of: &str, values: &[Value]) -> Vec<String> {
     }
     let sentence = |(reason, names): (&str, Vec<String>)| {
         let which = if names.len() > MOST_NAMED { format!("{} values", names.len()) } else { names.join(", ") };
-        format!("{of}: no uncertainty of {which}: {reason}")
+        format!("no uncertainty of {which}: {reason}")
     };
     reasons.into_iter().map(sentence).collect()
 }
