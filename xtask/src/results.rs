@@ -76,7 +76,7 @@ pub(crate) fn compare(words: &[&str]) -> Outcome {
 }
 
 /// The commands of a README, each on one line without its comment and the program's name.
-pub fn commands(text: &str) -> Vec<String> {
+pub(crate) fn commands(text: &str) -> Vec<String> {
     let mut commands = Vec::new();
     let mut inside = false;
     for line in text.replace("\\\n", " ").lines() {
