@@ -135,7 +135,7 @@ def _blocks(rows: int, per_task: int | None) -> int:
     if per_task is None:
         if not ray.is_initialized():
             ray.init()
-        processors = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        processors = max(1, int(ray.cluster_resources().get("CPU", 1)))  # type: ignore[no-untyped-call]
         per_task = min(MOST_PER_TASK, rows // (8 * processors))
     return -(-rows // max(1, per_task))
 
