@@ -28,12 +28,12 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
                 Outcome::Ok(readers)
             })
         });
-        run(&mut cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"])?)?;
-        run(cargo(runner)?.arg("--no-run"))?;
+        run(&mut linting(&["build", "--workspace", "--all-targets"])?)?;
+        run(linting(runner)?.arg("--no-run"))?;
         let readers = readers.map(|thread| thread.join().map_err(|_| "the packages could not be installed".to_owned()));
         readers.transpose()?.transpose()
     })?;
-    let mut tests = cargo(runner)?;
+    let mut tests = linting(runner)?;
     tests.arg("--no-fail-fast");
     // Foreign readers that one test starts inherit the open files of the others, and HDF5's locks on them with it.
     tests.env("HDF5_USE_FILE_LOCKING", "FALSE");
@@ -44,7 +44,7 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
         readers.equip(&mut tests);
     }
     run(&mut tests)?;
-    run(&mut cargo(&["test", "--workspace", "--doc", "--quiet"])?)?;
+    run(&mut linting(&["test", "--workspace", "--doc", "--quiet"])?)?;
     let program = target().join("debug/runout");
     run_example(&program)?;
     let package = || if foreign_readers { python::test() } else { Ok(()) };
@@ -73,6 +73,17 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
         return Err("a test was skipped; with --ci none may be (`cargo xtask data`, RUNOUT_DATA)".into());
     }
     Ok(())
+}
+
+/// A cargo command that compiles the crates of the workspace by clippy's compiler, which gives the lints as well: what the tests are built
+/// of is compiled once, where `cargo clippy` would compile all of it for itself. A warning is an error.
+fn linting(arguments: &[&str]) -> Outcome<Command> {
+    let mut command = cargo(arguments)?;
+    // As `cargo clippy -- --deny warnings` hands them on.
+    let separator = "__CLIPPY_HACKERY__";
+    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    command.env("CLIPPY_ARGS", format!("--deny{separator}warnings{separator}"));
+    Ok(command)
 }
 
 /// Tests without the measured data that they take, by what `tests/support/measured_data.rs` writes.

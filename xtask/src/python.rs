@@ -9,7 +9,7 @@ use std::{
 
 use crate::{
     process::{Outcome, answer, root, run, say, target, tools},
-    setup::{self, cargo},
+    setup,
 };
 
 /// What builds the package, and what its tests take.
@@ -63,11 +63,9 @@ pub(crate) fn install_test_packages() -> Outcome {
     Ok(())
 }
 
-/// Runs the tests of the package on the library that the workspace was built with: maturin would compile all dependencies
-/// again, since it builds the one crate with fewer features.
+/// Runs the tests of the package on the library that the workspace was built with before: maturin would compile all
+/// dependencies again, since it builds the one crate with fewer features.
 pub(crate) fn test() -> Outcome {
-    // With the tests' targets named, the dependencies have the tests' features.
-    run(&mut cargo(&["build", "--workspace", "--lib", "--bins", "--tests", "--quiet"])?)?;
     let place = target().join("python");
     assemble(&place.join("runout"))?;
     let python = environment()?.join("bin/python");
