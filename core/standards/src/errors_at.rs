@@ -7,10 +7,16 @@
 //! neighbouring points have nearly the same error. Each draw is independent of all others, where a drawn profile serves for 25.
 
 use crate::errors::{Draws, Noise};
-use runout_numerics::{Complex64, fourier::Fourier};
+use runout_numerics::{
+    Complex64,
+    fourier::Fourier,
+    lanes::{NullaryFnOnce, vectorised},
+};
 
 /// Share of an error's variance that is left out: a thousandth of its standard deviation.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Points whose errors are summed side by side.
+const LANES: usize = 16;
 
 /// Covariance of the errors of a profile on equal angles.
 #[derive(Debug, Clone)]
@@ -40,8 +46,12 @@ impl Covariance {
 #[derive(Debug, Clone)]
 pub struct ErrorsAt {
     draws: Draws,
-    /// What each independent number adds to each point.
-    columns: Vec<Vec<f64>>,
+    /// Independent numbers of a draw.
+    numbers: Vec<f64>,
+    /// What each of them adds to each point: groups of [`LANES`] points, in each group number by number.
+    shares: Vec<f64>,
+    points: usize,
+    /// Whole groups.
     errors_um: Vec<f64>,
 }
 
@@ -71,17 +81,51 @@ impl ErrorsAt {
             left[pivot] = 0.0;
             columns.push(column);
         }
-        Self { draws: Draws::new(noise, columns.len().div_ceil(2)), columns, errors_um: vec![0.0; points.len()] }
+        let (rank, groups) = (columns.len(), points.len().div_ceil(LANES));
+        let share = |place: usize| {
+            let (group, number, lane) = (place / (LANES * rank), place / LANES % rank, place % LANES);
+            columns[number].get(group * LANES + lane).copied().unwrap_or(0.0)
+        };
+        Self {
+            draws: Draws::new(noise, rank.div_ceil(2)),
+            numbers: vec![0.0; rank],
+            shares: (0..groups * LANES * rank).map(share).collect(),
+            points: points.len(),
+            errors_um: vec![0.0; groups * LANES],
+        }
     }
 
     /// The next errors, independent of all before.
     pub fn draw(&mut self) -> &[f64] {
-        self.errors_um.fill(0.0);
-        let numbers = self.draws.next(self.columns.len().div_ceil(2)).flatten().flat_map(|pair| [pair.re, pair.im]);
-        for (number, column) in numbers.zip(&self.columns) {
-            self.errors_um.iter_mut().zip(column).for_each(|(error, share)| *error += number * share);
+        let pairs = self.draws.next(self.numbers.len().div_ceil(2)).flatten();
+        let drawn = pairs.flat_map(|pair| [pair.re, pair.im]);
+        self.numbers.iter_mut().zip(drawn).for_each(|(number, drawn)| *number = drawn);
+        vectorised(Sums { numbers: &self.numbers, shares: &self.shares, errors_um: &mut self.errors_um });
+        &self.errors_um[..self.points]
+    }
+}
+
+/// What all numbers add to all points.
+struct Sums<'a> {
+    numbers: &'a [f64],
+    shares: &'a [f64],
+    errors_um: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Sums<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "what is not inlined is compiled for narrow registers")]
+    fn call(self) {
+        let groups = self.shares.chunks_exact((LANES * self.numbers.len()).max(1));
+        for (errors, shares) in self.errors_um.chunks_exact_mut(LANES).zip(groups) {
+            let mut sums = [0.0; LANES];
+            for (number, shares) in self.numbers.iter().zip(shares.chunks_exact(LANES)) {
+                sums.iter_mut().zip(shares).for_each(|(sum, share)| *sum += number * share);
+            }
+            errors.copy_from_slice(&sums);
         }
-        &self.errors_um
     }
 }
 
@@ -121,6 +165,6 @@ mod tests {
         }
         assert!(Covariance::new(&[f64::NAN; 9], &mut fourier).is_none());
         // A point beside itself needs no number of its own.
-        assert_eq!(ErrorsAt::new(&covariance, &[7, 7], &Noise::new(60, 3)).columns.len(), 1);
+        assert_eq!(ErrorsAt::new(&covariance, &[7, 7], &Noise::new(60, 3)).numbers.len(), 1);
     }
 }

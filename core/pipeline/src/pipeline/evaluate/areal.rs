@@ -73,6 +73,7 @@ pub(crate) fn add_areal(
         all_to: orders.fold(highest, usize::min),
         lost: lost.into_iter().collect(),
         half_power_upr: sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min),
+        shows_weakened: sections.iter().any(Section::shows_weakened),
     };
     let used = sections.iter().map(|section| section.used).sum::<f64>() / sections.len().max(1) as f64;
     let there = 1.0 - map.missing() as f64 / map.heights_um().len() as f64;
@@ -81,7 +82,11 @@ pub(crate) fn add_areal(
         values.extend(labelled_with_reasons(labels, numbers, &filter, &held, there.min(used)));
     };
     if evaluate.has(Group::Areal) {
-        add(&mut part.values, prepared.areal(&map, &prepared.draws(uncertain, lowest)));
+        let (draws, found) = threads::both(
+            || prepared.draws(uncertain, lowest),
+            || areal::areal(&map, &areal::Settings::default()).parameters(),
+        );
+        add(&mut part.values, prepared.areal(&map, &found, &draws));
     }
     if evaluate.has(Group::Twist) {
         match twist::twist(&map) {
@@ -271,9 +276,8 @@ impl<'a> Prepared<'a> {
         Ok([above, below])
     }
 
-    fn areal(&self, map: &HeightMap, draws: &Draws) -> (Vec<Label>, Vec<Found>) {
+    fn areal(&self, map: &HeightMap, parameters: &[areal::Parameter], draws: &Draws) -> (Vec<Label>, Vec<Found>) {
         let standard = |clause: &str| format!("ISO 25178-2:2021, {clause}");
-        let parameters = areal::areal(map, &areal::Settings::default()).parameters();
         let label = |one: &areal::Parameter| Label::new(one.symbol, one.unit, standard(one.clause), self.reference());
         let mut labels: Vec<Label> = parameters.iter().map(label).collect();
         let known = |index: usize, value: f64| match draws {
