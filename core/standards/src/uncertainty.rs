@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
-pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms};
+pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms, stands_out};
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 
@@ -140,18 +140,22 @@ pub fn monte_carlo_of(
     all_draws(draws, transforms, draw, summed_up)
 }
 
-/// The same where what is drawn is what the truth may be ([`LikelyForm`]): the interval is from the draws' 2.5 % point to their
-/// 97.5 % point.
+/// The same where what is drawn is what the truth may be, of each form as many draws as it says, form by form: the interval is from the
+/// draws' 2.5 % point to their 97.5 % point, and begins no later than that of the least form alone.
 pub fn likely_values_of(
-    draws: usize,
+    forms: &[LikelyForm],
     transforms: usize,
     draw: impl FnMut(bool, &mut Vec<f64>),
 ) -> Vec<(f64, Option<Uncertainty>)> {
+    let least = forms.first().filter(|form| form.least).map_or(0, |form| form.draws);
     let likely = |drawn: &mut [f64], value: f64| {
+        let (of_least, drawn) = drawn.split_at_mut(least.min(drawn.len()));
         let known = summed_up(drawn, value);
-        Uncertainty { interval_95: [point(drawn, TAIL), point(drawn, 1.0 - TAIL)], ..known }
+        of_least.sort_by(f64::total_cmp);
+        let begin = of_least.first().map_or(f64::INFINITY, |_| point(of_least, TAIL));
+        Uncertainty { interval_95: [point(drawn, TAIL).min(begin), point(drawn, 1.0 - TAIL)], ..known }
     };
-    all_draws(draws, transforms, draw, likely)
+    all_draws(forms.iter().map(|form| form.draws).sum(), transforms, draw, likely)
 }
 
 fn all_draws(

@@ -1,6 +1,11 @@
 //! Recorded turns: what a loader offers, read in blocks so that a station may be larger than memory.
 
-use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
+use std::{
+    f64::consts::{FRAC_PI_2, SQRT_2},
+    num::NonZeroUsize,
+    ops::Range,
+    path::PathBuf,
+};
 
 use crate::{checksum::Checksum, input_file::InputFile};
 use runout_error::Result;
@@ -142,6 +147,25 @@ pub struct Response {
     pub description: String,
     /// Effective −3 dB frequency, in Hz.
     pub half_power_hz: f64,
+    /// Order of the Butterworth low-pass that is applied twice, or that has about the same effect.
+    pub order: usize,
+    /// Sampling rate of the filter, in Hz; infinite where it has none.
+    pub sample_rate_hz: f64,
+}
+
+impl Response {
+    /// Share of the amplitude that passes: 1/(1 + (√2 − 1) r²ᴺ), where r is the frequency over that of −3 dB, both as the bilinear transform
+    /// warps them.
+    #[must_use]
+    pub fn amplitude(&self, frequency_hz: f64) -> f64 {
+        let nyquist_hz = 0.5 * self.sample_rate_hz;
+        if frequency_hz >= nyquist_hz {
+            return 0.0;
+        }
+        let warped = |hz: f64| if nyquist_hz.is_finite() { (FRAC_PI_2 * hz / nyquist_hz).tan() } else { hz };
+        let ratio = warped(frequency_hz) / warped(self.half_power_hz);
+        (1.0 + (SQRT_2 - 1.0) * ratio.powi(2 * self.order as i32)).recip()
+    }
 }
 
 /// Samples of one capture, block after block.

@@ -164,6 +164,14 @@ impl Split {
 }
 
 impl Profile {
+    /// Share of the amplitude of an order that the filters before it pass; 1 where the speed is not known.
+    #[must_use]
+    pub fn passed(&self, order: usize) -> f64 {
+        let Some(speed_rpm) = self.speed_rpm else { return 1.0 };
+        let frequency_hz = order as f64 * speed_rpm / 60.0;
+        self.responses.iter().map(|response| response.amplitude(frequency_hz)).product()
+    }
+
     /// Memory that its coefficients take, in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {

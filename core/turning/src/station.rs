@@ -42,6 +42,12 @@ impl StationResult {
         self.profiles.iter().filter_map(of).reduce(f64::min)
     }
 
+    /// Share of the amplitude of an order that the filters before the averages pass, in the average where it is least.
+    #[must_use]
+    pub fn passed(&self, order: usize) -> f64 {
+        self.profiles.iter().map(|profile| profile.passed(order)).fold(1.0, f64::min)
+    }
+
     /// Root mean square of a section's form over the observable orders from 2, and its standard uncertainty, in µm.
     ///
     /// rms² = ½ Σ|c|², so that errors δ of no favoured phase give u² = Σ|c|² E|δ|² / (8 rms²); NaN where no variance is known.

@@ -67,6 +67,7 @@ mod tests {
     use sci_rs::signal::filter::design::{DigitalFilter, FilterBandType, FilterOutputType, butter_dyn};
 
     use super::*;
+    use runout_turning::measurement::Response;
 
     #[test]
     fn poles_and_gains_are_those_of_an_independent_design() {
@@ -113,6 +114,16 @@ mod tests {
                 .map(|section| (poly(section.b, z) / poly([1.0, section.a[0], section.a[1]], z)).norm_sqr())
                 .product();
             assert!((gain - 0.5_f64.sqrt()).abs() < 1e-12, "order {order}: {gain}");
+            // What values are told of the filter.
+            let response = Response { description: String::new(), half_power_hz, order, sample_rate_hz: 1000.0 };
+            for frequency_hz in [1.0, 40.0, 90.0, 150.0, 300.0] {
+                let z = num_complex_exp(frequency_hz / 1000.0);
+                let gain: f64 = sections(order, 100.0, 1000.0)
+                    .iter()
+                    .map(|section| (poly(section.b, z) / poly([1.0, section.a[0], section.a[1]], z)).norm_sqr())
+                    .product();
+                assert!((response.amplitude(frequency_hz) - gain).abs() < 1e-12, "order {order}, {frequency_hz} Hz");
+            }
         }
     }
 }

@@ -103,6 +103,8 @@ impl Conditioner for LowPass {
                 significant(half_power_hz, 4)
             ),
             half_power_hz,
+            order: self.order,
+            sample_rate_hz: rate_hz,
         });
         let sections = sections(self.order, self.cutoff_hz, rate_hz);
         let lookahead = settling_samples(&sections, FORGOTTEN);

@@ -174,19 +174,38 @@ impl SynchronousAverage {
                 angles
             ));
         }
-        let held = (PASS_BAND * 0.5 * turn) as usize;
+        if self.is_weakened(capture, turn, exact) {
+            warnings.push(format!(
+                "{}: {turn:.0} samples a turn carry orders to {} through the resampling in angle; those above are weakened",
+                capture.object,
+                (PASS_BAND * 0.5 * turn) as usize
+            ));
+        }
+        warnings
+    }
+
+    /// Whether the resampling weakens orders that are to be kept, of turns of so many samples, and nothing before it has.
+    fn is_weakened(&self, capture: &Capture, turn: f64, exact: bool) -> bool {
         let filtered = |rate_hz: f64| {
             let band_hz = PASS_BAND * 0.5 * rate_hz;
             capture.responses.iter().any(|response| response.half_power_hz <= band_hz)
         };
-        if !exact && self.max_order().min(orders_held(turn)) > held && !capture.sample_rate_hz.is_some_and(filtered) {
-            warnings.push(format!(
-                "{}: {turn:.0} samples a turn carry orders to {held} through the resampling in angle; those above are \
-                 weakened",
-                capture.object
-            ));
-        }
-        warnings
+        let highest = self.max_order().min(orders_held(turn));
+        !exact && highest > (PASS_BAND * 0.5 * turn) as usize && !capture.sample_rate_hz.is_some_and(filtered)
+    }
+
+    /// What the resampling does to them.
+    fn resampling_response(&self, capture: &Capture, exact: bool) -> Option<Response> {
+        let (turn, rate_hz) = (capture.median_turn_samples()?, capture.sample_rate_hz?);
+        self.is_weakened(capture, turn, exact).then(|| {
+            let half_power_hz = KERNEL_HALF_POWER * 0.5 * rate_hz;
+            Response {
+                description: format!("resampling in angle, −3 dB at about {} Hz", significant(half_power_hz, 3)),
+                half_power_hz,
+                order: KERNEL_ORDER,
+                sample_rate_hz: f64::INFINITY,
+            }
+        })
     }
 }
 
@@ -204,6 +223,11 @@ fn near_synchronous(tones: &[NearTone], turns: usize, object: &str) -> Option<St
         size(largest),
     ))
 }
+
+/// Share of the recording's Nyquist frequency at which the kernel of the resampling passes half of the power, and the order of the low-pass that
+/// falls about as it does.
+const KERNEL_HALF_POWER: f64 = 0.9;
+const KERNEL_ORDER: usize = 8;
 
 /// Highest order that turns of this many samples hold, below Nyquist as for whole numbers of samples.
 fn orders_held(turn_samples: f64) -> usize {
@@ -293,6 +317,7 @@ impl Averager for SynchronousAverage {
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
         warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
+        capture.responses.extend(self.resampling_response(&capture, outcome.exact));
         if let Some(speed_rpm) = speed_rpm {
             in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
         }

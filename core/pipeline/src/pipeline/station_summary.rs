@@ -38,7 +38,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
         sections,
         motion_along_deg: azimuth.map(Azimuth::degrees),
         readings: if nothing { readings(&result.profiles, rig) } else { Vec::new() },
-        motion_z_mm: (!result.motion_values.is_empty()).then_some(result.separation.motion_z_mm),
+        motion_z_mm: plane_of_values(result),
         motion_values: result.motion_values.clone(),
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),
@@ -120,4 +120,10 @@ fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
         speed_rpm: profile.speed_rpm,
         filters: profile.responses.iter().map(|response| response.description.clone()).collect(),
     }
+}
+
+/// Where the radial values of error motion hold: midway between the sensors, not where the tables have x and y.
+fn plane_of_values(result: &StationResult) -> Option<f64> {
+    let spread = result.profiles.iter().find_map(|profile| profile.spread.as_ref())?;
+    (!result.motion_values.is_empty()).then_some(spread.projection.z_mm + result.z_mm)
 }

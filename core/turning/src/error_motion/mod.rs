@@ -21,10 +21,12 @@ mod polar;
 #[cfg(test)]
 mod tests;
 mod turns;
+mod weakened;
 
 pub use names::{WITH_FUNDAMENTAL, symbols};
 pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;
+pub use weakened::behind_low_pass;
 
 use std::cell::RefCell;
 

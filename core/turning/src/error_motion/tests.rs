@@ -16,7 +16,7 @@ const LINE_DEG: f64 = 30.0;
 const UNKNOWNS: [Quantity; 4] = [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY];
 
 /// Harmonics (order, coefficients of x, y, tilt about x and y of Re c e^{−inΦ}) at z = 0.
-fn separation(harmonics: &[(usize, [Complex64; 4])]) -> Separation {
+pub(super) fn separation(harmonics: &[(usize, [Complex64; 4])]) -> Separation {
     let mut estimate = vec![Complex64::ZERO; 4 * 21];
     for (order, values) in harmonics {
         estimate[4 * order..4 * order + 4].copy_from_slice(values);

@@ -2,7 +2,7 @@
 
 use crate::separation::{Quantity, Separation};
 use runout_numerics::Complex64;
-use runout_standards::gaps::Gaps;
+use runout_standards::{gaps::Gaps, uncertainty::stands_out};
 
 /// One section's form, order by order from 0; `None` where it is not known.
 #[derive(Debug)]
@@ -48,6 +48,15 @@ impl Section {
     pub fn lost_orders(&self) -> impl Iterator<Item = usize> + '_ {
         let orders = self.orders.iter().enumerate().skip(2);
         orders.filter(|(_, known)| known.is_none()).map(|(order, _)| order)
+    }
+
+    /// Whether form stands out from the noise at orders that a filter before the average has weakened: from half of that on of which half of the
+    /// power passes.
+    #[must_use]
+    pub fn shows_weakened(&self) -> bool {
+        let Some(half_power_upr) = self.half_power_upr else { return false };
+        let weakened = self.orders.iter().enumerate().skip(2).filter(|(order, _)| *order as f64 > 0.5 * half_power_upr);
+        weakened.filter_map(|(_, known)| *known).any(|known| stands_out(known.value, known.variance))
     }
 
     pub(super) fn label(&self) -> String {

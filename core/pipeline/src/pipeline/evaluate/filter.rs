@@ -91,6 +91,11 @@ impl Filter {
         self.band.below_upr.is_some_and(|cutoff| self.passes(half_power_upr, cutoff) >= MATTERS)
     }
 
+    /// Whether it has no cut-off for high orders: its values are of the orders that there are.
+    pub(crate) fn passes_everything(&self) -> bool {
+        self.band.below_upr.is_none()
+    }
+
     /// Whether it passes a thousandth or more of what is above an order. What lets everything pass is of the orders there
     /// are.
     pub(crate) fn reaches_above(&self, order: usize) -> bool {

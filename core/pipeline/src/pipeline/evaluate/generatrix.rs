@@ -140,8 +140,13 @@ impl<'a> Generatrix<'a> {
         let numbers: Vec<Found> =
             numbers.map(|(index, value)| found(drawn.as_ref(), index, *value, sensitivity(index))).collect();
         let coverage = measured.points as f64 / (measured.points + measured.missing).max(1) as f64;
-        let held =
-            Content { highest: self.highest, all_to: self.highest, lost: self.lost.clone(), half_power_upr: None };
+        let held = Content {
+            highest: self.highest,
+            all_to: self.highest,
+            lost: self.lost.clone(),
+            half_power_upr: None,
+            shows_weakened: false,
+        };
         labelled_with_reasons(labels.collect(), numbers, &filter.along_axis(), &held, coverage)
     }
 }

@@ -60,6 +60,8 @@ struct Content {
     lost: Vec<usize>,
     /// Order of which filters before the average pass half.
     half_power_upr: Option<f64>,
+    /// Whether there is form above that order, weakened.
+    shows_weakened: bool,
 }
 
 impl Content {
@@ -83,6 +85,12 @@ struct Found {
     no_uncertainty: Option<String>,
 }
 
+impl From<(f64, Option<Uncertainty>)> for Found {
+    fn from((value, uncertainty): (f64, Option<Uncertainty>)) -> Self {
+        Self { value, uncertainty, no_uncertainty: None }
+    }
+}
+
 /// Numbers under their labels; what is no number is left out: the profile or the wall does not have that value.
 fn labelled(
     labels: Vec<Label>,
@@ -91,8 +99,7 @@ fn labelled(
     held: &Content,
     coverage: f64,
 ) -> Vec<Value> {
-    let found = found.into_iter().map(|(value, uncertainty)| Found { value, uncertainty, no_uncertainty: None });
-    labelled_with_reasons(labels, found.collect(), filter, held, coverage)
+    labelled_with_reasons(labels, found.into_iter().map(Found::from).collect(), filter, held, coverage)
 }
 
 /// The same of numbers that say why they have no uncertainty.
@@ -104,7 +111,9 @@ fn labelled_with_reasons(
     coverage: f64,
 ) -> Vec<Value> {
     let lost_orders = filter.lost(&held.lost);
-    let weakened_above_upr = held.half_power_upr.filter(|half| filter.asks_for_more_than(*half));
+    let weakened_above_upr = held
+        .half_power_upr
+        .filter(|half| filter.asks_for_more_than(*half) || (held.shows_weakened && filter.passes_everything()));
     let absent_above_upr = Some(held.all_to).filter(|order| filter.reaches_above(*order));
     let known = labels.into_iter().zip(found).filter(|(_, found)| found.value.is_finite());
     known

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, rc::Rc};
 
-use super::{Filter, Label, POINTS_A_WAVE, config::Propagation, section::Form};
+use super::{Filter, Found, Label, POINTS_A_WAVE, config::Propagation, labelled_with_reasons, section::Form};
 use runout_numerics::{
     Complex64,
     filter::{Degree, Smoother, robust_gaussian},
@@ -12,10 +12,7 @@ use runout_standards::{
     Value,
     roundness::{Angles, Disturbed, Points, Reference, Series, Values},
     slope::{Drawn, steepest_um_per_rad},
-    uncertainty::{
-        DRAWS, Errors, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, extreme, forms_to_draw, likely_values_of,
-        of_rms, stand_in,
-    },
+    uncertainty::{DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, forms_to_draw, likely_values_of, of_rms},
 };
 
 /// Of so many points that may come to touch, errors cost as much as those of whole profiles.
@@ -34,6 +31,10 @@ fn reach(reference: Reference) -> f64 {
 /// Share of noise in the form found from which on errors are drawn as whole profiles: crests between few angles are then
 /// crests of noise, which draws of the true form do not have.
 const MOST_NOISE: f64 = 0.25;
+
+/// Share of errors in the variance of the slope from which on its intervals hold the truth too rarely: slopes are those of the highest
+/// orders, of which errors hide the form first.
+const MOST_NOISE_OF_SLOPE: f64 = 0.03;
 
 /// Draws of what is filtered robustly, point by point and some times over.
 const DRAWS_OF_ROBUST: usize = 64;
@@ -58,14 +59,14 @@ impl Form {
             let both = known.as_ref().is_some_and(|known| has_kinks(label) && holds(known));
             (value, if both { known.map(|known| known.on_both_sides(value)) } else { known })
         });
-        let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
+        let mut found: Vec<Found> = found.map(Found::from).collect();
         if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
             let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
             let reference = Reference::LeastSquares.symbol();
             labels.insert(last + 1, Label::new("dr/dtheta", "µm/°", steepest, reference));
             found.insert(last + 1, self.steepest(filter));
         }
-        self.labelled(labels, found, filter)
+        labelled_with_reasons(labels, found, filter, &self.held, self.at.coverage(self.angles))
     }
 
     /// Values about reference circles, of the profile between the angles too.
@@ -122,9 +123,9 @@ impl Form {
                 (form.errors(), circles)
             })
             .collect();
-        let transforms = forms.iter().map(LikelyForm::transforms).sum();
+        let transforms = forms.iter().filter(|form| !form.least).map(LikelyForm::transforms).sum();
         let mut places = places_of(&forms);
-        let mut found = likely_values_of(DRAWS, transforms, |disturbed, found| {
+        let mut found = likely_values_of(&forms, transforms, |disturbed, found| {
             if !disturbed {
                 for reference in references {
                     let about = circle(*reference, &profile_um, 0.0).map(|circle| circle.about());
@@ -182,7 +183,7 @@ impl Form {
         let mut fourier = Fourier::new(angles.len());
         let harmonics = filter.harmonics(&self.harmonics);
         let forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, &self.noise, &mut fourier);
-        if forms.iter().any(|form| form.share_of_noise() > MOST_NOISE) {
+        if forms.iter().any(|form| !form.least && form.share_of_noise() > MOST_NOISE) {
             return None;
         }
         let profile_um = self.profile(filter, &mut fourier);
@@ -205,7 +206,7 @@ impl Form {
             let (mut places, mut certain) = (places_of(&forms), true);
             // As wide as from whole profiles: draws about a form that holds its noise scatter too little.
             let transforms = DRAWS.div_ceil(TURNS_OF_A_DRAW);
-            let values = likely_values_of(DRAWS, transforms, |disturbed, found| {
+            let values = likely_values_of(&forms, transforms, |disturbed, found| {
                 if !disturbed {
                     add_values(Some(about), *reference, found);
                     return;
@@ -228,27 +229,52 @@ impl Form {
         Some(found)
     }
 
-    /// The steepest slope, µm/°, from the harmonics. High orders count by their number, and noise with them: it is drawn
-    /// about a profile that stands for the truth.
-    fn steepest(&self, filter: &Filter) -> (f64, Option<Uncertainty>) {
+    /// The steepest slope, µm/°, from the harmonics, and what it may be of the true form.
+    fn steepest(&self, filter: &Filter) -> Found {
         let harmonics = filter.harmonics(&self.harmonics);
         let value = steepest_um_per_rad(&harmonics, &self.at.gaps).to_radians();
-        let variance = filter.variance(&self.variance);
-        let of_slopes: Vec<f64> = (variance.iter().enumerate())
-            .map(|(order, variance)| variance * (order as f64).to_radians().powi(2))
-            .collect();
-        let Some(mut errors) = Errors::sharing(&of_slopes, 2, &self.noise) else { return (value, None) };
-        let weights = stand_in(&harmonics, &variance, 2);
-        let likely = harmonics.iter().zip(weights).enumerate();
-        let likely = likely.map(|(order, (value, weight))| Complex64::I * (order as f64).to_radians() * value * weight);
+        let um_per_deg = |order: usize| (order as f64).to_radians();
+        let slopes: Vec<Complex64> =
+            harmonics.iter().enumerate().map(|(order, value)| Complex64::I * um_per_deg(order) * value).collect();
+        let widened = self.widened(filter).into_iter().enumerate();
+        let variance: Vec<f64> = widened.map(|(order, variance)| variance * um_per_deg(order).powi(2)).collect();
+        let of_errors: f64 = variance.iter().skip(2).filter(|variance| **variance > 0.0).sum();
+        if of_errors == 0.0 {
+            return Found::from((value, None));
+        }
+        let share = of_errors / slopes.iter().skip(2).map(Complex64::norm_sqr).sum::<f64>();
+        if share > MOST_NOISE_OF_SLOPE {
+            let reason = format!(
+                "errors are {:.0} % of the slope's variance, most of them at the highest orders, where the recording does not show how much \
+                 is form; a filter with a lower cut-off leaves less of them",
+                (100.0 * share).min(100.0)
+            );
+            return Found { value, uncertainty: None, no_uncertainty: Some(reason) };
+        }
         let waves = filter.highest(self.held.highest).max(2);
         let mut fourier = Fourier::new((DRAWN_POINTS_A_WAVE * waves).next_power_of_two());
-        let mut likely = fourier.synthesise(likely).to_vec();
-        self.at.gaps.blank(&mut likely);
-        let about = Drawn::about(&likely);
-        let draws = (0..DRAWS).map(|_| about.steepest(&errors.turned(&mut fourier)));
-        let known = extreme(value, about.undisturbed(), draws.collect()).map(|(_, known)| known);
-        (value, known)
+        let mut forms = forms_to_draw(self.likely(), &slopes, &variance, DRAWS, &self.noise, &mut fourier);
+        forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
+        let mut found_slopes = fourier.synthesise(slopes).to_vec();
+        self.at.gaps.blank(&mut found_slopes);
+        // On the angles of the draws, from which the value differs by its crest.
+        let about = Drawn::about(&found_slopes).undisturbed();
+        let mut of_forms: Vec<_> = forms.iter().map(|form| (form.errors(), Drawn::about(&form.mean_um))).collect();
+        let transforms = forms.iter().filter(|form| !form.least).map(LikelyForm::transforms).sum();
+        let mut places = places_of(&forms);
+        let found = likely_values_of(&forms, transforms, |disturbed, found| {
+            if !disturbed {
+                found.push(about);
+                return;
+            }
+            let Some((errors, slopes)) = places.next().and_then(|place| of_forms.get_mut(place)) else { return };
+            found.push(match errors {
+                Some(errors) => slopes.steepest(&errors.turned(&mut fourier)),
+                None => slopes.undisturbed(),
+            });
+        });
+        let known = found.into_iter().next().and_then(|(_, known)| known);
+        Found::from((value, known.map(|known| known.moved(value - about))))
     }
 
     /// Roundness behind the robust Gaussian (ISO 16610-31), which is applied to each drawn profile.
@@ -274,10 +300,7 @@ impl Form {
 
 /// Which of the forms each draw is of.
 fn places_of(forms: &[LikelyForm]) -> impl Iterator<Item = usize> + '_ {
-    let last = forms.len().saturating_sub(1);
-    let places = forms.iter().enumerate().flat_map(|(place, form)| std::iter::repeat_n(place, form.draws));
-    // Shares are rounded to whole draws.
-    places.chain(std::iter::repeat(last))
+    forms.iter().enumerate().flat_map(|(place, form)| std::iter::repeat_n(place, form.draws))
 }
 
 /// RONt, and about LSCI RONp, RONv and RONq.

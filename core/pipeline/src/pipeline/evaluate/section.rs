@@ -9,7 +9,7 @@ use runout_standards::{
     roundness::{Angles, Points, Reference},
     uncertainty::{
         DRAWS, Errors, Likely, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, likely_forms, monte_carlo_of, noise_95,
-        seed, student_95,
+        seed, stands_out, student_95,
     },
 };
 use runout_turning::{
@@ -26,8 +26,9 @@ pub(crate) fn section_values(
 ) -> Vec<Value> {
     let Some(form) = Form::of(result, section, radius_mm) else { return Vec::new() };
     let mut values = form.values(evaluate);
+    let restored = form.restored(&|order| result.passed(order));
     let equivalents: Vec<Vec<Value>> =
-        form.equivalents.iter().map(|harmonics| form.exactly(harmonics).values(evaluate)).collect();
+        (form.equivalents.iter().chain(&restored)).map(|harmonics| form.exactly(harmonics).values(evaluate)).collect();
     for value in &mut values {
         let key = |value: &Value| {
             let Value { symbol, filter, reference, band_upr, .. } = value;
@@ -99,6 +100,9 @@ pub(super) struct Form {
     likely: OnceCell<Vec<Likely>>,
 }
 
+/// What a low-pass has taken of the profile is left out where it is below this share of the errors' standard deviation.
+const NEGLIGIBLE: f64 = 1e-3;
+
 impl Form {
     fn of(result: &StationResult, section: usize, radius_mm: f64) -> Option<Self> {
         let separation = &result.separation;
@@ -113,12 +117,18 @@ impl Form {
             all_to: separation.max_order(),
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
             half_power_upr: result.half_power_upr(),
+            shows_weakened: false,
         };
+        let variance = separation.noise_variance(unknown);
+        let above = held.half_power_upr.map_or(usize::MAX, |half| half as usize + 1);
+        let weakened = separation.coefficients(unknown).skip(above.max(2));
+        let shows_weakened = weakened.zip(variance.iter().skip(above.max(2))).any(|(value, of)| stands_out(value, *of));
+        let held = Content { shows_weakened, ..held };
         // Of a form of which nothing can be told, nothing is a value.
         (result.angles > 1 && held.lost.len() < held.highest.saturating_sub(1)).then(|| Self {
             harmonics: from_two(separation.coefficients(unknown).collect()),
             equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),
-            variance: separation.noise_variance(unknown),
+            variance,
             freedom: (0..=separation.max_order()).map(|order| separation.degrees_of_freedom(order)).collect(),
             angles: result.angles,
             radius_mm,
@@ -135,6 +145,26 @@ impl Form {
         let (freedom, held, at) = (self.freedom.clone(), self.held.clone(), self.at.clone());
         let likely = OnceCell::new();
         Self { harmonics, equivalents, variance, freedom, held, at, likely, ..*self }
+    }
+
+    /// The form with what a low-pass has taken from the orders that stand out from their noise, as far up as half of their power passes; `None`
+    /// where that is nothing beside the errors. Noise is left as it is: nothing says what of it was form.
+    fn restored(&self, passed: &impl Fn(usize) -> f64) -> Option<Vec<Complex64>> {
+        let half_power_upr = self.held.half_power_upr?;
+        let mut taken_um = 0.0;
+        let of_order = |(order, harmonic): (usize, &Complex64)| {
+            if order as f64 > half_power_upr
+                || !self.variance.get(order).is_some_and(|variance| stands_out(*harmonic, *variance))
+            {
+                return *harmonic;
+            }
+            let restored = harmonic / passed(order);
+            taken_um += (restored - harmonic).norm();
+            restored
+        };
+        let harmonics: Vec<Complex64> = self.harmonics.iter().enumerate().map(of_order).collect();
+        let power: f64 = self.variance.iter().skip(2).filter(|variance| **variance > 0.0).sum();
+        (taken_um > NEGLIGIBLE * (0.5 * power).sqrt()).then_some(harmonics)
     }
 
     fn values(&self, evaluate: &Evaluate) -> Vec<Value> {
@@ -246,7 +276,7 @@ impl Form {
 
     /// What the true form may be, given the one found.
     pub(super) fn likely(&self) -> &[Likely] {
-        self.likely.get_or_init(|| likely_forms(&self.harmonics, &self.variance, 2))
+        self.likely.get_or_init(|| likely_forms(&self.harmonics, &self.variance, &self.freedom, 2))
     }
 
     /// Variances as wide as they are badly known, behind a filter.

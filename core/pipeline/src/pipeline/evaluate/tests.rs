@@ -206,7 +206,7 @@ fn all_groups_are_asked_for_by_one_word() {
 }
 
 /// The same of the steepest slope, of which noise of high orders is a good part: forms of 4 µm that fall with order⁻¹ to 60
-/// and with order⁻² to 20, errors of 4 nm and 20 nm at every angle in orders to 255, of a variance that 20 degrees of
+/// and with order⁻² to 20, errors of 4 nm and 20 nm (12 nm) at every angle in orders to 255, of a variance that 20 degrees of
 /// freedom tell.
 #[test]
 fn intervals_of_the_steepest_slope_hold_the_truth() {
@@ -221,7 +221,7 @@ fn intervals_of_the_steepest_slope_hold_the_truth() {
     };
     let mut random = ChaCha8Rng::seed_from_u64(21);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-    for (fall, last, std_um) in [(-1, 60, 0.0043), (-1, 60, 0.02), (-2, 20, 0.0043), (-2, 20, 0.02)] {
+    for (fall, last, std_um) in [(-1, 60, 0.0043), (-1, 60, 0.02), (-2, 20, 0.0043), (-2, 20, 0.012)] {
         let rms: f64 = (2..=last).map(|order| 0.5 * f64::from(order).powi(2 * fall)).sum::<f64>().sqrt();
         let variance = 2.0 * std_um * std_um / (HIGHEST - 1) as f64;
         let (mut inside, mut noise) = (0, 0.0);
@@ -238,11 +238,11 @@ fn intervals_of_the_steepest_slope_hold_the_truth() {
                 *wave = (order, wave.1 + Complex64::new(share * normal(), share * normal()));
             }
             // Five orders have their variance in common.
-            let mut told = vec![variance; HIGHEST + 1];
-            for five in told.chunks_mut(5) {
+            let mut stated = vec![variance; HIGHEST + 1];
+            for five in stated.chunks_mut(5) {
                 five.fill(variance * (0..40).map(|_| normal().powi(2)).sum::<f64>() / 40.0);
             }
-            let found = of(&waves[2..], &told, trial);
+            let found = of(&waves[2..], &stated, trial);
             let [low, high] = found.uncertainty.unwrap().interval_95;
             inside += usize::from(low <= truth && truth <= high);
             noise += (found.value / truth - 1.0) / TRIALS as f64;
@@ -252,6 +252,10 @@ fn intervals_of_the_steepest_slope_hold_the_truth() {
         // 95 % of 300 are 285 ± 3.8.
         assert!((91.5..=99.0).contains(&percent), "{percent} %");
     }
+    // Σ n²σ² of errors of 10 nm in 254 orders is 4.4 µm²; of a wave of order 3 it is 9a², 11 times as much for 2.3 µm.
+    let hidden = of(&[(3, Complex64::from(2.3))], &[2.0 * 1e-4 / 254.0; HIGHEST + 1], 0);
+    assert!(hidden.uncertainty.is_none(), "{hidden:?}");
+    assert!(hidden.no_uncertainty.is_some_and(|reason| reason.contains("9 % of the slope's variance")));
 }
 
 /// Also where no other value of the part was asked for.
@@ -761,6 +765,22 @@ fn nothing_is_proven_of_a_value_that_lacks_orders() {
     assert_eq!(decided(&[], Some(1500.0)), of(Decision::Conforms, Decision::Conforms));
 }
 
+/// 2 µm of ten lobes behind a low-pass whose −3 dB are at order 10.8, and the same at order 11.
+#[test]
+fn what_a_low_pass_takes_is_in_the_interval_or_nothing_is_proven() {
+    let evaluate = evaluate("references = ['LSCI']\nfilter_upr = []").unwrap();
+    let of = |order: usize| {
+        let response = weakened(108.0).responses.remove(0);
+        let mut result = station(0.0, &[lobes(order, response.amplitude(10.0 * order as f64))], 40, 1e-8, &[]);
+        result.profiles = vec![weakened(108.0)];
+        find(&section_values(&result, 0, &evaluate, RADIUS_MM), "RONt", "LSCI", "none").clone()
+    };
+    let below = of(10);
+    let [low, high] = below.uncertainty.unwrap().interval_95;
+    assert!(below.value < 1.8 && low < below.value && high > 2.0 && below.weakened_above_upr.is_none());
+    assert_eq!(of(11).weakened_above_upr, Some(10.8));
+}
+
 /// A form with a wave of order 300 and 3.6 µm in a band to 500 UPR, recorded with orders to 255: nothing of that band is
 /// proven.
 #[test]
@@ -840,7 +860,7 @@ fn a_wall_and_a_surface_say_what_their_filter_asks_for_and_they_do_not_have() {
 fn weakened(half_power_hz: f64) -> Profile {
     Profile {
         speed_rpm: Some(600.0),
-        responses: vec![Response { description: "low-pass".into(), half_power_hz }],
+        responses: vec![Response { description: "low-pass".into(), half_power_hz, order: 4, sample_rate_hz: 20_000.0 }],
         ..Profile::default()
     }
 }

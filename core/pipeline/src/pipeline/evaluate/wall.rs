@@ -100,7 +100,14 @@ impl Wall {
         });
         let rings: Vec<Ring> = rings.collect();
         let half_power_upr = sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min);
-        let held = Content { highest, all_to: all_to.min(highest), lost: lost.into_iter().collect(), half_power_upr };
+        let shows_weakened = sections.iter().any(Section::shows_weakened);
+        let held = Content {
+            highest,
+            all_to: all_to.min(highest),
+            lost: lost.into_iter().collect(),
+            half_power_upr,
+            shows_weakened,
+        };
         Self { angles: Angles::equal(count), count, radius_mm, placed, rings, held }
     }
 
