@@ -58,7 +58,9 @@ impl LinearFit {
         })
     }
 
-    /// What the fit leaves of each observation, in their unit and order.
+    /// What the fit leaves of each observation, in their unit and in the order of the groups, as in
+    /// [`LinearTerms::observations`](super::LinearTerms::observations).
+    /// [`LinearTerms::places`](super::LinearTerms::places) gives where each was before.
     #[must_use]
     pub fn residual(&self) -> Vec<f64> {
         let scale = self.data.observations.std.unwrap_or(1.0);

@@ -15,7 +15,7 @@ pub trait Exporter: Send + Sync {
     fn takes(&self) -> Takes;
 
     /// The files that it writes of a result with these tables, so that two exporters do not write the same one. The first is
-    /// always there.
+    /// always there, and `diagnosis.json` goes beside it where this is the first exporter.
     fn outputs(&self, tables: &[TableSpec]) -> Vec<PathBuf>;
 
     /// Where the run's summary goes if this is the first exporter: beside the first of its files.

@@ -40,7 +40,7 @@ pub trait PointSeparator: Send + Sync {
     /// The columns that it needs of the points, and those that it can use.
     fn columns(&self) -> Vec<PointColumn>;
 
-    /// The tables of its result, but for those that follow from form.
+    /// The tables of its result, but for those that follow from form and for the values. A linear model declares [`residual_table`] here.
     fn tables(&self) -> Vec<TableSpec>;
 
     /// What the points say.
@@ -129,7 +129,7 @@ pub struct PointDiagnosis {
 /// What a separator makes of points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outcome {
-    /// Signs and references of its numbers.
+    /// Signs and references of its numbers. With closed profiles, exporters write the convention of form instead.
     pub convention: String,
     /// Rows of its tables.
     pub tables: Vec<TableRows>,
@@ -190,7 +190,7 @@ impl<M: LinearModel> PointModel for M {
     }
 }
 
-/// The result of a linear model as it is declared.
+/// The result of a linear model as it is declared, with the rows of [`residual_table`], which the separator's `tables` must declare.
 ///
 /// # Errors
 /// When the points do not hold what the model needs.
