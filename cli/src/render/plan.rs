@@ -90,8 +90,8 @@ fn additions(page: &mut Page, report: &Report) {
         if !suggestion.reveals.is_empty() {
             does.push(format!("shows {}", foresight::names(&suggestion.reveals)));
         }
-        if !suggestion.tells_apart.is_empty() {
-            does.push(format!("distinguishes {}", sets(&suggestion.tells_apart)));
+        if !suggestion.distinguishes.is_empty() {
+            does.push(format!("distinguishes {}", sets(&suggestion.distinguishes)));
         }
         if !does.is_empty() {
             lines.push(format!("{}: {}", suggestion.text, does.join("; ")));

@@ -108,7 +108,7 @@ pub(crate) struct Suggested {
     /// Blind effects, "effect target", that would show with this.
     pub reveals: Vec<String>,
     /// Confounded sets that would be distinguished.
-    pub tells_apart: Vec<Vec<String>>,
+    pub distinguishes: Vec<Vec<String>>,
     /// The rig as it is.
     pub before: Score,
     /// The rig with this.
@@ -221,7 +221,7 @@ impl Suggested {
             section,
             angle_deg,
             reveals: change.map(|change| change.reveals.clone()).unwrap_or_default(),
-            tells_apart: change.map(|change| change.tells_apart.clone()).unwrap_or_default(),
+            distinguishes: change.map(|change| change.distinguishes.clone()).unwrap_or_default(),
             before: before.into(),
             after: found.after.into(),
         }

@@ -191,8 +191,8 @@ fn plan_of_a_rig_that_loses_orders() {
     // Two sensors a section show only the ratio of their gains; a third one tells whose it is.
     let gains = json!(["sensor-gain S1", "sensor-gain S2"]);
     assert!(report["confounded"].as_array().unwrap().contains(&gains));
-    let tells = |entry: &&Value| entry["tells_apart"].as_array().unwrap().contains(&gains);
-    let addition = report["suggestions"].as_array().unwrap().iter().find(tells).unwrap();
+    let distinguishes = |entry: &&Value| entry["distinguishes"].as_array().unwrap().contains(&gains);
+    let addition = report["suggestions"].as_array().unwrap().iter().find(distinguishes).unwrap();
     assert_eq!([&addition["add"], &addition["section"]], ["sensor", "a"]);
     // With the part reversed and nothing else, an angle that is off by a little looks like another form.
     let blind = |entry: &&Value| entry["effect"] == "reversal-angle" && entry["targets"] == json!(["reversed"]);

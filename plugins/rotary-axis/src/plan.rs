@@ -213,7 +213,7 @@ impl RotaryAxis {
             after: self.score(gains),
             noise_gain: self.named(gains),
             reveals: Vec::new(),
-            tells_apart: Vec::new(),
+            distinguishes: Vec::new(),
         }
     }
 

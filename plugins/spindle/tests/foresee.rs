@@ -109,7 +109,7 @@ fn a_third_sensor_tells_the_gains_of_its_section_apart() {
     let found = changes(&rig, &foresight, &[], clearance_deg).unwrap();
     for (section, [one, other]) in [["S1", "S2"], ["S3", "S4"]].into_iter().enumerate() {
         for effect in ["sensor-gain", "sensor-angle"] {
-            let change = found.found.iter().find(|change| change.tells_apart.contains(&pair(effect, one, other)));
+            let change = found.found.iter().find(|change| change.distinguishes.contains(&pair(effect, one, other)));
             let change = change.unwrap_or_else(|| panic!("nothing tells {effect} apart: {found:?}"));
             // No setup does: whatever both sensors scale or turn together, form and motion take.
             assert!(matches!(change.addition, Addition::Sensor { section: of, .. } if of == section), "{change:?}");

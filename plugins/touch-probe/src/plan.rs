@@ -55,7 +55,7 @@ impl TouchProbe {
                 after: with.score(),
                 noise_gain: with.named(),
                 reveals: Vec::new(),
-                tells_apart: Vec::new(),
+                distinguishes: Vec::new(),
             };
             plan.suggestions.push(addition.changing(&foresight, &Self(with).foreseen()));
         }

@@ -32,7 +32,7 @@ pub struct Change {
     /// Blind effects ("effect target") that would show.
     pub reveals: Vec<String>,
     /// Confounded sets of which every two members would be distinguished.
-    pub tells_apart: Vec<Vec<String>>,
+    pub distinguishes: Vec<Vec<String>>,
 }
 
 /// Additions that make effects visible or distinguish them.
@@ -116,7 +116,7 @@ pub fn changes(rig: &Rig, foresight: &Foresight, known: &[Suggestion], clearance
             open.blind.retain(|name| !settled.blind.contains(name));
             open.confounded.retain(|set| !settled.confounded.contains(set));
             let (addition, rig, _) = candidates.remove(index);
-            found.push(Change { addition, rig, reveals: settled.blind, tells_apart: settled.confounded });
+            found.push(Change { addition, rig, reveals: settled.blind, distinguishes: settled.confounded });
         }
     }
     Ok(Changes { found, still_blind: open.blind, still_confounded: open.confounded })
