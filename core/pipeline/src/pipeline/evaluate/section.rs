@@ -114,7 +114,7 @@ impl Form {
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
             half_power_upr: result.half_power_upr(),
         };
-        // Of a form of which nothing can be told, nothing is a value.
+        // A form of which nothing is observable has no values.
         (result.angles > 1 && held.lost.len() < held.highest.saturating_sub(1)).then(|| Self {
             harmonics: from_two(separation.coefficients(unknown).collect()),
             equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),
