@@ -259,12 +259,12 @@ impl From<&plan::Arrangement> for Arrangement {
 impl From<plan::Score> for Score {
     fn from(score: plan::Score) -> Self {
         // Noise gains are above 0: 0 is the worst of none.
-        let told = score.worst > 0.0;
+        let some_observable = score.worst > 0.0;
         Self {
             lost_form_orders: score.lost,
-            worst: told.then_some(score.worst),
-            worst_order: told.then_some(score.worst_order),
-            rms: told.then_some(score.rms),
+            worst: some_observable.then_some(score.worst),
+            worst_order: some_observable.then_some(score.worst_order),
+            rms: some_observable.then_some(score.rms),
         }
     }
 }

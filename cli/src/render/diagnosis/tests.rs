@@ -158,7 +158,7 @@ fn noise_that_is_not_known_and_another_unit() {
 }
 
 #[test]
-fn what_acts_on_the_rig_or_on_one_setup_is_told_apart() {
+fn what_acts_on_the_rig_or_on_one_setup_is_distinguished() {
     let bias_per_unit = BiasPerUnit { value: 0.3, unit: "um/deg".into(), on: "form".into() };
     let one = |targets: &[&str]| Blind {
         effect: "speed-ripple".into(),
