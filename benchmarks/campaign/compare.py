@@ -48,7 +48,7 @@ def run_runout(threads, *settings):
 
 
 def run_values(threads):
-    """The same, and the standards' values with their uncertainty, as a run gives them unless told otherwise."""
+    """The same, and the standards' values with their uncertainty, as a run gives them by default."""
     everything = 'evaluate.values=["roundness", "cylindricity", "texture", "error-motion"]'
     return run_runout(threads, "--set", everything)
 

@@ -76,7 +76,7 @@ fn main() -> Outcome {
     report("csv-read-two-files", || {
         clocked(|| {
             std::thread::scope(|scope| {
-                // An error of one thread is told in the other one's words.
+                // An error of the other thread is passed on as text.
                 let beside = scope.spawn(|| read_csv().map_err(|error| error.to_string()));
                 read_csv()?;
                 beside.join().map_err(|_| "the thread that read a file stopped")?.map_err(Into::into)

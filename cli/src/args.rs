@@ -206,7 +206,7 @@ pub(crate) enum Criterion {
     Rms,
 }
 
-/// Above it, rounding of e^{inθ} is no longer small beside what tells a lost order.
+/// Above it, rounding of e^{inθ} is no longer small beside what distinguishes a lost order.
 const HIGHEST_ORDER: usize = 10_000;
 
 fn orders(text: &str) -> Result<RangeInclusive<usize>, String> {

@@ -80,7 +80,7 @@ impl Failure {
         render::to_stderr(&self.text());
         // The result itself is the one document then.
         if json && !matches!(self, Self::Limit(_) | Self::Warnings(_) | Self::Recordings(_)) {
-            // When stdout cannot be written to either, the exit status has to tell.
+            // When stdout cannot be written to either, the exit status is the only report.
             let _ = render::document(&json!({ "error": self.document() }));
         }
         match self {

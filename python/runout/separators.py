@@ -97,8 +97,8 @@ class HarmonicLeastSquares:
     plugin: ClassVar[str] = "harmonic-least-squares"
 
     max_noise_gain: Union[float, None] = None
-    """An order is lost where form or motion would carry more than this many times the readings' noise; without it, where the
-    layout cannot tell it at all."""
+    """An order is lost where form or motion would carry more than this many times the readings' noise; without it, where it is not
+    observable with the layout."""
 
     second_order: Union[bool, None] = None
     """Whether readings follow exact geometry (a line meets the displaced profile) or the linear equations. Default: true."""

@@ -1,4 +1,4 @@
-//! How often stated intervals hold the truth on walls whose centres are known, as a measuring machine tells them: positions about a
+//! How often stated intervals hold the truth on walls whose centres are known, as a measuring machine gives them: positions about a
 //! datum, taper and lines, and texture along the axis. Whole pipelines, from points to values; the truth is that of the same wall
 //! without noise.
 

@@ -11,7 +11,7 @@ fn form_error_does_not_grow_with_eccentricity() {
             assert!(*error <= eccentricity::LIMIT_UM, "{} µm: {error} µm rms", row.eccentricity_um);
         }
     }
-    // Without the second order, 150 µm of eccentricity is told from none by far: the study can fail.
+    // Without the second order, 150 µm of eccentricity makes errors far above the limit: the study can fail.
     let linear = &rows[2].linear_um;
     assert!(linear.iter().all(|error| *error > 5.0 * eccentricity::LIMIT_UM), "{linear:?}");
 }

@@ -140,7 +140,7 @@ fn record_scenario(scenario: &str, path: &Path) {
 struct Peaks {
     /// Most bytes of Rust code's at a time, above those held before.
     counted: usize,
-    /// Most resident memory of the whole process, where the system tells.
+    /// Most resident memory of the whole process, where the system reports it.
     resident: Option<usize>,
 }
 
@@ -160,14 +160,14 @@ fn measure(stations: usize, folder: &Path) -> Peaks {
     let mut least = Peaks { counted: usize::MAX, resident: None };
     for _ in 0..RUNS {
         // Writing 5 there sets the process's peak back to what it holds now (proc(5)).
-        let told = fs::write("/proc/self/clear_refs", "5").is_ok();
+        let reset = fs::write("/proc/self/clear_refs", "5").is_ok();
         let before = HELD.load(Ordering::Relaxed);
         PEAK.store(before, Ordering::Relaxed);
         let summary = run(&pipeline, NonZeroUsize::new(1), &Silent).unwrap();
         let counted = PEAK.load(Ordering::Relaxed) - before;
         assert_eq!(summary.stations.len(), stations);
         least.counted = least.counted.min(counted);
-        least.resident = [least.resident, told.then(resident_peak).flatten()].into_iter().flatten().min();
+        least.resident = [least.resident, reset.then(resident_peak).flatten()].into_iter().flatten().min();
     }
     least
 }

@@ -136,7 +136,7 @@ fn remove(folder: &Path) -> Outcome {
     Ok(())
 }
 
-/// What one batch took. Where the system does not tell the last two, they are 0.
+/// What one batch took. Where the system does not report the last two, they are 0.
 struct Spent {
     seconds: f64,
     peak_kb: u64,

@@ -71,7 +71,7 @@ impl Readers {
         Ok(Self { browser, interpreter, node_modules: node.join("node_modules") })
     }
 
-    /// Tells a test run where they are, and that none may be left out.
+    /// Sets in the environment of a test run where they are, and that none may be left out.
     pub(crate) fn equip(&self, tests: &mut Command) {
         tests
             .env("RUNOUT_CHROMIUM", self.browser)

@@ -117,7 +117,7 @@ fn named(one: &Added) -> [String; 2] {
 fn confounded(added: &[Added]) -> Vec<String> {
     let sets = added.iter().filter(|one| !one.confounded_with.is_empty());
     sets.map(|one| {
-        let by = one.told_apart_by.as_ref().map(|by| format!("; to decide: {by}")).unwrap_or_default();
+        let by = one.distinguished_by.as_ref().map(|by| format!("; to decide: {by}")).unwrap_or_default();
         format!("{}{by}", one.members())
     })
     .collect()

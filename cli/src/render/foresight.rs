@@ -142,7 +142,7 @@ mod tests {
         assert!(text.contains("the whole rig") && text.contains("a, b") && !text.contains(", ,"), "{text}");
         let mut page = Page::default();
         visible(&mut page, &Foresight { visible: vec![one(&[])], ..Foresight::default() });
-        assert!(!page.into_text().contains("the whole rig"), "nothing to tell it from");
+        assert!(!page.into_text().contains("the whole rig"), "nothing to distinguish it from");
     }
 
     #[test]

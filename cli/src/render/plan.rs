@@ -43,16 +43,16 @@ pub(crate) fn page(report: &Report) -> Page {
 
 fn gains(page: &mut Page, gains: &[Gain]) {
     let heading = "Noise gain of form by order, the worst section";
-    let told: Vec<f64> = gains.iter().filter_map(|gain| gain.gain).collect();
-    if let Some([lowest, _, highest]) = spread(told.iter().copied())
-        && told.len() == gains.len()
+    let observable: Vec<f64> = gains.iter().filter_map(|gain| gain.gain).collect();
+    if let Some([lowest, _, highest]) = spread(observable.iter().copied())
+        && observable.len() == gains.len()
         && same(lowest, highest)
     {
         page.heading(heading);
         page.line(format_args!("  {} at every order", significant(highest, 3)));
         return;
     }
-    if told.is_empty() {
+    if observable.is_empty() {
         return;
     }
     let together = gains.len().div_ceil(10 * LINES).max(1);
@@ -90,8 +90,8 @@ fn additions(page: &mut Page, report: &Report) {
         if !suggestion.reveals.is_empty() {
             does.push(format!("shows {}", foresight::names(&suggestion.reveals)));
         }
-        if !suggestion.tells_apart.is_empty() {
-            does.push(format!("distinguishes {}", sets(&suggestion.tells_apart)));
+        if !suggestion.distinguishes.is_empty() {
+            does.push(format!("distinguishes {}", sets(&suggestion.distinguishes)));
         }
         if !does.is_empty() {
             lines.push(format!("{}: {}", suggestion.text, does.join("; ")));

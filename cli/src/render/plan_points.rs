@@ -111,7 +111,7 @@ fn suggestions(page: &mut Page, plan: &PointPlan) {
         if !addition.reveals.is_empty() {
             does.push(format!("shows {}", foresight::names(&addition.reveals)));
         }
-        let sets: Vec<String> = addition.tells_apart.iter().map(|set| foresight::names(set)).collect();
+        let sets: Vec<String> = addition.distinguishes.iter().map(|set| foresight::names(set)).collect();
         if !sets.is_empty() {
             does.push(format!("distinguishes {}", sets.join("; ")));
         }

@@ -108,7 +108,7 @@ pub(crate) struct Suggested {
     /// Blind effects, "effect target", that would show with this.
     pub reveals: Vec<String>,
     /// Confounded sets that would be distinguished.
-    pub tells_apart: Vec<Vec<String>>,
+    pub distinguishes: Vec<Vec<String>>,
     /// The rig as it is.
     pub before: Score,
     /// The rig with this.
@@ -221,7 +221,7 @@ impl Suggested {
             section,
             angle_deg,
             reveals: change.map(|change| change.reveals.clone()).unwrap_or_default(),
-            tells_apart: change.map(|change| change.tells_apart.clone()).unwrap_or_default(),
+            distinguishes: change.map(|change| change.distinguishes.clone()).unwrap_or_default(),
             before: before.into(),
             after: found.after.into(),
         }
@@ -259,12 +259,12 @@ impl From<&plan::Arrangement> for Arrangement {
 impl From<plan::Score> for Score {
     fn from(score: plan::Score) -> Self {
         // Noise gains are above 0: 0 is the worst of none.
-        let told = score.worst > 0.0;
+        let some_observable = score.worst > 0.0;
         Self {
             lost_form_orders: score.lost,
-            worst: told.then_some(score.worst),
-            worst_order: told.then_some(score.worst_order),
-            rms: told.then_some(score.rms),
+            worst: some_observable.then_some(score.worst),
+            worst_order: some_observable.then_some(score.worst_order),
+            rms: some_observable.then_some(score.rms),
         }
     }
 }

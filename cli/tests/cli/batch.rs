@@ -218,7 +218,7 @@ fn a_kill_at_any_step_leaves_no_summary_without_its_tables() {
 }
 
 #[test]
-fn what_cannot_be_told_apart_is_refused_before_the_work() {
+fn what_cannot_be_distinguished_is_refused_before_the_work() {
     let folder = recorded(&["a.h5"]);
     fs::create_dir(folder.path().join("other")).unwrap();
     fs::copy(folder.path().join("a.h5"), folder.path().join("other/a.h5")).unwrap();

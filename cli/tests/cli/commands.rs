@@ -52,12 +52,12 @@ fn completions_know_the_commands() {
 }
 
 #[test]
-fn check_of_a_rig_that_tells_everything() {
+fn check_of_a_rig_with_everything_observable() {
     let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
     assert_snapshot!(folder.run(&["check", "pipeline.toml"]).shown());
 }
 
-/// The paper's own layout: with the sensors fixed, even orders cannot be told (physics of a half turn, not of a seed).
+/// The paper's own layout: with fixed sensors, even orders are not observable (physics of a half turn, not of a seed).
 #[test]
 fn check_names_the_orders_that_fixed_sensors_lose() {
     let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
@@ -171,7 +171,7 @@ fn plan_of_a_three_point_rig() {
     assert_snapshot!(folder.run(&["plan", "rig.toml", "--orders", "2..50"]).shown());
 }
 
-/// Fixed sensors, two setups: every even order is lost, and a setup that tells them is known.
+/// Fixed sensors, two setups: every even order is lost, and a setup with which they are observable is known.
 #[test]
 fn plan_of_a_rig_that_loses_orders() {
     let folder = Folder::with(&[("rig.toml", &RIG.replace("sensors_deg = 180", "sensors_deg = 0"))]);
@@ -188,11 +188,11 @@ fn plan_of_a_rig_that_loses_orders() {
     assert_eq!(report["residual_dof"][1], json!({ "order": 3, "dof": 2 }));
     let best = &report["suggestions"][0];
     assert_eq!([&best["before"]["lost_form_orders"], &best["after"]["lost_form_orders"]], [40, 0]);
-    // Two sensors a section show only the ratio of their gains; a third one tells whose it is.
+    // Two sensors a section show only the ratio of their gains; a third one shows whose it is.
     let gains = json!(["sensor-gain S1", "sensor-gain S2"]);
     assert!(report["confounded"].as_array().unwrap().contains(&gains));
-    let tells = |entry: &&Value| entry["tells_apart"].as_array().unwrap().contains(&gains);
-    let addition = report["suggestions"].as_array().unwrap().iter().find(tells).unwrap();
+    let distinguishes = |entry: &&Value| entry["distinguishes"].as_array().unwrap().contains(&gains);
+    let addition = report["suggestions"].as_array().unwrap().iter().find(distinguishes).unwrap();
     assert_eq!([&addition["add"], &addition["section"]], ["sensor", "a"]);
     // With the part reversed and nothing else, an angle that is off by a little looks like another form.
     let blind = |entry: &&Value| entry["effect"] == "reversal-angle" && entry["targets"] == json!(["reversed"]);

@@ -166,7 +166,7 @@ fn a_run_takes_the_corrected_rig() {
     let gain = r#"effect=[{plugin="sensor-gain",targets=["S2"],relative_gain=0.02}]"#;
     let bent = r#"effect=[{plugin="sensor-nonlinearity",targets=["S3"],quadratic_per_um=0.002}]"#;
     let angle = r#"effect=[{plugin="reversal-angle",targets=["b"],angle_deg=0.34}]"#;
-    // A third sensor a section tells gains apart.
+    // A third sensor a section distinguishes gains.
     let more =
         r#"rig.sensors=[{id="S1",angle_deg=0,z_mm=100,section="a"},{id="S2",angle_deg=99.844,z_mm=100,section="a"},
         {id="S5",angle_deg=202.5,z_mm=100,section="a"},{id="S3",angle_deg=0,z_mm=130,section="b"},
@@ -199,7 +199,7 @@ fn a_run_takes_the_corrected_rig() {
     }
 }
 
-/// Of two sensors that the data do not tell apart, none is written as if it were known.
+/// Of two sensors that the data do not distinguish, none is written as if it were known.
 #[test]
 fn a_confounded_set_changes_no_rig() {
     let folder = Folder::with(&[("scenario.toml", SCENARIO), ("pipeline.toml", PIPELINE)]);

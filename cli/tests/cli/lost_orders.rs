@@ -121,10 +121,10 @@ fn no_file_hides_them() {
 
 /// A row of the harmonics: real and imaginary part, standard uncertainty.
 fn look(order: usize, observable: bool, numbers: [f64; 3]) {
-    let told = order % 2 == 1;
-    assert_eq!(observable, told, "order {order}");
+    let expected = order % 2 == 1;
+    assert_eq!(observable, expected, "order {order}");
     for number in numbers {
-        assert_eq!(number.is_finite(), told, "order {order}: {number}");
+        assert_eq!(number.is_finite(), expected, "order {order}: {number}");
     }
 }
 

@@ -63,7 +63,7 @@ fn each_rig_gives_its_form() {
             let [error, stated] = ["truth_form_rms_error_um", "form_std_um"].map(|key| section[key].as_f64().unwrap());
             assert!(error < 2.5 * stated && stated < 0.15, "{rig}: {error} µm for ± {stated} µm");
         }
-        // The declared rig explains the readings, up to what 20 turns tell of their own scatter.
+        // The declared rig explains the readings, up to what 20 turns show of their own scatter.
         let chi2 = summary["stations"][0]["chi2_per_dof"].as_f64().unwrap();
         assert!((0.5..2.0).contains(&chi2), "{rig}: {chi2}");
     }

@@ -17,30 +17,30 @@ fn form_and_motion_come_out_of_the_file() {
     let rms_um = station["sections"][0]["form_rms_um"].as_f64().unwrap();
     // 1.5 µm were simulated; 0.02 µm is five times the stated uncertainty.
     assert!((rms_um - 1.5).abs() < 0.02, "{station}");
-    let told = summary["warnings"].to_string();
-    assert!(told.contains("Zeit, Temperatur"), "{told}");
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("Zeit, Temperatur"), "{warnings}");
 }
 
-/// Ten turns are enough to tell what is usual. A disturbance that is left out need not be told.
+/// Ten turns are enough to know what is usual. A disturbance that is left out need not be reported.
 #[test]
-fn a_reading_far_from_all_others_is_told_unless_its_turn_is_left_out() {
+fn a_reading_far_from_all_others_is_reported_unless_its_turn_is_left_out() {
     let mut lines: Vec<String> = RECORDING.lines().map(str::to_owned).collect();
     let mut cells: Vec<&str> = lines[1300].split(';').collect();
     cells[2] = "106,221";
     lines[1300] = cells.join(";");
     let spiked = lines.join("\n");
     let folder = Folder::with(&[("pipeline.toml", PIPELINE), ("shaft.csv", &spiked)]);
-    let told = |more: &[&str]| {
+    let warnings_with = |more: &[&str]| {
         let ran = folder.run(&[&["run", "pipeline.toml", "--json"], more].concat());
         assert_eq!(ran.status, 0, "{}", ran.stderr);
         let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
         summary["stations"][0]["warnings"].to_string()
     };
-    let warnings = told(&[]);
+    let warnings = warnings_with(&[]);
     for part in ["shaft.csv", "A reads 106.2210 µm at sample", "in other turns at most", "outlier_sigma"] {
         assert!(warnings.contains(part), "{part}: {warnings}");
     }
-    let warnings = told(&["--set", "preprocess.0.outlier_sigma=6", "--set", "preprocess.0.min_turns=4"]);
+    let warnings = warnings_with(&["--set", "preprocess.0.outlier_sigma=6", "--set", "preprocess.0.min_turns=4"]);
     assert!(!warnings.contains("µm at sample"), "{warnings}");
 }
 

@@ -122,7 +122,7 @@ pub struct Added {
     pub confounded_with: Vec<String>,
     /// What would distinguish them.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub told_apart_by: Option<String>,
+    pub distinguished_by: Option<String>,
     /// Its parameters. Of a confounded set: as if this member were all of it, without standard uncertainty.
     pub parameters: Vec<Estimated>,
     /// The keys of the rig that would declare it, and the values to put there: lines of TOML, one a key

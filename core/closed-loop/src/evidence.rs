@@ -55,7 +55,7 @@ impl Evidence {
 const KNOWN: f64 = 1e6;
 
 /// Chance that independent data (`stretches` of the residual) agree so well on an effect that is not there; `None` where there are
-/// too few of them to tell. `columns` are the effect's signature, orthonormal.
+/// too few of them to decide. `columns` are the effect's signature, orthonormal.
 ///
 /// Within a stretch, errors may depend on each other as no covariance says: a slow wander leaks into all orders alike. So the
 /// effect's size is set against how far its sizes in the stretches differ. (The sandwich estimator with clusters: Liang, Zeger,
@@ -126,7 +126,7 @@ pub fn far_worse(groups: &[Group]) -> Vec<usize> {
 /// Groups of which one can be called worse than the others, at least.
 const FEWEST_GROUPS: usize = 3;
 
-/// Stretches that tell how far they differ, at least.
+/// Least number of stretches that show how far they differ.
 const FEWEST_STRETCHES: usize = 4;
 
 #[cfg(test)]

@@ -176,7 +176,7 @@ pub trait Fit {
         Vec::new()
     }
 
-    /// What measurement would tell effects of a confounded set apart.
+    /// What measurement would distinguish effects of a confounded set.
     fn distinguished_by(&self, _effects: &[usize]) -> Option<String> {
         None
     }

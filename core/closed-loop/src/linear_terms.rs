@@ -95,8 +95,8 @@ impl LinearTerms {
     /// A model of `observations`.
     ///
     /// # Errors
-    /// When columns and observations are not of one length, a number is not finite, or the points cannot tell the declared
-    /// parameters apart.
+    /// When columns and observations are not of one length, a number is not finite, or the points do not
+    /// distinguish the declared parameters.
     pub fn new(mut observations: Observations, mut declared: Vec<Declared>, mut terms: Vec<Term>) -> Result<Self> {
         let refuse = |problem: String| Error::new("fit", "the points", problem);
         let count = observations.values.len();

@@ -54,7 +54,7 @@ pub(super) fn added<M: Model>(found: &Found, model: &M, fit: &M::Fit, applied: &
         effect: named.id.clone(),
         targets: named.targets.clone(),
         confounded_with: found.members[1..].iter().map(|member| effects[*member].name()).collect(),
-        told_apart_by: if confounded { fit.distinguished_by(&found.members) } else { None },
+        distinguished_by: if confounded { fit.distinguished_by(&found.members) } else { None },
         parameters: model.present(found.members[0], parameters.collect()),
         // The data do not decide which member of a set it is: no key is right.
         change: Some(model.changes(found.members[0], applied).join("\n"))

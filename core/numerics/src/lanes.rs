@@ -207,7 +207,7 @@ mod tests {
         }
     }
 
-    /// Products and sums that rounding tells apart from fused ones.
+    /// Products and sums that differ from fused ones by rounding.
     struct Recursion<'a>(&'a mut [f64], usize);
 
     impl LaneWork for Recursion<'_> {

@@ -1,14 +1,14 @@
 //! Variances of many things, each known from few degrees of freedom, that learn from each other.
 //!
 //! G. K. Smyth, "Linear models and empirical Bayes methods", Stat. Appl. Genet. Mol. Biol. 3 (2004), article 3: true variances scatter
-//! about s₀² as if that were known from d₀ degrees of freedom, which the scatter of the logarithms tells. A variance s² of d degrees of
+//! about s₀² as if that were known from d₀ degrees of freedom, which the scatter of the logarithms gives. A variance s² of d degrees of
 //! freedom becomes (d₀ s₀² + d s²)/(d₀ + d), with d₀ + d degrees of freedom. Where all true variances are the same, d₀ has no bound.
 
 use statrs::function::gamma::digamma;
 
 /// Variances below this share of their mean are taken as this share of it where logarithms are: readings that repeat to the last digit.
 const LEAST: f64 = 1e-5;
-/// Fewer variances than this do not tell how variances scatter.
+/// Fewer variances than this do not show how variances scatter.
 const FEWEST: usize = 10;
 /// d₀ from which on variances are taken as the same.
 const MANY: f64 = 1e4;

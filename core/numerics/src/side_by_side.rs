@@ -207,7 +207,7 @@ impl Orthonormal {
         }
     }
 
-    /// Takes matrices apart, `[row][col]`; tells which are known to have full rank: ‖R⁻¹‖ and with it the distance of the
+    /// Takes matrices apart, `[row][col]`; returns which are known to have full rank: ‖R⁻¹‖ and with it the distance of the
     /// columns from being dependent is within `bound`.
     #[inline(always)]
     pub fn factor<A: Arithmetic>(&mut self, matrix: &[Complexes], bound: f64) -> [bool; TOGETHER] {
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn operators_are_those_of_each_alone_and_deficient_matrices_are_told() {
+    fn operators_are_those_of_each_alone_and_deficient_matrices_are_marked() {
         for (rows, cols) in [(1, 1), (8, 3), (8, 8), (12, 5)] {
             let mut matrix = some(rows * cols, 1.1);
             // Columns of very different sizes.
@@ -374,9 +374,9 @@ mod tests {
             let mut operator = vec![Complexes::ZERO; cols * rows];
             orthonormal.operator::<Fused>(&mut operator);
             for lane in 0..TOGETHER {
-                let told = lane != empty && (lane != deficient || cols == 1);
-                assert_eq!(full[lane], told, "{rows} by {cols}, lane {lane}");
-                if !told {
+                let full_rank = lane != empty && (lane != deficient || cols == 1);
+                assert_eq!(full[lane], full_rank, "{rows} by {cols}, lane {lane}");
+                if !full_rank {
                     continue;
                 }
                 let qr = PivotedQr::new(rows, cols, &problem(&matrix, lane), 1e-12);

@@ -106,7 +106,7 @@ impl PendingFile {
                 let problem = format!("it may take {wanted:.1} MB, and {free:.1} MB are free there");
                 Err(self.failure(problem).of(ErrorKind::Io).help("make room, or write elsewhere"))
             }
-            // Where the system does not tell, the attempt will.
+            // Where the system does not report free space, the attempt decides.
             _ => Ok(()),
         }
     }
@@ -200,7 +200,7 @@ fn make(folder: &Path) -> std::io::Result<bool> {
 }
 
 /// Removes what runs that were killed left of the same file: temporary files of processes that are no more. Where the
-/// system does not tell (no /proc), they stay.
+/// system does not list processes (no /proc), they stay.
 fn remove_stale(folder: &Path, name: &str) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -263,7 +263,7 @@ pub fn complete_publication(file: &Path) -> Result<()> {
     })
 }
 
-/// One spelling of a path, by which two paths to the same file can be told to be so, whether or not it exists yet.
+/// One spelling of a path, the same for all paths to the same file, whether or not it exists yet.
 #[must_use]
 pub fn resolved(path: &Path) -> PathBuf {
     if let Ok(found) = path.canonicalize() {

@@ -24,7 +24,7 @@ const CIRCLES: [(&str, f64, f64, f64); 4] = [
     ("Rundheit 1", 103.1, 0.1, 30.0),
     ("Rundheit 2", 99.0, 0.1, 30.0),
 ];
-/// Cylinders of which the points that count are told from the others by their state.
+/// Cylinders of which the points that count are distinguished from the others by their state.
 const CYLINDERS: [(&str, f64, f64, f64); 5] = [
     ("DIN Zylinderform2", 24.1, 0.1, 15.055_957_294_5),
     ("DIN Zylinderform3", 9.1, 0.1, 15.057_263_497_1),

@@ -281,7 +281,7 @@ mod tests {
         // Second order only: σ² √(2/100)/√800.
         assert!((middle - truth).abs() < 1e-3, "{middle} for {truth}");
         assert_eq!(found.draws, 800);
-        // As a root mean square, it tells the errors' share: σ² over the mean square.
+        // As a root mean square, it gives the errors' share: σ² over the mean square.
         let rms = |form: &[f64]| vec![mean_square(form)[0].sqrt()];
         let next =
             |errors: &mut [f64]| errors.fill_with(|| sigma * Distribution::<f64>::sample(&StandardNormal, &mut random));

@@ -37,7 +37,7 @@ pub struct Value {
     pub source: String,
     /// Undulations per revolution over which it was computed, both ends included; a filter's end is where half passes.
     pub band_upr: [usize; 2],
-    /// Orders that the layout cannot tell, of which the filter would pass a hundredth or more: they are not in the value.
+    /// Orders not observable with the layout, of which the filter passes a hundredth or more: they are not in the value.
     pub lost_orders: Vec<usize>,
     /// Undulations per revolution from which on a filter before the average passes less than half of the power, where the
     /// value's own filter passes a hundredth or more: what is above is not in the value; null where nothing is missing.

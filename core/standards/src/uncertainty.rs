@@ -48,7 +48,7 @@ impl Uncertainty {
         Self { std, interval_95: [low, value + reach], draws: 0 }
     }
 
-    /// The same where its draws come from so many transforms of several draws each, which tell a standard deviation no
+    /// The same where its draws come from so many transforms of several draws each, which give a standard deviation no
     /// better than two real degrees of freedom a transform do: the interval is wider by Student's factor, about its
     /// middle.
     #[must_use]
@@ -73,7 +73,7 @@ impl Uncertainty {
     /// The same of a value with kinks: an interval that reaches as far below the value as above it, the farther of both.
     ///
     /// Where an error changes which contacts hold a circle (nearly opposite contacts of MICI and MCCI), draws about the value
-    /// do not tell on which side of it the truth lies.
+    /// do not show on which side of it the truth lies.
     #[must_use]
     pub fn on_both_sides(mut self, value: f64) -> Self {
         let [low, high] = self.interval_95;
@@ -211,7 +211,7 @@ pub fn monte_carlo<const N: usize>(
 /// taken as exact. `None` where no variance is known.
 ///
 /// q² = ½ Σ |cₙ|² holds ½ Σ σₙ² of errors in the mean, which the interval takes off. About the truth it has the variance ½ Σ |tₙ|²σₙ² + ¼ Σ σₙ⁴, of
-/// which what was found tells ½ Σ |cₙ|²σₙ² − ¼ Σ σₙ⁴; as one of many orders it is normal.
+/// which what was found gives ½ Σ |cₙ|²σₙ² − ¼ Σ σₙ⁴; as one of many orders it is normal.
 #[must_use]
 pub fn of_rms(
     harmonics: &[Complex64],
@@ -349,7 +349,7 @@ mod tests {
         let expected = (0.5 * variance.iter().skip(2).sum::<f64>()).sqrt();
         let form = vec![1.0; 512];
         let [found] = monte_carlo(&form, &variance, 7, |profile| [profile[100]]).unwrap();
-        // 400 draws of 16 transforms, which tell a standard deviation to an eighth: three of that.
+        // 400 draws of 16 transforms, which give a standard deviation to an eighth: three of that.
         assert!((found.std / expected - 1.0).abs() < 0.37, "{} for {expected}", found.std);
         for (end, sign) in found.interval_95.iter().zip([-1.0, 1.0]) {
             assert!((end - (1.0 + sign * 1.96 * expected)).abs() < 0.8 * expected, "{:?}", found.interval_95);

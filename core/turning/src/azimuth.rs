@@ -8,7 +8,7 @@ const NANO: f64 = 1e9;
 
 /// A line across the spindle, by its angle from x towards y: 0 to below 180°, to a billionth of a degree.
 ///
-/// Two sensors on opposite sides look along the same line, so that rounding must not tell their directions apart.
+/// Two sensors on opposite sides look along the same line, so that rounding must not distinguish their directions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Azimuth {
     nano_deg: u64,

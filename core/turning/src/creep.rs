@@ -16,7 +16,7 @@ use runout_numerics::{least_squares::dot, statistics::f_tail};
 const FEWEST: usize = 8;
 /// Levels depend on those of the turns around them: so many turns count as one observation.
 const TURNS_ALIKE: f64 = 4.0;
-/// Wander has periods up to the length of the capture, so that longer captures do not tell it from a drift any better.
+/// Wander has periods up to the length of the capture: longer captures do not distinguish it from a drift any better.
 const MOST_OBSERVATIONS: f64 = 15.0;
 /// A creep that all captures share is certain above this many standard uncertainties of its size,
 const CERTAIN: f64 = 6.0;
@@ -89,7 +89,7 @@ impl Course {
     }
 }
 
-/// What the levels of a sensor's turns tell of its creep.
+/// A sensor's creep, as the levels of its turns show it.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Creep {
@@ -273,7 +273,7 @@ impl Sensor {
     fn of_all(&self, fitted: &Fitted, all: &[&Self]) -> Creep {
         let levels: f64 = self.captures.iter().map(|capture| capture.means_um.len() as f64).sum();
         let captures = self.captures.len();
-        // Turns that wander together count as one; captures tell how far they do, as far as there are enough of them.
+        // Turns that wander together count as one; captures show how far they do, as far as there are enough of them.
         let noise = fitted.left * self.alike / (levels - captures as f64 - 1.0 - extra(fitted.course)).max(1.0);
         let partials = Partials::new(self, fitted);
         let [rate_std, time_constant_std, over_capture_std] = partials.stds(noise, all);

@@ -42,7 +42,7 @@ pub struct InputFile {
     identity: Identity,
 }
 
-/// What tells two states of files apart.
+/// What distinguishes two states of files.
 #[derive(Debug, Clone, PartialEq)]
 struct Identity {
     /// Device and inode, where the system has them.

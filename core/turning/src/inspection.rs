@@ -17,7 +17,7 @@
 //!   its swing so far is at most [`STUCK_STEPS`] of its finest steps, unless it has not moved at all.
 //! - A channel that never moves is an error at the end of the stream.
 //! - A reading far from what the channel reads in all other turns may be a disturbance, or what the part and the spindle did:
-//!   it is handed on, and [told of](Inspection::telling).
+//!   it is handed on, and [reported](Inspection::reporting).
 
 mod channel;
 mod spikes;
@@ -67,14 +67,14 @@ pub struct Inspection<'a> {
     /// Frames that are looked over at once.
     chunk: usize,
     ended: bool,
-    tell: Option<Box<dyn FnOnce(Vec<Spike>) + Send + 'a>>,
+    report: Option<Box<dyn FnOnce(Vec<Spike>) + Send + 'a>>,
 }
 
 impl<'a> Inspection<'a> {
-    /// Wraps a loader's stream; at its end `tell` gets what is far from all other readings.
+    /// Wraps a loader's stream; at its end `report` gets what is far from all other readings.
     #[must_use]
-    pub fn telling(input: Box<dyn SampleStream + 'a>, tell: impl FnOnce(Vec<Spike>) + Send + 'a) -> Self {
-        Self { tell: Some(Box::new(tell)), ..Self::new(input) }
+    pub fn reporting(input: Box<dyn SampleStream + 'a>, report: impl FnOnce(Vec<Spike>) + Send + 'a) -> Self {
+        Self { report: Some(Box::new(report)), ..Self::new(input) }
     }
 
     /// Wraps a loader's stream.
@@ -96,7 +96,7 @@ impl<'a> Inspection<'a> {
         let channels = vec![Channel::new(turn); count];
         let chunk = turn.map_or(CHUNK[1], |turn| (turn.ceil() as usize).clamp(CHUNK[0], CHUNK[1]));
         let (raw, held, past) = (Block::default(), Block::default(), Vec::new());
-        Self { input, raw, held, past, channels, rule, stuck, chunk, ended: false, tell: None }
+        Self { input, raw, held, past, channels, rule, stuck, chunk, ended: false, report: None }
     }
 
     /// Looks at the block in `raw` and joins it to those held.
@@ -205,9 +205,9 @@ impl SampleStream for Inspection<'_> {
             } else {
                 self.ended = true;
                 self.alive()?;
-                if let Some(tell) = self.tell.take() {
+                if let Some(report) = self.report.take() {
                     let spike = |(index, channel): (usize, &Channel)| channel.spike(index);
-                    tell(self.channels.iter().enumerate().filter_map(spike).collect());
+                    report(self.channels.iter().enumerate().filter_map(spike).collect());
                 }
             }
         }

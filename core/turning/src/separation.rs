@@ -68,7 +68,7 @@ impl Assessment {
 
     /// Whether no order (from 2) of any section's form is observable, nor any motion: readings are then form and motion together.
     #[must_use]
-    pub fn tells_no_form(&self) -> bool {
+    pub fn has_no_observable_form(&self) -> bool {
         let mut orders = self.orders.iter().filter(|entry| entry.order > 1).peekable();
         let some = orders.peek().is_some() && self.unknowns.iter().any(|unknown| unknown.is_form());
         some && !orders.any(|entry| entry.observable.contains(&true))
@@ -116,8 +116,8 @@ pub struct Separation {
     pub equivalents: Vec<Vec<Complex64>>,
     /// Whether it is observable with the layout, `[order][unknown]`.
     pub observable: Vec<bool>,
-    /// Where x and y are the axis's displacement, in mm along the spindle: 0 where tilt is told, the sensors' plane
-    /// where it is not.
+    /// Where x and y are the axis's displacement, in mm along the spindle: 0 where tilt is observable, the
+    /// sensors' plane where it is not.
     pub motion_z_mm: f64,
     /// By how much forms that were declared within a bound, and taken as 0, may move each unknown, peak to valley over a turn, in
     /// its unit; not in `variance`. Empty where no bound was declared.
@@ -317,7 +317,7 @@ impl Separation {
 
     /// Whether no order (from 2) of any section's form is observable, nor any motion: readings are then form and motion together.
     #[must_use]
-    pub fn tells_no_form(&self) -> bool {
+    pub fn has_no_observable_form(&self) -> bool {
         let width = self.unknowns.len();
         let seen =
             |unknown: usize| self.observable.iter().skip(unknown).step_by(width.max(1)).skip(2).any(|seen| *seen);

@@ -76,7 +76,7 @@ impl Direction {
 /// How motion of the axis follows from the readings of one setup, but for what form and clamping add to every turn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projection {
-    /// Motions that these sensors tell, each with the rig's sensors and their weights, µm or µrad per µm.
+    /// Motions observable with these sensors, each with the rig's sensors and their weights, µm or µrad per µm.
     pub rows: Vec<(Quantity, Vec<(usize, f64)>)>,
     /// Where x and y are taken, in mm along the spindle, before the station's position is added.
     pub z_mm: f64,

@@ -7,8 +7,8 @@
 //!
 //! Three effects of the toolkit come close. To first order a low-pass in one channel (`filter-attenuation`, p = λ) is the
 //! same: the amplitudes of high orders distinguish them, once nλ is no longer small. A turned sensor (`sensor-angle`) shifts the
-//! form as much and the motion otherwise. A lag in all channels alike is another zero of the spindle's angle, and can never be
-//! told.
+//! form as much and the motion otherwise. A lag in all channels alike is another zero of the spindle's angle, and is never
+//! observable.
 
 mod channel_delay;
 

@@ -160,7 +160,7 @@ fn expanded(
         if count > 1 && !pattern.contains(word) {
             return Err(Fault::at(
                 "pattern",
-                format!("expected `{word}` in the pattern, to tell {count} of them apart"),
+                format!("expected `{word}` in the pattern, to distinguish {count} of them"),
             ));
         }
     }

@@ -11,7 +11,7 @@ pub(crate) const ANGLE: &str = "angle_deg";
 /// Column of the time.
 pub(crate) const TIME: &str = "time_s";
 
-/// What the header tells.
+/// What the header declares.
 #[derive(Debug, Clone)]
 pub(crate) struct Header {
     pub(crate) shown: String,
@@ -27,7 +27,7 @@ pub(crate) struct Header {
     pub(crate) unknown: Vec<String>,
 }
 
-/// The column that tells the turns.
+/// The column that gives the turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Phase {
     Index(usize),

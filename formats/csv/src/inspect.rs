@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_told_by_its_header_and_first_row() {
+    fn a_table_is_recognised_by_its_header_and_first_row() {
         let report =
             found("# made by hand\n\ntime_s;index;S1;Fühler\n0,0;0;1,25;-0,5\n0,1;1;1;2;\n\n".as_bytes()).unwrap();
         assert_eq!(report.columns, ["time_s", "index", "S1", "Fühler"]);

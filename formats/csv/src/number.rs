@@ -21,7 +21,7 @@ const WHOLE_POWERS: [u64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10
 /// Whole numbers up to here are exact in f64.
 const EXACT_WHOLE: u64 = 1 << 53;
 
-/// Reads a plain number at the beginning of `bytes`: its value and its length, or `None` where only the slower way tells.
+/// Reads a plain number at the beginning of `bytes`: its value and its length, or `None` where only the slower way decides.
 /// What follows is for the caller to look at: an exponent is none of it.
 ///
 /// Where the digits make a whole number up to 2^53 and the power of ten is at most 22, both are exact and their quotient

@@ -288,7 +288,7 @@ mod tests {
         }
     }
 
-    /// What a recorder leaves that lost its power, also before any row has told the decimal mark.
+    /// What a recorder leaves that lost its power, also before any row has shown the decimal mark.
     #[test]
     fn zero_bytes_are_no_number() {
         for row in ["1;2;0\0", "1\0;2;0", "1\x005;2;0", "\0\0\0\0"] {
@@ -309,9 +309,9 @@ mod tests {
         }
     }
 
-    /// Wherever a stretch of text ends: of two mistakes the first one is told, with its line.
+    /// Wherever a stretch of text ends: of two mistakes the first one is reported, with its line.
     #[test]
-    fn the_first_mistake_is_told_with_its_line() {
+    fn the_first_mistake_is_reported_with_its_line() {
         let (text, _) = long("index", 0);
         let lines: Vec<&str> = text.lines().collect();
         for (line, row, words) in [
@@ -330,15 +330,15 @@ mod tests {
             for way in WAYS {
                 // Cells of readings are not looked at where they are not kept: that is left to the second look.
                 let problem = problem(&text, way);
-                let told = problem.starts_with(&format!(", line {line}")) && problem.contains(words);
+                let reported = problem.starts_with(&format!(", line {line}")) && problem.contains(words);
                 let later = row.ends_with('x') && problem.starts_with(&format!(", line {}", line + 12_001));
-                assert!(told || (later && way.1 < MOST_KEPT), "{line}, {way:?}: {problem}");
+                assert!(reported || (later && way.1 < MOST_KEPT), "{line}, {way:?}: {problem}");
             }
         }
     }
 
     #[test]
-    fn a_mistake_before_a_line_without_end_is_told_first() {
+    fn a_mistake_before_a_line_without_end_is_reported_first() {
         let (text, _) = long("index", 0);
         let mut lines: Vec<&str> = text.lines().collect();
         let endless = "1".repeat(3 << 20);

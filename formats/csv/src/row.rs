@@ -55,7 +55,7 @@ pub(crate) struct Instant {
 
 impl Row<'_> {
     /// A row of plain numbers, as most are, that begins where `bytes` do and ends somewhere in them: fills the channels, and
-    /// gives its length with the line's end. `None` where only a look at each cell tells.
+    /// gives its length with the line's end. `None` where each cell has to be read by itself.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "what is not inlined leaves wide registers")]
     pub(crate) fn plain(&self, reading: impl Reading, bytes: &[u8], channels: &mut [f64]) -> Option<(Instant, usize)> {

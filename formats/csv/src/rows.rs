@@ -30,12 +30,12 @@ pub(crate) struct Format {
     processor: Processor,
 }
 
-/// Where the rows come from, and what those before tell.
+/// Where the rows come from, and what is known from those before.
 struct Text {
     stretches: Stretches,
     /// The stretch that comes next, where it is read already.
     next: Option<Stretch>,
-    /// `.` or `,`, once a row told.
+    /// `.` or `,`, once a row has shown it.
     decimal: Option<u8>,
     /// The first of the blank lines that the file seems to end with.
     blank: Option<u64>,
@@ -114,7 +114,7 @@ impl Rows {
         };
         let mut spare = vec![Piece::default()];
         let threads = threads.get();
-        // The first rows tell how the others are to be read.
+        // The first rows decide how the others are to be read.
         while threads == 1 || text.decimal.is_none() {
             let piece = &mut spare[0];
             if !read(&mut text, piece)? {
@@ -141,7 +141,7 @@ impl Rows {
             };
             let parsers: Vec<(SyncSender<Piece>, Receiver<Piece>)> = (0..threads).map(parse).collect();
             let (mut given, mut taken) = (0, 0);
-            // What stops the reading is told behind what was read before.
+            // What stops the reading is reported behind what was read before.
             let mut end = None;
             loop {
                 while end.is_none() && given < taken + WAITING * threads {
@@ -180,7 +180,7 @@ impl Text {
         }
     }
 
-    /// Takes note of what a piece tells, once those before it are taken.
+    /// Takes note of what a piece shows, once those before it are taken.
     fn accept(&mut self, header: &Header, piece: &Piece) -> Result<()> {
         let goes_on = !piece.instants.is_empty() || piece.error.is_some();
         if let Some(number) = self.blank.filter(|_| goes_on) {

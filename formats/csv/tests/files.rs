@@ -83,7 +83,7 @@ fn expect(found: &str, parts: &[&str]) {
 }
 
 #[test]
-fn delimiters_decimals_and_encodings_are_told_apart() {
+fn delimiters_decimals_and_encodings_are_distinguished() {
     let comma = "S1,index,Fühler\n1.5,0,2\n-0.25,1,.5\n1e-3,0,-7.125\n";
     let semicolon = comma.replace(',', ";");
     let decimal_comma = semicolon.replace('.', ",");
@@ -186,7 +186,7 @@ fn times_have_to_be_even() {
 }
 
 #[test]
-fn mistakes_are_told_with_their_place() {
+fn mistakes_are_reported_with_their_place() {
     expect(&refusal(""), &["x.csv", "expected a header"]);
     expect(&refusal("index,S1,Fühler\n"), &["expected samples"]);
     expect(&refusal("index,S1,T2\n0,1,2\n"), &["x.csv, line 1", "`Fühler`", "found index, S1, T2"]);

@@ -104,7 +104,7 @@ pub(crate) fn all_data(file: &File) -> Option<Vec<Range<u64>>> {
 fn extent(dataset: &Dataset, found: &mut Vec<Range<u64>>) {
     match dataset.offset() {
         Some(start) => found.push(start..start.saturating_add(dataset.storage_size())),
-        // What is not told is looked through.
+        // Where no offset is known, the chunks are visited.
         None => {
             let _ = dataset.chunks_visit(|chunk| {
                 found.push(chunk.addr..chunk.addr.saturating_add(chunk.size));

@@ -12,7 +12,7 @@
 //! /truth/<station>/…            what a simulation declares to be true
 //! ```
 //!
-//! As MATLAB and LabVIEW write it, the same is read as `[channels, n]` (the number of names in `sensors` tells), `[n, 1]` or
+//! As MATLAB and LabVIEW write it, the same is read as `[channels, n]` (the number of names in `sensors` decides), `[n, 1]` or
 //! `[1, n]`, with names that are padded with blanks or NULs, separated by commas in one text, or in a dataset
 //! `/<setup>/<station>/sensors`, there also as MATLAB's characters or cells.
 //!

@@ -157,7 +157,7 @@ fn a_falling_angle_turns_the_same_way_round() {
 }
 
 #[test]
-fn what_is_no_measurement_is_told() {
+fn what_is_no_measurement_is_refused() {
     let (folder, rig) = (tempfile::tempdir().unwrap(), rig());
     let text = message(load(&folder.path().join("none.h5"), &rig));
     assert!(text.contains("none.h5") && text.contains("No such file"), "{text}");

@@ -91,7 +91,7 @@ fn a_converter_s_codes_come_back_exactly_with_its_limits() {
         for (index, (found, written)) in found.samples.iter().zip(&memory.captures[0][0].samples).enumerate() {
             assert!((found - written).abs() <= code_um / 2.0 + 3e-14, "{found} {written}");
             let [low, high] = ranges_um[index % 2];
-            // What was clipped still meets the limit to the bit, or clipping could not be told.
+            // What was clipped still meets the limit to the bit, or clipping could not be detected.
             let limits = limits_um[index % 2];
             let same = |a: f64, b: f64| a.to_bits() == b.to_bits();
             assert_eq!(same(*written, low), same(*found, limits[0]));
@@ -162,7 +162,7 @@ fn the_truth_comes_back() {
 }
 
 #[test]
-fn inspection_tells_what_is_there() {
+fn inspection_lists_what_is_there() {
     let (folder, rig) = (tempfile::tempdir().unwrap(), rig());
     let path = folder.path().join("shaft.h5");
     let memory = Memory::new(&rig, &[("b", 2.0), ("a", 1.0)], 500, false);

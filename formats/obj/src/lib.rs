@@ -49,7 +49,7 @@ const TOGETHER: usize = 4;
 
 /// Writes comments, vertices with their normals row by row, and triangles band by band.
 ///
-/// Each vertex has one normal, of the same number: readers that tell vertices apart by both find the same solid.
+/// Each vertex has one normal, of the same number: readers that distinguish vertices by both find the same solid.
 fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
     let mut bytes = Vec::new();
     let mut text = Text::behind(&mut bytes);

@@ -147,7 +147,7 @@ fn rows(station: &StationComparison) -> Vec<ArrayRef> {
     };
     let orders = blocks.iter().flat_map(|block| (1..).take(block.orders()));
     let z_mm = blocks.iter().flat_map(|block| repeat_n(block.value.z_mm, block.orders()));
-    let told = blocks.iter().flat_map(|block| block.value.harmonics.re.iter().map(Option::is_some));
+    let observable = blocks.iter().flat_map(|block| block.value.harmonics.re.iter().map(Option::is_some));
     vec![
         texts(repeat_n(station.station.as_str(), rows)),
         repeated(|block| Some(block.quantity.quantity.clone())),
@@ -158,7 +158,7 @@ fn rows(station: &StationComparison) -> Vec<ArrayRef> {
         harmonic(|value| &value.harmonics.re),
         harmonic(|value| &value.harmonics.im),
         harmonic(|value| &value.harmonics.std),
-        flags(told),
+        flags(observable),
         difference(|one| &one.by_order.difference),
         difference(|one| &one.by_order.std),
         difference(|one| &one.by_order.e_n),

@@ -137,7 +137,7 @@ fn sum(index: usize, unknown: usize, angle_deg: f64, sign: f64) -> f64 {
 }
 
 #[test]
-fn form_is_the_sum_of_what_could_be_told() {
+fn form_is_the_sum_of_observable_orders() {
     let folder = tempfile::tempdir().unwrap();
     export(folder.path(), 3, true);
     let (form, entries) = read(&folder.path().join("form.parquet"));
@@ -154,7 +154,7 @@ fn form_is_the_sum_of_what_could_be_told() {
         // 1e-13: rounding of six terms near 1.
         assert!((numbers(&form, "form_um").value(row) - expected).abs() < 1e-13);
     }
-    // Five orders that could be told, each of variance 0.02: √(½·0.1).
+    // Five observable orders, each of variance 0.02: √(½·0.1).
     assert!((numbers(&form, "std_um").value(0) - 0.05_f64.sqrt()).abs() < 1e-15);
     assert_eq!(entries["runout.title"], "Probelauf µ");
     assert_eq!(entries["runout.lost_orders"], r#"{"form":[4],"motion":[4]}"#);
@@ -198,7 +198,7 @@ fn harmonics_say_what_is_lost() {
     // Orders 1 to 6: no level is known.
     assert_eq!(table.num_rows(), 2 * 4 * MAX_ORDER);
     let orders: &UInt32Array = table.column_by_name("order").unwrap().as_any().downcast_ref().unwrap();
-    let told: &BooleanArray = table.column_by_name("observable").unwrap().as_any().downcast_ref().unwrap();
+    let observable: &BooleanArray = table.column_by_name("observable").unwrap().as_any().downcast_ref().unwrap();
     for row in 0..table.num_rows() {
         let (index, unknown) = (row / (4 * MAX_ORDER), row / MAX_ORDER % 4);
         let order = orders.value(row) as usize;
@@ -208,7 +208,7 @@ fn harmonics_say_what_is_lost() {
             0 | 1 => assert_eq!(texts(&table, "section").value(row), ["a", "b"][unknown]),
             _ => assert!(texts(&table, "section").is_null(row)),
         }
-        assert_eq!(told.value(row), order != LOST);
+        assert_eq!(observable.value(row), order != LOST);
         let [re, im, std] = ["re", "im", "std"].map(|name| numbers(&table, name).value(row));
         if order == LOST {
             assert!(re.is_nan() && im.is_nan() && std.is_nan());
@@ -274,7 +274,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         coverage: 0.75,
         uncertainty,
     };
-    let mut told = summary();
+    let mut filled = summary();
     let section = SectionSummary {
         section: "a".into(),
         z_mm: 40.0,
@@ -283,7 +283,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         values: vec![value("RONt", 3.9, Some(interval))],
         truth_form_rms_error_um: None,
     };
-    told.stations = vec![StationSummary {
+    filled.stations = vec![StationSummary {
         station: "s00".into(),
         z_mm: 10.0,
         captures: Vec::new(),
@@ -300,8 +300,8 @@ fn values_are_rows_and_null_where_there_is_none() {
         truth: None,
         warnings: Vec::new(),
     }];
-    told.part = Some(PartSummary { values: vec![value("CYLt", 6.0, None)], ..PartSummary::default() });
-    commit_all(StationTables::new(None, None).finish(export, &told, None).unwrap()).unwrap();
+    filled.part = Some(PartSummary { values: vec![value("CYLt", 6.0, None)], ..PartSummary::default() });
+    commit_all(StationTables::new(None, None).finish(export, &filled, None).unwrap()).unwrap();
     let (table, entries) = read(&folder.path().join("values.parquet"));
     assert_eq!(entries["runout.title"], "Probelauf µ");
     assert_eq!(table.num_rows(), 3);

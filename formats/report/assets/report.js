@@ -18,7 +18,7 @@
     return element("label", {}, text, control);
   }
 
-  // Two charts are beside each other on A4, whose width a browser tells only once it prints.
+  // Two charts are beside each other on A4, whose width a browser gives only once it prints.
   const PAPER = { width: 320, height: 0.75 };
   let printing = false;
 

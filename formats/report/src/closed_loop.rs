@@ -122,7 +122,7 @@ fn added(added: &[Added]) -> Markup {
                         tr {
                             td {
                                 bdi { (one.members()) }
-                                @if let Some(by) = &one.told_apart_by { br; small { "to decide: " (by) } }
+                                @if let Some(by) = &one.distinguished_by { br; small { "to decide: " (by) } }
                             }
                             td { @for one in &one.parameters { div { (parameter(one)) } } }
                             td.number { (shown(one.held_out_rms_um.before)) " → " (shown(one.held_out_rms_um.after)) }

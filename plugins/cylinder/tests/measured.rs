@@ -205,7 +205,7 @@ fn the_run_says_what_it_left_out_and_how_well_it_predicts() {
         println!("{}: {}", station.station, station.warnings.join("; "));
         let section = &station.sections[0];
         println!("  form {:.3} µm rms, std {:?}", section.form_rms_um, section.form_std_um);
-        // C1 ends with a probe that lifts off by 53 µm: it must be told of, and not be in the form.
+        // C1 ends with a probe that lifts off by 53 µm: it must be reported, and not be in the form.
         assert!(section.form_rms_um < 2.0 && section.form_std_um.is_some());
     }
     assert!(summary.stations[0].warnings[0].contains("the farthest -6"), "{:?}", summary.stations[0].warnings);
@@ -285,7 +285,7 @@ fn the_surface_stands_on_the_fitted_radius() {
 }
 
 #[test]
-fn points_that_cannot_tell_a_cylinder_are_refused() {
+fn points_that_do_not_determine_a_cylinder_are_refused() {
     let refused = |points: &Points, hold_out: &[&str]| separator(50, hold_out).form(points).unwrap_err();
     let two = made(&[5.0, 9.0]);
     assert!(refused(&two, &["circle"]).to_string().contains("held out"));

@@ -26,7 +26,7 @@ const LISTED: usize = 5;
 /// Values that people look at, before and after.
 const LOOKED_AT: [&str; 3] = ["Sq", "Sz", "Sa"];
 /// What separates ratios of a line.
-const TOLD_APART_BY: &str =
+const DISTINGUISHED_BY: &str =
     "a map that reaches further along y, or with less noise; a recording of the spindle shows the frequency";
 
 impl PointModel for FlyCutting {
@@ -140,7 +140,7 @@ fn confound(diagnosis: &mut Diagnosis, set: &Aliases) {
     let found = diagnosis.added.iter_mut().find(|added| added.effect == effect.id && added.targets == effect.targets);
     let Some(added) = found.filter(|_| !set.ratios.is_empty()) else { return };
     added.confounded_with.extend(set.ratios.iter().map(|ratio| named(*ratio)));
-    added.told_apart_by = Some(TOLD_APART_BY.into());
+    added.distinguished_by = Some(DISTINGUISHED_BY.into());
     // The value of one member is conditional on a choice that the data do not make.
     added.parameters.iter_mut().for_each(|parameter| parameter.std = None);
 }

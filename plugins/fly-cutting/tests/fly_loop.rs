@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{CUT, diagnose, parameter, run, scenario, separator, told, value};
+use common::{CUT, diagnose, listing, parameter, run, scenario, separator, value};
 use runout_core::model::diagnosis::Verdict;
 
 const SIDE: usize = 160;
@@ -14,7 +14,7 @@ fn clean_surfaces_name_nothing() {
     for seed in 0..3 {
         let grid = scenario(SIDE, &format!("noise_nm = 0.2\nseed = {seed}")).heights().unwrap();
         let found = diagnose(grid, &separator(CUT));
-        assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor, "{}", told(&found.diagnosis));
+        assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor, "{}", listing(&found.diagnosis));
         assert!(found.diagnosis.added.is_empty());
     }
 }
@@ -23,8 +23,8 @@ fn clean_surfaces_name_nothing() {
 fn the_line_of_the_paper_is_found() {
     let line = "noise_nm = 0.1\n[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 4.0\nphase_deg = 40.0\n";
     let found = diagnose(scenario(SIDE, line).heights().unwrap(), &separator(CUT));
-    println!("{}", told(&found.diagnosis));
-    let [added] = &found.diagnosis.added[..] else { panic!("{}", told(&found.diagnosis)) };
+    println!("{}", listing(&found.diagnosis));
+    let [added] = &found.diagnosis.added[..] else { panic!("{}", listing(&found.diagnosis)) };
     assert_eq!((added.effect.as_str(), added.confounded_with.len()), ("spindle-line", 0));
     for (name, truth) in [("frequency_ratio", 5.6235 / 6.5), ("amplitude", 4.0), ("phase", 40.0)] {
         let [number, std] = parameter(added, name);
@@ -60,8 +60,8 @@ fn every_effect_is_found_with_its_size() {
             format!("noise_nm = 0.1\nseed = 4\n[[effect]]\nplugin = '{effect}'\n{keys}\n")
         };
         let found = diagnose(scenario(SIDE, &text).heights().unwrap(), &separator(CUT));
-        println!("{}", told(&found.diagnosis));
-        let [added] = &found.diagnosis.added[..] else { panic!("{}", told(&found.diagnosis)) };
+        println!("{}", listing(&found.diagnosis));
+        let [added] = &found.diagnosis.added[..] else { panic!("{}", listing(&found.diagnosis)) };
         assert_eq!(added.effect, effect);
         for (name, truth) in truth {
             let [number, std] = parameter(added, name);
@@ -76,7 +76,7 @@ fn large_and_joint_effects_are_found() {
     let text = "noise_nm = 0.5\n[[effect]]\nplugin = 'workpiece-tilt'\nx_urad = 800.0\n
         [[effect]]\nplugin = 'spindle-line'\nfrequency_ratio = 0.31\namplitude_nm = 30.0\n";
     let found = diagnose(scenario(100, text).heights().unwrap(), &separator(CUT));
-    println!("{}", told(&found.diagnosis));
+    println!("{}", listing(&found.diagnosis));
     let names: Vec<&str> = found.diagnosis.added.iter().map(|added| added.effect.as_str()).collect();
     assert_eq!(names, ["workpiece-tilt", "spindle-line"]);
     assert_eq!(found.diagnosis.verdict, Verdict::Explained);
@@ -92,7 +92,7 @@ fn strangers_are_unexplained_with_their_place() {
         for line in ["", "[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 3.0\n"] {
             let text = format!("noise_nm = 0.3\n[[effect]]\n{stranger}\n{line}");
             let found = diagnose(scenario(SIDE, &text).heights().unwrap(), &separator(CUT));
-            println!("{}", told(&found.diagnosis));
+            println!("{}", listing(&found.diagnosis));
             assert_eq!(found.diagnosis.verdict, Verdict::Unexplained);
             assert_eq!(found.diagnosis.added.len(), usize::from(!line.is_empty()));
             let place = &found.diagnosis.unexplained[0].place;
@@ -112,14 +112,14 @@ fn aliases_are_named_where_the_rows_do_not_separate_them() {
         )
     };
     let found = diagnose(common::of(&text(400, 0.1)).heights().unwrap(), &separator(CUT));
-    assert_eq!(found.diagnosis.added[0].confounded_with.len(), 0, "{}", told(&found.diagnosis));
+    assert_eq!(found.diagnosis.added[0].confounded_with.len(), 0, "{}", listing(&found.diagnosis));
     let found = diagnose(common::of(&text(20, 1.0)).heights().unwrap(), &separator(CUT));
-    println!("{}", told(&found.diagnosis));
+    println!("{}", listing(&found.diagnosis));
     let added = &found.diagnosis.added[0];
     assert!(!added.confounded_with.is_empty() && added.parameters.iter().all(|one| one.std.is_none()));
     let members = added.confounded_with.iter().filter_map(|name| name.rsplit(' ').next()?.parse::<f64>().ok());
     let mut ratios = members.chain([parameter(added, "frequency_ratio")[0]]);
-    assert!(ratios.any(|ratio| (ratio - 5.6235 / 6.5).abs() < 1e-3), "{}", told(&found.diagnosis));
+    assert!(ratios.any(|ratio| (ratio - 5.6235 / 6.5).abs() < 1e-3), "{}", listing(&found.diagnosis));
 }
 
 /// Without a stated uncertainty nothing can be called explained.
@@ -127,9 +127,9 @@ fn aliases_are_named_where_the_rows_do_not_separate_them() {
 fn unknown_noise_is_said() {
     let text = "noise_nm = 0.2\nstated_std_nm = 0\n[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 5.6235\namplitude_nm = 4.0\n";
     let found = diagnose(scenario(SIDE, text).heights().unwrap(), &separator(CUT));
-    assert_eq!(found.diagnosis.verdict, Verdict::Improved, "{}", told(&found.diagnosis));
+    assert_eq!(found.diagnosis.verdict, Verdict::Improved, "{}", listing(&found.diagnosis));
     let clean = diagnose(scenario(SIDE, "noise_nm = 0.2\nstated_std_nm = 0").heights().unwrap(), &separator(CUT));
-    assert_eq!(clean.diagnosis.verdict, Verdict::NothingFound, "{}", told(&clean.diagnosis));
+    assert_eq!(clean.diagnosis.verdict, Verdict::NothingFound, "{}", listing(&clean.diagnosis));
 }
 
 #[test]
@@ -183,6 +183,6 @@ fn heights_in_another_unit_and_too_large_a_noise_are_never_explained() {
     let mut loud = scenario(90, line).heights().unwrap();
     loud.std_nm = Some(1.0);
     let found = diagnose(loud, &fly).diagnosis;
-    assert_eq!(found.verdict, Verdict::Improved, "{}", told(&found));
+    assert_eq!(found.verdict, Verdict::Improved, "{}", listing(&found));
     assert!(found.warnings.iter().any(|warning| warning.contains("far below 1")), "{:?}", found.warnings);
 }

@@ -30,7 +30,7 @@ pub(crate) fn interrupted(rig: Option<&Rig>) -> Option<Rig> {
 }
 
 /// A stream with the interruptions of the part's surface bridged; the stream itself where no sensor sees one, and where
-/// nothing tells the spindle's angle.
+/// nothing gives the spindle's angle.
 pub(crate) fn bridged<'a>(input: Box<dyn SampleStream + 'a>, rig: Option<&Rig>) -> Box<dyn SampleStream + 'a> {
     let Some(rig) = rig else { return input };
     let capture = input.capture();

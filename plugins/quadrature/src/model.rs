@@ -92,7 +92,7 @@ const COLUMNS: [PointColumn; 4] = [
         "true angle in degrees of the signal's own period, from any zero",
     ),
 ];
-const TOLD_APART: &str = "a reference angle: the column reference_deg; or signals that are known to be sines: \
+const DISTINGUISHED_BY: &str = "a reference angle: the column reference_deg; or signals that are known to be sines: \
     `[diagnose] effects = [\"quadrature-offset\", \"quadrature-gain-and-angle\"]`";
 
 impl PointSeparator for Quadrature {
@@ -153,7 +153,7 @@ impl LinearModel for Quadrature {
         if samples.true_rad.is_some() {
             return Ok(model.judged_by(count..rows));
         }
-        Ok(model.distinguished_by(TOLD_APART))
+        Ok(model.distinguished_by(DISTINGUISHED_BY))
     }
 
     fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {

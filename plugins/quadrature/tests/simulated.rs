@@ -171,7 +171,7 @@ fn an_offset_and_second_harmonics_are_one_set_that_a_reference_decides() {
     let (found, [before, after, stated]) = corrected(&blind, None);
     assert_eq!(names(&found)[0], "quadrature-offset");
     assert_eq!(found.added[0].confounded_with, ["harmonic-2-forward"]);
-    assert!(found.added[0].told_apart_by.as_ref().unwrap().contains("reference_deg"));
+    assert!(found.added[0].distinguished_by.as_ref().unwrap().contains("reference_deg"));
     println!("{before:.5} → {after:.5} ± {stated:.5} rad");
     assert!(after <= 1.01 * before && after <= 2.0 * stated);
     let seen = recorded(&channels, 0.5, true, &mut Random(2));

@@ -23,7 +23,7 @@ const LARGEST: f64 = 20.0;
 /// χ² by which two explanations differ, up to which the data do not decide.
 const SAME_CHI2: f64 = 10.0;
 /// What separates the nest from the axes.
-const TOLD_APART_BY: &str =
+const DISTINGUISHED_BY: &str =
     "a calibration of the nest against known displacements along each axis, or of the linear axes on their own";
 
 /// An error of the nest instead of errors of linear axes.
@@ -101,7 +101,7 @@ pub(crate) fn confound(diagnosis: &mut Diagnosis, instead: &[Nest]) {
             if !found.confounded_with.contains(&name) {
                 found.confounded_with.push(name);
             }
-            found.told_apart_by = Some(TOLD_APART_BY.into());
+            found.distinguished_by = Some(DISTINGUISHED_BY.into());
             // The value of one member is conditional on a choice that the data do not make.
             found.parameters.iter_mut().for_each(|parameter| parameter.std = None);
             found.change = None;

@@ -1,4 +1,4 @@
-//! What balls tell before they are measured, and which one more helps most.
+//! What is observable with balls before they are measured, and which one more helps most.
 //!
 //! Noise gains are the standard uncertainties of the full fit at the nominal places, for 1 µm in every coordinate of every row.
 
@@ -213,7 +213,7 @@ impl RotaryAxis {
             after: self.score(gains),
             noise_gain: self.named(gains),
             reveals: Vec::new(),
-            tells_apart: Vec::new(),
+            distinguishes: Vec::new(),
         }
     }
 

@@ -194,7 +194,7 @@ fn a_rotor_that_is_held_everywhere_has_no_modes() {
 }
 
 #[test]
-fn rigid_bodies_are_told_and_left_out() {
+fn rigid_bodies_are_reported_and_left_out() {
     let outcome = solved(SHAFT, "modes = 4\ncampbell_rpm = [0, 6000]");
     assert!(outcome.remarks.iter().any(|remark| remark.starts_with("4 motions")), "{:?}", outcome.remarks);
     let lowest = outcome.values.iter().find(|one| one.symbol == "f").and_then(|one| one.value).unwrap();

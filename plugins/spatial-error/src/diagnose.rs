@@ -116,7 +116,7 @@ impl PointModel for SpatialError {
                     Added {
                         effect: effect.id.clone(),
                         targets: effect.targets.clone(),
-                        told_apart_by: (!alone).then(|| TOLD_APART_BY.to_owned()),
+                        distinguished_by: (!alone).then(|| DISTINGUISHED_BY.to_owned()),
                         confounded_with,
                         parameters: parameters(
                             &candidates[found.members[0]],
@@ -165,7 +165,7 @@ impl PointModel for SpatialError {
 }
 
 /// What separates effects that one layout confounds.
-const TOLD_APART_BY: &str = "a second campaign with another `tool_mm`, or in another order of the places";
+const DISTINGUISHED_BY: &str = "a second campaign with another `tool_mm`, or in another order of the places";
 
 impl SpatialError {
     /// The covariance that is given, as a prior that leaves nothing free.

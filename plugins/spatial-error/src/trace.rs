@@ -44,7 +44,7 @@ pub(crate) struct Gain {
     pub p: f64,
 }
 
-/// Something found: a candidate or a jump, with what it is not told from.
+/// Something found: a candidate or a jump, with what it is not distinguished from.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
     /// Indices of candidates, the best first; of the jump alone.

@@ -34,8 +34,8 @@ impl Selection {
         Self { rig: chosen, sensors, setups, unused }
     }
 
-    /// Says in an assessment what is not used.
-    pub fn tell(&self, assessment: &mut Assessment) {
+    /// Notes in an assessment what is not used.
+    pub fn note_unused(&self, assessment: &mut Assessment) {
         if !self.unused.is_empty() {
             assessment.notes.push(format!("not used: {}", self.unused.join(", ")));
         }

@@ -224,7 +224,7 @@ fn on_the_axis_z_and_form_are_one_thing() {
         // What is across the axis does not suffer from it.
         let lost = assessment.lost_orders(of(Quantity::X));
         assert_eq!(lost.is_empty(), part_deg.len() > 1, "{lost:?}");
-        assert_eq!(assessment.tells_no_form(), part_deg.len() < 2);
+        assert_eq!(assessment.has_no_observable_form(), part_deg.len() < 2);
         let truth = Truth::new(3);
         let found = separated(&rig, &truth.station(&rig, 8.0));
         assert!(found.coefficients(found.position(Quantity::Z).unwrap()).all(|value| value == Complex64::ZERO));

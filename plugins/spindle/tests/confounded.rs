@@ -165,7 +165,7 @@ fn does_not_mislead(config: &SpindleConfig, planted: &[&str]) {
             assert_eq!(named(set), *name);
             assert!(set.parameters.iter().all(|parameter| parameter.std.is_some()), "{set:?}");
         } else {
-            assert!(set.told_apart_by.is_some(), "{set:?}");
+            assert!(set.distinguished_by.is_some(), "{set:?}");
             assert!(set.parameters.iter().all(|parameter| parameter.std.is_none()), "{set:?}");
         }
     }

@@ -106,7 +106,7 @@ fn nothing_is_found_where_nothing_is() {
 #[test]
 fn a_gain_is_found_with_its_partner() {
     let effect = r#"[{"plugin":"sensor-gain","targets":["S1"],"relative_gain":0.017}]"#;
-    // Which of the two sensors it is cannot be told: half of 1.7 % of 4 µm at most.
+    // Which of the two sensors it is, is not observable: half of 1.7 % of 4 µm at most.
     finds(effect, "sensor-gain", Some("S1"), ("gain", 0.017), 0.04);
 }
 

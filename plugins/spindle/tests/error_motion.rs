@@ -242,7 +242,7 @@ fn noise_enters_by_the_stated_factor() {
 }
 
 #[test]
-fn sensors_that_look_along_one_direction_tell_that_one() {
+fn motion_is_observable_along_the_one_direction_of_all_sensors() {
     let one = rig(&[(0.0, 0.0, "a")], &[(0.0, 0.0), (180.0, 180.0)]);
     let separator = HarmonicLeastSquares::new(&one, false, Weighting::None);
     for (setup, weight) in [(0, 1.0), (1, -1.0)] {
@@ -260,8 +260,8 @@ fn sensors_that_look_along_one_direction_tell_that_one() {
     }
     let four = rig(&FOUR_SENSORS, &[(0.0, 0.0)]);
     let rows = HarmonicLeastSquares::new(&four, false, Weighting::None).projection(0).unwrap().rows;
-    let told: Vec<Quantity> = rows.iter().map(|(quantity, _)| *quantity).collect();
-    assert_eq!(told, [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY]);
+    let quantities: Vec<Quantity> = rows.iter().map(|(quantity, _)| *quantity).collect();
+    assert_eq!(quantities, [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY]);
 }
 
 /// Not a test: what the spread costs beside the average. `cargo test -p runout-spindle --test error_motion -- --ignored

@@ -61,7 +61,7 @@ fn two_sensors_a_section_show_only_the_ratio_of_their_gains() {
 }
 
 #[test]
-fn three_sensors_a_section_tell_gains_and_angles_apart() {
+fn three_sensors_a_section_distinguish_gains_and_angles() {
     let foresight = foresee_rig(&six_sensors()).unwrap();
     for effect in ["sensor-gain", "sensor-angle", "reversal-angle", "setup-motion-change"] {
         assert!(!foresight.confounded.iter().flatten().any(|name| name.starts_with(effect)), "{effect}");
@@ -103,14 +103,14 @@ fn mistakes_without_a_trace_are_foreseen() {
 }
 
 #[test]
-fn a_third_sensor_tells_the_gains_of_its_section_apart() {
+fn a_third_sensor_distinguishes_the_gains_of_its_section() {
     let (rig, clearance_deg) = (four_sensors(), 15.0);
     let foresight = foresee_rig(&rig).unwrap();
     let found = changes(&rig, &foresight, &[], clearance_deg).unwrap();
     for (section, [one, other]) in [["S1", "S2"], ["S3", "S4"]].into_iter().enumerate() {
         for effect in ["sensor-gain", "sensor-angle"] {
-            let change = found.found.iter().find(|change| change.tells_apart.contains(&pair(effect, one, other)));
-            let change = change.unwrap_or_else(|| panic!("nothing tells {effect} apart: {found:?}"));
+            let change = found.found.iter().find(|change| change.distinguishes.contains(&pair(effect, one, other)));
+            let change = change.unwrap_or_else(|| panic!("nothing distinguishes {effect}:  {found:?}"));
             // No setup does: whatever both sensors scale or turn together, form and motion take.
             assert!(matches!(change.addition, Addition::Sensor { section: of, .. } if of == section), "{change:?}");
         }

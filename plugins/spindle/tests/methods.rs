@@ -60,7 +60,10 @@ fn agree<M: Method>(name: &str, sensors: &[(f64, f64, &str)], setups: &[(f64, f6
             let sensitivities = [closed.sensitivity(&station).unwrap(), general.sensitivity(&station).unwrap()];
             let (closed, general) = (closed.separate(&station).unwrap(), general.separate(&station).unwrap());
             assert_eq!(closed.observable, general.observable, "{name}");
-            assert!(closed.observable.iter().filter(|told| **told).count() > 100, "{name}: most orders are told");
+            assert!(
+                closed.observable.iter().filter(|observable| **observable).count() > 100,
+                "{name}: most orders are observable"
+            );
             let mut worst: f64 = 0.0;
             for (index, (a, b)) in closed.estimate.iter().zip(&general.estimate).enumerate() {
                 if closed.observable[index] {
@@ -127,7 +130,7 @@ fn combined(motion: &[Sum; 4], quantity: Quantity) -> Sum {
     (2..=90).map(of_order).collect()
 }
 
-/// The truth from a rig by least squares, within rounding times the layout's noise gain; and what it cannot tell.
+/// The truth from a rig by least squares, within rounding times the layout's noise gain; and what is not observable.
 fn recovers(name: &str, sensors: &[(f64, f64, &str)], setups: &[(f64, f64)], lost: &dyn Fn(usize) -> bool) {
     let rig = rig(sensors, setups);
     let truth = truth(rig.sections.len() as u64);
@@ -163,7 +166,7 @@ fn the_general_separator_takes_arbitrary_angles_and_hybrids() {
         [(0.0, 100.0, "a"), (99.844, 100.0, "a"), (202.5, 100.0, "a"), (0.0, 130.0, "b"), (90.0, 130.0, "b")];
     recovers("three and two probes, reversed", &two_sections, &REVERSAL, &none);
     let steps: Vec<_> = (0..5).map(|step| (72.0 * f64::from(step), 0.0)).collect();
-    // x and y are seen, so 1/rev is told by the clamping rule; multiples of 5 are not.
+    // x and y are seen, so 1/rev is determined by the clamping rule; multiples of 5 are not.
     // All along one line: motion there is all that is observable, and 1/rev is eccentricity as well as motion.
     let oblique = [(30.0, 100.0, "a"), (210.0, 130.0, "b")];
     recovers("one line at 30°, reversed", &oblique, &REVERSAL, &none);
@@ -249,7 +252,7 @@ fn methods_choose_from_a_larger_rig() {
                 assert!(error < 1e-11, "{name}, order {order}: {error:e}");
             }
         }
-        // Motion is that of the sensors' plane where tilt is not told.
+        // Motion is that of the sensors' plane where tilt is not observable.
         assert!((separation.motion_z_mm - if forms == 1 { 100.0 } else { 0.0 }).abs() < 1e-12, "{name}");
     }
 }

@@ -220,7 +220,7 @@ fn a_tolerance_is_looked_at_in_every_corner_and_between() {
     assert!(found <= untouched * 1.01);
 }
 
-/// A single reversal tells all that its sensors can see, wherever they stand: nothing is sold as better.
+/// With a single reversal all that its sensors can see is observable at any angle: nothing is suggested as better.
 #[test]
 fn nothing_is_found_where_no_angle_helps() {
     let rig = rig(&FOUR_SENSORS, &[(0.0, 0.0), (180.0, 180.0)]);
@@ -247,7 +247,7 @@ fn too_many_sensors_are_refused_with_the_clearance_that_fits() {
 }
 
 #[test]
-fn one_sensor_is_told_to_be_reversed() {
+fn reversal_is_suggested_for_one_sensor() {
     let rig = probes(&[0.0]);
     let suggestions = suggest(&rig, &(2..=80), 15.0);
     let before = score(&rig, &(2..=80));
@@ -260,7 +260,7 @@ fn one_sensor_is_told_to_be_reversed() {
 }
 
 #[test]
-fn fixed_sensors_and_two_setups_are_told_a_third_part_angle() {
+fn a_third_part_angle_is_suggested_for_fixed_sensors_and_two_setups() {
     let rig = rig(&FOUR_SENSORS, &[(0.0, 0.0), (180.0, 0.0)]);
     let orders = 2..=80;
     assert_eq!(score(&rig, &orders).lost, 40);

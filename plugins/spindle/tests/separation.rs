@@ -1,4 +1,4 @@
-//! Separation of averaged readings: exactness, agreement of methods, and what layouts cannot tell.
+//! Separation of averaged readings: exactness, agreement of methods, and what is not observable with a layout.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -261,7 +261,7 @@ fn what_lost_orders_carry_is_in_the_uncertainty() {
 /// A wave of the fourth order in one reading is left where it was read: the fit cannot follow it wholly, and its rms is that of all
 /// readings together.
 #[test]
-fn what_is_left_is_told_by_reading_and_order() {
+fn the_residual_is_stated_by_reading_and_order() {
     let mut config = campaign(5, r#"[{"plugin":"sensor-line","targets":["S3"],"order":4,"amplitude_um":2.0}]"#);
     config.rig.setups.truncate(2);
     (config.rig.setups[1].part_deg, config.rig.setups[1].sensors_deg) = (180.0, 180.0);

@@ -152,7 +152,7 @@ fn the_stated_uncertainty_covers_the_truth() {
     let noise = Normal::new(0.0, 0.1).unwrap();
     for (repeats, quantile) in [([3, 3], 2.776), ([5, 2], 2.571), ([2, 1], 12.706)] {
         let mut random = ChaCha8Rng::seed_from_u64(4);
-        let (mut held, mut told, mut variance) = ([0, 0], 0, 0.0);
+        let (mut held, mut positions, mut variance) = ([0, 0], 0, 0.0);
         let campaigns = 600;
         for _ in 0..campaigns {
             let mut traces = Vec::new();
@@ -170,12 +170,12 @@ fn the_stated_uncertainty_covers_the_truth() {
                 held[0] += usize::from((found.part_um[at] - part[at]).abs() <= quantile * found.part_std_um[at]);
                 held[1] += usize::from((found.slide_um[at] - slide[at]).abs() <= quantile * found.slide_std_um[at]);
             }
-            told += z.len();
+            positions += z.len();
             variance += found.repeatability_um.powi(2) / f64::from(campaigns);
         }
-        let shares = held.map(|held| held as f64 / told as f64);
+        let shares = held.map(|held| held as f64 / positions as f64);
         println!(
-            "{repeats:?}: 95 % intervals hold {shares:.4?} of {told}; one trace repeats to {:.4} µm",
+            "{repeats:?}: 95 % intervals hold {shares:.4?} of {positions}; one trace repeats to {:.4} µm",
             variance.sqrt()
         );
         // 15 000 positions, little correlated: 0.0018 standard deviation of the share; 0.0075 is four of them.
@@ -320,7 +320,7 @@ fn a_gap_is_said() {
 
 /// A taper of the part, or a slide at an angle to it, is a slope like any other.
 #[test]
-fn taper_and_parallelism_cannot_be_told() {
+fn taper_and_parallelism_are_not_observable() {
     let z = even(0.0, 1.0, 101);
     let straight = File(vec![trace("1", "initial", &z, [0.0, 0.0]), trace("2", "reversed", &z, [0.0, 0.0])]);
     let mut tapered = straight.clone();

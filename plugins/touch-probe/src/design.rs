@@ -212,7 +212,7 @@ impl Fitted {
         DMatrix::from_fn(places.len(), places.len(), |row, column| self.covariance(places[row], places[column]))
     }
 
-    /// Whether the parameters are told by the touches.
+    /// Whether the parameters are observable with the touches.
     pub(crate) fn is_observable(&self, places: &[usize]) -> bool {
         places.iter().all(|place| !self.solved.lost[*place])
     }

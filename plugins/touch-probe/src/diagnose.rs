@@ -273,7 +273,7 @@ impl TouchProbe {
     }
 }
 
-/// Repeats tell the noise well: more than chance makes of it is unexplained, also below the limit for noise that is only stated.
+/// Repeats determine the noise well: more than chance makes of it is unexplained, also below the limit for noise that is only stated.
 fn more_than_repeats(diagnosis: &mut Diagnosis, fit: &LinearFit, noise_dof: usize) {
     let left = fit.remainder();
     let std = (2.0 / left.dof.max(1) as f64 + 2.0 / noise_dof.max(1) as f64).sqrt();

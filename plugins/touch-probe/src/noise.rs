@@ -9,7 +9,7 @@ use crate::{
 
 /// Polynomials of time, up to this degree, that the drift of radius and centre consists of.
 const DRIFT_DEGREE: i32 = 3;
-/// Degrees of freedom from which on repeats tell the noise.
+/// Degrees of freedom from which on repeats determine the noise.
 const FEWEST: usize = 8;
 
 /// The standard deviation of each touch.

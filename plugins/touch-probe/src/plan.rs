@@ -1,4 +1,4 @@
-//! What setups tell before a ring is touched, and which one more helps most.
+//! What is observable with setups before a ring is touched, and which one more helps most.
 //!
 //! A setup k with M touches evenly around reads each order as L·e^{−inπ} + F·e^{−inρ}, with noise of variance 2σ²/M in each part.
 //! Over K setups the normal matrix of (L, F) is [K, s; s*, K] with s = Σ e^{in(π − ρ)}; each part of both has the variance
@@ -55,7 +55,7 @@ impl TouchProbe {
                 after: with.score(),
                 noise_gain: with.named(),
                 reveals: Vec::new(),
-                tells_apart: Vec::new(),
+                distinguishes: Vec::new(),
             };
             plan.suggestions.push(addition.changing(&foresight, &Self(with).foreseen()));
         }
@@ -141,7 +141,7 @@ impl TouchProbeConfig {
     }
 
     /// One more setup with the fewest lost orders and about the lowest worst noise gain, with what it then is; of a turned probe the one
-    /// that best tells order 2 of the machine from lobing.
+    /// that best distinguishes order 2 of the machine from lobing.
     fn best_setup(&self, turned: Turned) -> Option<(Self, SetupConfig)> {
         let taken = |id: &str| self.setups.iter().any(|setup| setup.id == id);
         let mut tried: Vec<(LayoutScore, Self, SetupConfig)> = Vec::new();

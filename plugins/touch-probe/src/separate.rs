@@ -231,8 +231,9 @@ impl TouchProbe {
     fn has_enough(&self, points: &Points, prepared: &Prepared, fit: &Fitted) -> Result<()> {
         let count = prepared.touches.all.len();
         let orders = 2..=self.0.max_order;
-        let told = |order: usize| fit.design.pair(lobing_order, order).is_some_and(|places| fit.is_observable(&places));
-        if orders.clone().any(told) && fit.solved.dof > 0 {
+        let is_observable =
+            |order: usize| fit.design.pair(lobing_order, order).is_some_and(|places| fit.is_observable(&places));
+        if orders.clone().any(is_observable) && fit.solved.dof > 0 {
             return Ok(());
         }
         let highest = self.0.max_order;

@@ -58,7 +58,7 @@ pub struct Traced {
     pub parameters: [usize; 2],
 }
 
-/// Root mean square errors of form over orders 2 to 80, as far as they can be told, in µm.
+/// Root mean square errors of form over orders 2 to 80, as far as they are observable, in µm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FormErrors {
     /// Of the same campaign with nothing wrong.
@@ -151,10 +151,10 @@ fn holds(added: &Added, planted: &Planted) -> bool {
         Some(target) => format!("{} {target}", planted.id),
         None => planted.id.to_owned(),
     };
-    let told = added.parameters.iter().find(|one| one.name == "order").map(|one| one.value);
+    let found_order = added.parameters.iter().find(|one| one.name == "order").map(|one| one.value);
     let true_order = planted.parameters.iter().find(|(name, _)| *name == "order").map(|(_, order)| *order);
     // Of effects with an order, another order is another effect.
-    let same_order = told.zip(true_order).is_none_or(|(told, order)| (told - order).abs() < 0.1);
+    let same_order = found_order.zip(true_order).is_none_or(|(found, order)| (found - order).abs() < 0.1);
     (name(added) == wanted && same_order) || added.confounded_with.contains(&wanted)
 }
 
@@ -187,9 +187,9 @@ fn form_errors(said: &StationDiagnosis, sound: &[Separation], truth: &StationTru
             let index = |one: &Separation| {
                 let unknown = one.position(Quantity::Form(section))?;
                 let index = order * one.unknowns.len() + unknown;
-                one.observable.get(index).is_some_and(|told| *told).then_some(index)
+                one.observable.get(index).is_some_and(|observable| *observable).then_some(index)
             };
-            // Orders that one of them cannot tell are no errors.
+            // Orders that are not observable in one of them are no errors.
             let (Some(a), Some(b), Some(c)) = (index(sound), index(before), index(after)) else { continue };
             let found = [sound.estimate[a], before.estimate[b], after.estimate[c]];
             let errors = found.map(|value| (value - harmonics.get(order).copied().unwrap_or_default()).norm_sqr());
@@ -246,7 +246,7 @@ impl Judged {
         let alarm = if self.campaign.kind == Kind::Stranger { "blamed" } else { "false alarm" };
         failures.extend(self.false_alarms.iter().map(|name| format!("{alarm}: {name}")));
         let [farther, stated] = [self.form.sound, self.form.stated].map(|other| self.form.after / other);
-        if self.told_apart() && self.effects.iter().any(|traced| traced.visible) && farther > 1.5 {
+        if self.is_distinguishable() && self.effects.iter().any(|traced| traced.visible) && farther > 1.5 {
             failures.push(format!("form {farther:.1} times as far off as the sound one"));
         }
         let seen = self.campaign.kind != Kind::Stranger && self.effects.iter().all(|traced| traced.visible);
@@ -268,8 +268,8 @@ impl Judged {
         failures
     }
 
-    /// Whether the loop knows what was planted and the layout tells it from all else.
-    fn told_apart(&self) -> bool {
+    /// Whether the loop knows what was planted and the layout distinguishes it from all else.
+    fn is_distinguishable(&self) -> bool {
         self.campaign.rig == Layout::Six && matches!(self.campaign.kind, Kind::Single | Kind::Pair)
     }
 

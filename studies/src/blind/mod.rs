@@ -1,4 +1,4 @@
-//! The blind benchmarks of the closed loop: simulated campaigns with something wrong that the loop is not told of, from below
+//! The blind benchmarks of the closed loop: simulated campaigns with something wrong that is not declared to the loop, from below
 //! what can be seen to large; two things wrong; nothing wrong; and strangers, which it does not know.
 //!
 //! [`draw`], [`judge`] and [`report`] are the spindle's. Measured points share one driver, [`points`]; a domain adds one file to

@@ -53,7 +53,7 @@ fn diagnosed() -> Diagnosis {
         effect: "sensor-nonlinearity".into(),
         targets: vec!["S1".into()],
         confounded_with: vec![],
-        told_apart_by: None,
+        distinguished_by: None,
         parameters: vec![estimate("quadratic", 1.712e-3, 2.3e-5, "1/um"), estimate("cubic", -4.04e-7, 3.1e-8, "1/um2")],
         change: Some("sensors.0.quadratic_per_um = 0.001712\nsensors.0.cubic_per_um2 = -4.04e-7".into()),
         residual_rms_um: step(0.0593, 0.0266),
@@ -66,7 +66,7 @@ fn diagnosed() -> Diagnosis {
         effect: "sensor-gain".into(),
         targets: vec!["S3".into()],
         confounded_with: vec!["sensor-gain S4".into()],
-        told_apart_by: Some("a third sensor in section b".into()),
+        distinguished_by: Some("a third sensor in section b".into()),
         parameters: vec![Estimated { std: None, ..estimate("gain", 0.0171, 0.0, "") }],
         change: None,
         residual_rms_um: step(0.0266, 0.0102),
@@ -158,7 +158,7 @@ fn noise_that_is_not_known_and_another_unit() {
 }
 
 #[test]
-fn what_acts_on_the_rig_or_on_one_setup_is_told_apart() {
+fn what_acts_on_the_rig_or_on_one_setup_is_distinguished() {
     let bias_per_unit = BiasPerUnit { value: 0.3, unit: "um/deg".into(), on: "form".into() };
     let one = |targets: &[&str]| Blind {
         effect: "speed-ripple".into(),

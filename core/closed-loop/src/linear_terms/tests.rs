@@ -177,7 +177,7 @@ fn a_bad_group_is_named() {
 }
 
 #[test]
-fn what_only_one_group_tells_is_predicted_as_nothing() {
+fn what_only_one_group_determines_is_predicted_as_nothing() {
     // Two groups of two; the term is seen in the second alone.
     let observations = Observations {
         values: vec![1.0, 1.2, 5.0, 5.2],
@@ -205,7 +205,7 @@ fn known_effects_are_not_fitted_again() {
 }
 
 #[test]
-fn points_that_cannot_tell_are_refused() {
+fn points_that_do_not_determine_the_parameters_are_refused() {
     let observations = |values: &[f64]| Observations {
         values: values.to_vec(),
         group: vec![0; values.len()],

@@ -175,7 +175,7 @@ impl Basis {
     /// Each point less what the fit to the points outside its group predicts of it.
     ///
     /// With r what the fit to all points leaves, it is r_g + Q_g·(1 − Q_gᵀQ_g)⁻¹·Q_gᵀr_g: the others' normal matrix is
-    /// 1 − Q_gᵀQ_g, well conditioned because Q is orthonormal. A direction that only the group tells is predicted as 0.
+    /// 1 − Q_gᵀQ_g, well conditioned because Q is orthonormal. A direction that only the group shows is predicted as 0.
     #[must_use]
     pub fn left_out(&self, values: &[f64], groups: &[Vec<usize>]) -> Vec<f64> {
         let count = self.rank();
@@ -184,9 +184,9 @@ impl Basis {
         self.remove_from(&mut left);
         let mut found = left.clone();
         for points in groups {
-            let (inside, told) = self.without(points);
+            let (inside, others) = self.without(points);
             let mut change = vec![0.0; count];
-            for (direction, weight) in told.eigenvectors.column_iter().zip(told.eigenvalues.iter()) {
+            for (direction, weight) in others.eigenvectors.column_iter().zip(others.eigenvalues.iter()) {
                 let step = if *weight > DETERMINED {
                     let shown = &inside * direction;
                     shown.iter().zip(points).map(|(entry, point)| entry * left[*point]).sum::<f64>() / weight
@@ -208,10 +208,10 @@ impl Basis {
     #[must_use]
     pub fn left_out_gain(&self, groups: &[Vec<usize>], points: usize) -> f64 {
         let predicted = groups.iter().map(|group| {
-            let (inside, told) = self.without(group);
-            let directions = told.eigenvectors.column_iter().zip(told.eigenvalues.iter());
-            let told = directions.filter(|(_, weight)| **weight > DETERMINED);
-            told.map(|(direction, weight)| (&inside * direction).norm_squared() / weight).sum::<f64>()
+            let (inside, others) = self.without(group);
+            let directions = others.eigenvectors.column_iter().zip(others.eigenvalues.iter());
+            let determined = directions.filter(|(_, weight)| **weight > DETERMINED);
+            determined.map(|(direction, weight)| (&inside * direction).norm_squared() / weight).sum::<f64>()
         });
         (1.0 + predicted.sum::<f64>() / points.max(1) as f64).sqrt()
     }

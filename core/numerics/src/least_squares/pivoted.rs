@@ -1,4 +1,4 @@
-//! Small complex least squares by column-pivoted Householder QR, with what the columns cannot tell.
+//! Small complex least squares by column-pivoted Householder QR, and which unknowns the columns make observable.
 
 use crate::Complex64;
 
@@ -272,11 +272,11 @@ mod tests {
     }
 
     #[test]
-    fn dependent_columns_are_told_from_the_others() {
+    fn dependent_columns_are_not_observable() {
         let mut seed = 3;
         let (rows, cols) = (7, 4);
         let mut matrix = random(rows, cols, &mut seed);
-        // Column 2 becomes a multiple of column 0: both cannot be told; 1 and 3 can.
+        // Column 2 becomes a multiple of column 0: neither is observable; 1 and 3 are.
         for row in 0..rows {
             matrix[row * cols + 2] = matrix[row * cols] * Complex64::new(0.3, -1.2);
         }

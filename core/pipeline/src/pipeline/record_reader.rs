@@ -80,14 +80,14 @@ impl RecordReader<'_> {
             });
             let captures =
                 claimed.flat_map(|station| (0..setups).map(move |setup| (station, setup))).map(|(station, setup)| {
-                    let told = &spikes[station * setups + setup];
-                    (station, self.recorded(readers, station, setup, told))
+                    let spikes = &spikes[station * setups + setup];
+                    (station, self.recorded(readers, station, setup, spikes))
                 });
             let work_on = |captures: &mut dyn Captures<usize>| {
                 while let Some(index) = captures.coming() {
-                    let told = &spikes[index * setups..(index + 1) * setups];
+                    let spikes = &spikes[index * setups..(index + 1) * setups];
                     let result =
-                        self.station(&stations[index], captures, told).and_then(|station| work(index, station));
+                        self.station(&stations[index], captures, spikes).and_then(|station| work(index, station));
                     if !ordered_collector.pass(index, result) {
                         failed.store(true, Ordering::Relaxed);
                     }
@@ -134,8 +134,8 @@ impl RecordReader<'_> {
         spikes: &'b Mutex<Vec<Spike>>,
     ) -> Result<Box<dyn SampleStream + 'b>> {
         let opened = calibrated(self.recording.open_with(threads, station, setup)?, self.rig);
-        let tell = |found| *spikes.lock().unwrap_or_else(PoisonError::into_inner) = found;
-        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::telling(opened, tell));
+        let report = |found| *spikes.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::reporting(opened, report));
         self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))
     }
 
@@ -183,7 +183,7 @@ fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String
             || marks.is_none_or(|(first, last)| !(*first..*last).contains(&sample))
     };
     let in_average = spikes.iter().filter(|spike| !left_out(spike));
-    let told = in_average.map(|spike| {
+    let messages = in_average.map(|spike| {
         let Spike { channel, near_sample, within_samples, reading_um, usual_um, stretches } = spike;
         let sensor = capture.sensor_ids.get(*channel).map_or("", String::as_str);
         let times = if *stretches > 1 { format!(" ({stretches} turns or so have such readings)") } else { String::new() };
@@ -195,16 +195,16 @@ fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String
             capture.object
         )
     });
-    told.collect()
+    messages.collect()
 }
 
-/// Separates a station, and refuses what is not a number where the layout could tell one, and a form that no part of
+/// Separates a station, and refuses what is not a number where it is observable, and a form that no part of
 /// `radius_mm` has.
 pub(crate) fn separate(separator: &dyn StationSeparator, station: &Station, radius_mm: f64) -> Result<Separation> {
     let separation = separator.separate(station)?;
     let width = separation.unknowns.len().max(1);
-    let told = separation.estimate.iter().zip(&separation.observable);
-    let number = told.enumerate().find(|(_, (value, told))| **told && !value.is_finite());
+    let estimates = separation.estimate.iter().zip(&separation.observable);
+    let number = estimates.enumerate().find(|(_, (value, observable))| **observable && !value.is_finite());
     let problem = match number {
         Some((index, _)) => {
             let quantity = separation.unknowns[index % width].id();

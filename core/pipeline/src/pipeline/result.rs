@@ -10,7 +10,7 @@ use runout_turning::{
     separation::{Quantity, Separation, UM_PER_MM_URAD},
 };
 
-/// Which of the standards' values a part of some nominal radius gets, and the rig that tells where it is interrupted.
+/// Which of the standards' values a part of some nominal radius gets, and the rig, which declares interruptions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evaluation<'a> {
     pub evaluate: &'a Evaluate,
@@ -60,7 +60,7 @@ fn true_motion(motion: &[Vec<f64>; 4], quantity: Quantity, z_mm: f64) -> Vec<f64
     sum
 }
 
-/// Root mean square of estimate minus truth over the orders from 2 that could be told; along the axis from 1.
+/// Root mean square of estimate minus truth over the observable orders from 2; along the axis from 1.
 pub(super) fn true_error(result: &StationResult, quantity: Quantity) -> Option<f64> {
     let truth = result.truth.as_ref()?;
     let curve = match quantity {
@@ -76,17 +76,21 @@ pub(super) fn true_error(result: &StationResult, quantity: Quantity) -> Option<f
     let mut harmonics = vec![Complex64::ZERO; fourier.max_order() + 1];
     fourier.analyse(curve.iter().copied(), &mut harmonics);
     let width = result.separation.unknowns.len();
-    let told = result.separation.observable.iter().skip(unknown).step_by(width);
+    let observable = result.separation.observable.iter().skip(unknown).step_by(width);
     // Along the axis, the fundamental is error motion.
     let lowest = if quantity.is_axial() { 1 } else { 2 };
-    let squares =
-        result.separation.coefficients(unknown).zip(told).enumerate().skip(lowest).filter(|(_, (_, told))| **told).map(
-            |(order, (value, _))| {
-                let truth = harmonics.get(order).copied().unwrap_or_default();
-                let truth = if quantity.is_form() { truth } else { truth.conj() };
-                (value - truth).norm_sqr()
-            },
-        );
+    let squares = result
+        .separation
+        .coefficients(unknown)
+        .zip(observable)
+        .enumerate()
+        .skip(lowest)
+        .filter(|(_, (_, seen))| **seen)
+        .map(|(order, (value, _))| {
+            let truth = harmonics.get(order).copied().unwrap_or_default();
+            let truth = if quantity.is_form() { truth } else { truth.conj() };
+            (value - truth).norm_sqr()
+        });
     Some((0.5 * squares.sum::<f64>()).sqrt())
 }
 
@@ -97,9 +101,9 @@ mod tests {
     use super::*;
     use runout_turning::separation::{Residual, SectionAt};
 
-    /// Sensors in one plane tell the motion of that plane: 2 µm at the reference and 5 µrad 100 mm further are 2.5 µm.
+    /// Sensors in one plane measure the motion there: 2 µm at the reference and 5 µrad 100 mm further are 2.5 µm.
     #[test]
-    fn motion_is_compared_where_it_is_told() {
+    fn motion_is_compared_where_it_is_observable() {
         let cosine = |amplitude: f64| -> Vec<f64> {
             (0..32).map(|step| amplitude * (3.0 * std::f64::consts::TAU * f64::from(step) / 32.0).cos()).collect()
         };
@@ -128,6 +132,6 @@ mod tests {
             // Rounding of transforms of values near 1.
             assert!(true_error(&result, quantity).unwrap() < 1e-14, "{quantity:?}");
         }
-        assert!(true_error(&result, Quantity::TiltX).is_none(), "tilt was not told");
+        assert!(true_error(&result, Quantity::TiltX).is_none(), "tilt is not observable");
     }
 }

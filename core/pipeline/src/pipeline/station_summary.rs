@@ -14,7 +14,7 @@ use runout_turning::{
 pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSummary {
     let separation = &result.separation;
     let known = |value: f64| value.is_finite().then_some(value);
-    let nothing = separation.tells_no_form();
+    let nothing = separation.has_no_observable_form();
     // A face has no form of a circle around the part: its harmonics are in the table.
     let around = |(section, _): &(usize, &SectionAt)| rig.is_none_or(|rig| !rig.is_face(*section));
     let sections = separation.sections.iter().enumerate().filter(around).map(|(section, at)| {

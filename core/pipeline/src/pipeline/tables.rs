@@ -126,7 +126,7 @@ impl StationTables {
         if separation.unknowns.iter().any(|unknown| !unknown.is_form()) {
             tables.push((&self.motion, motion_rows(result, self.line, self.axial)));
         }
-        if separation.tells_no_form() {
+        if separation.has_no_observable_form() {
             tables.push((&self.reading, reading_rows(result, self.rig.as_ref())));
         }
         if !separation.residual.by_reading.is_empty() {

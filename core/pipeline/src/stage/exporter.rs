@@ -54,7 +54,7 @@ pub struct ResultInfo {
 
 /// An export under way.
 pub trait Export: Send {
-    /// Takes rows of one of the tables that it was told of.
+    /// Takes rows of one of the tables announced in [`ResultInfo`].
     ///
     /// # Errors
     /// When they cannot be written.

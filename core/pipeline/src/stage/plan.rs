@@ -72,7 +72,7 @@ pub struct PointAddition {
     /// Effects, "effect target", that are blind as it is and would show with this.
     pub reveals: Vec<String>,
     /// Confounded sets that would be distinguished.
-    pub tells_apart: Vec<Vec<String>>,
+    pub distinguishes: Vec<Vec<String>>,
 }
 
 impl NoiseGain {
@@ -120,11 +120,11 @@ impl PointAddition {
         let now: Vec<String> = after.blind_names().collect();
         let shows = |blind: &String| after.visible.iter().any(|one| name(&one.effect, &one.targets) == *blind);
         let reveals = before.blind_names().filter(|blind| !now.contains(blind) && shows(blind)).collect();
-        let tells_apart = before
+        let distinguishes = before
             .confounded
             .iter()
             .filter(|set| !set.iter().any(|one| now.contains(one)) && !after.confounded.contains(set));
-        let tells_apart = tells_apart.cloned().collect();
-        Self { reveals, tells_apart, ..self }
+        let distinguishes = distinguishes.cloned().collect();
+        Self { reveals, distinguishes, ..self }
     }
 }

@@ -77,8 +77,8 @@ pub trait PointSeparator: Send + Sync {
         None
     }
 
-    /// What the layout would tell and how well, and what to add to it: of the points where they are there, else as the
-    /// configuration has it. Nothing where there is nothing to plan.
+    /// What is observable with the layout and how well, and what to add to it: of the points where they are there, else
+    /// as the configuration has it. Nothing where there is nothing to plan.
     ///
     /// # Errors
     /// When the points do not hold what the method needs.

@@ -39,7 +39,7 @@ pub trait StationSeparator: Send + Sync {
     /// When the profiles do not fit the rig.
     fn sensitivity(&self, station: &Station) -> Result<Sensitivity>;
 
-    /// How motion of the axis follows from the readings of one setup (an index into the rig's); `None` where these tell none.
+    /// How motion of the axis follows from the readings of one setup (an index into the rig's); `None` where they show none.
     fn projection(&self, _setup: usize) -> Option<Projection> {
         None
     }

@@ -10,7 +10,7 @@ use runout_numerics::lanes::product;
 
 /// Highest degree of a polynomial form.
 const HIGHEST_DEGREE: usize = 8;
-/// Singular values below this share of the largest are none: directions that the points measured cannot tell.
+/// Singular values below this share of the largest are none: directions that the points measured do not determine.
 const RANK: f64 = 1e-12;
 
 /// A map without the least-squares cylinder: mean radius, the axis' offset and its tilt, linear in deviations that are

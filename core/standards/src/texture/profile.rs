@@ -9,7 +9,7 @@ use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
 /// Spacings that differ by less than this share are equal.
 const EVEN: f64 = 1e-6;
 /// Share of the mean distance of points by which one may be off a limit and counts as at it: the axis of a cylinder, by which places
-/// along it are told, is fitted to noisy points.
+/// along it are given, is fitted to noisy points.
 pub(super) const AT_AN_END: f64 = 1e-3;
 
 /// A profile about its mean line.

@@ -21,7 +21,7 @@ fn creep(sizes: &[f64], course: Course) -> Creep {
 }
 
 #[test]
-fn straight_and_settling_creeps_are_told_apart_by_evidence() {
+fn straight_and_settling_creeps_are_distinguished_by_evidence() {
     for size in [1.0, -24.0, 100.0] {
         let found = creep(&[size; 3], Course::Straight);
         assert!(found.certain && found.shared && found.time_constant.is_none(), "{found:?}");

@@ -201,14 +201,14 @@ fn a_slow_swing_of_few_steps_is_not_stuck() {
     }
 }
 
-/// What is told of at the end.
+/// What is reported at the end.
 fn spikes(stream: MemoryStream) -> Vec<Spike> {
-    let (sender, told) = std::sync::mpsc::channel();
-    let mut inspection = Inspection::telling(Box::new(stream), move |spikes| sender.send(spikes).unwrap());
+    let (sender, reported) = std::sync::mpsc::channel();
+    let mut inspection = Inspection::reporting(Box::new(stream), move |spikes| sender.send(spikes).unwrap());
     let mut block = Block::default();
     while inspection.next_block(&mut block).unwrap() {}
     drop(inspection);
-    told.recv().unwrap()
+    reported.recv().unwrap()
 }
 
 /// Numbers with a Gaussian distribution of deviation 1, the sum of twelve from Knuth's generator.
@@ -230,7 +230,7 @@ fn with_noise(mut channel: Vec<f64>, std_um: f64, seed: u64) -> Vec<f64> {
 const TURNS: usize = 60;
 
 #[test]
-fn a_reading_far_from_all_others_is_told_with_its_place() {
+fn a_reading_far_from_all_others_is_reported_with_its_place() {
     for (seed, place) in [0, 1, 999, 23_456, 40_000, TURNS * TURN - 1].into_iter().enumerate() {
         for (spike_um, noise_um) in [(40.0, 0.05), (-12.5, 0.05), (500.0, 0.0), (-45.0, 2.0)] {
             let [quiet, mut marred] = [0.0, 1.0].map(|phase| {

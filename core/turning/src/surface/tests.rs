@@ -191,7 +191,7 @@ fn sections_of_two_sensors_meet_and_are_averaged_by_their_variance() {
 }
 
 #[test]
-fn an_order_that_one_section_cannot_tell_comes_from_the_other() {
+fn an_order_not_observable_in_one_section_comes_from_the_other() {
     let nan = Complex64::new(f64::NAN, f64::NAN);
     let lost = [Complex64::ZERO, Complex64::ZERO, nan, Complex64::new(1.0, 0.0)];
     let whole = [Complex64::ZERO, Complex64::ZERO, Complex64::new(4.0, 0.0), Complex64::new(3.0, 0.0)];

@@ -83,7 +83,7 @@ impl Loader for Hdf5Loader {
 
     fn open(&self, wanted: &Request) -> Result<Source> {
         let rig = wanted.rig.ok_or_else(|| {
-            Error::new("open", self.path.display().to_string(), "recorded turns need a [rig] to tell the sensors")
+            Error::new("open", self.path.display().to_string(), "recorded turns need a [rig] that names the sensors")
                 .of(ErrorKind::Configuration)
         })?;
         Ok(Source::Turns(Box::new(Hdf5Recording::open(&self.path, rig, self.marker.clone(), self.follow_links)?)))

@@ -50,7 +50,7 @@ pub(crate) fn parameter(added: &Added, name: &str) -> [f64; 2] {
     [found.value, found.std.unwrap_or(f64::NAN)]
 }
 
-pub(crate) fn told(diagnosis: &Diagnosis) -> String {
+pub(crate) fn listing(diagnosis: &Diagnosis) -> String {
     let added: Vec<String> = diagnosis
         .added
         .iter()

@@ -12,7 +12,7 @@ fn low_pass(cutoff_hz: f64, order: usize) -> Box<dyn Conditioner> {
     conditioner(LowPassConfig { cutoff_hz, order })
 }
 
-/// Noise about a level and a slope, which tell how the ends are continued.
+/// Noise about a level and a slope, which determine how the ends are continued.
 fn rough(frames: usize, channels: usize) -> Vec<Vec<f64>> {
     let mut scatter = scatter(1);
     let channel = |index: usize| {

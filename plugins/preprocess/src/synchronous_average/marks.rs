@@ -1,4 +1,4 @@
-//! How well marks that are known to a part of a sample tell the spindle angle.
+//! How well marks that are known to a part of a sample give the spindle angle.
 
 use std::f64::consts::TAU;
 

@@ -40,7 +40,7 @@ impl Outliers {
         Self { sigma, channels, held: Vec::new() }
     }
 
-    /// Takes a turn; `judged` gets those that can now be told.
+    /// Takes a turn; `judged` gets those that can now be judged.
     pub(super) fn add(&mut self, turn: PendingTurn, means: &mut Means, judged: &mut Vec<Verdict>) {
         self.held.push(turn);
         if self.held.len() >= 2 * TOGETHER {

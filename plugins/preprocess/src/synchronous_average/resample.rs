@@ -287,7 +287,7 @@ fn angles(turns: &[Turn], samples_per_rev: usize, encoder: bool) -> (usize, bool
             return (length, true);
         }
     }
-    // Within a turn the encoder tells of faster and slower stretches: where it is slow, samples lie closer.
+    // Within a turn the encoder shows faster and slower stretches: where it is slow, samples lie closer.
     let densest = if encoder { 1.25 * longest } else { longest };
     let needed = (0.5 * densest) as usize + max_order(samples_per_rev).min(orders_held(densest)) + 1;
     let fewest = needed.max(longest as usize).next_multiple_of(2);

@@ -118,7 +118,7 @@ pub(crate) struct StationData {
     pub seen: Arc<TurnObservations>,
     /// Leak of each line into the readings.
     pub leaks: Vec<Vec<Complex64>>,
-    /// Sensor, mean creep a turn where it is largest and its standard uncertainty, where the levels tell a drift for certain: one observation
+    /// Sensor, mean creep a turn where it is largest and its standard uncertainty, where the levels show a drift for certain: one observation
     /// more, since a creep of one sensor can look like a motion in the averaged turn.
     pub creeps: Vec<(usize, f64, f64)>,
     /// Covariance of the averages with the drifts that single turns show still in it.

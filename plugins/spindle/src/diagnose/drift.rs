@@ -91,7 +91,7 @@ impl Creeping {
         self.creep.over(largest, 0.0, turns)
     }
 
-    /// The reference creep and its standard uncertainty as one of the stations tells it, in µm a turn.
+    /// The reference creep and its standard uncertainty as one of the stations gives it, in µm a turn.
     pub(crate) fn observed(&self, part: Part) -> (f64, f64) {
         let creep = self.reference(part);
         let rate = self.creep.rates.get(self.creep.largest()).copied().unwrap_or(0.0);

@@ -250,7 +250,7 @@ impl Fit for SpindleFit {
     }
 
     fn results(&self) -> Vec<f64> {
-        let told = self.stations.iter().flat_map(|solved| {
+        let harmonics = self.stations.iter().flat_map(|solved| {
             self.layout.forms().flat_map(move |unknown| {
                 (2..=solved.corrected.max_order).flat_map(move |order| {
                     let observable = solved.operators.observable(order)[unknown];
@@ -259,7 +259,7 @@ impl Fit for SpindleFit {
                 })
             })
         });
-        told.collect()
+        harmonics.collect()
     }
 
     fn mix(&mut self, weights: &[f64], others: Vec<Self>) {

@@ -36,7 +36,7 @@ impl SpindleModel {
         self.traced.places.iter().position(is)
     }
 
-    /// Mistakes beside some effects that would leave far less, as effects: the first station tells.
+    /// Mistakes beside some effects that would leave far less, as effects: the first station decides.
     pub(super) fn suspects(&self, applied: &[Setting]) -> Vec<Vec<usize>> {
         let Some(data) = self.traced.data.first() else { return Vec::new() };
         let alterations = self.alterations(applied);

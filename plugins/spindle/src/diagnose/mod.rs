@@ -270,7 +270,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
         model.traced.kinds[place.kind].about().acts_on == ActsOn::Sensor
             && changes.iter().any(|change| section(change.sensor) == section(place.index))
     };
-    // Turns that tell how a sensor's level goes tell whether it drifts: a wander leaks into the mean as a drift does.
+    // Turns that show how a sensor's level goes show whether it drifts: a wander leaks into the mean as a drift does.
     let creeping = model.traced.data.first().map_or(&[][..], |station| &station.seen.creeping);
     let steady = |place: &data::Place| {
         let creeping = creeping.get(place.index).and_then(Option::as_ref);
@@ -326,7 +326,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
         diagnosis.warnings.extend(sizes::mistaken_units(rig, &data.readings));
     }
     let highest = TRACED_ORDERS.min(closed.after.max_order());
-    if model.traced.layout.assess(highest).tells_no_form() {
+    if model.traced.layout.assess(highest).has_no_observable_form() {
         // Single turns may show a drift or a line all the same; the averaged turn shows nothing.
         diagnosis.nothing_separated = true;
         diagnosis.verdict = if diagnosis.added.is_empty() { Verdict::NothingFound } else { Verdict::Improved };

@@ -49,7 +49,7 @@ pub(crate) fn lines(selection: &Selection, alterations: &Alterations, key: RigKe
 }
 
 fn line(table: &str, key: &str, value: f64) -> String {
-    // TOML tells 100 from 100.0.
+    // TOML distinguishes 100 from 100.0.
     format!("{table}.{key} = {value:?}")
 }
 

@@ -1,5 +1,5 @@
 //! `even-order-motion`: the sensors stayed while the part was reversed, and motion of even orders did not change its sign, as
-//! the separator was told to assume. It has no parameter: with it, even orders are lost instead of wrong.
+//! the separator was configured to assume. It has no parameter: with it, even orders are lost instead of wrong.
 
 use runout_core::Complex64;
 

@@ -1,6 +1,6 @@
 //! `sensor-axial-position`: a sensor sits at z + ζ, with another lever arm on tilt, ∂/∂ζ = ε_y cos θ' − ε_x sin θ'. It sees
 //! another circle of the part there: + ∂h/∂z, as the form changes from one section to the next. Both are tried: sections may
-//! be too far apart to tell the change between them.
+//! be too far apart to show the change between them.
 
 use runout_core::Complex64;
 

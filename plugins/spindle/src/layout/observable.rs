@@ -12,7 +12,7 @@ impl Layout {
     /// Whether each unknown is observable at an order.
     ///
     /// At order 1 form is 0 by definition and motion is its counter-rotating part; both are lost where one clamping
-    /// cannot tell eccentricity from co-rotating motion even in principle (A₁ is deficient), or no sensor pair tells
+    /// does not distinguish eccentricity from co-rotating motion (A₁ is deficient), or no sensor pair measures
     /// the counter-rotating part.
     #[must_use]
     pub fn observable(&self, order: usize) -> Vec<bool> {
@@ -29,18 +29,18 @@ impl Layout {
         if order == 1 {
             let unknowns = self.first_order_unknowns();
             let first = self.factor_matrix(unknowns.len(), &self.first_order_matrix()).observable(NULL_TOLERANCE);
-            let told =
+            let is_observable =
                 |wanted| !unknowns.contains(&wanted) || unknowns.iter().zip(&first).any(|(u, t)| *u == wanted && *t);
             for (quantity, observable) in self.unknowns.iter().zip(&mut observable) {
                 // Of the face, 1/rev is how it was clamped, in each setup by itself: the equations of order 1 say all of z.
                 if *quantity == Quantity::Z {
-                    *observable = told(FirstOrder::Axial);
+                    *observable = is_observable(FirstOrder::Axial);
                     continue;
                 }
                 *observable &= match quantity {
                     Quantity::Form(_) | Quantity::FaceForm(_) => true,
-                    motion if motion.is_tilt() => told(FirstOrder::CounterRotatingTilt),
-                    _ => told(FirstOrder::CounterRotatingShift),
+                    motion if motion.is_tilt() => is_observable(FirstOrder::CounterRotatingTilt),
+                    _ => is_observable(FirstOrder::CounterRotatingShift),
                 };
             }
         } else if self.max_noise_gain.is_finite() {
@@ -80,8 +80,8 @@ impl Layout {
         let observable = self.observable_unknowns(&qr, order);
         let covariance = qr.covariance();
         let gains = self.to_reference(self.mean_z_mm).spread(&covariance);
-        let told = observable.iter().zip(gains);
-        let noise_gain = told.map(|(seen, gain)| if *seen { gain.sqrt() } else { f64::NAN }).collect();
+        let by_unknown = observable.iter().zip(gains);
+        let noise_gain = by_unknown.map(|(seen, gain)| if *seen { gain.sqrt() } else { f64::NAN }).collect();
         let lost_because = observable.contains(&false).then(|| {
             let lost = self.unknowns.iter().zip(&observable).filter(|(_, seen)| !**seen);
             let mut names: Vec<&str> = lost.clone().map(|(quantity, _)| quantity.id()).collect();

@@ -22,7 +22,7 @@ use crate::{
 /// Angles at which the part is clamped or a sensor stands, in degrees, round ones first.
 const TRIED_DEG: [f64; 9] = [90.0, 180.0, 270.0, 45.0, 135.0, 225.0, 60.0, 120.0, 100.0];
 
-/// An addition, and what the rig would tell with it that it does not without.
+/// An addition, and what is observable or distinguished with it and not without it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
     /// What to add.
@@ -32,7 +32,7 @@ pub struct Change {
     /// Blind effects ("effect target") that would show.
     pub reveals: Vec<String>,
     /// Confounded sets of which every two members would be distinguished.
-    pub tells_apart: Vec<Vec<String>>,
+    pub distinguishes: Vec<Vec<String>>,
 }
 
 /// Additions that make effects visible or distinguish them.
@@ -116,7 +116,7 @@ pub fn changes(rig: &Rig, foresight: &Foresight, known: &[Suggestion], clearance
             open.blind.retain(|name| !settled.blind.contains(name));
             open.confounded.retain(|set| !settled.confounded.contains(set));
             let (addition, rig, _) = candidates.remove(index);
-            found.push(Change { addition, rig, reveals: settled.blind, tells_apart: settled.confounded });
+            found.push(Change { addition, rig, reveals: settled.blind, distinguishes: settled.confounded });
         }
     }
     Ok(Changes { found, still_blind: open.blind, still_confounded: open.confounded })
@@ -137,7 +137,7 @@ impl Open {
         self.blind.len() + self.confounded.len()
     }
 
-    /// What of it a rig tells that foresees this.
+    /// What of it a rig with this foresight settles.
     fn settled_by(&self, after: &Foresight) -> Self {
         let blind: Vec<String> = after.blind_names().collect();
         let together = |set: &Vec<String>| {

@@ -91,7 +91,7 @@ pub struct FormGain {
 #[derive(Debug, Default)]
 struct Tally {
     lost: usize,
-    told: usize,
+    observable: usize,
     worst: f64,
     worst_order: usize,
     squares: f64,
@@ -103,7 +103,7 @@ impl Tally {
             self.lost += 1;
             return;
         }
-        self.told += 1;
+        self.observable += 1;
         self.squares += gain * gain;
         if gain > self.worst * (1.0 + SAME_GAIN) {
             (self.worst, self.worst_order) = (gain, order);
@@ -111,7 +111,7 @@ impl Tally {
     }
 
     fn score(&self) -> Score {
-        let rms = (self.squares / self.told.max(1) as f64).sqrt();
+        let rms = (self.squares / self.observable.max(1) as f64).sqrt();
         Score { lost: self.lost, worst: self.worst, worst_order: self.worst_order, rms }
     }
 }

@@ -72,7 +72,7 @@ pub fn suggest(rig: &Rig, orders: &RangeInclusive<usize>, clearance_deg: f64) ->
 
 /// Angles to try, round ones first: where several do as well as one another, the first is taken, which is easy to set.
 ///
-/// A grid of M places a turn cannot tell anything at orders that are multiples of M, and little beside them.
+/// With a grid of M places a turn nothing is observable at orders that are multiples of M, and little beside them.
 fn grid_deg(highest_order: usize) -> Vec<f64> {
     let per_deg = match highest_order {
         ..=180 => 1,

@@ -36,7 +36,7 @@ pub trait ClosedForm: Send + Sync {
     /// Unknowns = operator · readings at an order from 2, `[unknown][reading]`; `None` where the formula has a pole.
     fn operator(&self, layout: &Layout, order: usize) -> Option<Vec<Complex64>>;
 
-    /// What the user should know before any data, besides what the layout tells.
+    /// What the user should know before any data, besides what follows from the layout.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
@@ -181,7 +181,7 @@ impl ClosedFormSeparator {
 impl StationSeparator for ClosedFormSeparator {
     fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
         let mut assessment = self.layout.assess(max_order);
-        self.selection.tell(&mut assessment);
+        self.selection.note_unused(&mut assessment);
         assessment.notes.extend(self.method.notes());
         Ok(assessment)
     }

@@ -55,7 +55,7 @@ pub struct HarmonicLeastSquaresConfig {
     #[serde(default)]
     pub weighting: Weighting,
     /// An order is lost where form or motion would carry more than this many times the readings' noise; without it,
-    /// where the layout cannot tell it at all.
+    /// where it is not observable with the layout.
     #[serde(default)]
     pub max_noise_gain: Option<f64>,
 }
@@ -86,7 +86,7 @@ pub struct HarmonicLeastSquares {
 }
 
 impl HarmonicLeastSquares {
-    /// For one rig, with every order that it can tell.
+    /// For one rig, with every order that is observable with it.
     #[must_use]
     pub fn new(rig: &Rig, second_order: bool, weighting: Weighting) -> Self {
         Self::of(Selection::whole(rig), second_order, weighting, f64::INFINITY)
@@ -108,7 +108,7 @@ impl StationSeparator for HarmonicLeastSquares {
     fn assess(&self, max_order: usize) -> std::result::Result<Assessment, Fault> {
         let mut assessment = self.layout.assess(max_order);
         assessment.notes.extend(face_notes(&self.selection.rig, &assessment));
-        self.selection.tell(&mut assessment);
+        self.selection.note_unused(&mut assessment);
         Ok(assessment)
     }
 

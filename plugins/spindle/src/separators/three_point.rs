@@ -44,7 +44,7 @@ impl Probes {
         self.weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt()
     }
 
-    /// The two sensors nearest to a right angle: they tell motion best.
+    /// The two sensors nearest to a right angle: they measure motion best.
     fn squarest(&self) -> [usize; 2] {
         let opposite = (0..3).max_by(|a, b| self.weights[*a].abs().total_cmp(&self.weights[*b].abs())).unwrap_or(0);
         [(opposite + 1) % 3, (opposite + 2) % 3]

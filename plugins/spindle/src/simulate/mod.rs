@@ -119,7 +119,7 @@ impl StageConfig for SpindleConfig {
         "a turned part on a spindle: form, error motion, and what goes wrong while measuring them";
 
     fn check(mut self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        // As harmonics: the recording then tells the whole truth without the file.
+        // As harmonics: the recording then holds the whole truth without the file.
         if let Some(path) = self.form.measured.take() {
             let harmonics = measured::harmonics(&context.path(&path), self.form.max_order)
                 .map_err(|problem| Fault::at("measured", problem).under("form"))?;

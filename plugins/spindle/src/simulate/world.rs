@@ -84,7 +84,7 @@ pub(super) struct Clamping {
 pub(super) const UM_PER_MM_URAD: f64 = 1e-3;
 /// Stations that a campaign may have.
 const MOST_STATIONS: usize = 1_000_000;
-/// What the random streams can tell apart.
+/// How many parts the random streams distinguish.
 const MOST_PARTS: usize = 4_096;
 
 impl World {

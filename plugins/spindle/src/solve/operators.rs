@@ -164,7 +164,7 @@ mod tests {
         (1..=max_order).map(|order| Blocks::new(size, blocks(order))).collect()
     }
 
-    /// Of three sensors, some orders are lost, and orders close to them are told badly.
+    /// Of three sensors, some orders are lost, and orders close to them have a large noise gain.
     #[test]
     fn eight_orders_at_once_are_as_one_after_the_other() {
         const MAX_ORDER: usize = 83;

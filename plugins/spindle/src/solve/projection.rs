@@ -8,7 +8,7 @@ use crate::{
 };
 
 /// Least-squares inverse of what the sensors of a setup (an index into the whole rig's) see of motion, at their mean z;
-/// `None` where they tell none.
+/// `None` where none of it is observable.
 pub(crate) fn projection(selection: &Selection, layout: &Layout, setup: usize) -> Option<Projection> {
     let setup = selection.setups.iter().position(|chosen| *chosen == setup)?;
     let readings: Vec<&Reading> = layout.readings.iter().filter(|reading| reading.setup == setup).collect();
@@ -25,8 +25,9 @@ pub(crate) fn projection(selection: &Selection, layout: &Layout, setup: usize) -
     let matrix: Vec<_> = readings.iter().flat_map(|reading| row(reading)).collect();
     let qr = PivotedQr::new(readings.len(), motions.len(), &matrix, RANK_TOLERANCE);
     let operator = qr.operator();
-    let told = qr.observable(NULL_TOLERANCE).into_iter();
-    let rows = motions.iter().zip(operator.chunks_exact(readings.len())).zip(told).filter(|(_, told)| *told);
+    let observable = qr.observable(NULL_TOLERANCE).into_iter();
+    let rows =
+        motions.iter().zip(operator.chunks_exact(readings.len())).zip(observable).filter(|(_, observable)| *observable);
     let rows: Vec<_> = rows
         .map(|((motion, weights), _)| {
             let weights = readings.iter().zip(weights).filter(|(_, weight)| weight.re.abs() > ALONG_AXIS);

@@ -35,7 +35,7 @@ impl Solver<'_> {
             let row = order * width..(order + 1) * width;
             let mut solved = estimate.values[row.clone()].to_vec();
             to_reference.apply(&mut solved);
-            let told = &operators.observable(order);
+            let order_observable = &operators.observable(order);
             if layout.direction < 0.0 {
                 let forms = layout.unknowns.iter().zip(&mut solved).filter(|(unknown, _)| unknown.is_form());
                 forms.for_each(|(_, form)| *form = form.conj());
@@ -61,11 +61,11 @@ impl Solver<'_> {
             }
             for unknown in 0..width {
                 let index = row.start + unknown;
-                observable[index] = told[unknown];
+                observable[index] = order_observable[unknown];
                 let lost = Complex64::new(f64::NAN, f64::NAN);
-                values[index] = if told[unknown] { solved[unknown] } else { lost };
+                values[index] = if order_observable[unknown] { solved[unknown] } else { lost };
                 variance[index] = match &spread {
-                    Some(spread) if told[unknown] => spread[unknown * width + unknown].re.max(0.0),
+                    Some(spread) if order_observable[unknown] => spread[unknown * width + unknown].re.max(0.0),
                     _ => f64::NAN,
                 };
             }
@@ -73,7 +73,7 @@ impl Solver<'_> {
         let rig = &self.selection.rig;
         let sections = (rig.sections.iter().enumerate())
             .map(|(index, id)| SectionAt::whole(id.clone(), rig.section_z_mm(index) + station.z_mm));
-        let tells_tilt = layout.unknowns.iter().any(|unknown| unknown.is_tilt());
+        let has_tilt = layout.unknowns.iter().any(|unknown| unknown.is_tilt());
         Separation {
             sections: sections.collect(),
             unknowns: layout.unknowns.clone(),
@@ -85,7 +85,7 @@ impl Solver<'_> {
             freedom: freedom(station, &self.selection.setups),
             equivalents: Vec::new(),
             form_bound: self.form_bound(operators, &to_reference),
-            motion_z_mm: if tells_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
+            motion_z_mm: if has_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
             warnings: Vec::new(),
         }
@@ -106,8 +106,8 @@ impl Solver<'_> {
         for order in 2..=operators.orders.len() {
             let mut rows = self.order_operator(operators, order, count);
             to_reference.apply(&mut rows);
-            let told = rows.chunks_exact(count).zip(&mut largest).zip(operators.observable(order));
-            for ((row, largest), _) in told.filter(|(_, told)| **told) {
+            let unknowns = rows.chunks_exact(count).zip(&mut largest).zip(operators.observable(order));
+            for ((row, largest), _) in unknowns.filter(|(_, observable)| **observable) {
                 let moved: f64 = row.iter().zip(&bounds).map(|(entry, bound)| entry.norm() * bound).sum();
                 *largest = largest.max(moved);
             }

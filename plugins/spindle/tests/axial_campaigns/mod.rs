@@ -85,7 +85,7 @@ fn a_hidden_gain_of_an_axial_sensor() {
     assert!(itself || added.confounded_with.contains(&"sensor-gain Z".to_owned()), "{added:?}");
     if itself && added.confounded_with.is_empty() {
         let gain = &added.parameters[0];
-        // In ± is the form of the pole that the rig declares: it changes z, by which the gain is told.
+        // In ± is the form of the pole that the rig declares: it changes z, by which the gain is determined.
         assert!((gain.value - 0.04).abs() < 2.5 * gain.std.unwrap(), "{gain:?}");
     }
     let [before, after_error] = [&before, &after].map(|separation| z_error_um(separation, &truth));

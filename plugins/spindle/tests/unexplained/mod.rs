@@ -143,7 +143,7 @@ fn a_small_stranger_is_blamed_on_nothing() {
     }
 }
 
-/// A probe that slips in the middle of a setup is no sensor's gain: the turns tell, and nothing is blamed.
+/// A probe that slips in the middle of a setup is no sensor's gain: the turns show it, and nothing is blamed.
 #[test]
 fn a_probe_that_slips_within_a_setup_is_said_to_have() {
     let effect = r#"[{"plugin":"slipped-probe","targets":["S2"],"setup":"b","after_turns":31.4,"shift_um":0.7,

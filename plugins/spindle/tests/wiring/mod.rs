@@ -149,7 +149,7 @@ fn mistakes_are_named_together_and_beside_effects() {
     assert!(after < CLEAN_UM, "{after}: {:?}", found.diagnosis.added);
 }
 
-/// A sensor half a turn from its angle. Two sensors in a section do not tell it from another mistake: then both are in the uncertainty.
+/// A sensor half a turn from its angle. Two sensors in a section do not distinguish it from another mistake: then both are in the uncertainty.
 #[test]
 fn a_sensor_on_the_other_side_is_named() {
     for (sensor, change) in [("S2", "sensors.1.angle_deg = -80.156"), ("S4", "sensors.3.angle_deg = 180.0")] {
@@ -219,10 +219,10 @@ fn setups_in_a_cycle_are_named() {
     assert_eq!(looked_into(&corrected, &station).diagnosis.verdict, Verdict::AtNoiseFloor);
 }
 
-/// Two sensors in a section do not tell whose sign is wrong: the form and its negative explain as much, but for the exact
+/// Two sensors in a section do not show whose sign is wrong: the form and its negative explain as much, but for the exact
 /// geometry. The uncertainty of form holds both.
 #[test]
-fn what_a_layout_does_not_tell_is_in_the_uncertainty() {
+fn what_a_layout_does_not_distinguish_is_in_the_uncertainty() {
     for offset_um in [0.5, 8.0, 40.0] {
         let mut config = campaign(1, r#"[{"plugin":"sensor-sign","targets":["S1"]}]"#);
         config.eccentricity.offset_um = offset_um;

@@ -139,9 +139,9 @@ fn values(all: &[Judged]) -> String {
             own.map(|value| if last { value.last } else { value.declared }).collect()
         };
         let share = |ratios: &[f64]| {
-            let told = ratios.iter().filter(|ratio| ratio.is_finite()).count();
+            let finite = ratios.iter().filter(|ratio| ratio.is_finite()).count();
             let within = ratios.iter().filter(|ratio| ratio.abs() <= 2.0).count();
-            format!("{told}, {}{within}", percent(within, told))
+            format!("{finite}, {}{within}", percent(within, finite))
         };
         let clean = |judged: &Judged| judged.kind == Kind::Clean;
         let seen = |judged: &Judged| matches!(judged.kind, Kind::Single | Kind::Pair) && judged.is_visible();

@@ -49,7 +49,7 @@ pub fn recordings(paths: &[PathBuf], folders: usize) -> Result<Vec<Recording>> {
             Some((_, other)) if *other == place => {}
             Some((other, _)) => {
                 let problem = format!("{} has the same name, `{name}`", other.display());
-                return Err(Error::new("tell apart", path.display().to_string(), problem)
+                return Err(Error::new("distinguish", path.display().to_string(), problem)
                     .of(ErrorKind::Configuration)
                     .help("rename one, or take folders of the path into the name: `--name-folders 1`"));
             }

@@ -16,7 +16,7 @@ use runout_table::{
 
 /// The column that names the recording of a row.
 pub const RECORDING: &str = "recording";
-/// Columns of values that tell one from another, in the order in which they are read.
+/// Columns that distinguish one value from another, in the order in which they are read.
 const NAMES: [&str; 7] = ["symbol", "reference", "filter", "of", "section", "station", "unit"];
 const UNIT: &str = "unit";
 /// The column that says whether a series has a signal, and what it holds then.

@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 /// uncertainties),
 const ALIKE: f64 = 1e-6;
 /// a difference below this share of those is none: an uncertainty has at most two significant digits (GUM 7.2.6). Methods of one
-/// formula differ by so much where they share what no reading tells otherwise, and exact geometry depends on it.
+/// formula differ by so much where they share what no reading determines otherwise, and exact geometry depends on it.
 const NEGLIGIBLE: f64 = 1e-2;
 /// Scatter below this share of the values is rounding: turns that are all alike say nothing of the uncertainty.
 const NO_SCATTER: f64 = 1e-12;
@@ -27,7 +27,7 @@ pub(super) fn quantities(
     scatter: &Scatter,
 ) -> Vec<QuantityComparison> {
     // Values stand side by side in one plane: that of the first method that cannot move to another.
-    let fixed = estimates.iter().find(|one| one.has_motion() && !one.tells_tilt());
+    let fixed = estimates.iter().find(|one| one.has_motion() && !one.has_tilt());
     let plane_mm = fixed.or(estimates.first()).map_or(0.0, |one| one.motion_z_mm);
     let estimates: Vec<Estimates> =
         estimates.into_iter().map(|one| one.moved_to(plane_mm, scatter).unwrap_or(one)).collect();
@@ -86,9 +86,9 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
         Quantity::Form(section) => Some(section),
         _ => None,
     };
-    let told: Vec<Option<(Complex64, f64)>> =
+    let observable: Vec<Option<(Complex64, f64)>> =
         (1..=one.max_order()).map(|order| one.observable_value(order, unknown)).collect();
-    let counted = || told.iter().skip(first_order(quantity) - 1).flatten();
+    let counted = || observable.iter().skip(first_order(quantity) - 1).flatten();
     let ront = |section: usize| result.values.get(section)?.iter().find(|value| value.symbol == "RONt");
     Some(MethodValue {
         method: name.to_owned(),
@@ -102,11 +102,11 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
         std: known(rms(counted().map(|(_, variance)| variance).sum())),
         ront_um: section.and_then(ront).map(|value| value.value),
         truth_rms_error_um: section.and_then(|_| true_error(result, quantity)),
-        lost_orders: (1..).zip(&told).filter(|(_, told)| told.is_none()).map(|(order, _)| order).collect(),
+        lost_orders: (1..).zip(&observable).filter(|(_, one)| one.is_none()).map(|(order, _)| order).collect(),
         harmonics: Harmonics {
-            re: told.iter().map(|told| told.map(|(value, _)| value.re)).collect(),
-            im: told.iter().map(|told| told.map(|(value, _)| value.im)).collect(),
-            std: told.iter().map(|told| told.and_then(|(_, variance)| known(variance.sqrt()))).collect(),
+            re: observable.iter().map(|one| one.map(|(value, _)| value.re)).collect(),
+            im: observable.iter().map(|one| one.map(|(value, _)| value.im)).collect(),
+            std: observable.iter().map(|one| one.and_then(|(_, variance)| known(variance.sqrt()))).collect(),
         },
     })
 }
@@ -136,16 +136,17 @@ fn difference(name: &str, quantity: Quantity, pair: [&Estimates; 2], scatter: &S
 
 fn compared(quantity: Quantity, pair: [&Estimates; 2], unknowns: [usize; 2], scatter: &Scatter) -> Difference {
     let max_order = pair[0].max_order().min(pair[1].max_order());
-    let told = |order: usize| {
+    let both_observable = |order: usize| {
         let both = Some((pair[0].observable_value(order, unknowns[0])?, pair[1].observable_value(order, unknowns[1])?));
         both.filter(|_| order >= first_order(quantity))
     };
-    let size = rms((1..=max_order).filter_map(told).map(|((a, _), (b, _))| a.norm_sqr().max(b.norm_sqr())).sum());
+    let size =
+        rms((1..=max_order).filter_map(both_observable).map(|((a, _), (b, _))| a.norm_sqr().max(b.norm_sqr())).sum());
     let mut by_order = DifferenceOrders::default();
     let (mut squares, mut variances, mut orders_compared) = (0.0, 0.0, 0);
     let mut worst: Option<Worst> = None;
     for order in 1..=max_order {
-        let Some(((a, variance_a), (b, variance_b))) = told(order) else {
+        let Some(((a, variance_a), (b, variance_b))) = both_observable(order) else {
             by_order.difference.push(None);
             by_order.std.push(None);
             by_order.e_n.push(None);
@@ -209,8 +210,8 @@ mod tests {
         assert_eq!(normalised(0.02, 0.0, 0.0, 4.0), None, "turns that are all alike say nothing of a difference");
         assert_eq!(normalised(0.02, f64::NAN, f64::NAN, 4.0), None, "one turn");
         assert_eq!(normalised(3e-7, 1e-17, 0.02, 4.0), Some(0.0), "three-point by formula and by least squares");
-        let told = normalised(3e-3, 1e-17, 0.02, 4.0).unwrap_or_default();
-        assert!(told > 1e6, "more than the two digits of an uncertainty: {told}");
+        let proven = normalised(3e-3, 1e-17, 0.02, 4.0).unwrap_or_default();
+        assert!(proven > 1e6, "more than the two digits of an uncertainty: {proven}");
         assert_eq!(normalised(1e-4, 5e-5, 0.02, 4.0), Some(1.0), "scatter of their own");
         let systematic = normalised(0.02, 0.0, 0.01, 4.0).unwrap_or_default();
         assert!(systematic > 1e6 && systematic.is_finite(), "no scatter explains it");

@@ -99,7 +99,7 @@ impl Estimates {
         self.unknowns.iter().any(|unknown| !unknown.is_form())
     }
 
-    pub(crate) fn tells_tilt(&self) -> bool {
+    pub(crate) fn has_tilt(&self) -> bool {
         self.unknowns.iter().any(|unknown| unknown.is_tilt())
     }
 
@@ -113,7 +113,7 @@ impl Estimates {
         if self.in_plane(z_mm) {
             return Some(self.clone());
         }
-        if !self.tells_tilt() {
+        if !self.has_tilt() {
             return None;
         }
         let distance = (z_mm - self.motion_z_mm) * UM_PER_MM_URAD;

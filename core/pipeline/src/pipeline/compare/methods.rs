@@ -53,7 +53,7 @@ pub(super) fn choose(
 }
 
 /// Gives methods of the same name a number from the second on; all names, the reference's first.
-pub(super) fn told_apart<'a>(reference: &str, methods: impl Iterator<Item = &'a mut String>) -> Vec<String> {
+pub(super) fn distinct_names<'a>(reference: &str, methods: impl Iterator<Item = &'a mut String>) -> Vec<String> {
     let mut names = vec![reference.to_owned()];
     for name in methods {
         let plugin = name.clone();

@@ -94,7 +94,7 @@ impl<'a> Comparing<'a> {
             let fault = Fault::at("separate", "no other separator can take this rig: there is nothing to compare");
             return Err(fault.help(reasons.join("; ")));
         }
-        let names = methods::told_apart(&pipeline.separator, methods.iter_mut().map(|method| &mut method.name));
+        let names = methods::distinct_names(&pipeline.separator, methods.iter_mut().map(|method| &mut method.name));
         let reference = &**separator;
         Ok(Self { pipeline, rig, conditioners, averager: &**averager, reference, methods, refused, names })
     }

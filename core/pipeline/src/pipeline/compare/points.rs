@@ -8,7 +8,7 @@ use std::{collections::BTreeSet, path::PathBuf};
 
 use super::{
     Comparison, MethodSummary, Refusal,
-    methods::{self, told_apart},
+    methods::{self, distinct_names},
     report::{ColumnComparison, ColumnDifference, ValueComparison, ValueDifference, ValueOf},
 };
 use crate::{
@@ -90,7 +90,7 @@ impl<'a> ComparingPoints<'a> {
             let help = "name one with --with, or give its keys in a table [[compare]]";
             return Err(fault.help(if reasons.is_empty() { help.to_owned() } else { reasons.join("; ") }));
         }
-        let names = told_apart(&pipeline.separator, methods.iter_mut().map(|method| &mut method.name));
+        let names = distinct_names(&pipeline.separator, methods.iter_mut().map(|method| &mut method.name));
         Ok(Self { pipeline, reference: &**separator, methods, refused, names })
     }
 

@@ -98,8 +98,8 @@ pub struct QuantityComparison {
 pub struct MethodValue {
     /// The method.
     pub method: String,
-    /// Place of the section, or of the plane whose displacement x and y are, in mm; null for tilt. Methods that tell
-    /// tilt give x and y in the plane of the first method that does not.
+    /// Place of the section, or of the plane whose displacement x and y are, in mm; null for tilt. Methods that give
+    /// tilt state x and y in the plane of the first method that does not.
     pub z_mm: Option<f64>,
     /// Root mean square over the angles, of the observable orders.
     pub rms: f64,

@@ -156,7 +156,7 @@ pub(super) fn turns(
         Separator::Stations(separator) => {
             let mut assessment =
                 separator.assess(averager.max_order()).map_err(|fault| document::resolve(fault, separate_table))?;
-            if assessment.tells_no_form() {
+            if assessment.has_no_observable_form() {
                 assessment.notes.insert(0, NOTHING_SEPARATED.into());
             }
             let model = separator.model(&registry.effects);

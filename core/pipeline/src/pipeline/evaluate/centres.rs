@@ -5,7 +5,7 @@
 //! several distances changes by no more than the largest error of a centre.
 //!
 //! Taper, straightness of generatrices and parallelism are largest sizes of what is linear in the form: f(t + e) differs from
-//! f(t) by f(e) at most, which draws of the errors alone tell.
+//! f(t) by f(e) at most, which draws of the errors alone give.
 
 use runout_standards::uncertainty::Uncertainty;
 
@@ -13,7 +13,7 @@ use runout_standards::uncertainty::Uncertainty;
 const BEYOND: f64 = 0.05;
 /// The same share of draws; fewer, as the quantile is known from some hundred of them.
 const OF_DRAWS_BEYOND: f64 = 0.025;
-/// From so many times the largest error on, draws tell the interval.
+/// From so many times the largest error on, draws give the interval.
 const CLEAR: f64 = 4.0;
 
 /// Standard uncertainty along x and along y of the distance of one section's centre from the least-squares line through the
@@ -34,7 +34,7 @@ pub(super) fn std_um(z_mm: &[f64], variance: &[f64], place: usize, datums: &[usi
     (0..z_mm.len()).map(of).sum::<f64>().sqrt()
 }
 
-/// Of a diameter that holds several centres, twice the largest distance: as draws tell it where it is clear of noise, else from
+/// Of a diameter that holds several centres, twice the largest distance: as draws give it where it is clear of noise, else from
 /// it less to it plus the largest error that noise alone makes of so many centres. `std_um` is the largest of theirs.
 pub(super) fn of_diameter(known: Uncertainty, value_um: f64, std_um: f64, centres: usize) -> Uncertainty {
     let noise_um = 2.0 * std_um * (2.0 * (centres.max(1) as f64 / BEYOND).ln()).sqrt();
@@ -50,7 +50,7 @@ pub(super) fn of_size(known: Uncertainty, value_um: f64, mut of_noise_um: Vec<f6
     near_noise(known, value_um, noise_um, rms_um)
 }
 
-/// Whether a value is so far above such a noise that draws about the form tell its interval.
+/// Whether a value is so far above such a noise that draws about the form give its interval.
 pub(super) fn is_clear(value_um: f64, noise_um: f64) -> bool {
     value_um > CLEAR * noise_um
 }

@@ -50,7 +50,7 @@ fn timed(name: &str, work: &mut dyn FnMut() -> usize) {
     println!("{name:44} {values:6} values {took:7.3} s, {processor:6.2} s of processors");
 }
 
-/// Time of all threads on a processor in s, to 0.01 s; NaN where the system does not tell.
+/// Time of all threads on a processor in s, to 0.01 s; NaN where the system does not report it.
 fn processor_s() -> f64 {
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let after_name = text.rsplit(')').next().unwrap_or_default();
@@ -61,7 +61,7 @@ fn processor_s() -> f64 {
 
 /// Values of 400 sections of 2560 angles, group by group; then all of a run, sections on as many threads as a run has them.
 #[test]
-#[ignore = "prints times, of which only those of a release build tell anything"]
+#[ignore = "prints times, which are meaningful in a release build only"]
 fn cost_of_all_values() {
     let stations = stations(1279);
     println!("of one thread:");
@@ -123,7 +123,7 @@ fn of_part(builder: &SurfaceBuilder, evaluate: &super::Evaluate) -> PartSummary 
 
 /// RONt of one section with 500 orders, about each reference.
 #[test]
-#[ignore = "prints times, of which only those of a release build tell anything"]
+#[ignore = "prints times, which are meaningful in a release build only"]
 fn cost_of_one_value() {
     let stations = stations(500);
     for reference in ["LSCI", "MZCI", "MICI", "MCCI"] {

@@ -30,7 +30,7 @@ enum Shape {
 
 const SHAPES: [Shape; 3] = [Shape::Waves, Shape::Bow, Shape::Power];
 
-/// How errors are made and what of them is told.
+/// How errors are made and what of them is stated.
 #[derive(Debug, Clone, Copy)]
 enum Noise {
     /// Independent, of a standard deviation that is known.
@@ -66,7 +66,7 @@ fn truth(shape: Shape, seed: u64) -> Vec<f64> {
     z_mm().iter().map(height).collect()
 }
 
-/// Errors, and what is told of them.
+/// Errors, and what is stated of them.
 fn errors(noise: Noise, std_um: f64, seed: u64) -> (Vec<f64>, OpenErrors) {
     let mut random = ChaCha8Rng::seed_from_u64(1_000_000 + seed);
     let white: Vec<f64> = (0..POINTS + 2).map(|_| StandardNormal.sample(&mut random)).collect();
@@ -75,8 +75,8 @@ fn errors(noise: Noise, std_um: f64, seed: u64) -> (Vec<f64>, OpenErrors) {
         Noise::Known => (white[..POINTS].iter().map(|one| std_um * one).collect(), exact),
         Noise::Scatter => {
             let chi2 = ChiSquared::new(4.0).unwrap();
-            let told = (0..POINTS).map(|_| std_um * (chi2.sample(&mut random) / 4.0_f64).sqrt()).collect();
-            let all = OpenErrors { std_um: told, freedom: 4.0, ..OpenErrors::default() };
+            let stated = (0..POINTS).map(|_| std_um * (chi2.sample(&mut random) / 4.0_f64).sqrt()).collect();
+            let all = OpenErrors { std_um: stated, freedom: 4.0, ..OpenErrors::default() };
             (white[..POINTS].iter().map(|one| std_um * one).collect(), all)
         }
         Noise::Correlated => {
@@ -111,9 +111,9 @@ fn shares(shape: Shape, noise: Noise, std_um: f64, trials: u64, text: &str) -> S
     for trial in 0..trials {
         let true_um = truth(shape, trial);
         let exact = values(true_um.clone(), Err("the truth".into()), "truth", text);
-        let (errors_um, told) = errors(noise, std_um, trial);
+        let (errors_um, stated) = errors(noise, std_um, trial);
         let measured = true_um.iter().zip(&errors_um).map(|(height, error)| height + error).collect();
-        let found = values(measured, Ok(told), &format!("trace {trial}"), text);
+        let found = values(measured, Ok(stated), &format!("trace {trial}"), text);
         for value in &exact {
             let key = format!("{} {}", value.symbol, value.reference);
             let place = shares.iter().position(|known| known.0 == key).unwrap_or_else(|| {

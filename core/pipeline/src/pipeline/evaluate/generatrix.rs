@@ -27,7 +27,7 @@ const PAIRS: usize = 128;
 /// Points that a profile along the axis needs.
 const FEWEST: usize = 7;
 
-const CENTRED: &str = "texture along the axis is of centred sections: displacement sensors do not tell the mean radius and the \
+const CENTRED: &str = "texture along the axis is of centred sections: displacement sensors do not measure the mean radius and the \
     centre of a section, so that their differences from section to section are not in it";
 
 /// Adds texture values of the profiles through all sections at the angles asked for. Sections count where they were measured,

@@ -33,8 +33,11 @@ impl Limit {
 /// What of a value's band is not in it.
 fn missing(value: &Value) -> Option<String> {
     if let [first, others @ ..] = &value.lost_orders[..] {
-        let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
-        return Some(format!("order {first}{more} of its band cannot be told"));
+        let of_band = match others.len() {
+            0 => "of its band is".to_owned(),
+            more => format!("and {more} more of its band are"),
+        };
+        return Some(format!("order {first} {of_band} not observable"));
     }
     if let Some(order) = value.absent_above_upr {
         return Some(format!(

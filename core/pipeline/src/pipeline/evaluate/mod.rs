@@ -56,7 +56,7 @@ struct Content {
     highest: usize,
     /// Highest order that every part of it has.
     all_to: usize,
-    /// Orders that the layout cannot tell.
+    /// Orders not observable with the layout.
     lost: Vec<usize>,
     /// Order of which filters before the average pass half.
     half_power_upr: Option<f64>,

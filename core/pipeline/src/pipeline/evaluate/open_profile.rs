@@ -155,7 +155,7 @@ fn with_uncertain_shift(mut found: Found) -> Found {
 }
 
 /// Share of the errors in the variance of an open profile above which a value has no interval: a line has fewer places than a turn, which
-/// tell less of what is noise. By simulation, `intervals_of_straightness_by_noise` and `intervals_of_open_texture_by_noise`.
+/// show less of what is noise. By simulation, `intervals_of_straightness_by_noise` and `intervals_of_open_texture_by_noise`.
 fn largest_share(sensitivity: Sensitivity) -> f64 {
     match sensitivity {
         Sensitivity::Mean => 0.05,

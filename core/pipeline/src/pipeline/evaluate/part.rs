@@ -8,7 +8,7 @@ use runout_turning::surface;
 const MOST_ANGLES: usize = 720;
 
 /// Cylindricity of sections about a nominal radius; `None` where they do not lie at two heights. `placed` says that their
-/// centres and mean radii are known relative to each other, which only a measuring machine tells.
+/// centres and mean radii are known relative to each other, which only a measuring machine measures.
 pub(crate) fn part_summary(
     sections: &[surface::Section],
     angles: usize,
@@ -54,5 +54,5 @@ pub(crate) fn part_summary(
 }
 
 const CENTRED: &str = "every section is centred, without its 1/rev, and has the nominal radius: displacement sensors do \
-    not tell a section's centre and mean radius. Taper (CYLtt), straightness of generatrices and coaxiality are therefore \
+    not measure a section's centre and mean radius. Taper (CYLtt), straightness of generatrices and coaxiality are therefore \
     not given, and CYLt holds none of them";

@@ -124,7 +124,7 @@ impl Form {
         let weakened = separation.coefficients(unknown).skip(above.max(2));
         let shows_weakened = weakened.zip(variance.iter().skip(above.max(2))).any(|(value, of)| stands_out(value, *of));
         let held = Content { shows_weakened, ..held };
-        // Of a form of which nothing can be told, nothing is a value.
+        // A form of which nothing is observable has no values.
         (result.angles > 1 && held.lost.len() < held.highest.saturating_sub(1)).then(|| Self {
             harmonics: from_two(separation.coefficients(unknown).collect()),
             equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),

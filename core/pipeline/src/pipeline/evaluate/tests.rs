@@ -206,8 +206,8 @@ fn all_groups_are_asked_for_by_one_word() {
 }
 
 /// The same of the steepest slope, of which noise of high orders is a good part: forms of 4 µm that fall with order⁻¹ to 60
-/// and with order⁻² to 20, errors of 4 nm and 20 nm (12 nm) at every angle in orders to 255, of a variance that 20 degrees of
-/// freedom tell.
+/// and with order⁻² to 20, errors of 4 nm and 20 nm (12 nm) at every angle in orders to 255, of a variance known from 20
+/// degrees of freedom.
 #[test]
 fn intervals_of_the_steepest_slope_hold_the_truth() {
     const TRIALS: usize = 300;
@@ -734,7 +734,7 @@ fn a_crest_between_two_angles_is_not_missed() {
 }
 
 #[test]
-fn a_form_that_cannot_be_told_has_no_values() {
+fn a_form_that_is_not_observable_has_no_values() {
     let all: Vec<usize> = (1..=60).collect();
     let lost = station(0.0, &[lobes(3, 2.0)], 60, 1e-6, &all);
     assert_eq!(section_values(&lost, 0, &Evaluate::default(), RADIUS_MM), []);

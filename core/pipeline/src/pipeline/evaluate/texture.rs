@@ -35,7 +35,7 @@ pub(super) fn sensitivity(index: usize) -> Result<Sensitivity, &'static str> {
     }
 }
 
-/// A number found, with what draws tell of its error.
+/// A number found, with its error as draws give it.
 pub(super) fn found(drawn: Option<&Drawn>, index: usize, value: f64, sensitivity: Result<Sensitivity, &str>) -> Found {
     let Some(drawn) = drawn else { return Found { value, uncertainty: None, no_uncertainty: None } };
     let known = sensitivity.map_err(str::to_owned).and_then(|sensitivity| drawn.uncertainty(index, value, sensitivity));

@@ -189,7 +189,7 @@ impl Wall {
         let mut errors = self.errors(filter).unwrap_or_default();
         let draws = if errors.is_empty() { 0 } else { draws };
         let mut drawn = forms.clone();
-        // A turned error tells nothing new of a section's centre: where there is time, each draw is one of its own.
+        // A turned error shows nothing new of a section's centre: where there is time, each draw is one of its own.
         let fresh = draws * self.rings.len() * angles.len() <= POINTS_DRAWN;
         let transforms = if fresh { draws } else { draws.div_ceil(TURNS_OF_A_DRAW) };
         let transforms = if decided_by == DecidedBy::OneSection { transforms } else { transforms * self.rings.len() };

@@ -130,7 +130,7 @@ pub(crate) fn lines(selection: &Selection, layout: &Layout, station: &Station, o
         return Vec::new();
     };
     let rates: Option<Vec<f64>> = station.profiles.iter().map(|profile| profile.sample_rate_hz).collect();
-    // Of captures at several rates, samples tell no time.
+    // Of captures at several rates, samples give no time.
     let rate_hz = rates.and_then(|rates| {
         rates.first().copied().filter(|first| rates.iter().all(|rate| rate.total_cmp(first).is_eq()))
     });

@@ -40,7 +40,7 @@ pub(crate) fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Statio
             if *motion {
                 added.confounded_with.extend(of_motion.clone());
                 let by = "a sensor at another angle, which a motion along this one would show in too";
-                added.told_apart_by = Some(by.into());
+                added.distinguished_by = Some(by.into());
             }
         }
         remarks.extend(remark(line, &added.targets));

@@ -127,7 +127,7 @@ impl Default for RecordingConfig {
     }
 }
 
-/// How a recording tells the spindle's angle.
+/// How a recording gives the spindle's angle.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {

@@ -97,7 +97,8 @@ impl Effect {
     /// Changes the world; `index` is the effect's place in the list.
     pub(super) fn apply(&self, world: &mut World, index: usize) -> Result<(), Fault> {
         if self.acts().declared() {
-            let fault = Fault::at("declared", "expected false: a scenario does not tell the separation of its effects");
+            let fault =
+                Fault::at("declared", "expected false: a scenario does not declare its effects to the separation");
             return Err(fault.help("leave it out; what the separation is to know is declared in the pipeline, in its rig or as `[diagnose] known`"));
         }
         self.acts().apply(world, index)

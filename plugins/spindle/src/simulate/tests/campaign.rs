@@ -66,7 +66,7 @@ fn the_seed_decides_and_the_scenario_text_repeats_it() {
     assert_eq!(readings(&fewer, 1, 1), readings(&more, 1, 1));
 }
 
-/// Φ is a whole number of turns at each mark, told by the encoder's angles on either side.
+/// Φ is a whole number of turns at each mark, as the encoder's angles on either side show.
 #[test]
 fn marks_and_encoder_agree() {
     let simulator = simulator(&everything()).unwrap();

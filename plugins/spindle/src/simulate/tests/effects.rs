@@ -359,7 +359,7 @@ fn filter_attenuation() {
     assert!(largest_difference(settled, expected) < 1e-11);
 }
 
-/// A scenario cannot tell a separation of its effects: the pipeline does.
+/// A scenario cannot declare its effects to a separation: the pipeline does.
 #[test]
 fn an_effect_that_claims_to_be_declared_is_refused() {
     let with = |declared| {

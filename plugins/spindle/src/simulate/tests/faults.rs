@@ -31,7 +31,7 @@ fn fault(rest: &str) -> (String, String, usize) {
 }
 
 #[test]
-fn the_place_of_a_mistake_is_told() {
+fn the_place_of_a_mistake_is_reported() {
     for (rest, message, help, line) in [
         ("[recording]\nspeed_rpm = 0", "above 0", "", 7),
         ("[recording]\nrevolutions = 0", "expected 1", "", 7),
