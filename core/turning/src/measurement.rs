@@ -164,7 +164,7 @@ impl Response {
         }
         let warped = |hz: f64| if nyquist_hz.is_finite() { (FRAC_PI_2 * hz / nyquist_hz).tan() } else { hz };
         let ratio = warped(frequency_hz) / warped(self.half_power_hz);
-        (1.0 + (SQRT_2 - 1.0) * ratio.powi(2 * self.order as i32)).recip()
+        (1.0 + (SQRT_2 - 1.0) * ratio.powf(2.0 * self.order as f64)).recip()
     }
 }
 

@@ -48,6 +48,8 @@ pub struct Profile {
     /// Standard uncertainty of the spindle angle that the turns are counted from, in rad: of marks that are known to a part of a
     /// sample only. It turns all harmonics together.
     pub angle_std_rad: f64,
+    /// Standard deviation by which such marks turn single turns, in rad. It turns the eccentricity of every turn.
+    pub turn_angle_std_rad: f64,
     /// Mean speed over the turns used, where the sampling rate is known.
     pub speed_rpm: Option<f64>,
     /// Samples a second, where known.

@@ -24,8 +24,10 @@ mod spread;
 mod turns;
 mod window;
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use runout_core::{
-    Error, ErrorKind, Result,
+    Complex64, Error, ErrorKind, Result,
     fault::Fault,
     measurement::{Block, Capture, Response, SampleStream},
     near_tone::NearTone,
@@ -39,7 +41,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use kernel::{Kernel, PASS_BAND};
-use marks::angle_std_rad;
+use marks::{angle_std_rad, turn_angle_std_rad};
 use resample::Resampling;
 use turns::Turn;
 
@@ -209,6 +211,27 @@ impl SynchronousAverage {
     }
 }
 
+/// Asynchronous motion below this, in µm rms, is not said.
+const SAID_UM: f64 = 0.01;
+
+/// Says what marks at whole samples add to asynchronous motion: they turn the eccentricity of each turn.
+fn jitter_of_eccentricity(jitter_rad: f64, mean: &[Complex64], capture: &Capture) -> Option<String> {
+    let channels = capture.channels();
+    let of_order_1 = mean.iter().skip(channels).take(channels);
+    let eccentricity_um = of_order_1.map(|value| value.norm()).fold(0.0, f64::max);
+    let added_um = FRAC_1_SQRT_2 * jitter_rad * eccentricity_um;
+    (added_um >= SAID_UM).then(|| {
+        format!(
+            "{}: marks at whole samples scatter single turns by {}° (std), which with an eccentricity of {} µm adds about {} µm rms to asynchronous \
+             motion; give marks between samples or the encoder's angle, or centre the part",
+            capture.object,
+            significant(jitter_rad.to_degrees(), 2),
+            significant(eccentricity_um, 3),
+            significant(added_um, 2)
+        )
+    })
+}
+
 /// Says which tones the average takes for synchronous.
 fn near_synchronous(tones: &[NearTone], turns: usize, object: &str) -> Option<String> {
     let size = |tone: &NearTone| tone.leak.iter().map(|leak| leak.norm()).fold(0.0, f64::max);
@@ -315,6 +338,10 @@ impl Averager for SynchronousAverage {
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        let jitter_rad = turn_angle_std_rad(&capture.marks, capture.marks_within_samples);
+        if outcome.spread.is_some() {
+            warnings.extend(jitter_of_eccentricity(jitter_rad, &outcome.mean, &capture));
+        }
         warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
         capture.responses.extend(self.resampling_response(&capture, outcome.exact));
@@ -337,6 +364,7 @@ impl Averager for SynchronousAverage {
             spread: outcome.spread,
             turns: count,
             angle_std_rad: angle_std_rad(&capture.marks, capture.marks_within_samples),
+            turn_angle_std_rad: jitter_rad,
             speed_rpm,
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,

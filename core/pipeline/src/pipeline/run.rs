@@ -24,7 +24,7 @@ use runout_numerics::threads;
 use runout_standards::Value;
 use runout_turning::station::StationResult;
 use runout_turning::{
-    error_motion::{Centre, ErrorMotion, behind_low_pass},
+    error_motion::{Centre, ErrorMotion, behind_low_pass, with_jitter_of_marks},
     mains,
     measurement::Recording,
     profile::Profile,
@@ -185,6 +185,7 @@ fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f6
     let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
     let slope = steepest.to_degrees() / (1e3 * radius_mm);
     let values = ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres);
+    let values = with_jitter_of_marks(values, profiles);
     match result.half_power_upr() {
         Some(half_power_upr) => behind_low_pass(values, separation, half_power_upr),
         None => values,

@@ -14,6 +14,7 @@
 //! x and y are those in the plane midway between the sensors, where noise is least.
 
 mod axial;
+mod marks;
 mod names;
 mod noise;
 mod plots;
@@ -23,6 +24,7 @@ mod tests;
 mod turns;
 mod weakened;
 
+pub use marks::with_jitter_of_marks;
 pub use names::{WITH_FUNDAMENTAL, symbols};
 pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;

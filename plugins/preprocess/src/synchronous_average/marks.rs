@@ -18,6 +18,14 @@ pub(super) fn angle_std_rad(marks: &[f64], within: f64) -> f64 {
     common.sqrt() * TAU / turn_samples
 }
 
+/// Standard deviation by which marks that are known to ±`within` samples turn single turns, in rad: no more than they scatter about even
+/// turns.
+pub(super) fn turn_angle_std_rad(marks: &[f64], within: f64) -> f64 {
+    let ([first, .., last], true) = (marks, within > 0.0) else { return 0.0 };
+    let turn_samples = (last - first) / (marks.len() - 1) as f64;
+    (within * within / 3.0).min(scatter(marks)).sqrt() * TAU / turn_samples
+}
+
 /// Mean square of ascending numbers about their least-squares line; 0 of fewer than three.
 fn scatter(marks: &[f64]) -> f64 {
     if marks.len() < 3 {
