@@ -181,6 +181,18 @@ fn std_of(value: &Value) -> Option<f64> {
     value.uncertainty.as_ref().map(|uncertainty| uncertainty.std)
 }
 
+/// A value with its standard uncertainty, or with its 95 % interval where this does not hold the value: noise adds to ranges.
+fn with_uncertainty(value: &Value) -> String {
+    let Some(known) = &value.uncertainty else { return significant(value.value, 4) };
+    let [low, high] = known.interval_95;
+    if (low..=high).contains(&value.value) {
+        return with_std(value.value, Some(known.std));
+    }
+    // As many decimals as the uncertainty has.
+    let number = |number: f64| with_std(number, Some(known.std)).split(' ').next().unwrap_or_default().to_owned();
+    format!("{} (95 %: {} to {})", number(value.value), number(low), number(high))
+}
+
 fn form_heading(stations: &[StationSummary]) -> String {
     let band = sections(stations).find_map(|(_, section)| section.values.first()).map(|value| value.band_upr);
     let band = band.map(|[low, high]| format!(", {low} to {high} undulations per revolution")).unwrap_or_default();
@@ -205,11 +217,7 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
         let lost = lost_in(section);
         row.extend(firsts.iter().enumerate().map(|(place, first)| {
             let Some(value) = value_of(section, &first.symbol) else { return String::new() };
-            let number = if std_of(value).is_some() {
-                with_std(value.value, std_of(value))
-            } else {
-                significant(value.value, 4)
-            };
+            let number = with_uncertainty(value);
             // The orders are named once a row.
             if place == 0 { number + &lacking(lost) } else { number + star(lost) }
         }));

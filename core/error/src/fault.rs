@@ -126,7 +126,7 @@ impl Diagnostic {
 #[must_use]
 pub fn known_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let mut ranked: Vec<(f64, &str)> =
-        known.into_iter().map(|candidate| (strsim::jaro_winkler(name, candidate), candidate)).collect();
+        known.into_iter().map(|candidate| (nearness(name, candidate), candidate)).collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
     let list: Vec<String> = ranked.iter().map(|(_, candidate)| format!("`{candidate}`")).collect();
     match ranked.first() {
@@ -137,4 +137,9 @@ pub fn known_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> 
         }
         Some(_) => format!("known: {}", list.join(", ")),
     }
+}
+
+/// How much two names look alike, 1 where they differ by upper and lower case only.
+fn nearness(name: &str, candidate: &str) -> f64 {
+    if name.eq_ignore_ascii_case(candidate) { 1.0 } else { strsim::jaro_winkler(name, candidate) }
 }

@@ -33,6 +33,9 @@ const CUT: &str = "cut the recording there and use the longer part: a jump of wh
 
 /// An angle that begins at 0 again goes back by less than this.
 const WRAPPED_DEG: f64 = 360.0;
+/// What to do about an angle that begins anew with each turn.
+const UNWRAP: &str =
+    "an angle that begins at 0 again with each turn is to be unwrapped (`numpy.unwrap(angle_deg, period=360)`)";
 /// A longer step between two samples leaves open which way the spindle went.
 const LONGEST_STEP_DEG: f64 = 180.0;
 /// A step longer than twice the longest before it by more than this is a jump: twice, as an encoder coarser than the
@@ -59,7 +62,10 @@ impl EncoderScan {
                 let problem =
                     format!("expected an unwrapped angle, found a step from {}° to {angle_deg}°", self.last_deg);
                 // One beyond a turn is none of an angle that begins at 0 again.
-                let help = (self.samples > 1 && step_deg.abs() > WRAPPED_DEG).then_some(CUT);
+                let help = match step_deg.abs() {
+                    step_deg if step_deg > WRAPPED_DEG => (self.samples > 1).then_some(CUT),
+                    _ => Some(UNWRAP),
+                };
                 return Err(EncoderFault { sample: self.samples, problem, help });
             }
             if self.direction == 0.0 && step_deg != 0.0 {

@@ -2,9 +2,9 @@
 
 use runout_core::{standards::Value, summary::StationSummary};
 
-use super::{std_of, unit};
+use super::{unit, with_uncertainty};
 use crate::render::{
-    number::{lacking, significant, spread, with_std},
+    number::{lacking, significant, spread},
     page::Page,
     table::Table,
 };
@@ -85,8 +85,7 @@ fn parts(value: &Value) -> (&str, String) {
 fn cell(values: &[&Value]) -> String {
     match values {
         [] => String::new(),
-        [only] if std_of(only).is_some() => with_std(only.value, std_of(only)) + &lacking(&only.lost_orders),
-        [only] => significant(only.value, 4) + &lacking(&only.lost_orders),
+        [only] => with_uncertainty(only) + &lacking(&only.lost_orders),
         several => match spread(several.iter().map(|value| value.value)) {
             Some([low, _, high]) => {
                 let lost = several.first().map_or_else(String::new, |value| lacking(&value.lost_orders));

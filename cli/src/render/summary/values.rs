@@ -5,9 +5,9 @@ use runout_core::{
     summary::{Decision, LimitSummary, LimitValue, Summary},
 };
 
-use super::{FEW_STATIONS, known, std_of, unit};
+use super::{FEW_STATIONS, known, unit, with_uncertainty};
 use crate::render::{
-    number::{lacking, significant, with_std},
+    number::{lacking, significant},
     page::Page,
     table::Table,
 };
@@ -18,11 +18,7 @@ pub(crate) fn part(page: &mut Page, summary: &Summary) {
     let mut table = Table::new(2, ["value", "reference", ""]);
     let shown = |value: &&Value| ["CYLt", "Sa", "Sz"].contains(&&*value.symbol) && value.filter == "none";
     for value in part.values.iter().filter(shown) {
-        let number = match std_of(value) {
-            Some(std) => with_std(value.value, Some(std)),
-            None => significant(value.value, 4),
-        };
-        let number = number + &lacking(&value.lost_orders);
+        let number = with_uncertainty(value) + &lacking(&value.lost_orders);
         table.row([format!("{} {}", value.symbol, unit(&value.unit)), value.reference.clone(), number]);
     }
     page.headed_table("The whole part", &table);

@@ -300,11 +300,19 @@ fn assign<'a>(table: &mut DeTable<'a>, steps: &[&str], value: Spanned<DeValue<'a
     }
 }
 
+/// First bytes of an HDF5 file.
+const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+
 fn read_text(path: &Path) -> Result<String, Error> {
     let shown = path.display().to_string();
     let mut bytes = Vec::new();
     let read = open_regular(path).and_then(|mut file| file.read_to_end(&mut bytes));
     read.map_err(|error| Error::caused("read", &shown, error))?;
+    if bytes.starts_with(HDF5) {
+        let problem = "expected a configuration in TOML, found an HDF5 file";
+        let help = "name the recording in [load] of a pipeline (`plugin = \"hdf5\"`, `path`), and give the pipeline";
+        return Err(Error::new("read", &shown, problem).of(ErrorKind::Configuration).help(help));
+    }
     String::from_utf8(bytes).map_err(|error| {
         Error::new("read", &shown, format!("expected UTF-8, found {}", error.utf8_error()))
             .of(ErrorKind::DamagedData)

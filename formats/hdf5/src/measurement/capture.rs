@@ -196,7 +196,14 @@ fn positions(vector: &Vector, samples: usize) -> Result<Vec<f64>> {
             }
             _ => format!("a sample position from 0 to {samples}"),
         };
-        Err(vector.place().error(format!("mark {}: expected {expected}, found {value}", marks.len())))
+        let error = vector.place().error(format!("mark {}: expected {expected}, found {value}", marks.len()));
+        // A signal of 0 and 1 has a value a sample.
+        let is_signal = vector.length() == samples && [0.0, 1.0].contains(&value);
+        Err(if is_signal {
+            error.help("`index` holds sample positions, one a turn; a marker's signal is named by `marker` in [load]")
+        } else {
+            error
+        })
     })?;
     Ok(marks)
 }

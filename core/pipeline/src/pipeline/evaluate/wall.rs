@@ -100,7 +100,7 @@ impl Wall {
         });
         let rings: Vec<Ring> = rings.collect();
         let half_power_upr = sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min);
-        let shows_weakened = sections.iter().any(Section::shows_weakened);
+        let shows_weakened = sections.iter().any(|section| section.shows_weakened());
         let held = Content {
             highest,
             all_to: all_to.min(highest),
