@@ -32,7 +32,8 @@ pub(crate) struct Report {
     /// The columns that the separator takes of measured points.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub columns: Vec<TakenColumn>,
-    /// What the separator offers that the standards' values are computed from: "closed-profiles", "axis-motion", "open-profile", "height-map".
+    /// What the separator offers that the standards' values are computed from: "closed-profiles", "axis-motion", "turn-spread",
+    /// "open-profile", "height-map".
     pub evaluables: Vec<&'static str>,
     /// The tables of the result, also those that it may lack.
     pub tables: Vec<String>,

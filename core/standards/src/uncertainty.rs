@@ -52,10 +52,15 @@ impl Uncertainty {
     /// better than two real degrees of freedom a transform do: the interval is wider by Student's factor, about its
     /// middle.
     #[must_use]
-    fn of_transforms(mut self, transforms: f64) -> Self {
-        let wider = student_95(2.0 * transforms) / NORMAL_95;
+    fn of_transforms(self, transforms: f64) -> Self {
+        self.widened(student_95(2.0 * transforms) / NORMAL_95)
+    }
+
+    /// The same with an interval so many times as wide about its middle.
+    #[must_use]
+    pub fn widened(mut self, factor: f64) -> Self {
         let [low, high] = self.interval_95;
-        let (middle, half) = (0.5 * (low + high), 0.5 * wider * (high - low));
+        let (middle, half) = (0.5 * (low + high), 0.5 * factor * (high - low));
         let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
         // An end at 0 stays there.
         self.interval_95 = [if low == 0.0 { low } else { (middle - half).max(floor) }, middle + half];

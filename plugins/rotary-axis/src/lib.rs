@@ -14,6 +14,7 @@ mod effects;
 mod kinematics;
 mod left_out;
 mod model;
+mod motion;
 mod nest;
 mod noise;
 mod paper;

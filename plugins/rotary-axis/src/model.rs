@@ -5,7 +5,8 @@
 //!
 //! d_j(C) = d_j0 + a_j cos C + b_j sin C,  j = x, y, z.
 //!
-//! Higher harmonics are error motions of the axis.
+//! Higher harmonics are error motions of the axis at the ball: radial and axial motion, and the three angles times the ball's lever arms. One
+//! ball does not separate these, so that no error motion value of the axis follows.
 
 use runout_core::{
     Error, Result,

@@ -4,7 +4,9 @@ use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
     points::{PointColumn, Points},
-    stage::{Outcome, PointModel, PointPlan, PointSeparator, far_below_noise, residual_table},
+    stage::{
+        Evaluable, EvaluableKind, Outcome, PointModel, PointPlan, PointSeparator, far_below_noise, residual_table,
+    },
     summary::NamedValue,
     table::{TableRows, TableSpec, numbers, numbers_or_null, texts},
 };
@@ -14,6 +16,7 @@ use crate::{
     campaign::{Campaign, columns},
     config::RotaryAxis,
     left_out::left_out,
+    motion::axis_motion,
     noise::Noise,
     scale::{noise_remark, scale},
     solve::{Column, Estimate, Fit, Layout, Reading, fit},
@@ -57,6 +60,11 @@ impl PointSeparator for RotaryAxis {
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let campaign = Campaign::of(&self.0, points)?;
         self.fitted_outcome(points, &campaign, &[], &[], &[])
+    }
+
+    /// One ball does not separate component errors from location errors.
+    fn evaluables(&self) -> Vec<EvaluableKind> {
+        if self.0.component_errors && self.0.balls.len() > 1 { vec![EvaluableKind::AxisMotion] } else { Vec::new() }
     }
 
     fn notes(&self) -> Vec<String> {
@@ -213,7 +221,9 @@ impl RotaryAxis {
              added to the commands of the linear axes",
             ['X', 'Y', 'Z'][axis.order()[2]]
         );
-        Ok(Outcome { convention, tables, values, remarks, notes, ..Outcome::default() })
+        let motion = || Evaluable::AxisMotion(axis_motion(axis, campaign, &found, &others, &scale));
+        let evaluables = if self.evaluables().is_empty() { Vec::new() } else { vec![motion()] };
+        Ok(Outcome { convention, tables, values, evaluables, remarks, notes, ..Outcome::default() })
     }
 
     fn lost(&self, found: &Fit, campaign: &Campaign) -> Option<String> {

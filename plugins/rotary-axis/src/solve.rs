@@ -15,6 +15,7 @@ mod system;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::kinematics::{Errors, turn};
+pub(crate) use results::Combined;
 
 /// A ball's reading at a command; mm, about an axis along z.
 #[derive(Debug, Clone, Copy)]
@@ -206,6 +207,8 @@ struct Solution {
     covariance: DMatrix<f64>,
     /// Unknowns by the right side of the gauge.
     by_gauge: DMatrix<f64>,
+    /// Unknowns by independent errors of variance 1 of the rows that component errors cannot reach.
+    by_rows: DMatrix<f64>,
     /// Unknowns that the rows determined.
     rank: usize,
 }

@@ -303,7 +303,7 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
     if let (true, Some(table)) = (given.is_empty(), configured.as_ref().or(limits.first())) {
         let fault = Fault::span(
             table.span(),
-            "there is no form here, nor another profile or height map, whose values could be chosen or limited",
+            "there is no form here, nor another profile, height map or motion of an axis, whose values could be chosen or limited",
         );
         return Err(fault.help("leave it out; the values are those of the separator"));
     }

@@ -15,6 +15,8 @@ pub enum Evaluable {
     OpenProfile(OpenProfile),
     /// Heights on a plane: areal values. Of the first one in an outcome meshes are drawn.
     HeightMap(PlaneMap),
+    /// Motion of an axis of rotation at standing positions: synchronous error motion values.
+    AxisMotion(AxisMotion),
 }
 
 /// Kinds of [`Evaluable`], which a domain declares before there are data; and what only recorded turns have.
@@ -23,8 +25,10 @@ pub enum Evaluable {
 pub enum EvaluableKind {
     /// Closed profiles, section by section.
     ClosedProfiles,
-    /// Motion of an axis with the spread over its turns, station by station. Recorded turns give it, points do not.
+    /// Motion of an axis of rotation.
     AxisMotion,
+    /// How far single turns of an axis lie apart, station by station. Recorded turns give it beside the motion, points do not.
+    TurnSpread,
     /// A profile along a line.
     OpenProfile,
     /// Heights on a plane.
@@ -38,6 +42,7 @@ impl EvaluableKind {
         match self {
             Self::ClosedProfiles => "closed-profiles",
             Self::AxisMotion => "axis-motion",
+            Self::TurnSpread => "turn-spread",
             Self::OpenProfile => "open-profile",
             Self::HeightMap => "height-map",
         }
@@ -52,6 +57,7 @@ impl Evaluable {
             Self::ClosedProfiles(_) => EvaluableKind::ClosedProfiles,
             Self::OpenProfile(_) => EvaluableKind::OpenProfile,
             Self::HeightMap(_) => EvaluableKind::HeightMap,
+            Self::AxisMotion(_) => EvaluableKind::AxisMotion,
         }
     }
 
@@ -101,4 +107,35 @@ pub struct PlaneMap {
     pub of: String,
     /// The heights.
     pub grid: HeightGrid,
+}
+
+/// Motion of an axis of rotation at standing positions.
+///
+/// Directions are those of an axis along z: x and y across it, right-handed. Level, and what turns with the axis once a turn, are how the
+/// axis and what it carries are placed, and no part of any value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisMotion {
+    /// What it is of: "C". Values have it as `of`, and limits name it as `section`.
+    pub of: String,
+    /// Letters of the machine's directions in the places of x, y and z: `['y', 'z', 'x']` of an axis along x.
+    pub letters: [char; 3],
+    /// Distinct positions, in degrees.
+    pub angle_deg: Vec<f64>,
+    /// Where along the axis x and y are, in mm.
+    pub z_mm: f64,
+    /// At each position: x, y and z of the axis in µm, its tilts about x and y in µrad; NaN where not observable.
+    pub motion: Vec<[f64; 5]>,
+    /// What its errors are; or why they are not known, in words for the user.
+    pub errors: Result<MotionErrors, String>,
+}
+
+/// Errors of the motion of an axis. Its covariance is that of both kinds together.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MotionErrors {
+    /// Covariance of the five numbers at each position, but for `common`; independent from position to position.
+    pub own: Vec<[[f64; 5]; 5]>,
+    /// Changes of the whole motion, five numbers at each position, each change with a factor of its own of standard deviation 1.
+    pub common: Vec<Vec<[f64; 5]>>,
+    /// Degrees of freedom behind both; 0 where they are taken as exact.
+    pub freedom: f64,
 }

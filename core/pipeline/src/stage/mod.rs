@@ -12,7 +12,7 @@ mod separator;
 mod simulator;
 
 pub use check::{Check, Planned, speeds_and_turns, speeds_of};
-pub use evaluable::{Evaluable, EvaluableKind, Form, OpenProfile, PlaneMap};
+pub use evaluable::{AxisMotion, Evaluable, EvaluableKind, Form, MotionErrors, OpenProfile, PlaneMap};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
 pub use overview::{Overview, Part, Section};

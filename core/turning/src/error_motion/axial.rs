@@ -9,18 +9,22 @@
 //! how the face was clamped, and is left out.
 
 use super::{
-    ErrorMotion, FINER, SAID,
-    names::{RESIDUAL, STANDARD, centre_of_chart, described, over, unit},
-    noise::{Measure, without_noise},
+    ErrorMotion, FINER,
+    names::{RESIDUAL, STANDARD, XYZ, centre_of_chart, described, fundamental_along, over, unit},
     polar::Synchronous,
+    synchronous::Named,
     turns::{between_setups, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest},
 };
 use crate::spread::{Direction, Spread};
 use runout_standards::{
     Value,
-    roundness::{Angles, ront_lsci_um},
+    roundness::Angles,
     uncertainty::{self, Uncertainty},
 };
+
+/// Synchronous values along the axis in words, and those without the fundamental.
+pub(super) const WHOLE: &str = "synchronous error motion value";
+pub(super) const WITHOUT_FUNDAMENTAL: &str = "residual synchronous error motion value, without the fundamental";
 
 impl ErrorMotion<'_> {
     /// Synchronous, total, residual synchronous and fundamental values along the axis; without those of order 1 where it is lost.
@@ -32,53 +36,34 @@ impl ErrorMotion<'_> {
         };
         let mut values = Vec::new();
         if let Some(whole) = from(1).filter(|plot| plot.lost.first() != Some(&1)) {
-            values.extend(self.synchronous("synchronous", "synchronous error motion value", direction, &whole, z_mm));
+            values.extend(self.synchronous("synchronous", WHOLE, direction, &whole, z_mm).into_iter().flatten());
             values.extend(self.total_axial(direction, &whole, spreads, z_mm).into_iter().flatten());
             values.extend(self.fundamental_axial(direction, &whole, z_mm));
         }
         if let Some(residual) = from(2) {
-            let what = "residual synchronous error motion value, without the fundamental";
-            values.extend(self.synchronous(RESIDUAL, what, direction, &residual, z_mm));
+            values.extend(
+                self.synchronous(RESIDUAL, WITHOUT_FUNDAMENTAL, direction, &residual, z_mm).into_iter().flatten(),
+            );
         }
         values
     }
 
     /// Range of what repeats, and its root mean square.
-    fn synchronous(&self, kind: &str, what: &str, direction: Direction, plot: &Synchronous, z_mm: f64) -> [Value; 2] {
-        let drawn = plot.over_angle(&Angles::shared(self.angles));
-        let found = [ront_lsci_um(&drawn), rms_about_mean(&drawn)];
-        let seed = uncertainty::seed(&[self.station, &self.id(direction), kind]);
-        let known = without_noise(found, &drawn, &plot.variance, plot.band[0], seed, &Measure::AboutFixedCentre);
-        let between = ront_lsci_um(&plot.over_angle(&Angles::shared(FINER * self.angles))) - found[0];
-        let [range, rms] = match known {
-            Some([(range_share, range), (rms_share, rms)]) => {
-                [(found[0] + between, range_share, Some(range.moved(between))), (found[1], rms_share, Some(rms))]
-            }
-            None => [(found[0] + between, 0.0, None), (found[1], 0.0, None)],
-        };
+    fn synchronous(
+        &self,
+        kind: &str,
+        what: &str,
+        direction: Direction,
+        plot: &Synchronous,
+        z_mm: f64,
+    ) -> Option<[Value; 2]> {
         let id = self.id(direction);
-        let value = |symbol: String,
-                     what: String,
-                     (found, share, known): (f64, f64, Option<Uncertainty>),
-                     bound: f64| {
-            let noise = if known.is_some() && share >= SAID {
-                format!(", without {share:.3} {} that noise adds to it", unit(direction))
-            } else {
-                String::new()
-            };
-            let value = (found - share).max(0.0);
-            Self::axial_value(symbol, &format!("{what}{noise}"), direction, plot, z_mm, value, bounded(known, bound))
-        };
-        [
-            value(format!("{kind}-{id}"), what.to_owned(), range, plot.bound),
-            // The root mean square of what lies within a range of B is B/2 at most.
-            value(
-                format!("{kind}-{id}-rms"),
-                format!("{what}, root mean square over the angles"),
-                rms,
-                0.5 * plot.bound,
-            ),
-        ]
+        let seed = uncertainty::seed(&[self.station, &id, kind]);
+        let centre = centre_of_chart();
+        let seen = plot.seen(centre, self.angles, plot.band[0], seed)?;
+        let described = described_within(direction, plot, z_mm);
+        let named = Named { kind, what, id: &id, described: &described, unit: unit(direction), centre };
+        Some(plot.values(&named, &seen))
     }
 
     /// Range of all turns, and their root mean square.
@@ -118,12 +103,8 @@ impl ErrorMotion<'_> {
         // The part of an error E|δ|² along the phasor is half of it.
         let std = (2.0 * plot.variance.get(1).copied().unwrap_or(0.0)).sqrt();
         let known = (std > 0.0).then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1)));
-        let what = "fundamental error motion value, peak to valley of 1/rev";
-        let symbol = format!("fundamental-{}", self.id(direction));
-        let known = bounded(known, plot.bound);
-        let mut value = Self::axial_value(symbol, what, direction, plot, z_mm, value, known);
-        (value.band_upr, value.lost_orders) = ([1, 1], Vec::new());
-        Some(value)
+        let described = described_within(direction, plot, z_mm);
+        Some(fundamental_along(&self.id(direction), value, bounded(known, plot.bound), &described))
     }
 
     #[allow(clippy::too_many_arguments, reason = "what differs between the values of one plot")]
@@ -136,27 +117,32 @@ impl ErrorMotion<'_> {
         value: f64,
         uncertainty: Option<Uncertainty>,
     ) -> Value {
-        let bound = if plot.bound > 0.0 {
-            format!("; the form declared within its bound may add up to {:.3} {}", plot.bound, unit(direction))
-        } else {
-            String::new()
-        };
         Value {
             symbol,
-            unit: unit(direction),
+            unit: unit(direction).into(),
             value,
-            source: format!("{STANDARD}, {what}, {}{bound}", described(direction, z_mm)),
+            source: format!("{STANDARD}, {what}, {}", described_within(direction, plot, z_mm)),
             band_upr: plot.band,
             lost_orders: plot.lost.clone(),
             weakened_above_upr: None,
             absent_above_upr: None,
             no_uncertainty: None,
             filter: "none".into(),
-            reference: centre_of_chart().into(),
+            reference: centre_of_chart().symbol().into(),
             coverage: 1.0,
             uncertainty,
         }
     }
+}
+
+/// The direction in words, with what a declared form may add.
+fn described_within(direction: Direction, plot: &Synchronous, z_mm: f64) -> String {
+    let bound = if plot.bound > 0.0 {
+        format!("; the form declared within its bound may add up to {:.3} {}", plot.bound, unit(direction))
+    } else {
+        String::new()
+    };
+    format!("{}{bound}", described(direction, z_mm, XYZ))
 }
 
 /// The uncertainty of a value that a declared form may move by up to `bound` either way, as likely to anything within it; the

@@ -12,6 +12,8 @@
 //! is.
 //!
 //! x and y are those in the plane midway between the sensors, where noise is least.
+//!
+//! Of an axis that was measured at standing positions, [`StandingMotion`] gives the synchronous values.
 
 mod axial;
 mod marks;
@@ -19,18 +21,19 @@ mod names;
 mod noise;
 mod plots;
 mod polar;
+mod standing;
+mod synchronous;
 #[cfg(test)]
 mod tests;
 mod turns;
 mod weakened;
 
 pub use marks::with_jitter_of_marks;
-pub use names::{WITH_FUNDAMENTAL, symbols};
+pub use names::{WITH_FUNDAMENTAL, is_along_axis, standing_symbols, symbols};
 pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;
+pub use standing::{Fundamental, StandingMotion, weights};
 pub use weakened::behind_low_pass;
-
-use std::cell::RefCell;
 
 use crate::{
     profile::Profile,
@@ -38,15 +41,15 @@ use crate::{
     spread::{Direction, Spread},
 };
 use axial::bounded;
-use names::{RESIDUAL, STANDARD, chosen_id, described, id, millimetres, over, unit};
-use noise::{Measure, without_noise};
-use polar::{Motion, Synchronous, seen_from};
+use names::{STANDARD, XYZ, chosen_id, described, fundamental_across, id, kind_of, over, place, unit};
+use polar::{Motion, Synchronous};
 use runout_standards::{
     Value,
-    roundness::{Angles, Points, Reference, ront_lsci_um},
+    roundness::{Angles, Points, Reference},
     uncertainty::{self, Uncertainty},
 };
-use turns::{between_setups, directions, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest};
+use synchronous::Named;
+use turns::{between_setups, directions, of_all_turns, rms_across, root_mean_square, widest};
 
 /// What error motion is evaluated from: one station.
 #[derive(Debug, Clone, Copy)]
@@ -138,82 +141,38 @@ impl ErrorMotion<'_> {
         plot: &Synchronous,
         spreads: &[&Spread],
     ) -> Option<Vec<Value>> {
-        let points = RefCell::new(Points::default());
-        let seen_on = |count: usize| {
-            let angles = Angles::shared(count);
-            let drawn = plot.over_angle(&angles);
-            let place = centre.of(&angles, &drawn, &mut points.borrow_mut())?;
-            Some(seen_from(place, &angles, &drawn))
-        };
-        let angles = Angles::shared(self.angles);
-        let (seen, finely) = (seen_on(self.angles)?, seen_on(FINER * self.angles)?);
-        // Draws on fewer angles tell the error as well, not the range: its ends lie between those angles.
-        let between = ront_lsci_um(&finely) - ront_lsci_um(&seen);
+        let mut points = Points::default();
         let seed = uncertainty::seed(&[self.station, id(direction), centre.symbol()]);
-        let about_moved = |plot: &[f64]| {
-            let place = centre.of(&angles, plot, &mut points.borrow_mut()).unwrap_or_default();
-            let seen = seen_from(place, &angles, plot);
-            [ront_lsci_um(&seen), rms_about_mean(&seen)]
-        };
-        let values = if centre.is_linear() { Measure::AboutFixedCentre } else { Measure::Of(&about_moved) };
-        let found = [ront_lsci_um(&seen), rms_about_mean(&seen)];
-        let [(range, range_share, range_known), (rms, rms_share, rms_known)] =
-            match without_noise(found, &seen, &plot.variance, 2, seed, &values) {
-                Some(known) => {
-                    let mut found = found.into_iter();
-                    known
-                        .map(|(share, known)| ((found.next().unwrap_or(f64::NAN) - share).max(0.0), share, Some(known)))
-                }
-                None => found.map(|found| (found, 0.0, None)),
-            };
-        let range = range + between;
-        let range_known = range_known.map(|known| known.moved(between));
+        let seen = plot.seen(centre, self.angles, 2, seed)?;
+        let rms = seen.rms.value;
         let (mut all, mut each, mut each_rms) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new(), Vec::new());
         for spread in spreads {
-            let other = if spread.angles == self.angles { None } else { Some(seen_on(FINER * spread.angles)?) };
-            let (inner, outer) = of_all_turns(other.as_ref().unwrap_or(&finely), spread.in_direction(direction)?);
+            let other =
+                (spread.angles != self.angles).then(|| plot.seen_on(FINER * spread.angles, centre, &mut points));
+            let other = other.map_or(Some(None), |other| other.map(Some))?;
+            let (inner, outer) = of_all_turns(other.as_ref().unwrap_or(&seen.finely), spread.in_direction(direction)?);
             all = (all.0.min(inner), all.1.max(outer));
             each.push(outer - inner);
             each_rms.push(rms.hypot(spread.rms(direction)?));
         }
-        let about = |symbol, what: &str, value, uncertainty| Value {
-            symbol,
-            unit: unit(direction),
-            value,
-            source: format!("{STANDARD}, {what}, {}", described(direction, z_mm)),
-            band_upr: plot.band,
-            lost_orders: plot.lost.clone(),
-            weakened_above_upr: None,
-            absent_above_upr: None,
-            no_uncertainty: None,
-            filter: "none".into(),
-            reference: centre.symbol().into(),
-            coverage: 1.0,
-            uncertainty,
-        };
-        let (kind, synchronous) = if direction.is_tilt() {
-            (RESIDUAL, "residual synchronous error motion value")
-        } else {
-            ("synchronous", "synchronous error motion value")
-        };
-        let said = |what: &str, share: f64, known: &Option<Uncertainty>| match known {
-            Some(_) if share >= SAID => format!("{what}, without {share:.3} {} that noise adds to it", unit(direction)),
-            _ => what.to_owned(),
-        };
+        let (id, described) = (self.id(direction), described(direction, z_mm, XYZ));
+        let (kind, what) = kind_of(direction);
+        let named = Named { kind, what, id: &id, described: &described, unit: unit(direction), centre };
+        let [range, rms] = plot.values(&named, &seen);
         let total = format!("total error motion value without 1/rev, {}", over(spreads));
-        let id = self.id(direction);
+        let about = |symbol: String, what: &str, value, uncertainty| Value {
+            symbol,
+            value,
+            source: format!("{STANDARD}, {what}, {described}"),
+            uncertainty,
+            ..range.clone()
+        };
         let std = |known: &Option<Uncertainty>, across| {
             known.as_ref().map_or(0.0, |known| known.std).hypot(self.carried(direction, spreads, across))
         };
-        let (range_std, rms_std) = (std(&range_known, widest), std(&rms_known, rms_across));
-        let (range_said, rms_said) = (
-            said(synchronous, range_share, &range_known),
-            said(&format!("{synchronous}, root mean square over the angles"), rms_share, &rms_known),
-        );
+        let (range_std, rms_std) = (std(&seen.range.known, widest), std(&seen.rms.known, rms_across));
         let total_rms = root_mean_square(&each_rms);
-        Some(vec![
-            about(format!("{kind}-{id}"), &range_said, range, bounded(range_known, plot.bound)),
-            about(format!("{kind}-{id}-rms"), &rms_said, rms, bounded(rms_known, 0.5 * plot.bound)),
+        let totals = [
             about(format!("total-{id}"), &total, all.1 - all.0, bounded(between_setups(&each, range_std), plot.bound)),
             about(
                 format!("total-{id}-rms"),
@@ -221,7 +180,8 @@ impl ErrorMotion<'_> {
                 total_rms,
                 bounded(between_setups(&each_rms, rms_std), 0.5 * plot.bound),
             ),
-        ])
+        ];
+        Some([range, rms].into_iter().chain(totals).collect())
     }
 
     /// The range of all turns with the part of 1/rev that turns against the spindle, about the centre of the polar chart.
@@ -242,12 +202,12 @@ impl ErrorMotion<'_> {
         let id = self.id(direction);
         Some(Value {
             symbol: format!("total-{id}{WITH_FUNDAMENTAL}"),
-            unit: unit(direction),
+            unit: unit(direction).into(),
             value: all.1 - all.0,
             source: format!(
                 "{STANDARD}, total error motion value with the part of 1/rev that turns against the spindle, {}, {}",
                 over(spreads),
-                described(direction, z_mm)
+                described(direction, z_mm, XYZ)
             ),
             band_upr: plot.band,
             lost_orders: plot.lost.clone(),
@@ -284,10 +244,10 @@ impl ErrorMotion<'_> {
         let gain_unit = if direction.is_tilt() { " µrad/µm" } else { "" };
         let alone = if each.len() < 2 { "; one setup leaves its uncertainty unknown" } else { "" };
         let id = self.id(direction);
-        let described = described(direction, z_mm);
+        let described = described(direction, z_mm, XYZ);
         let value = |symbol, what: &str, value, uncertainty| Value {
             symbol,
-            unit: unit(direction),
+            unit: unit(direction).into(),
             value,
             source: format!(
                 "{STANDARD}, asynchronous error motion value, {described}, {what} of {}; with the sensors' noise, \
@@ -341,27 +301,9 @@ impl ErrorMotion<'_> {
         let value = 2.0 * motion.coefficients(self.separation).get(1)?.norm();
         // The part of an error E|δ|² along the phasor is half of it.
         let std = (2.0 * motion.variance(self.separation, 1, None)).sqrt();
-        let direction = if quantity == Quantity::X { Direction::X } else { Direction::TiltY };
-        Some(Value {
-            symbol: if direction.is_tilt() { "fundamental-tilt".into() } else { "fundamental-radial".into() },
-            unit: unit(direction),
-            value,
-            source: format!(
-                "{STANDARD}, fundamental error motion value{}: the part that turns against the spindle, the rest of 1/rev is \
-                 centring",
-                if direction.is_tilt() { String::new() } else { format!(" at z = {} mm", millimetres(z_mm)) }
-            ),
-            band_upr: [1, 1],
-            lost_orders: Vec::new(),
-            weakened_above_upr: None,
-            absent_above_upr: None,
-            no_uncertainty: None,
-            filter: "none".into(),
-            reference: "PC".into(),
-            coverage: 1.0,
-            // Eccentricity is no form: at order 1 a declared form adds nothing.
-            uncertainty: (std > 0.0)
-                .then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1))),
-        })
+        let tilt = quantity != Quantity::X;
+        // Eccentricity is no form: at order 1 a declared form adds nothing.
+        let known = (std > 0.0).then(|| Uncertainty::of_amplitude(value, std, self.separation.degrees_of_freedom(1)));
+        Some(fundamental_across(tilt, value, known, "spindle", &place(z_mm, XYZ)))
     }
 }

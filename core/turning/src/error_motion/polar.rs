@@ -154,6 +154,22 @@ impl Synchronous {
         })
     }
 
+    /// In a fixed direction, from coefficients of Re Σ cₙ e^{+inΦ} and the variance of each by order from 0, of those from `lowest` on.
+    pub(super) fn fixed(lowest: usize, harmonics: &[Complex64], variance: &[f64]) -> Self {
+        let counting = |order: usize| order >= lowest;
+        let first =
+            harmonics.iter().enumerate().map(|(n, value)| if counting(n) { value.conj() } else { Complex64::ZERO });
+        let variance = variance.iter().enumerate().map(|(n, variance)| if counting(n) { *variance } else { 0.0 });
+        Self {
+            band: [lowest, harmonics.len().saturating_sub(1)],
+            first: first.collect(),
+            second: None,
+            variance: variance.collect(),
+            lost: Vec::new(),
+            bound: 0.0,
+        }
+    }
+
     /// Whether no order of the band is observable.
     pub(crate) fn is_lost(&self) -> bool {
         self.lost.len() > self.band[1].saturating_sub(self.band[0])

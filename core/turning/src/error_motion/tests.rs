@@ -6,9 +6,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::*;
+use super::{polar::seen_from, *};
 use crate::{azimuth::Azimuth, profile::TurnCount, separation::Residual, spread::Projection};
 use runout_numerics::Complex64;
+use runout_standards::roundness::ront_lsci_um;
 
 const ANGLES: usize = 720;
 /// A chosen sensitive direction.

@@ -1,6 +1,6 @@
 //! Location errors, component errors, placement and effects of a fit, with their standard uncertainties.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
 use super::{DEPENDS, Estimate, Fit, LOST, gauge};
 use crate::kinematics::{Errors, place, turn};
@@ -63,6 +63,31 @@ impl Fit {
         })
     }
 
+    /// Combinations of the component errors at a command: each row takes three shifts (mm) and three angles (rad).
+    pub(crate) fn combined(&self, command: usize, rows: &[[f64; 6]]) -> Combined {
+        let Errors { shift, angle, .. } = self.state.errors[command];
+        let found = Vector6::new(shift.x, shift.y, shift.z, angle.x, angle.y, angle.z);
+        // As the unknowns count angles.
+        let scale = Vector6::new(1.0, 1.0, 1.0, self.lever, self.lever, self.lever);
+        let rows = DMatrix::from_fn(rows.len(), 6, |row, column| rows[row][column]);
+        let scaled = &rows * Matrix6::from_diagonal(&scale.map(f64::recip));
+        let (sensitivity, unknown) = (&self.structure.sensitivity[command], &self.structure.unknown[command]);
+        let lost = scaled.row_iter().map(|row| {
+            let row = row / row.norm();
+            let outside = !self.structure.in_gauge[command] && (&row * unknown).norm() > DEPENDS;
+            outside || !self.structure.observes(&(row * sensitivity).transpose())
+        });
+        let lost: Vec<bool> = lost.collect();
+        let block = &self.system.blocks[command];
+        let own = &scaled * &block.gain;
+        let by = self.structure.sensitivity(command, block, self.structure.count);
+        Combined {
+            value: (rows * found).iter().zip(lost).map(|(value, lost)| if lost { f64::NAN } else { *value }).collect(),
+            own: &own * own.transpose(),
+            common: scaled * by * &self.solution.by_rows,
+        }
+    }
+
     /// Covariances at a command: unknowns with component errors, and of component errors.
     fn at_command(&self, command: usize) -> (DMatrix<f64>, DMatrix<f64>) {
         let block = &self.system.blocks[command];
@@ -120,4 +145,14 @@ impl Fit {
         let nominal = self.layout.balls[ball];
         place(errors, phi, &(nominal + self.state.placement[ball])).at - turn(phi) * nominal
     }
+}
+
+/// Combinations of the component errors at a command, with their errors but for those that act as placement of the axis or of all balls.
+pub(crate) struct Combined {
+    /// NaN where not observable.
+    pub value: Vec<f64>,
+    /// Covariance of what only this command's readings add.
+    pub own: DMatrix<f64>,
+    /// What each change that all commands share adds, one column a change of standard deviation 1.
+    pub common: DMatrix<f64>,
 }

@@ -57,7 +57,8 @@ impl System {
         if rank == 0 {
             let by_gauge = basis * inverse;
             let covariance = &by_gauge * &self.gauge_covariance * by_gauge.transpose();
-            return Ok(Solution { unknowns: &by_gauge * &self.right, covariance, by_gauge, rank });
+            let by_rows = DMatrix::zeros(basis.nrows(), 0);
+            return Ok(Solution { unknowns: &by_gauge * &self.right, covariance, by_gauge, by_rows, rank });
         }
         if free.nrows() < rank {
             return Err("there are too few readings".into());
@@ -73,6 +74,6 @@ impl System {
         let by_rows = basis * from_rows;
         let unknowns = &by_gauge * &self.right + &by_rows * (q_t * &self.left);
         let covariance = &by_gauge * &self.gauge_covariance * by_gauge.transpose() + &by_rows * by_rows.transpose();
-        Ok(Solution { unknowns, covariance, by_gauge, rank })
+        Ok(Solution { unknowns, covariance, by_gauge, by_rows, rank })
     }
 }

@@ -56,7 +56,9 @@ impl Route {
     #[must_use]
     pub fn evaluables(&self) -> Vec<EvaluableKind> {
         match self {
-            Self::Turns { .. } => vec![EvaluableKind::ClosedProfiles, EvaluableKind::AxisMotion],
+            Self::Turns { .. } => {
+                vec![EvaluableKind::ClosedProfiles, EvaluableKind::AxisMotion, EvaluableKind::TurnSpread]
+            }
             Self::Points { separator, .. } => separator.evaluables(),
         }
     }

@@ -1,6 +1,7 @@
-//! The standards' values of what a domain of points offers beside closed profiles: open profiles and height maps.
+//! The standards' values of what a domain of points offers beside closed profiles: open profiles, height maps and motion
+//! of an axis.
 
-use super::{Evaluate, Group, open_profile, plane_map};
+use super::{Evaluate, Group, axis_motion, open_profile, plane_map};
 use crate::{
     stage::{Evaluable, EvaluableKind},
     summary::{NamedValue, PlacedValue},
@@ -27,6 +28,7 @@ impl Evaluated {
                 Evaluable::ClosedProfiles(_) => continue,
                 Evaluable::OpenProfile(profile) => (&profile.of, open_profile::values(profile, evaluate)),
                 Evaluable::HeightMap(map) => (&map.of, plane_map::values(map, evaluate)?),
+                Evaluable::AxisMotion(motion) => (&motion.of, axis_motion::values(motion, evaluate)),
             };
             said.into_iter().chain(unknown(&values)).for_each(|sentence| remarks.add(of, sentence));
             all.values.extend(values.into_iter().map(|value| (of.clone(), value)));

@@ -3,7 +3,7 @@
 use super::{Evaluate, Limit, ascii_unit};
 use runout_error::fault::{Fault, known_names};
 use runout_turning::{
-    error_motion::{Centre, WITH_FUNDAMENTAL},
+    error_motion::{self, Centre, WITH_FUNDAMENTAL},
     rig::Rig,
 };
 
@@ -50,7 +50,7 @@ impl Limit {
             "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
                 known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;
             }
-            symbol if symbol.ends_with(WITH_FUNDAMENTAL) => {
+            symbol if symbol.ends_with(WITH_FUNDAMENTAL) || error_motion::is_along_axis(symbol) => {
                 known("reference", &self.reference, vec![Centre::PolarChart.symbol().to_owned()])?;
             }
             symbol if ["synchronous-", "residual-", "total-"].iter().any(|kind| symbol.starts_with(kind)) => {

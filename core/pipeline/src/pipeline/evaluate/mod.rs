@@ -1,6 +1,7 @@
 //! The standards' values of a run: which (`[evaluate]`), of what, and the limits that they have to keep (`[[limit]]`).
 
 mod areal;
+mod axis_motion;
 mod centres;
 mod config;
 mod cylindricity;
@@ -135,6 +136,8 @@ fn labelled_with_reasons(
         .collect()
 }
 
+#[cfg(test)]
+mod axis_motion_tests;
 #[cfg(test)]
 mod cost_tests;
 #[cfg(test)]

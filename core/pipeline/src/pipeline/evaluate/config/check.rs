@@ -142,6 +142,7 @@ impl EvaluateConfig {
         Ok(Evaluate {
             all: self.values == Some(Groups::All),
             of_closed: usual.of_closed,
+            of_turns: usual.of_turns,
             groups: match self.values {
                 Some(Groups::All) => Group::ALL.to_vec(),
                 Some(Groups::Listed(groups)) => groups,

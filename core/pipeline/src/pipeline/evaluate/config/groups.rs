@@ -26,7 +26,7 @@ pub enum Group {
     Areal,
     /// Twist of a turned or ground shaft (MBN 31007-07): the strongest helix on the surface.
     Twist,
-    /// ISO 230-7, of each station.
+    /// ISO 230-7, of each station; of an axis at standing positions its synchronous values.
     ErrorMotion,
 }
 

@@ -98,6 +98,8 @@ pub struct Evaluate {
     groups: Vec<Group>,
     /// Whether there are closed profiles to evaluate.
     of_closed: bool,
+    /// Whether single turns of the axis are known.
+    of_turns: bool,
     /// Whether all groups were asked for, and none by its name.
     pub(crate) all: bool,
     pub(super) references: Vec<Reference>,
@@ -130,6 +132,7 @@ impl Default for Evaluate {
                 Group::ErrorMotion,
             ],
             of_closed: true,
+            of_turns: true,
             all: false,
             references: vec![Reference::LeastSquares, Reference::MinimumZone],
             filter_upr: None,
@@ -195,6 +198,7 @@ impl Evaluate {
     pub(crate) fn keep_given(&mut self, given: &[EvaluableKind]) {
         self.groups.retain(|group| group.is_given_by(given));
         self.of_closed = given.contains(&EvaluableKind::ClosedProfiles);
+        self.of_turns = given.contains(&EvaluableKind::TurnSpread);
         if !self.of_closed && self.areal.form == FormRemoval::Cylinder {
             self.areal.form = FormRemoval::Plane;
         }

@@ -73,7 +73,8 @@ impl Evaluate {
         let mut symbols: Vec<(String, &'static str)> =
             symbols.into_iter().map(|(symbol, unit)| (symbol.to_owned(), unit)).collect();
         if self.has(Group::ErrorMotion) {
-            symbols.extend(error_motion::symbols(&self.directions, &self.faces));
+            let of_axis = if self.of_turns { error_motion::symbols } else { error_motion::standing_symbols };
+            symbols.extend(of_axis(&self.directions, &self.faces));
         }
         symbols
     }
