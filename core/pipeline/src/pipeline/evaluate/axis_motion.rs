@@ -144,7 +144,7 @@ impl At<'_> {
             found.lost.push((standing.id(), lost));
             return;
         }
-        let open = self.goes_on(&harmonics, &variance);
+        let open = goes_on(&harmonics, &variance);
         if open {
             found.open.push(standing.id());
         }
@@ -170,19 +170,6 @@ impl At<'_> {
             variance.iter_mut().zip(changed).for_each(|(variance, harmonic)| *variance += harmonic.norm_sqr());
         }
         variance
-    }
-
-    /// Whether orders above the highest may be there. They would fold into the upper half of the band as likely as into the lower: where
-    /// the upper half has no more than noise, there are none. Few orders, or errors that are not known, show nothing.
-    fn goes_on(&self, harmonics: &[Complex64], variance: &[f64]) -> bool {
-        let upper = harmonics.len() / 2..harmonics.len();
-        let upper = upper.start.max(2)..upper.end;
-        if variance.is_empty() || upper.len() < UPPER_ORDERS {
-            return true;
-        }
-        let count = upper.len() as f64;
-        let power = upper.map(|order| harmonics[order].norm_sqr() / variance[order]).sum::<f64>() / count;
-        power.is_nan() || power > 1.0 + CHANCE / count.sqrt()
     }
 
     /// Of x + iy (or of both tilts) the part that turns against the axis: the mean of (x + iy)·e^{iθ}.
@@ -242,4 +229,17 @@ fn sum(weights: &[f64; 5], of: &[f64; 5]) -> f64 {
 
 fn quadratic(weights: &[f64; 5], covariance: &[[f64; 5]; 5]) -> f64 {
     sum(weights, &covariance.map(|row| sum(weights, &row)))
+}
+
+/// Whether orders above the highest may be there. They would fold into the upper half of the band as likely as into the lower: where
+/// the upper half has no more than noise, there are none. Few orders, or errors that are not known, show nothing.
+fn goes_on(harmonics: &[Complex64], variance: &[f64]) -> bool {
+    let upper = harmonics.len() / 2..harmonics.len();
+    let upper = upper.start.max(2)..upper.end;
+    if variance.is_empty() || upper.len() < UPPER_ORDERS {
+        return true;
+    }
+    let count = upper.len() as f64;
+    let power = upper.map(|order| harmonics[order].norm_sqr() / variance[order]).sum::<f64>() / count;
+    power.is_nan() || power > 1.0 + CHANCE / count.sqrt()
 }

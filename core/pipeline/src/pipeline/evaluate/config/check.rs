@@ -62,11 +62,7 @@ impl EvaluateConfig {
         Ok(())
     }
 
-    /// Checks the values.
-    ///
-    /// # Errors
-    /// The first that cannot be, with its key.
-    pub(crate) fn check(self) -> Result<Evaluate, Fault> {
+    fn check_cutoffs(&self) -> Result<(), Fault> {
         for (key, cutoffs) in [("filter_upr", &self.filter_upr), ("robust_filter_upr", &self.robust_filter_upr)] {
             for (index, cutoff) in cutoffs.iter().flatten().enumerate() {
                 if !(cutoff.is_finite() && *cutoff > 0.0) {
@@ -94,6 +90,15 @@ impl EvaluateConfig {
                 return Err(Fault::at("high_pass_upr", message));
             }
         }
+        Ok(())
+    }
+
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// The first that cannot be, with its key.
+    pub(crate) fn check(self) -> Result<Evaluate, Fault> {
+        self.check_cutoffs()?;
         if let Some(window) = self.slope_window_deg.filter(|window| !(*window > 0.0 && *window <= 180.0)) {
             let message = format!("the window must be above 0° and at most 180°, found {window}");
             return Err(Fault::at("slope_window_deg", message));
