@@ -250,7 +250,7 @@ impl LeastSquaresCylinder {
             variance,
             motion_covariance: None,
             form_covariance: None,
-            freedom: 0,
+            freedom: fit.remainder().dof,
             equivalents: Vec::new(),
             form_bound: Vec::new(),
             motion_z_mm: 0.0,

@@ -80,7 +80,7 @@ pub(crate) fn fit(layout: &Layout, readings: &[Reading], effects: &[Column]) -> 
         }
     }
     Err(format!(
-        "the fit does not settle within {MAX_STEPS} steps: are the readings in mm and the balls' places right?"
+        "the fit does not settle within {MAX_STEPS} steps: are the readings in mm, are the balls' places right, and do the balls lie nearly in a line?"
     ))
 }
 

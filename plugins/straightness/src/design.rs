@@ -44,7 +44,7 @@ impl Data {
         let range = [ends(0).fold(f64::INFINITY, f64::min), ends(1).fold(f64::NEG_INFINITY, f64::max)];
         let spacing = self.traces.iter().map(AxialTrace::spacing_mm).fold(0.0, f64::max);
         let part = Knots::over(range, KNOT_SPACINGS * spacing);
-        let slide = self.slide_cutoff_mm.map(|cutoff| Knots::over(range, 0.5 * cutoff));
+        let slide = self.slide_cutoff_mm.map(|cutoff| Knots::for_waves(range, cutoff));
         let first = [0, if slide.is_some() { 0 } else { part.splines() }];
         Readings { of, part, slide, first, splines: first[1] + part.splines() }
     }

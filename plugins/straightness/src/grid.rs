@@ -39,11 +39,10 @@ pub(crate) struct Split {
     pub beyond_smooth_um: f64,
 }
 
-/// The deviations about a straight line that have no waves shorter than `cutoff_mm`: cubic splines whose knots are half of
-/// that apart.
+/// The deviations about a straight line that have no waves shorter than `cutoff_mm`.
 pub(crate) fn smooth(z_mm: &[f64], cutoff_mm: f64) -> Basis {
     let range = [z_mm.first(), z_mm.last()].map(|z| z.copied().unwrap_or_default());
-    let knots = Knots::over(range, 0.5 * cutoff_mm);
+    let knots = Knots::for_waves(range, cutoff_mm);
     let columns = (0..knots.splines()).map(|spline| {
         let weight = |z: &f64| {
             let at = knots.at(*z);

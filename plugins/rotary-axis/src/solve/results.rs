@@ -74,7 +74,7 @@ impl Fit {
         let (sensitivity, unknown) = (&self.structure.sensitivity[command], &self.structure.unknown[command]);
         let lost = scaled.row_iter().map(|row| {
             let row = row / row.norm();
-            let outside = !self.structure.in_gauge[command] && (&row * unknown).norm() > DEPENDS;
+            let outside = !self.structure.in_gauge[command] && (row * unknown).norm() > DEPENDS;
             outside || !self.structure.observes(&(row * sensitivity).transpose())
         });
         let lost: Vec<bool> = lost.collect();
