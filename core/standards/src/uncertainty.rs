@@ -146,7 +146,8 @@ pub fn monte_carlo_of(
 }
 
 /// The same where what is drawn is what the truth may be, of each form as many draws as it says, form by form: the interval is from the
-/// draws' 2.5 % point to their 97.5 % point, and begins no later than that of the least form alone.
+/// draws' 2.5 % point to their 97.5 % point, and begins no later than that of the least form alone. The standard uncertainty is the root mean square
+/// of the draws about the value, which noise may have raised.
 pub fn likely_values_of(
     forms: &[LikelyForm],
     transforms: usize,
@@ -158,7 +159,9 @@ pub fn likely_values_of(
         let known = summed_up(drawn, value);
         of_least.sort_by(f64::total_cmp);
         let begin = of_least.first().map_or(f64::INFINITY, |_| point(of_least, TAIL));
-        Uncertainty { interval_95: [point(drawn, TAIL).min(begin), point(drawn, 1.0 - TAIL)], ..known }
+        let squares: f64 = drawn.iter().map(|draw| (draw - value).powi(2)).sum();
+        let std = (squares / drawn.len().max(1) as f64).sqrt();
+        Uncertainty { std, interval_95: [point(drawn, TAIL).min(begin), point(drawn, 1.0 - TAIL)], ..known }
     };
     all_draws(forms.iter().map(|form| form.draws).sum(), transforms, draw, likely)
 }

@@ -67,7 +67,7 @@ mod tests {
     use sci_rs::signal::filter::design::{DigitalFilter, FilterBandType, FilterOutputType, butter_dyn};
 
     use super::*;
-    use runout_turning::measurement::Response;
+    use runout_core::measurement::Response;
 
     #[test]
     fn poles_and_gains_are_those_of_an_independent_design() {
