@@ -13,7 +13,7 @@ use super::{
     names::{RESIDUAL, STANDARD, XYZ, centre_of_chart, described, fundamental_along, over, unit},
     polar::Synchronous,
     synchronous::Named,
-    turns::{between_setups, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest},
+    turns::{between_setups, bounded, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest},
 };
 use crate::spread::{Direction, Spread};
 use runout_standards::{
@@ -143,14 +143,4 @@ fn described_within(direction: Direction, plot: &Synchronous, z_mm: f64) -> Stri
         String::new()
     };
     format!("{}{bound}", described(direction, z_mm, XYZ))
-}
-
-/// The uncertainty of a value that a declared form may move by up to `bound` either way, as likely to anything within it; the
-/// interval reaches as far.
-pub(super) fn bounded(known: Option<Uncertainty>, bound: f64) -> Option<Uncertainty> {
-    let mut known = known?;
-    known.std = known.std.hypot(bound / 3.0_f64.sqrt());
-    let [low, high] = known.interval_95;
-    known.interval_95 = [(low - bound).max(0.0), high + bound];
-    Some(known)
 }

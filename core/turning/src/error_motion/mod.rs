@@ -40,7 +40,6 @@ use crate::{
     separation::{Quantity, Separation},
     spread::{Direction, Spread},
 };
-use axial::bounded;
 use names::{STANDARD, XYZ, chosen_id, described, fundamental_across, id, kind_of, over, place, unit};
 use polar::{Motion, Synchronous};
 use runout_standards::{
@@ -49,7 +48,7 @@ use runout_standards::{
     uncertainty::{self, Uncertainty},
 };
 use synchronous::Named;
-use turns::{between_setups, directions, of_all_turns, rms_across, root_mean_square, widest};
+use turns::{between_setups, bounded, directions, of_all_turns, rms_across, root_mean_square, widest};
 
 /// What error motion is evaluated from: one station.
 #[derive(Debug, Clone, Copy)]

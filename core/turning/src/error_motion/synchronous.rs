@@ -4,11 +4,10 @@ use std::cell::RefCell;
 
 use super::{
     Centre, FINER, SAID,
-    axial::bounded,
     names::STANDARD,
     noise::{Measure, without_noise},
     polar::{Synchronous, seen_from},
-    turns::rms_about_mean,
+    turns::{bounded, rms_about_mean},
 };
 use runout_standards::{
     Value,

@@ -69,3 +69,13 @@ pub(super) fn between_setups(each: &[f64], std: f64) -> Option<Uncertainty> {
     let half = (student * scatter * (1.0 + 1.0 / count).sqrt()).hypot(NORMAL_95 * std);
     Some(Uncertainty { std: scatter.hypot(std), interval_95: [(mean - half).max(0.0), mean + half], draws: 0 })
 }
+
+/// The uncertainty of a value that a declared form may move by up to `bound` either way, as likely to anything within it; the
+/// interval reaches as far.
+pub(super) fn bounded(known: Option<Uncertainty>, bound: f64) -> Option<Uncertainty> {
+    let mut known = known?;
+    known.std = known.std.hypot(bound / 3.0_f64.sqrt());
+    let [low, high] = known.interval_95;
+    known.interval_95 = [(low - bound).max(0.0), high + bound];
+    Some(known)
+}
