@@ -188,7 +188,7 @@ impl LikelyForm {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 

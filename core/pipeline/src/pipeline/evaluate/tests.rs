@@ -249,8 +249,8 @@ fn intervals_of_the_steepest_slope_hold_the_truth() {
         }
         let percent = 100.0 * inside as f64 / TRIALS as f64;
         println!("order^{fall} to {last}, {std_um} µm: {percent:.1} %, noise adds {:.1} %", 100.0 * noise);
-        // 95 % of 300 are 285 ± 3.8.
-        assert!((91.5..=99.0).contains(&percent), "{percent} %");
+        // 95 % of 300 are 285 ± 3.8; of forms that end, the lower end is that of none above their last order, which holds more.
+        assert!((91.5..=99.8).contains(&percent), "{percent} %");
     }
     // Σ n²σ² of errors of 10 nm in 254 orders is 4.4 µm²; of a wave of order 3 it is 9a², 11 times as much for 2.3 µm.
     let hidden = of(&[(3, Complex64::from(2.3))], &[2.0 * 1e-4 / 254.0; HIGHEST + 1], 0);
