@@ -11,6 +11,7 @@
 use super::{
     ErrorMotion, FINER,
     names::{RESIDUAL, STANDARD, XYZ, centre_of_chart, described, fundamental_along, over, unit},
+    noise::Orders,
     polar::Synchronous,
     synchronous::Named,
     turns::{between_setups, bounded, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest},
@@ -60,7 +61,7 @@ impl ErrorMotion<'_> {
         let id = self.id(direction);
         let seed = uncertainty::seed(&[self.station, &id, kind]);
         let centre = centre_of_chart();
-        let seen = plot.seen(centre, self.angles, plot.band[0], seed)?;
+        let seen = plot.seen(centre, self.angles, plot.band[0], seed, Orders::Many)?;
         let described = described_within(direction, plot, z_mm);
         let named = Named { kind, what, id: &id, described: &described, unit: unit(direction), centre };
         Some(plot.values(&named, &seen))

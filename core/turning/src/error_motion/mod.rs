@@ -41,6 +41,7 @@ use crate::{
     spread::{Direction, Spread},
 };
 use names::{STANDARD, XYZ, chosen_id, described, fundamental_across, id, kind_of, over, place, unit};
+use noise::Orders;
 use polar::{Motion, Synchronous};
 use runout_standards::{
     Value,
@@ -142,7 +143,7 @@ impl ErrorMotion<'_> {
     ) -> Option<Vec<Value>> {
         let mut points = Points::default();
         let seed = uncertainty::seed(&[self.station, id(direction), centre.symbol()]);
-        let seen = plot.seen(centre, self.angles, 2, seed)?;
+        let seen = plot.seen(centre, self.angles, 2, seed, Orders::Many)?;
         let rms = seen.rms.value;
         let (mut all, mut each, mut each_rms) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new(), Vec::new());
         for spread in spreads {

@@ -3,7 +3,7 @@
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     roundness::{self, FixedCentre},
-    uncertainty::{DRAWS, Errors, Uncertainty, extreme, stand_in},
+    uncertainty::{DRAWS, Errors, NORMAL_95, Uncertainty, extreme, stand_in},
 };
 
 /// How two values of a plot are found.
@@ -14,28 +14,61 @@ pub(super) enum Measure<'a> {
     Of(&'a dyn Fn(&[f64]) -> [f64; 2]),
 }
 
+/// How many orders a plot has, on which it depends what stands for the truth.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Orders {
+    /// So many that neighbours show the noise of an order.
+    Many,
+    /// So few that one line may be in the neighbourhood of all others.
+    Few,
+}
+
+/// A value's share of noise, and its uncertainty without it.
+type Shared = (f64, Uncertainty);
+
 /// What noise adds to two values of a plot in the mean, and the uncertainty of each without it; `None` where no variance is
 /// known. Tilt has noise of all orders and little motion above the low ones, so that noise adds up.
+///
+/// Of few orders, those near noise may be motion or not. The interval reaches from what is right where they are noise to what is right where
+/// all that was found is motion: one of both alone holds the truth in 30 to 80 % of simulated plots with motion of about its noise.
 pub(super) fn without_noise(
     found: [f64; 2],
     plot: &[f64],
     variance: &[f64],
     lowest: usize,
     seed: u64,
-    measure: &Measure,
-) -> Option<[(f64, Uncertainty); 2]> {
+    (measure, orders): (&Measure, Orders),
+) -> Option<[Shared; 2]> {
     if plot.len() < 2 {
         return None;
     }
-    let mut errors = Errors::new(variance, lowest, seed)?;
     let mut fourier = Fourier::new(plot.len());
     let mut harmonics = vec![Complex64::ZERO; variance.len().min(fourier.max_order() + 1)];
     fourier.analyse(plot.iter().copied(), &mut harmonics);
-    let weights = stand_in(&harmonics, variance, lowest);
-    // What is above the orders with a known variance stays.
-    let noise: Vec<Complex64> = harmonics.iter().zip(weights).map(|(value, weight)| value * (1.0 - weight)).collect();
-    let mut likely = plot.to_vec();
-    likely.iter_mut().zip(fourier.synthesise(noise)).for_each(|(value, noise)| *value -= noise);
+    let mut about = |weights: &[f64]| {
+        // What is above the orders with a known variance stays.
+        let noise = harmonics.iter().zip(weights).map(|(value, weight)| value * (1.0 - weight));
+        let mut likely = plot.to_vec();
+        likely.iter_mut().zip(fourier.synthesise(noise)).for_each(|(value, noise)| *value -= noise);
+        drawn_about(found, likely, Errors::new(variance, lowest, seed)?, &mut fourier, measure)
+    };
+    match orders {
+        Orders::Many => about(&stand_in(&harmonics, variance, lowest)),
+        Orders::Few => {
+            let [first, second] = about(&clear_of_noise(&harmonics, variance, lowest))?;
+            let [first_whole, second_whole] = about(&vec![1.0; harmonics.len()])?;
+            Some([joined(first, &first_whole), joined(second, &second_whole)])
+        }
+    }
+}
+
+fn drawn_about(
+    found: [f64; 2],
+    mut likely: Vec<f64>,
+    mut errors: Errors,
+    fourier: &mut Fourier,
+    measure: &Measure,
+) -> Option<[Shared; 2]> {
     let (about, drawn): ([f64; 2], Vec<[f64; 2]>) = match measure {
         Measure::AboutFixedCentre => {
             // Errors of orders from 1 on leave the mean.
@@ -43,12 +76,12 @@ pub(super) fn without_noise(
             likely.iter_mut().for_each(|value| *value -= mean);
             let plot = FixedCentre::new(likely);
             let both = |values: roundness::Values| [values.ront_um, values.ronq_um];
-            (both(plot.about()), (0..DRAWS).map(|_| both(plot.values(&errors.turned(&mut fourier)))).collect())
+            (both(plot.about()), (0..DRAWS).map(|_| both(plot.values(&errors.turned(fourier)))).collect())
         }
         Measure::Of(values) => {
             let mut drawn = likely.clone();
             let mut next = || {
-                errors.draw(&mut fourier, &likely, &mut drawn);
+                errors.draw(fourier, &likely, &mut drawn);
                 values(&drawn)
             };
             let all = (0..DRAWS).map(|_| next()).collect();
@@ -57,4 +90,30 @@ pub(super) fn without_noise(
     };
     let (first, second) = drawn.into_iter().map(|[first, second]| (first, second)).unzip();
     Some([extreme(found[0], about[0], first)?, extreme(found[1], about[1], second)?])
+}
+
+/// With an interval that holds both.
+fn joined((share, known): Shared, (_, whole): &Shared) -> Shared {
+    let low = known.interval_95[0].min(whole.interval_95[0]);
+    let high = known.interval_95[1].max(whole.interval_95[1]);
+    let std = known.std.max((high - low) / (2.0 * NORMAL_95));
+    (share, Uncertainty { std, interval_95: [low, high], ..known })
+}
+
+/// Power over its variance from which on an order is motion: noise alone exceeds it in 1 of 8000 cases.
+const CLEAR: f64 = 9.0;
+
+/// Weights by order of what is motion beyond doubt: an order that is clear of noise keeps its share of power without noise, the others the
+/// share that they have together. Orders below `lowest` keep all.
+fn clear_of_noise(harmonics: &[Complex64], variance: &[f64], lowest: usize) -> Vec<f64> {
+    let ratio = |order: usize| harmonics[order].norm_sqr() / variance[order];
+    let weak: Vec<f64> = (lowest..harmonics.len()).map(ratio).filter(|ratio| *ratio <= CLEAR).collect();
+    let mean = weak.iter().sum::<f64>() / weak.len().max(1) as f64;
+    let together = if mean - 1.0 > 2.0 / (weak.len().max(1) as f64).sqrt() { 1.0 - 1.0 / mean } else { 0.0 };
+    let weight = |order: usize| match ratio(order) {
+        _ if order < lowest => 1.0,
+        own if own > CLEAR => 1.0 - 1.0 / own,
+        _ => together,
+    };
+    (0..harmonics.len()).map(weight).collect()
 }

@@ -9,6 +9,7 @@ use super::{
     names::{
         RESIDUAL, centre_of_chart, described, fundamental_across, fundamental_along, kind_of, letter_id, place, unit,
     },
+    noise::Orders,
     polar::Synchronous,
     synchronous::{Measured, Named, Seen},
 };
@@ -92,7 +93,7 @@ impl StandingMotion<'_> {
         let (id, described) = (self.id(), described(self.direction, self.z_mm, self.letters));
         let angles = (ANGLES_AN_ORDER * self.harmonics.len()).max(FEWEST_ANGLES);
         let seed = uncertainty::seed(&[self.of, &id, kind, centre.symbol()]);
-        let Seen { range, rms, finely } = plot.seen(centre, angles, lowest, seed)?;
+        let Seen { range, rms, finely } = plot.seen(centre, angles, lowest, seed, Orders::Few)?;
         let seen = Seen { range: self.as_known(range), rms: self.as_known(rms), finely };
         let named = Named { kind, what, id: &id, described: &described, unit: unit(self.direction), centre };
         Some(plot.values(&named, &seen))

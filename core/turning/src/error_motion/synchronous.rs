@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use super::{
     Centre, FINER, SAID,
     names::STANDARD,
-    noise::{Measure, without_noise},
+    noise::{Measure, Orders, without_noise},
     polar::{Synchronous, seen_from},
     turns::{bounded, rms_about_mean},
 };
@@ -49,7 +49,7 @@ pub(super) struct Named<'a> {
 
 impl Synchronous {
     /// The plot from a centre, with errors of orders from `lowest` on; `None` where the centre is not determined.
-    pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64) -> Option<Seen> {
+    pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64, orders: Orders) -> Option<Seen> {
         let points = RefCell::new(Points::default());
         let seen_on = |count: usize| self.seen_on(count, centre, &mut points.borrow_mut());
         let (seen, finely) = (seen_on(angles)?, seen_on(FINER * angles)?);
@@ -63,11 +63,15 @@ impl Synchronous {
         };
         let values = if centre.is_linear() { Measure::AboutFixedCentre } else { Measure::Of(&about_moved) };
         let found = [ront_lsci_um(&seen), rms_about_mean(&seen)];
-        let known = without_noise(found, &seen, &self.variance, lowest, seed, &values);
+        let known = without_noise(found, &seen, &self.variance, lowest, seed, (&values, orders));
         let [range_known, rms_known] = known.map_or([None, None], |known| known.map(Some));
         let measured = |found: f64, between: f64, known: Option<(f64, Uncertainty)>| match known {
             Some((share, known)) => {
-                Measured { value: (found - share).max(0.0) + between, share, known: Some(known.moved(between)) }
+                // An interval from 0 on stays one: it holds a plot without motion.
+                let low = known.interval_95[0];
+                let mut known = known.moved(between);
+                known.interval_95[0] = if low > 0.0 { known.interval_95[0] } else { low };
+                Measured { value: (found + between - share).max(0.0), share, known: Some(known) }
             }
             None => Measured { value: found + between, share: 0.0, known: None },
         };

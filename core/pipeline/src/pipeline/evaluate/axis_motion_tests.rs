@@ -374,7 +374,9 @@ fn intervals_hold_the_truth() {
     for (count, std_um, told) in [
         (36, 0.02, Told::Exactly),
         (36, 0.3, Told::Exactly),
+        (36, 1.0, Told::Exactly),
         (12, 0.1, Told::Exactly),
+        (12, 0.5, Told::Exactly),
         (36, 0.1, Told::From(6.0)),
         (36, 0.1, Told::WithCommon),
     ] {
