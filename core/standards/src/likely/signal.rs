@@ -37,7 +37,7 @@ pub(super) fn signal_at(quantile: usize, found: f64, root: f64) -> f64 {
 
 fn in_column(column: &[Quantiles], quantile: usize, found: f64, root: f64) -> f64 {
     let place = (found.max(TABLED[0]) - TABLED[0]) / STEP;
-    let below = place as usize;
+    let below = place.min(column.len() as f64) as usize;
     if let (Some(low), Some(high)) = (column.get(below), column.get(below + 1)) {
         return low[quantile] + (high[quantile] - low[quantile]) * place.fract();
     }
@@ -122,7 +122,8 @@ mod tests {
                 );
             }
         }
-        // Far above, S is what was found.
+        // Far above, S is what was found; any size of it has its place.
+        assert!(signal_at(3, 1e300, 0.0) >= 1e300 && signal_at(3, 1e300, 1.0).is_finite());
         assert!((signal_at(3, 100.0, 0.0) - 100.0).abs() < 0.01);
         // A power in proportion: the median of 1 + S over what was found is the same from there on.
         let ratio = |found: f64| (1.0 + 0.5 * signal_at(3, found, 0.5)) / (1.0 + 0.5 * found);
