@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn wrapped_missing_and_backward_angles_are_faults() {
         let wrapped = scan([0.0, 120.0, 240.0, 0.0]).unwrap_err();
-        assert_eq!((wrapped.sample, wrapped.help), (3, None));
+        assert_eq!((wrapped.sample, wrapped.help), (3, Some(UNWRAP)));
         assert_eq!(scan([0.0, 1.0, f64::NAN]).unwrap_err().sample, 2);
         assert_eq!(scan([5.0, 5.0, 4.0, 4.5]).unwrap_err().sample, 3);
     }

@@ -34,7 +34,7 @@ const MOST_NOISE: f64 = 0.25;
 
 /// Share of errors in the variance of the slope from which on its intervals hold the truth too rarely: slopes are those of the highest
 /// orders, of which errors hide the form first.
-const MOST_NOISE_OF_SLOPE: f64 = 0.01;
+const MOST_NOISE_OF_SLOPE: f64 = 0.004;
 
 /// Draws of what is filtered robustly, point by point and some times over.
 const DRAWS_OF_ROBUST: usize = 64;
