@@ -143,3 +143,14 @@ pub fn known_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> 
 fn nearness(name: &str, candidate: &str) -> f64 {
     if name.eq_ignore_ascii_case(candidate) { 1.0 } else { strsim::jaro_winkler(name, candidate) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::known_names;
+
+    #[test]
+    fn upper_and_lower_case_make_no_other_name() {
+        assert!(known_names("RONT", ["RONp", "RONv", "RONt"]).starts_with("did you mean `RONt`?"));
+        assert_eq!(known_names("zzz", ["RONp"]), "known: `RONp`");
+    }
+}

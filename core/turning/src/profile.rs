@@ -9,6 +9,7 @@ use crate::{
     spread::Spread,
 };
 use runout_numerics::Complex64;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// What the turns of one capture say together: Re Σ cₙ e^{−inΦ} for each channel, Φ the spindle angle.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -166,6 +167,20 @@ impl Split {
 }
 
 impl Profile {
+    /// The largest amplitude of order 1 of a reading, in µm.
+    #[must_use]
+    pub fn eccentricity_um(&self) -> f64 {
+        let channels = self.sensors.len();
+        self.mean.iter().skip(channels).take(channels).map(|value| value.norm()).fold(0.0, f64::max)
+    }
+
+    /// What marks at whole samples add to single turns, in µm rms: they turn an eccentricity e by their scatter σ, which is eσ/√2 in every
+    /// direction.
+    #[must_use]
+    pub fn jitter_um(&self) -> f64 {
+        FRAC_1_SQRT_2 * self.turn_angle_std_rad * self.eccentricity_um()
+    }
+
     /// Share of the amplitude of an order that the filters before it pass; 1 where the speed is not known.
     #[must_use]
     pub fn passed(&self, order: usize) -> f64 {

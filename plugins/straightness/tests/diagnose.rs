@@ -42,6 +42,25 @@ fn named(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     diagnosis.added.iter().map(of).collect()
 }
 
+/// Waves of the slide of 1.2, 2 and 5 times its cut-off, a hundred times the noise: nothing is there to be found, and errors are those of noise.
+#[test]
+fn a_slide_with_waves_near_its_cutoff_lacks_nothing() {
+    for seed in 0..6 {
+        let mut campaign = ground(20 + seed, [3, 3]);
+        campaign.noise_um = 0.05;
+        campaign.length_mm = 300.0;
+        campaign.step_mm = 2.0;
+        campaign.part = vec![[1.0, 150.0, 0.4], [0.4, 37.0, 1.1]];
+        campaign.slide = vec![[2.0, 60.0, 0.3 * seed as f64], [1.5, 100.0, 1.0], [2.5, 250.0, 2.0]];
+        let found = run(&campaign, Some(50.0));
+        let [part, slide] = errors(&campaign, &found);
+        // Of three traces on each side, 0.05/√6 = 0.02 µm; of the smooth slide less.
+        assert!(part < 0.04 && slide < 0.03, "{seed}: {part} {slide}");
+        let diagnosis = diagnosed(&campaign, Some(50.0)).diagnosis;
+        assert!(diagnosis.added.is_empty(), "{seed}: {:?}", named(&diagnosis));
+    }
+}
+
 #[test]
 fn shifted_traces_are_found_and_corrected() {
     let mut campaign = ground(1, [3, 3]);

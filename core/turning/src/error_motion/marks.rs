@@ -3,28 +3,20 @@
 use crate::profile::Profile;
 use runout_standards::Value;
 
-/// Asynchronous values, radial, with intervals that reach down to what is left without the marks' share: marks that are known to a part of a sample turn
-/// each turn's eccentricity e by their scatter σ, which adds e²σ²/2 to the mean square in every direction.
+/// Asynchronous values, radial, with intervals that reach down to what is left without the [marks' share](Profile::jitter_um).
 #[must_use]
 pub fn with_jitter_of_marks(mut values: Vec<Value>, profiles: &[Profile]) -> Vec<Value> {
     let evaluated = profiles.iter().filter(|profile| profile.spread.is_some());
-    let added_um2 = evaluated.map(|profile| (profile.turn_angle_std_rad * eccentricity_um(profile)).powi(2) / 2.0);
-    let added_um2 = added_um2.fold(0.0, f64::max);
-    if added_um2 <= 0.0 {
+    let added_um = evaluated.map(Profile::jitter_um).fold(0.0, f64::max);
+    if added_um <= 0.0 {
         return values;
     }
     let all: Vec<(String, f64)> = values.iter().map(|value| (value.symbol.clone(), value.value)).collect();
     for value in values.iter_mut().filter(|value| value.symbol.starts_with("asynchronous-radial")) {
         let rms = format!("{}-rms", value.symbol.trim_end_matches("-rms"));
         let Some((_, rms_um)) = all.iter().find(|(symbol, _)| *symbol == rms) else { continue };
-        let left = value.value * (1.0 - added_um2 / rms_um.powi(2)).max(0.0).sqrt();
+        let left = value.value * (1.0 - (added_um / rms_um).powi(2)).max(0.0).sqrt();
         value.uncertainty = value.uncertainty.take().map(|known| known.with_equivalents(value.value, &[left]));
     }
     values
-}
-
-/// The largest amplitude of order 1 of a reading.
-fn eccentricity_um(profile: &Profile) -> f64 {
-    let channels = profile.sensors.len();
-    profile.mean.iter().skip(channels).take(channels).map(|value| value.norm()).fold(0.0, f64::max)
 }

@@ -169,33 +169,23 @@ pub(super) fn described(direction: Direction, z_mm: f64, letters: Letters) -> St
 
 /// The value of the part of 1/rev across the axis that turns against the axis, radial or of tilt. Radial, it is ` at` a place.
 pub(super) fn fundamental_across(tilt: bool, value: f64, known: Option<Uncertainty>, turns: &str, at: &str) -> Value {
-    let (direction, at) = if tilt { (Direction::TiltY, "") } else { (Direction::X, at) };
-    Value {
-        symbol: if tilt { "fundamental-tilt".into() } else { "fundamental-radial".into() },
-        unit: unit(direction).into(),
-        value,
-        source: format!(
-            "{STANDARD}, fundamental error motion value{at}: the part that turns against the {turns}, the rest of 1/rev is centring"
-        ),
-        band_upr: [1, 1],
-        lost_orders: Vec::new(),
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        no_uncertainty: None,
-        filter: "none".into(),
-        reference: centre_of_chart().symbol().into(),
-        coverage: 1.0,
-        uncertainty: known,
-    }
+    let (direction, id, at) = if tilt { (Direction::TiltY, "tilt", "") } else { (Direction::X, "radial", at) };
+    let what = format!("value{at}: the part that turns against the {turns}, the rest of 1/rev is centring");
+    fundamental(id, direction, &what, value, known)
 }
 
 /// The value of 1/rev along the axis.
 pub(super) fn fundamental_along(id: &str, value: f64, known: Option<Uncertainty>, described: &str) -> Value {
+    let what = format!("value, peak to valley of 1/rev, {described}");
+    fundamental(id, Direction::Axial, &what, value, known)
+}
+
+fn fundamental(id: &str, direction: Direction, what: &str, value: f64, uncertainty: Option<Uncertainty>) -> Value {
     Value {
         symbol: format!("fundamental-{id}"),
-        unit: unit(Direction::Axial).into(),
+        unit: unit(direction).into(),
         value,
-        source: format!("{STANDARD}, fundamental error motion value, peak to valley of 1/rev, {described}"),
+        source: format!("{STANDARD}, fundamental error motion {what}"),
         band_upr: [1, 1],
         lost_orders: Vec::new(),
         weakened_above_upr: None,
@@ -204,7 +194,7 @@ pub(super) fn fundamental_along(id: &str, value: f64, known: Option<Uncertainty>
         filter: "none".into(),
         reference: centre_of_chart().symbol().into(),
         coverage: 1.0,
-        uncertainty: known,
+        uncertainty,
     }
 }
 

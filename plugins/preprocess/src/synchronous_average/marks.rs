@@ -74,6 +74,18 @@ mod tests {
         }
     }
 
+    /// Each turn, by the mark that begins it and the one that ends it, is off by the errors of both: across the turn, the error at its middle is
+    /// their mean, at its ends their own. At random phases a mark's own error is even over a sample.
+    #[test]
+    fn single_turns_scatter_as_their_marks_do() {
+        for (turn_samples, expected) in [(500.237, (1.0_f64 / 12.0).sqrt()), (500.5, 0.25), (500.0, 0.0)] {
+            let marks: Vec<f64> = (0..=2000).map(|turn| (17.3 + f64::from(turn) * turn_samples).ceil() - 0.5).collect();
+            let found = turn_angle_std_rad(&marks, 0.5) * turn_samples / TAU;
+            assert!((found - expected).abs() < 0.01, "{turn_samples}: {found} for {expected}");
+        }
+        assert!(turn_angle_std_rad(&[0.0, 500.0, 1000.0], 0.0).abs() < f64::MIN_POSITIVE);
+    }
+
     #[test]
     fn marks_that_are_timed_are_certain() {
         let marks: Vec<f64> = (0..10).map(|turn| 500.0 * f64::from(turn)).collect();

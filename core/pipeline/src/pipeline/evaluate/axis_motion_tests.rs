@@ -385,8 +385,9 @@ fn intervals_hold_the_truth() {
         let all = held(count, std_um, told, 200);
         println!("{count} positions, {std_um} µm, {told:?}: {all:?}");
         for (name, held) in all {
-            // 95 % are 190 ± 3. About MZC, with errors from six degrees of freedom, 176 are held, 88 %; all others 180 or more.
-            assert!(held >= 172, "{count} positions, {std_um} µm, {told:?}, {name}: {held} of 200");
+            // 90 % of 200; 95 % are 190 ± 3. About MZC, with errors from six degrees of freedom, 176 are held, 88 %.
+            let fewest = if matches!(told, Told::From(_)) && name.ends_with("MZC") { 172 } else { 180 };
+            assert!(held >= fewest, "{count} positions, {std_um} µm, {told:?}, {name}: {held} of 200");
         }
     }
 }
