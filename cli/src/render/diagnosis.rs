@@ -255,11 +255,11 @@ fn shown(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "-".into(), |value| significant(value, digits))
 }
 
-fn unit(unit: &str) -> String {
-    match unit {
+fn unit(id: &str) -> String {
+    match id {
         "1" => String::new(),
         "deg" => "°".into(),
-        _ => unit.replace("um", "µm").replace("urad", "µrad").replace("/deg", "/°"),
+        _ => super::unit(id).replace("/deg", "/°"),
     }
 }
 

@@ -114,8 +114,7 @@ fn targets<'a>(
 
 /// "0.015 to 0.016 %"; a share is shown in per cent.
 fn sizes(values: impl Iterator<Item = f64>, unit: &str) -> String {
-    let (factor, unit) =
-        if unit == "1" { (100.0, "%".to_owned()) } else { (1.0, unit.replace("um", "µm").replace("urad", "µrad")) };
+    let (factor, unit) = if unit == "1" { (100.0, "%".to_owned()) } else { (1.0, super::unit(unit)) };
     let Some([low, _, high]) = spread(values.map(|value| value * factor)) else { return String::new() };
     let [low, high] = [low, high].map(|value| if value < 1e-12 { "0".into() } else { significant(value, 2) });
     if low == high { format!("{low} {unit}") } else { format!("{low} to {high} {unit}") }

@@ -29,6 +29,15 @@ fn is_harmful(character: char) -> bool {
         || matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
+/// A unit as the field writes it: "µm/m" of `um/m`.
+pub(crate) fn unit(id: &str) -> String {
+    let of_part = |part: &str| {
+        let letters = part.trim_end_matches(|character: char| !character.is_ascii_alphabetic());
+        if matches!(letters, "um" | "urad") { format!("µ{}", &part[1..]) } else { part.to_owned() }
+    };
+    id.split_inclusive(['/', '(', ' ', '·']).map(of_part).collect()
+}
+
 /// A text as a terminal may show it, whatever file it comes from: control characters as `\u{1b}`.
 #[must_use]
 pub(crate) fn printable(text: &str) -> Cow<'_, str> {
@@ -95,4 +104,15 @@ pub(crate) fn fancy_stderr() -> bool {
 #[must_use]
 pub(crate) fn count(number: usize, thing: &str) -> String {
     if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unit;
+
+    #[test]
+    fn units_are_shown_as_the_field_writes_them() {
+        let ids = ["um", "urad", "um/m", "um/(um/m)", "um3/um2", "mm", "1", "volume/um2"];
+        assert_eq!(ids.map(unit), ["µm", "µrad", "µm/m", "µm/(µm/m)", "µm3/µm2", "mm", "1", "volume/µm2"]);
+    }
 }

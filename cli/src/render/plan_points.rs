@@ -78,7 +78,7 @@ fn noise_gain(plan: &PointPlan, group: &str, gains: &[NoiseGain]) -> Table {
     header.extend(plan.suggestions.iter().zip(1..).map(|(_, number)| format!("with {number}")));
     let mut table = Table::new(1, header);
     for (place, gain) in gains.iter().enumerate() {
-        let unit = if gain.unit == "urad" { "µrad" } else { "µm" };
+        let unit = super::unit(&gain.unit);
         let name = match gain.order {
             Some(order) => format!("order {order}"),
             None => format!("{}, {unit}", gain.quantity),

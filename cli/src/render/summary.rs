@@ -15,6 +15,7 @@ use super::{
     number::{lacking, ranges, significant, spread, with_std},
     page::Page,
     table::Table,
+    unit,
 };
 
 /// Up to so many stations each has its own row; more are gathered into lowest, median and highest.
@@ -159,14 +160,6 @@ pub(super) fn described(symbol: &str, reference: &str, filter: &str, unit_id: &s
     let reference = if reference == "mean line" { String::new() } else { format!(" {reference}") };
     let filter = if filter == "none" { "unfiltered" } else { filter };
     format!("{symbol}{reference}, {filter} {}", unit(unit_id))
-}
-
-fn unit(id: &str) -> String {
-    match id {
-        "um" => "µm".into(),
-        "urad" => "µrad".into(),
-        other => other.into(),
-    }
 }
 
 fn sections(stations: &[StationSummary]) -> impl Iterator<Item = (&StationSummary, &SectionSummary)> {

@@ -8,6 +8,7 @@
 //! readings are bridged before anything is interpolated between them ([`interruptions`]), and each turn once more
 //! ([`bridge`]).
 
+mod angle_unit;
 mod bridge;
 mod encoder;
 mod kernel;
@@ -24,10 +25,8 @@ mod spread;
 mod turns;
 mod window;
 
-use std::f64::consts::FRAC_1_SQRT_2;
-
 use runout_core::{
-    Complex64, Error, ErrorKind, Result,
+    Error, ErrorKind, Result,
     fault::Fault,
     measurement::{Block, Capture, Response, SampleStream},
     near_tone::NearTone,
@@ -45,6 +44,7 @@ use marks::{angle_std_rad, turn_angle_std_rad};
 use resample::Resampling;
 use turns::Turn;
 
+use self::angle_unit::AngleUnit;
 use crate::{interruptions, low_pass::significant};
 
 /// Averages whole turns, one harmonic at a time, with the covariance across channels.
@@ -214,20 +214,16 @@ impl SynchronousAverage {
 /// Asynchronous motion below this, in µm rms, is not said.
 const SAID_UM: f64 = 0.01;
 
-/// Says what marks at whole samples add to asynchronous motion: they turn the eccentricity of each turn.
-fn jitter_of_eccentricity(jitter_rad: f64, mean: &[Complex64], capture: &Capture) -> Option<String> {
-    let channels = capture.channels();
-    let of_order_1 = mean.iter().skip(channels).take(channels);
-    let eccentricity_um = of_order_1.map(|value| value.norm()).fold(0.0, f64::max);
-    let added_um = FRAC_1_SQRT_2 * jitter_rad * eccentricity_um;
-    (added_um >= SAID_UM).then(|| {
+/// Says what marks at whole samples add to asynchronous motion.
+fn jitter_of_marks(profile: &Profile) -> Option<String> {
+    (profile.jitter_um() >= SAID_UM).then(|| {
         format!(
             "{}: marks at whole samples scatter single turns by {}° (std), which with an eccentricity of {} µm adds about {} µm rms to asynchronous \
              motion; give marks between samples or the encoder's angle, or centre the part",
-            capture.object,
-            significant(jitter_rad.to_degrees(), 2),
-            significant(eccentricity_um, 3),
-            significant(added_um, 2)
+            profile.object,
+            significant(profile.turn_angle_std_rad.to_degrees(), 2),
+            significant(profile.eccentricity_um(), 3),
+            significant(profile.jitter_um(), 2)
         )
     })
 }
@@ -312,9 +308,12 @@ impl Averager for SynchronousAverage {
 
         let mut resampling = Resampling::new(self, &capture, usable, wanted);
         let mut block = Block::default();
+        let mut angle_unit = AngleUnit::new(&capture);
         while input.next_block(&mut block)? {
+            angle_unit.take(&block);
             resampling.take(&mut block);
         }
+        angle_unit.check(&capture.object)?;
         let mut outcome = resampling.finish();
         count.used = outcome.used;
         count.rejected.extend(outcome.rejected);
@@ -338,17 +337,13 @@ impl Averager for SynchronousAverage {
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
-        let jitter_rad = turn_angle_std_rad(&capture.marks, capture.marks_within_samples);
-        if outcome.spread.is_some() {
-            warnings.extend(jitter_of_eccentricity(jitter_rad, &outcome.mean, &capture));
-        }
         warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
         capture.responses.extend(self.resampling_response(&capture, outcome.exact));
         if let Some(speed_rpm) = speed_rpm {
             in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
         }
-        Ok(Profile {
+        let mut profile = Profile {
             object: capture.object,
             setup: capture.setup,
             sensors: capture.sensors,
@@ -364,13 +359,18 @@ impl Averager for SynchronousAverage {
             spread: outcome.spread,
             turns: count,
             angle_std_rad: angle_std_rad(&capture.marks, capture.marks_within_samples),
-            turn_angle_std_rad: jitter_rad,
+            turn_angle_std_rad: turn_angle_std_rad(&capture.marks, capture.marks_within_samples),
             speed_rpm,
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,
             bridged_beyond_rad: outcome.bridged_beyond_rad,
             warnings,
-        })
+        };
+        if profile.spread.is_some() {
+            let said = jitter_of_marks(&profile);
+            profile.warnings.extend(said);
+        }
+        Ok(profile)
     }
 }
 

@@ -1,4 +1,5 @@
-//! Channels whose readings are a thousand times larger or smaller than those of the others: numbers in another unit.
+//! Readings of a size that shows numbers in another unit: a thousand times larger or smaller than those of other channels, or beyond
+//! the range of displacement sensors.
 
 use runout_core::{Complex64, rig::Rig};
 
@@ -10,9 +11,11 @@ const BETWEEN_UNITS: f64 = 1e3;
 const USUAL_RATIO: f64 = 3.0;
 /// So many others show what is usual.
 const FEWEST_OTHERS: usize = 2;
+/// No part turns on a spindle with an eccentricity above this, in µm.
+const LARGEST_UM: f64 = 2000.0;
 
 /// Names each sensor whose readings are about a thousand times smaller or larger than the median of the other sensors that look
-/// the same way.
+/// the same way, or all sensors whose readings vary by millimetres.
 pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
     let sensors = rig.sensors.len();
     let size = |sensor: usize| {
@@ -46,5 +49,15 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
             None
         }
     };
-    (0..sensors).filter_map(said).collect()
+    let large: Vec<&str> =
+        (0..sensors).filter(|at| sizes[*at] > LARGEST_UM).map(|at| rig.sensors[at].id.as_str()).collect();
+    let beyond = (!large.is_empty() && large.len() + 1 >= sensors).then(|| {
+        let largest_mm = sizes.iter().copied().fold(0.0, f64::max) / 1000.0;
+        format!(
+            "the readings of {} vary with an amplitude of up to {largest_mm:.1} mm over a turn: they may be in a smaller unit than declared (`unit` \
+             of the sensors)",
+            large.join(", ")
+        )
+    });
+    (0..sensors).filter_map(said).chain(beyond).collect()
 }

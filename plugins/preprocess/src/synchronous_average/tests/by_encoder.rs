@@ -53,3 +53,26 @@ fn an_encoder_that_stumbles_costs_its_turn() {
     assert_eq!(reasons(&profile), [(2, &Rejection::Angle), (4, &Rejection::Angle)]);
     assert!(worst(&profile) < 5.0 * kernel::ERROR);
 }
+
+#[test]
+fn an_angle_in_radians_or_turns_is_refused() {
+    for (unit, per_revolution, turns) in [("radians", TAU, 400), ("turns", 1.0, 2500)] {
+        let (samples_per_turn, frames) = (97.3, 98 * turns);
+        let angle = |frame: usize| frame as f64 / samples_per_turn;
+        let data: Vec<Vec<f64>> = (0..2)
+            .map(|channel| {
+                let harmonics: Vec<_> = harmonics(channel).into_iter().filter(|(order, _)| *order < 40).collect();
+                (0..frames).map(|frame| signal(&harmonics, TAU * angle(frame))).collect()
+            })
+            .collect();
+        // What the program takes for degrees.
+        let found_rev = |turn: f64| turn * per_revolution / 360.0;
+        let turn_samples = samples_per_turn * 360.0 / per_revolution;
+        let marks = (0..).map(|mark| f64::from(mark) * turn_samples).take_while(|mark| *mark < frames as f64);
+        let mut encoder = stream(&data, marks.collect());
+        encoder.capture.encoder = true;
+        encoder.angle_rev = (0..frames).map(|frame| found_rev(angle(frame))).collect();
+        let error = average(64, encoder).unwrap_err().to_string();
+        assert!(error.contains(&format!("it is in {unit}")), "{error}");
+    }
+}
