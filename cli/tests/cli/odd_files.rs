@@ -37,6 +37,17 @@ fn a_folder_whose_name_is_not_utf_8_can_be_worked_in() {
 }
 
 #[test]
+fn a_recording_in_the_place_of_a_pipeline_is_named() {
+    let folder = text_recording();
+    fs::write(folder.path().join("recording.h5"), b"\x89HDF\r\n\x1a\n and more").unwrap();
+    for command in ["run", "check", "diagnose"] {
+        let ran = folder.run(&[command, "recording.h5"]);
+        let said = ran.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!([1, 2].contains(&ran.status) && said.contains("found an HDF5 file") && said.contains("hdf5"), "{said}");
+    }
+}
+
+#[test]
 #[cfg(unix)]
 fn what_never_ends_is_refused_at_once_wherever_a_file_is_named() {
     let folder = text_recording();

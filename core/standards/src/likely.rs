@@ -31,8 +31,9 @@ const BESIDE: usize = 4;
 const LOOKS: usize = 3;
 /// Orders that have their variance from the same turns: it is known no better from several.
 const ORDERS_TOGETHER: f64 = 5.0;
-/// Weights that differ by less are one.
-const EQUAL: f64 = 0.02;
+/// Forms are the same where the variances of their errors differ by less than this share of the noise, and their means by less than this share of
+/// its standard deviation.
+const SAME_FORM: f64 = 0.01;
 
 /// Weights w by order, and the share of all draws that are to be made with them.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,17 +99,40 @@ pub fn likely_forms(harmonics: &[Complex64], variance: &[f64], freedom: &[usize]
         };
         (0..count).map(weight).collect()
     };
-    let mut found: Vec<Likely> = Vec::new();
-    for quantile in 0..QUANTILES.len() {
-        let (weights, share, least) = (weights(quantile), 1.0 / (QUANTILES.len() - 1) as f64, quantile == 0);
-        let same = |other: &Likely| weights.iter().zip(&other.weights).all(|(one, other)| (one - other).abs() <= EQUAL);
-        match found.last_mut().filter(|last| same(last)) {
-            // The least form is one of those that are as likely.
-            Some(last) => (last.share, last.least) = (if last.least { share } else { last.share + share }, false),
-            None => found.push(Likely { weights, share, least }),
+    let share = 1.0 / (QUANTILES.len() - 1) as f64;
+    let likely = |quantile: usize| match quantile {
+        0 => Likely { weights: weights(quantile), share: 0.0, least: true },
+        _ => Likely { weights: weights(quantile), share, least: false },
+    };
+    (0..QUANTILES.len()).map(likely).collect()
+}
+
+/// Sets of weights that make nearly the same of harmonics with these variances are one, the middle one of them, with all their shares.
+fn distinct(likely: &[Likely], harmonics: &[Complex64], variance: &[f64]) -> Vec<Likely> {
+    let most = SAME_FORM * sum_of_known(variance);
+    let is_same = |one: &Likely, other: &Likely| {
+        let (mut of_variance, mut of_mean) = (0.0, 0.0);
+        for (order, (one, other)) in one.weights.iter().zip(&other.weights).enumerate().skip(2) {
+            let differ = (one - other).abs();
+            of_variance += variance.get(order).filter(|noise| **noise > 0.0).map_or(0.0, |noise| differ * noise);
+            of_mean += harmonics.get(order).map_or(0.0, |harmonic| differ * differ * harmonic.norm_sqr());
+        }
+        of_variance <= most && of_mean <= SAME_FORM * most
+    };
+    let mut groups: Vec<Vec<&Likely>> = Vec::new();
+    for next in likely {
+        match groups.last_mut().filter(|group| is_same(group[0], next)) {
+            Some(group) => group.push(next),
+            None => groups.push(vec![next]),
         }
     }
-    found
+    let one = |group: Vec<&Likely>| {
+        let least = group.iter().all(|likely| likely.least);
+        let share =
+            if least { 1.0 / (QUANTILES.len() - 1) as f64 } else { group.iter().map(|likely| likely.share).sum() };
+        Likely { weights: group[group.len() / 2].weights.clone(), share, least }
+    };
+    groups.into_iter().map(one).collect()
 }
 
 /// The form as it may be by one set of weights, on equal angles: its mean, and errors about it.
@@ -144,7 +168,7 @@ pub fn forms_to_draw(
         let draws = (likely.share * draws as f64).round() as usize;
         LikelyForm { mean_um, variance, of_noise, draws, least: likely.least, noise }
     };
-    likely.iter().enumerate().map(form).collect()
+    distinct(likely, harmonics, variance).iter().enumerate().map(form).collect()
 }
 
 /// Sum of the variances that are known, of orders from 2 on.
@@ -262,7 +286,7 @@ mod tests {
             );
         }
         // Without noise, the form is what was found.
-        let exact = likely_forms(&harmonics, &[f64::NAN; 900], &[], 2);
+        let exact = distinct(&likely_forms(&harmonics, &[f64::NAN; 900], &[], 2), &harmonics, &[f64::NAN; 900]);
         assert!(exact.len() == 1 && exact[0].weights.iter().all(|weight| (weight - 1.0).abs() < 1e-12));
     }
 

@@ -253,7 +253,8 @@ fn intervals_of_lobes(lobes: usize, noise_um: f64, profiles: u64) -> BTreeMap<&'
             .collect();
         let mut result = station(0.0, &waves, ORDERS, f64::NAN, &[]);
         result.station = format!("lobes {number}");
-        // Twenty degrees of freedom tell the noise of each five orders.
+        // Forty squares tell the noise of each five orders.
+        result.separation.freedom = 8;
         for five in (2..=ORDERS).collect::<Vec<_>>().chunks(5) {
             let chance = (0..40).map(|_| normal().powi(2)).sum::<f64>() / 40.0;
             five.iter().for_each(|order| result.separation.variance[*order] = chance * variance(*order));
