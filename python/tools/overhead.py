@@ -99,7 +99,7 @@ def beside(name: str, program: str, pipeline: Path, settings: dict[str, object],
 def main() -> None:
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     words.add_argument("--program", default=shutil.which("runout") or str(ROOT / "target" / "release" / "runout"))
-    words.add_argument("--record", type=Path, default=ROOT / "target" / "bench" / "record-f64-40.h5")
+    words.add_argument("--record", type=lambda text: Path(text).resolve(), default=ROOT / "target" / "bench" / "record-f64-40.h5")
     words.add_argument("--rounds", type=int, default=5)
     asked = words.parse_args()
     print(f"Load {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors; medians of {asked.rounds} rounds in turns\n")
