@@ -1,6 +1,6 @@
 //! What the power of a form may be beside noise, given what was found of it.
 
-use std::sync::LazyLock;
+use std::sync::OnceLock;
 
 /// What S may be is looked at here, each as likely as the others but for the first, which is for the least that it may be.
 pub(super) const QUANTILES: [f64; 6] = [0.01, 0.1, 0.3, 0.5, 0.7, 0.9];
@@ -12,26 +12,30 @@ const STEP: f64 = 0.1;
 const TABLED: [f64; 2] = [-4.0, 12.0];
 /// Columns of the table: 1/√k in eighths, from normal numbers to a single square.
 const ROOTS: usize = 9;
+/// Logarithm of a share of the largest likelihood below which it is nothing: 4e-18.
+const LEAST_LOG: f64 = -40.0;
 /// Steps of an integral.
 const STEPS_OF_SIGNAL: usize = 400;
 
 type Quantiles = [f64; QUANTILES.len()];
 
-/// Quantiles of S in standard deviations of the noise's mean, by 1/√k of it and by what was found of S in the same unit.
-static SIGNALS: LazyLock<Vec<Vec<Quantiles>>> = LazyLock::new(|| {
-    let steps = ((TABLED[1] - TABLED[0]) / STEP).round() as usize;
-    let column = |root: usize| {
-        let root = root as f64 / (ROOTS - 1) as f64;
+/// Quantiles of S in standard deviations of the noise's mean, by 1/√k of it and by what was found of S in the same unit. A run needs few
+/// columns, each of which takes some milliseconds.
+static SIGNALS: [OnceLock<Vec<Quantiles>>; ROOTS] = [const { OnceLock::new() }; ROOTS];
+
+fn column(number: usize) -> &'static [Quantiles] {
+    SIGNALS[number].get_or_init(|| {
+        let steps = ((TABLED[1] - TABLED[0]) / STEP).round() as usize;
+        let root = number as f64 / (ROOTS - 1) as f64;
         (0..=steps).map(|step| signals_of(TABLED[0] + STEP * step as f64, root)).collect()
-    };
-    (0..ROOTS).map(column).collect()
-});
+    })
+}
 
 /// A quantile of S from the table, for what was found of it and for 1/√k of the noise's mean.
 pub(super) fn signal_at(quantile: usize, found: f64, root: f64) -> f64 {
     let place = root.clamp(0.0, 1.0) * (ROOTS - 1) as f64;
     let (first, share) = (place as usize, place.fract());
-    let of = |column: usize| in_column(&SIGNALS[column], quantile, found, column as f64 / (ROOTS - 1) as f64);
+    let of = |number: usize| in_column(column(number), quantile, found, number as f64 / (ROOTS - 1) as f64);
     if share > 0.0 { of(first) + share * (of(first + 1) - of(first)) } else { of(first) }
 }
 
@@ -55,11 +59,16 @@ fn signals_of(found: f64, root: f64) -> Quantiles {
         if root == 0.0 {
             return -0.5 * (found - signal).powi(2);
         }
-        let (ratio, expected) = ((1.0 + found * root).max(1e-3), 1.0 + signal * root);
-        -(expected.ln() + ratio / expected - ratio.ln() - 1.0) / (root * root)
+        let ratio = (1.0 + found * root).max(1e-3) / (1.0 + signal * root);
+        (ratio.ln() - ratio + 1.0) / (root * root)
     };
     let step = most / STEPS_OF_SIGNAL as f64;
-    let at: Vec<f64> = (0..=STEPS_OF_SIGNAL).map(|index| log_likelihood(step * index as f64).exp()).collect();
+    let largest = log_likelihood(found.max(0.0));
+    let likelihood = |index: usize| match log_likelihood(step * index as f64) - largest {
+        log if log > LEAST_LOG => log.exp(),
+        _ => 0.0,
+    };
+    let at: Vec<f64> = (0..=STEPS_OF_SIGNAL).map(likelihood).collect();
     let mut up_to = vec![at[0]];
     for pair in at.windows(2) {
         let last = up_to[up_to.len() - 1];
