@@ -313,7 +313,7 @@ impl Averager for SynchronousAverage {
             angle_unit.take(&block);
             resampling.take(&mut block);
         }
-        angle_unit.check(&capture.object)?;
+        let of_angle = angle_unit.check(&capture.object)?;
         let mut outcome = resampling.finish();
         count.used = outcome.used;
         count.rejected.extend(outcome.rejected);
@@ -337,6 +337,7 @@ impl Averager for SynchronousAverage {
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        warnings.extend(of_angle);
         warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
         capture.responses.extend(self.resampling_response(&capture, outcome.exact));

@@ -10,7 +10,8 @@ use runout_core::{
 use crate::low_pass::significant;
 
 /// Units that angles are in, and how many of each make a revolution.
-const OTHERS: [(&str, f64); 2] = [("radians", TAU), ("turns", 1.0)];
+const OTHERS: [(&str, f64); 2] = [("radians", TAU), (TURNS, 1.0)];
+const TURNS: &str = "turns";
 /// Share of a reading's variance that has to repeat with each revolution in another unit. In degrees it is at order 57.3 or 360, where
 /// no part has most of what a sensor reads.
 const SHARE: f64 = 0.5;
@@ -65,20 +66,27 @@ impl AngleUnit {
         }
     }
 
+    /// Warns of readings that repeat with each revolution in turns, or 360 times a turn.
+    ///
     /// # Errors
-    /// When most of a reading repeats with each revolution in another unit.
-    pub(super) fn check(&self, object: &str) -> Result<()> {
+    /// When most of a reading repeats with each revolution in radians: no part has that many lobes.
+    pub(super) fn check(&self, object: &str) -> Result<Option<String>> {
         if self.range_rev[1] - self.range_rev[0] < FEWEST_TURNS {
-            return Ok(());
+            return Ok(None);
         }
-        let Some((unit, per_revolution, share)) = self.repeats() else { return Ok(()) };
-        let problem = format!(
-            "expected the encoder's angle in degrees, found readings that repeat {} % of their variance every {} of it: it is in {unit}",
+        let Some((unit, per_revolution, share)) = self.repeats() else { return Ok(None) };
+        let found = format!(
+            "readings that repeat {} % of their variance every {} of the encoder's angle",
             significant(100.0 * share, 3),
             significant(per_revolution, 5)
         );
-        let help = format!("multiply the angle by {}", if unit == "radians" { "180/π" } else { "360" });
-        Err(Error::new("average", object, problem).of(ErrorKind::UnsuitableData).help(help))
+        if unit == TURNS {
+            return Ok(Some(format!(
+                "{object}: {found}: it is in turns, not in degrees (multiply it by 360), or the part has 360 lobes"
+            )));
+        }
+        let problem = format!("expected the encoder's angle in degrees, found {found}: it is in {unit}");
+        Err(Error::new("average", object, problem).of(ErrorKind::UnsuitableData).help("multiply the angle by 180/π"))
     }
 
     /// The unit, what makes a revolution, and the share of a reading that repeats with it.
