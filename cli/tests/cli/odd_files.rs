@@ -87,9 +87,9 @@ fn a_title_with_nul_is_refused() {
 #[test]
 fn far_more_angles_than_samples_are_a_warning_and_fewer() {
     let folder = text_recording();
-    let ran = folder.run(&["run", "pipeline.toml", "--set", "preprocess.0.samples_per_rev=1000000", "--json"]);
+    let ran = folder.run(&["run", "pipeline.toml", "--set", "preprocess.0.samples_per_rev=131072", "--json"]);
     assert_eq!(ran.status, 0, "{}", ran.stderr);
-    let said = "`samples_per_rev` = 1000000 is far above the 256 samples of a turn: results are given on 4096 angles";
+    let said = "`samples_per_rev` = 131072 is far above the 256 samples of a turn: results are given on 4096 angles";
     assert!(ran.stdout.contains(said), "{}", ran.stdout);
     let rows = folder.run(&["inspect", "out/form.parquet", "--json"]).stdout;
     assert!(rows.contains("\"rows\": 4096"), "{rows}");

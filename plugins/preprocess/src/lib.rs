@@ -63,7 +63,7 @@ mod tests {
         };
         assert_eq!(refused(good.clone()), None);
         let fault = refused(SynchronousAverageConfig { samples_per_rev: 3, ..good.clone() });
-        assert_eq!(fault, Some(Fault::at("samples_per_rev", "expected 4 to 1000000, found 3")));
+        assert_eq!(fault, Some(Fault::at("samples_per_rev", "expected 4 to 131072, found 3")));
         for bad in [
             SynchronousAverageConfig { samples_per_rev: usize::MAX, ..good.clone() },
             SynchronousAverageConfig { min_turns: 0, ..good.clone() },

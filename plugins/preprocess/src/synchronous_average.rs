@@ -51,7 +51,7 @@ use crate::{interruptions, low_pass::significant};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SynchronousAverageConfig {
-    /// Equal angles per turn of the average, 4 to 1000000; it holds the orders below half of them, as far as the recording
+    /// Equal angles per turn of the average, 4 to 131072; it holds the orders below half of them, as far as the recording
     /// has them. Above 4096, and far above the recording's own samples a turn (8 times, rounded up to a power of two), fewer are
     /// used, with a warning.
     pub samples_per_rev: usize,
@@ -93,7 +93,7 @@ impl StageConfig for SynchronousAverageConfig {
             if good { Ok(()) } else { Err(Fault::at(key, format!("expected {expected}, found {found}"))) }
         };
         let samples = self.samples_per_rev;
-        expect((4..=1_000_000).contains(&samples), "samples_per_rev", "4 to 1000000", &samples)?;
+        expect((4..=MOST_SAMPLES_PER_REV).contains(&samples), "samples_per_rev", "4 to 131072", &samples)?;
         expect(self.min_turns >= 1, "min_turns", "at least 1", &self.min_turns)?;
         let percent = self.turn_tolerance_percent;
         expect(percent > 0.0 && percent < 50.0, "turn_tolerance_percent", "a percentage above 0, below 50", &percent)?;
@@ -264,6 +264,8 @@ fn most_angles(turn_samples: f64) -> usize {
     turn.saturating_mul(times).max(fewest)
 }
 
+/// Most that are asked for: what a rig sees of each order below half of them is looked at before anything is read, in 0.5 kB an order.
+const MOST_SAMPLES_PER_REV: usize = 131_072;
 /// Fewest samples that a turn may have: fewer come from marks in another unit.
 const SHORTEST_TURN: f64 = 8.0;
 /// A filter below this order weakens the form from its lowest order on.
