@@ -100,14 +100,11 @@ pub fn likely_forms(harmonics: &[Complex64], variance: &[f64], freedom: &[usize]
         (0..count).map(weight).collect()
     };
     let share = 1.0 / (QUANTILES.len() - 1) as f64;
-    let likely = |quantile: usize| match quantile {
-        0 => Likely { weights: weights(quantile), share: 0.0, least: true },
-        _ => Likely { weights: weights(quantile), share, least: false },
-    };
-    (0..QUANTILES.len()).map(likely).collect()
+    (0..QUANTILES.len()).map(|quantile| Likely { weights: weights(quantile), share, least: quantile == 0 }).collect()
 }
 
-/// Sets of weights that make nearly the same of harmonics with these variances are one, the middle one of them, with all their shares.
+/// Sets of weights that make nearly the same of harmonics with these variances are one, the middle one of them, with the shares of all. The least form
+/// is one of those that are as likely where it is the same as they are.
 fn distinct(likely: &[Likely], harmonics: &[Complex64], variance: &[f64]) -> Vec<Likely> {
     let most = SAME_FORM * sum_of_known(variance);
     let is_same = |one: &Likely, other: &Likely| {
@@ -128,9 +125,12 @@ fn distinct(likely: &[Likely], harmonics: &[Complex64], variance: &[f64]) -> Vec
     }
     let one = |group: Vec<&Likely>| {
         let least = group.iter().all(|likely| likely.least);
-        let share =
-            if least { 1.0 / (QUANTILES.len() - 1) as f64 } else { group.iter().map(|likely| likely.share).sum() };
-        Likely { weights: group[group.len() / 2].weights.clone(), share, least }
+        let counted = group.iter().filter(|likely| least || !likely.least);
+        Likely {
+            weights: group[group.len() / 2].weights.clone(),
+            share: counted.map(|likely| likely.share).sum(),
+            least,
+        }
     };
     groups.into_iter().map(one).collect()
 }
@@ -288,6 +288,22 @@ mod tests {
         // Without noise, the form is what was found.
         let exact = distinct(&likely_forms(&harmonics, &[f64::NAN; 900], &[], 2), &harmonics, &[f64::NAN; 900]);
         assert!(exact.len() == 1 && exact[0].weights.iter().all(|weight| (weight - 1.0).abs() < 1e-12));
+    }
+
+    /// Whether two sets are one depends on what they make of the noise, not on where their weights differ.
+    #[test]
+    fn sets_are_one_where_their_forms_are() {
+        let likely = |weight: f64, least: bool| Likely { weights: vec![1.0, 1.0, 1.0, weight, 0.5], share: 0.2, least };
+        let sets = [likely(0.1, true), likely(0.1, false), likely(0.4, false), likely(0.402, false)];
+        let shares = |third: f64| -> Vec<(f64, bool)> {
+            let harmonics = [0.0, 0.0, 5.0, third, 0.1].map(Complex64::from);
+            let found = distinct(&sets, &harmonics, &[0.0, 0.0, 0.01, 0.01, 1.0]);
+            found.iter().map(|likely| ((10.0 * likely.share).round(), likely.least)).collect()
+        };
+        // A hundredth of the noise is of order 3: 0.3 of it makes no difference, unless the mean has that order.
+        assert_eq!(shares(0.0), [(6.0, false)]);
+        assert_eq!(shares(0.2), [(2.0, false), (4.0, false)]);
+        assert_eq!(distinct(&[sets[0].clone(), sets[2].clone()], &[Complex64::from(9.0); 5], &[0.1; 5]).len(), 2);
     }
 
     /// The form has the mean and the variance of what it may be, as whole profiles and at points.

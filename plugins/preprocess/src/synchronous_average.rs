@@ -128,8 +128,8 @@ impl SynchronousAverage {
         if !reasons.is_empty() {
             problem = format!("{problem}; {}", reasons.join("; "));
         }
-        let help = if capture.encoder && turns.recorded == 0 {
-            "does the encoder's angle go round, and is it in degrees? An angle in radians or in turns grows too slowly"
+        let help = if capture.encoder && turns.recorded < wanted {
+            "record more turns, or lower min_turns; is the encoder's angle in degrees? In radians or in turns it grows too slowly"
         } else if turns.recorded == 0 {
             "record a once-per-turn mark or the encoder's angle: a turn is what lies between two marks"
         } else {

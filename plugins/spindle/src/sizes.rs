@@ -11,11 +11,11 @@ const BETWEEN_UNITS: f64 = 1e3;
 const USUAL_RATIO: f64 = 3.0;
 /// So many others show what is usual.
 const FEWEST_OTHERS: usize = 2;
-/// No part turns on a spindle with an eccentricity above this, in µm.
+/// Amplitude above the eccentricity of a part that is measured by displacement sensors, in µm. Cams have more.
 const LARGEST_UM: f64 = 2000.0;
 
 /// Names each sensor whose readings are about a thousand times smaller or larger than the median of the other sensors that look
-/// the same way, or all sensors whose readings vary by millimetres.
+/// the same way, and readings of millimetres in all that look across the axis.
 pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
     let sensors = rig.sensors.len();
     let size = |sensor: usize| {
@@ -49,14 +49,12 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
             None
         }
     };
-    let large: Vec<&str> =
-        (0..sensors).filter(|at| sizes[*at] > LARGEST_UM).map(|at| rig.sensors[at].id.as_str()).collect();
-    let beyond = (!large.is_empty() && large.len() + 1 >= sensors).then(|| {
-        let largest_mm = sizes.iter().copied().fold(0.0, f64::max) / 1000.0;
+    let least_um = (0..sensors).filter(|sensor| !looks_along(*sensor)).map(|sensor| sizes[sensor]).reduce(f64::min);
+    let beyond = least_um.filter(|least_um| *least_um > LARGEST_UM).map(|least_um| {
         format!(
-            "the readings of {} vary with an amplitude of up to {largest_mm:.1} mm over a turn: they may be in a smaller unit than declared (`unit` \
-             of the sensors)",
-            large.join(", ")
+            "all sensors across the axis read more than {:.1} mm over a turn: they may be in a smaller unit than declared: write `unit = \"um\"` or \
+             `unit = \"nm\"` at the sensors",
+            least_um / 1000.0
         )
     });
     (0..sensors).filter_map(said).chain(beyond).collect()

@@ -9,36 +9,82 @@ use runout_core::{
 
 use crate::low_pass::significant;
 
-/// Units that angles are in, and how many of each make a revolution.
-const OTHERS: [(&str, f64); 2] = [("radians", TAU), (TURNS, 1.0)];
-const TURNS: &str = "turns";
-/// Share of a reading's variance that has to repeat with each revolution in another unit. In degrees it is at order 57.3 or 360, where
-/// no part has most of what a sensor reads.
+/// A revolution in other units that angles come in.
+const RADIANS: f64 = TAU;
+const TURNS: f64 = 1.0;
+/// Orders of a revolution that are looked at: eccentricity and the form's lowest.
+const ORDERS: usize = 6;
+/// Share of a reading's variance that has to repeat with each revolution in another unit.
 const SHARE: f64 = 0.5;
 /// Turns in degrees from which on order 57.3 and its neighbours differ.
 const FEWEST_TURNS: f64 = 3.0;
 /// Samples of a long recording that are looked at, which takes some milliseconds.
-const MOST_SAMPLES: u64 = 1 << 18;
+const MOST_SAMPLES: u64 = 1 << 16;
 
 /// What of each reading repeats with each revolution, if the angle is in another unit.
 pub(super) struct AngleUnit {
     channels: usize,
     /// Of so many samples, one is looked at.
     step: usize,
-    samples: u64,
     range_rev: [f64; 2],
-    /// Σ x and Σ x² of each channel, x from its first sample on.
-    sums: Vec<[f64; 3]>,
-    /// Σ e and, of each channel, Σ x e, of each unit.
-    waves: [Vec<Complex64>; 2],
+    samples: f64,
+    /// First reading of each channel, which the others are counted from.
+    first: Vec<f64>,
+    /// Σ x and Σ x² of each channel.
+    sums: Vec<[f64; 2]>,
+    /// Waves in radians and in turns.
+    waves: [Waves; 2],
+}
+
+/// Σ e, and Σ x e of each channel, e = e^{inφ} and n from 1 to [`ORDERS`], for an angle φ in one unit.
+struct Waves {
+    revolution: f64,
+    of_one: [Complex64; ORDERS],
+    of_readings: Vec<[Complex64; ORDERS]>,
+}
+
+impl Waves {
+    fn new(revolution: f64, channels: usize) -> Self {
+        let none = [Complex64::ZERO; ORDERS];
+        Self { revolution, of_one: none, of_readings: vec![none; channels] }
+    }
+
+    fn add(&mut self, angle_rev: f64, readings: impl Iterator<Item = f64>) {
+        let first = Complex64::cis(TAU * (360.0 * angle_rev / self.revolution).fract());
+        let mut all = [first; ORDERS];
+        for order in 1..ORDERS {
+            all[order] = all[order - 1] * first;
+        }
+        self.of_one.iter_mut().zip(all).for_each(|(sum, wave)| *sum += wave);
+        for (sums, reading) in self.of_readings.iter_mut().zip(readings) {
+            sums.iter_mut().zip(all).for_each(|(sum, wave)| *sum += wave * reading);
+        }
+    }
+
+    /// The largest share of a reading's variance that repeats, of so many samples with these sums.
+    fn share(&self, samples: f64, sums: &[[f64; 2]]) -> f64 {
+        let of_channel = |(waves, [sum, squares]): (&[Complex64; ORDERS], &[f64; 2])| {
+            let (mean, variance) = (sum / samples, squares / samples - (sum / samples).powi(2));
+            let power = |(wave, one): (&Complex64, &Complex64)| 2.0 * ((wave - one * mean) / samples).norm_sqr();
+            let powers: f64 = waves.iter().zip(&self.of_one).map(power).sum();
+            if variance > 0.0 { powers / variance } else { 0.0 }
+        };
+        self.of_readings.iter().zip(sums).map(of_channel).fold(0.0, f64::max)
+    }
 }
 
 impl AngleUnit {
     pub(super) fn new(capture: &Capture) -> Self {
         let channels = capture.channels();
-        let waves = std::array::from_fn(|_| vec![Complex64::ZERO; channels + 1]);
-        let step = (capture.samples / MOST_SAMPLES) as usize + 1;
-        Self { channels, step, samples: 0, range_rev: [f64::INFINITY, f64::NEG_INFINITY], sums: Vec::new(), waves }
+        Self {
+            channels,
+            step: (capture.samples / MOST_SAMPLES) as usize + 1,
+            range_rev: [f64::INFINITY, f64::NEG_INFINITY],
+            samples: 0.0,
+            first: Vec::new(),
+            sums: vec![[0.0; 2]; channels],
+            waves: [RADIANS, TURNS].map(|revolution| Waves::new(revolution, channels)),
+        }
     }
 
     pub(super) fn take(&mut self, block: &Block) {
@@ -47,21 +93,16 @@ impl AngleUnit {
             if !angle_rev.is_finite() || readings.iter().any(|reading| !reading.is_finite()) {
                 continue;
             }
-            if self.sums.is_empty() {
-                self.sums = readings.iter().map(|first| [*first, 0.0, 0.0]).collect();
+            if self.first.is_empty() {
+                self.first.extend_from_slice(readings);
             }
-            self.samples += 1;
+            let moved = readings.iter().zip(&self.first).map(|(reading, first)| reading - first);
+            self.samples += 1.0;
             self.range_rev = [self.range_rev[0].min(*angle_rev), self.range_rev[1].max(*angle_rev)];
-            for (waves, (_, revolution)) in self.waves.iter_mut().zip(OTHERS) {
-                let wave = Complex64::cis(TAU * (360.0 * angle_rev / revolution).fract());
-                waves[0] += wave;
-                for ((sum, reading), [first, ..]) in waves[1..].iter_mut().zip(readings).zip(&self.sums) {
-                    *sum += (reading - first) * wave;
-                }
-            }
-            for ([first, sum, squares], reading) in self.sums.iter_mut().zip(readings) {
-                *sum += reading - *first;
-                *squares += (reading - *first).powi(2);
+            self.waves.iter_mut().for_each(|waves| waves.add(*angle_rev, moved.clone()));
+            for ([sum, squares], reading) in self.sums.iter_mut().zip(moved) {
+                *sum += reading;
+                *squares += reading * reading;
             }
         }
     }
@@ -69,38 +110,24 @@ impl AngleUnit {
     /// Warns of readings that repeat with each revolution in turns, or 360 times a turn.
     ///
     /// # Errors
-    /// When most of a reading repeats with each revolution in radians: no part has that many lobes.
+    /// When most of a reading repeats with each revolution in radians: no part has 57.3 lobes.
     pub(super) fn check(&self, object: &str) -> Result<Option<String>> {
         if self.range_rev[1] - self.range_rev[0] < FEWEST_TURNS {
             return Ok(None);
         }
-        let Some((unit, per_revolution, share)) = self.repeats() else { return Ok(None) };
-        let found = format!(
-            "readings that repeat {} % of their variance every {} of the encoder's angle",
-            significant(100.0 * share, 3),
-            significant(per_revolution, 5)
-        );
-        if unit == TURNS {
-            return Ok(Some(format!(
-                "{object}: {found}: it is in turns, not in degrees (multiply it by 360), or the part has 360 lobes"
-            )));
-        }
-        let problem = format!("expected the encoder's angle in degrees, found {found}: it is in {unit}");
-        Err(Error::new("average", object, problem).of(ErrorKind::UnsuitableData).help("multiply the angle by 180/π"))
-    }
-
-    /// The unit, what makes a revolution, and the share of a reading that repeats with it.
-    fn repeats(&self) -> Option<(&'static str, f64, f64)> {
-        let samples = self.samples as f64;
-        let of_unit = |(waves, (unit, per_revolution)): (&Vec<Complex64>, (&'static str, f64))| {
-            let share = |([_, sum, squares], wave): (&[f64; 3], &Complex64)| {
-                let variance = squares / samples - (sum / samples).powi(2);
-                let amplitude = 2.0 * (wave - waves[0] * (sum / samples)).norm() / samples;
-                if variance > 0.0 { 0.5 * amplitude.powi(2) / variance } else { 0.0 }
-            };
-            let share = self.sums.iter().zip(&waves[1..]).map(share).fold(0.0, f64::max);
-            (share >= SHARE).then_some((unit, per_revolution, share.min(1.0)))
+        let found = |share: f64, of_angle: &str| {
+            let percent = significant(100.0 * share.min(1.0), 3);
+            format!("readings that repeat {percent} % of their variance every {of_angle} of the encoder's angle")
         };
-        self.waves.iter().zip(OTHERS).find_map(of_unit)
+        let [radians, turns] = self.waves.each_ref().map(|waves| waves.share(self.samples, &self.sums));
+        if radians >= SHARE {
+            let problem =
+                format!("expected the encoder's angle in degrees, found {}: it is in radians", found(radians, "2π"));
+            let error = Error::new("average", object, problem).of(ErrorKind::UnsuitableData);
+            return Err(error.help("multiply the angle by 180/π"));
+        }
+        let found = (turns >= SHARE).then(|| found(turns, "degree"));
+        Ok(found
+            .map(|found| format!("{object}: {found}: it is in turns (multiply it by 360), or the part has 360 lobes")))
     }
 }

@@ -61,10 +61,13 @@ fn looked_into(rig: &RigConfig, station: &Station) -> StationDiagnosis {
         .unwrap()
 }
 
-/// What `run` warns of.
+/// What `run` warns of, or refuses.
 fn warned(rig: &RigConfig, station: &Station) -> Vec<String> {
     let rig = rig.clone().check().unwrap();
-    HarmonicLeastSquares::new(&rig, true, Weighting::TurnCovariance).separate(station).unwrap().warnings
+    match HarmonicLeastSquares::new(&rig, true, Weighting::TurnCovariance).separate(station) {
+        Ok(separated) => separated.warnings,
+        Err(error) => vec![error.to_string(), error.advice().unwrap_or_default().to_owned()],
+    }
 }
 
 fn name(added: &Added) -> String {
@@ -299,6 +302,30 @@ fn a_recording_stored_twice_is_said_by_run() {
     let found = looked_into(&config.rig, &station).diagnosis;
     assert!(found.warnings.iter().any(|warning| warning.contains("hold the same recording")), "{:?}", found.warnings);
     assert_eq!(found.added.iter().map(name).collect::<Vec<_>>(), ["setup-repeated b c"]);
+}
+
+/// One channel a thousand times smaller or larger than the others, or all of them.
+#[test]
+fn readings_in_another_unit_are_said_by_run() {
+    let config = six(1, "[]");
+    let rig = config.rig.clone().check().unwrap();
+    let (station, _) = averaged(&config, &rig);
+    let channels = rig.sensors.len();
+    let said = |of_channel: &dyn Fn(usize) -> f64| {
+        let mut station = station.clone();
+        for profile in &mut station.profiles {
+            profile.mean.iter_mut().enumerate().for_each(|(place, mean)| *mean *= of_channel(place % channels));
+        }
+        warned(&config.rig, &station).join("\n")
+    };
+    let second = |factor: f64| move |channel: usize| if channel == 1 { factor } else { 1.0 };
+    assert!(said(&second(1e-3)).contains("sensor `S2`") && said(&second(1e-3)).contains("times smaller"));
+    assert!(said(&second(1e3)).contains("sensor `S2`") && said(&second(1e3)).contains("times larger"));
+    let all = said(&|_| 300.0);
+    assert!(all.contains("all sensors across the axis read more than") && !all.contains("than those of"), "{all}");
+    assert!(said(&|_| 1e3).contains("the unit of the readings"));
+    // Ten times the eccentricity is no unit.
+    assert!(!said(&|_| 10.0).contains("unit"));
 }
 
 /// All sensors turned by 0.5° in a setup.

@@ -253,6 +253,8 @@ fn intervals_of_lobes(lobes: usize, noise_um: f64, profiles: u64) -> BTreeMap<&'
             .collect();
         let mut result = station(0.0, &waves, ORDERS, f64::NAN, &[]);
         result.station = format!("lobes {number}");
+        // As few as a run gives: two a wave of the highest order.
+        result.angles = 2 * (ORDERS + 1);
         // Forty squares tell the noise of each five orders.
         result.separation.freedom = 8;
         for five in (2..=ORDERS).collect::<Vec<_>>().chunks(5) {

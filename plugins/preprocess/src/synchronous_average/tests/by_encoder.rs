@@ -54,28 +54,28 @@ fn an_encoder_that_stumbles_costs_its_turn() {
     assert!(worst(&profile) < 5.0 * kernel::ERROR);
 }
 
+/// What the program takes for degrees: so many units make a revolution of parts that are mostly eccentric, or mostly lobes.
+fn in_another_unit(revolution: f64, turns: usize, lobes: usize) -> MemoryStream {
+    let (samples_per_turn, frames) = (97.3, 98 * turns);
+    let angle = |frame: usize| frame as f64 / samples_per_turn;
+    let harmonics = [(1, Complex64::new(2.0, 1.0)), (lobes, Complex64::new(-3.0, 2.0)), (17, Complex64::from(0.3))];
+    let data: Vec<f64> = (0..frames).map(|frame| signal(&harmonics, TAU * angle(frame))).collect();
+    let found_rev = |turn: f64| turn * revolution / 360.0;
+    let marks = (0..).map(|mark| f64::from(mark) * samples_per_turn * 360.0 / revolution);
+    let mut encoder = stream(&[data], marks.take_while(|mark| *mark < frames as f64).collect());
+    encoder.capture.encoder = true;
+    encoder.angle_rev = (0..frames).map(|frame| found_rev(angle(frame))).collect();
+    encoder
+}
+
 #[test]
 fn an_angle_in_radians_is_refused_and_one_in_turns_warned_of() {
-    for (unit, per_revolution, turns) in [("radians", TAU, 400), ("turns", 1.0, 2500)] {
-        let (samples_per_turn, frames) = (97.3, 98 * turns);
-        let angle = |frame: usize| frame as f64 / samples_per_turn;
-        let data: Vec<Vec<f64>> = (0..2)
-            .map(|channel| {
-                let harmonics: Vec<_> = harmonics(channel).into_iter().filter(|(order, _)| *order < 40).collect();
-                (0..frames).map(|frame| signal(&harmonics, TAU * angle(frame))).collect()
-            })
-            .collect();
-        // What the program takes for degrees.
-        let found_rev = |turn: f64| turn * per_revolution / 360.0;
-        let turn_samples = samples_per_turn * 360.0 / per_revolution;
-        let marks = (0..).map(|mark| f64::from(mark) * turn_samples).take_while(|mark| *mark < frames as f64);
-        let mut encoder = stream(&data, marks.collect());
-        encoder.capture.encoder = true;
-        encoder.angle_rev = (0..frames).map(|frame| found_rev(angle(frame))).collect();
-        let said = match average(64, encoder) {
-            Ok(profile) if unit == "turns" => profile.warnings.join("\n"),
-            averaged => averaged.unwrap_err().to_string(),
-        };
-        assert!(said.contains(&format!("it is in {unit}")), "{said}");
+    for lobes in [1, 2, 3, 5] {
+        let error = average(64, in_another_unit(TAU, 400, lobes)).unwrap_err().to_string();
+        assert!(error.contains("it is in radians"), "{lobes}: {error}");
+        let warnings = average(64, in_another_unit(1.0, 2500, lobes)).unwrap().warnings.join("\n");
+        assert!(warnings.contains("it is in turns"), "{lobes}: {warnings}");
+        let warnings = average(64, in_another_unit(360.0, 40, lobes)).unwrap().warnings.join("\n");
+        assert!(!warnings.contains("it is in"), "{lobes}: {warnings}");
     }
 }
