@@ -1,10 +1,11 @@
 //! A profile whose errors are drawn again and again.
 
-use std::f64::consts::TAU;
+use std::{cell::OnceCell, f64::consts::TAU};
 
 use super::{
-    Angles, FixedCentre, Points, Reference, Values,
+    Angles, Circle, FixedCentre, Points, Reference, Values,
     crests::{Crests, LIFT, around},
+    search,
     warm::{Found, Warm},
 };
 use crate::{
@@ -31,26 +32,54 @@ pub struct Disturbed<'a> {
     /// Centre of the circle about the profile itself.
     centre_um: [f64; 2],
     about: Values,
-    /// Where errors move LSCI by nothing.
-    fixed: Option<FixedCentre>,
+    /// Deviations about LSCI, where errors do not move it.
+    unmoved_um: Option<Vec<f64>>,
+    /// The same, with its points by height, for draws at all of them.
+    fixed: OnceCell<FixedCentre>,
     search: Option<Warm>,
     points: Points,
     drawn_um: Vec<f64>,
     crests: Crests,
 }
 
-impl<'a> Disturbed<'a> {
-    /// `usual_um` is about the largest error of a draw; errors have no orders 0 and 1. Crests are those between the angles where
-    /// `between`, else the highest and lowest at an angle. `None` where the profile has no such circle.
+/// Seeks the reference circles of profiles that differ little, each from that of the last.
+#[derive(Debug, Clone)]
+pub struct CircleSearch<'a> {
+    reference: Reference,
+    /// Whether crests lie between the angles.
+    between: bool,
+    angles: &'a Angles,
+    radius_mm: f64,
+    search: Option<Warm>,
+    last_um: Option<[f64; 2]>,
+}
+
+impl<'a> CircleSearch<'a> {
+    /// Crests are those between the angles where `between`, else the highest and lowest at an angle.
     #[must_use]
-    pub fn new(
-        reference: Reference,
-        angles: &'a Angles,
-        form_um: &'a [f64],
-        radius_mm: f64,
-        usual_um: f64,
-        between: bool,
-    ) -> Option<Self> {
+    pub fn new(reference: Reference, angles: &'a Angles, radius_mm: f64, between: bool) -> Self {
+        Self { reference, between, angles, radius_mm, search: Warm::new(reference), last_um: None }
+    }
+
+    /// The circle of the next profile. A profile far from a circle may have several, among which the last one tells nothing.
+    fn circle(&mut self, points: &Points) -> Option<Circle> {
+        let warm = match (&mut self.search, self.last_um) {
+            (Some(search), Some(last_um)) if !search::is_wide(points) => search.values(points, last_um),
+            _ => None,
+        };
+        let circle = match warm {
+            Some(found) => points.about(found.place, found.level_um(self.reference), [Vec::new(), Vec::new()]),
+            None => points.reference(self.reference)?,
+        };
+        self.last_um = Some([circle.x_um, circle.y_um]);
+        Some(circle)
+    }
+
+    /// A profile about its circle. `usual_um` is about the largest error of a draw; errors have no orders 0 and 1. `None` where the
+    /// profile has no such circle.
+    #[must_use]
+    pub fn disturbed(&mut self, form_um: &'a [f64], usual_um: f64) -> Option<Disturbed<'a>> {
+        let (reference, between, angles, radius_mm) = (self.reference, self.between, self.angles, self.radius_mm);
         let (mut points, mut crests) = (Points::default(), Crests::default());
         let of_angles = reference == Reference::LeastSquares;
         if of_angles || !between {
@@ -58,7 +87,7 @@ impl<'a> Disturbed<'a> {
         } else {
             set_crests(&mut points, &mut crests, angles, form_um, radius_mm);
         }
-        let circle = points.reference(reference)?;
+        let circle = self.circle(&points)?;
         let raw: Vec<f64> = points.deviations_um(&circle).collect();
         if of_angles && between {
             crests.set_all(&raw);
@@ -75,7 +104,7 @@ impl<'a> Disturbed<'a> {
         let places = near.points.iter().map(|point| beside(between, *point, count).map(place)).collect();
         // Errors of orders from 2 on are at right angles to what moves LSCI, on all of the circle.
         let stays = of_angles && raw.iter().all(|deviation| !deviation.is_nan());
-        Some(Self {
+        Some(Disturbed {
             reference,
             between,
             angles,
@@ -87,14 +116,17 @@ impl<'a> Disturbed<'a> {
             places,
             centre_um: [circle.x_um, circle.y_um],
             about,
-            fixed: stays.then(|| FixedCentre::new(raw)),
+            unmoved_um: stays.then_some(raw),
+            fixed: OnceCell::new(),
             search: Warm::new(reference),
             points,
             drawn_um: Vec::new(),
             crests,
         })
     }
+}
 
+impl Disturbed<'_> {
     /// Values of the profile itself.
     #[must_use]
     pub fn about(&self) -> Values {
@@ -104,8 +136,9 @@ impl<'a> Disturbed<'a> {
     /// Values of the profile with errors in it. RONq is that of all points about LSCI of an interrupted profile, or where crests are at the
     /// angles; else that of the points looked at, or NaN.
     pub fn values(&mut self, drawn: &DrawnErrors) -> Option<Values> {
-        match (self.reference, &self.fixed) {
-            (Reference::LeastSquares, Some(fixed)) => {
+        match (self.reference, &self.unmoved_um) {
+            (Reference::LeastSquares, Some(unmoved_um)) => {
+                let fixed = self.fixed.get_or_init(|| FixedCentre::new(unmoved_um.clone()));
                 Some(if self.between { fixed.between(drawn) } else { fixed.values(drawn) })
             }
             (Reference::LeastSquares, None) => self.of_all(drawn),
@@ -125,12 +158,12 @@ impl<'a> Disturbed<'a> {
     /// Values of the profile with these errors at its [`points`](Self::points), where no error is above `largest_um`; RONq is NaN.
     /// `None` where other points could touch, or about LSCI of an interrupted profile.
     pub fn values_at(&mut self, errors_um: &[f64], largest_um: f64) -> Option<Values> {
-        let form_um = self.fixed.as_ref().map_or(self.form_um, FixedCentre::deviations);
+        let form_um = self.unmoved_um.as_deref().unwrap_or(self.form_um);
         self.drawn_um.clear();
         self.drawn_um.extend(self.with_beside.iter().zip(errors_um).map(|(point, error)| form_um[*point] + error));
         let (drawn_um, step_rad) = (&self.drawn_um, self.step_rad());
         self.crests.set(self.places.iter().map(|places| places.map(|place| drawn_um[place as usize])), step_rad);
-        if self.fixed.is_some() {
+        if self.unmoved_um.is_some() {
             let ends = Course::of(self.crests.heights.iter().copied());
             return Some(Course { squares: f64::NAN, points: self.form_um.len(), ..ends }.into());
         }
@@ -238,7 +271,8 @@ mod tests {
                     form[20..40].fill(f64::NAN);
                 }
                 for reference in Reference::ALL {
-                    let mut disturbed = Disturbed::new(reference, &angles, &form, 30.0, 10.0 * size, true).unwrap();
+                    let mut search = CircleSearch::new(reference, &angles, 30.0, true);
+                    let mut disturbed = search.disturbed(&form, 10.0 * size).unwrap();
                     for _ in 0..20 {
                         let errors = wave(size);
                         let drawn: Vec<f64> = form.iter().zip(&errors).map(|(form, error)| form + error).collect();

@@ -35,11 +35,6 @@ impl FixedCentre {
         Self { deviations, squares, rise, highest, lowest }
     }
 
-    /// The deviations.
-    pub(super) fn deviations(&self) -> &[f64] {
-        &self.deviations
-    }
-
     /// Values of the deviations themselves.
     #[must_use]
     pub fn about(&self) -> Values {

@@ -29,7 +29,7 @@ mod warm;
 
 use super::near::Course;
 pub use super::reference::{Reference, Undetermined};
-pub use disturbed::Disturbed;
+pub use disturbed::{CircleSearch, Disturbed};
 pub use fixed_centre::FixedCentre;
 pub use points::{Angles, Points};
 pub use series::{Series, between_angles};

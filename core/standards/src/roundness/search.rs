@@ -202,7 +202,7 @@ impl<'a, const N: usize> Search<'a, N> {
     fn best(&mut self) -> Result<Rest, Undetermined> {
         let start = guess(self.points);
         let first = self.settle(start);
-        if self.points.span_um < WIDE * self.points.radius_um() {
+        if !is_wide(self.points) {
             return first;
         }
         let mut best = first;
@@ -235,6 +235,11 @@ impl<'a, const N: usize> Search<'a, N> {
         }
         Some(found)
     }
+}
+
+/// Whether a profile is so far from a circle that several may be optimal.
+pub(super) fn is_wide(points: &Points) -> bool {
+    points.span_um >= WIDE * points.radius_um()
 }
 
 /// Derivatives of the merit by place, upper and lower bound of the heights.

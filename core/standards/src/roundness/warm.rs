@@ -26,6 +26,18 @@ pub(super) struct Found {
     pub ends_um: [f64; 2],
 }
 
+impl Found {
+    /// By how much the circle's radius exceeds the nominal one.
+    pub(super) fn level_um(&self, reference: Reference) -> f64 {
+        let [low, high] = self.ends_um;
+        match reference {
+            Reference::MaximumInscribed => low,
+            Reference::MinimumCircumscribed => high,
+            Reference::MinimumZone | Reference::LeastSquares => 0.5 * (low + high),
+        }
+    }
+}
+
 impl Warm {
     /// `None` for LSCI, which needs no search.
     pub(crate) fn new(reference: Reference) -> Option<Self> {

@@ -10,7 +10,7 @@ use runout_numerics::{
 };
 use runout_standards::{
     Value,
-    roundness::{Angles, Disturbed, Points, Reference, Series, Values},
+    roundness::{Angles, CircleSearch, Points, Reference, Series, Values},
     slope::{Drawn, steepest_um_per_rad},
     uncertainty::{DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, forms_to_draw, likely_values_of, of_rms},
 };
@@ -111,15 +111,18 @@ impl Form {
         let harmonics = filter.harmonics(&self.harmonics);
         let mut forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
         forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
-        let circle = |reference: Reference, form_um, largest_um: f64| {
-            Disturbed::new(reference, &angles, form_um, self.radius_mm, reach(reference) * largest_um, true)
-        };
+        let search = |reference: &Reference| CircleSearch::new(*reference, &angles, self.radius_mm, true);
+        let mut searches: Vec<CircleSearch> = references.iter().map(search).collect();
+        let about: Vec<Option<Values>> =
+            searches.iter_mut().map(|search| search.disturbed(&profile_um, 0.0).map(|circle| circle.about())).collect();
         let mut of_forms: Vec<_> = forms
             .iter()
             .map(|form| {
                 let largest_um = LARGEST * form.std_um();
-                let circles: Vec<_> =
-                    references.iter().map(|reference| circle(*reference, &form.mean_um, largest_um)).collect();
+                let of_references = references.iter().zip(&mut searches);
+                let circles: Vec<_> = of_references
+                    .map(|(reference, search)| search.disturbed(&form.mean_um, reach(*reference) * largest_um))
+                    .collect();
                 (form.errors(), circles)
             })
             .collect();
@@ -127,10 +130,7 @@ impl Form {
         let mut places = places_of(&forms);
         let mut found = likely_values_of(&forms, transforms, |disturbed, found| {
             if !disturbed {
-                for reference in references {
-                    let about = circle(*reference, &profile_um, 0.0).map(|circle| circle.about());
-                    add_values(about, *reference, found);
-                }
+                references.iter().zip(&about).for_each(|(reference, about)| add_values(*about, *reference, found));
                 return;
             }
             let Some((errors, circles)) = places.next().and_then(|place| of_forms.get_mut(place)) else { return };
@@ -187,22 +187,20 @@ impl Form {
             return None;
         }
         let profile_um = self.profile(filter, &mut fourier);
-        let circle = |reference: Reference, form_um, largest_um: f64| {
-            Disturbed::new(reference, &angles, form_um, self.radius_mm, reach(reference) * largest_um, false)
-        };
         let mut found = Vec::new();
         for reference in references {
+            let mut search = CircleSearch::new(*reference, &angles, self.radius_mm, false);
+            let about = search.disturbed(&profile_um, 0.0)?.about();
             let mut of_forms = Vec::new();
             for form in &forms {
                 let largest_um = LARGEST * form.std_um();
-                let circle = circle(*reference, &form.mean_um, largest_um)?;
+                let circle = search.disturbed(&form.mean_um, reach(*reference) * largest_um)?;
                 if circle.points().len() > MOST_POINTS {
                     return None;
                 }
                 let errors = form.errors_at(circle.points(), &mut fourier);
                 of_forms.push((largest_um, errors, circle));
             }
-            let about = circle(*reference, &profile_um, 0.0)?.about();
             let (mut places, mut certain) = (places_of(&forms), true);
             // As wide as from whole profiles: draws about a form that holds its noise scatter too little.
             let transforms = DRAWS.div_ceil(TURNS_OF_A_DRAW);
