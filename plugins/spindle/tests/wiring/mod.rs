@@ -318,9 +318,10 @@ fn readings_in_another_unit_are_said_by_run() {
         }
         warned(&config.rig, &station).join("\n")
     };
-    let second = |factor: f64| move |channel: usize| if channel == 1 { factor } else { 1.0 };
-    assert!(said(&second(1e-3)).contains("sensor `S2`") && said(&second(1e-3)).contains("times smaller"));
-    assert!(said(&second(1e3)).contains("sensor `S2`") && said(&second(1e3)).contains("times larger"));
+    let smaller = said(&|channel| if channel == 1 { 1e-3 } else { 1.0 });
+    assert!(smaller.contains("sensor `S2`") && smaller.contains("times smaller"), "{smaller}");
+    let larger = said(&|channel| if channel == 1 { 10.0 } else { 0.01 });
+    assert!(larger.contains("sensor `S2`") && larger.contains("times larger"), "{larger}");
     let all = said(&|_| 300.0);
     assert!(all.contains("all sensors across the axis read more than") && !all.contains("than those of"), "{all}");
     assert!(said(&|_| 1e3).contains("the unit of the readings"));
