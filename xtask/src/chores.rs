@@ -16,6 +16,7 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     house::check_quietly()?;
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
+    generate_classes(&["--check"])?;
     let nextest = answer("cargo-nextest", &["--version"]).is_some();
     let runner: &[&str] =
         if nextest { &["nextest", "run", "--workspace"] } else { &["test", "--workspace", "--all-targets"] };
@@ -131,11 +132,16 @@ pub(crate) fn deny() -> Outcome {
 /// Writes schemas/ anew, and what is made from them where there is a Python.
 pub(crate) fn schemas() -> Outcome {
     run(&mut cargo(&["run", "--quiet", "--package", "runout", "--", "schema", "--out", "schemas"])?)?;
+    generate_classes(&[])
+}
+
+/// Writes the classes of python/runout from schemas/, or checks them, where there is a Python.
+fn generate_classes(arguments: &[&str]) -> Outcome {
     if answer("python3", &["--version"]).is_none() {
         say("there is no python3: the classes of python/runout were left as they are");
         return Ok(());
     }
-    run(Command::new("python3").arg("python/tools/generate.py"))
+    run(Command::new("python3").arg("python/tools/generate.py").args(arguments))
 }
 
 /// Makes the first example's campaign once, and runs its pipeline.

@@ -1,5 +1,7 @@
 //! Mistakes in the rig file, on simulated campaigns: the simulator records what was there, and the rig says something else.
 
+mod units;
+
 use runout_core::{
     model::{
         closed_loop::Settings,
@@ -302,31 +304,6 @@ fn a_recording_stored_twice_is_said_by_run() {
     let found = looked_into(&config.rig, &station).diagnosis;
     assert!(found.warnings.iter().any(|warning| warning.contains("hold the same recording")), "{:?}", found.warnings);
     assert_eq!(found.added.iter().map(name).collect::<Vec<_>>(), ["setup-repeated b c"]);
-}
-
-/// One channel a thousand times smaller or larger than the others, or all of them.
-#[test]
-fn readings_in_another_unit_are_said_by_run() {
-    let config = six(1, "[]");
-    let rig = config.rig.clone().check().unwrap();
-    let (station, _) = averaged(&config, &rig);
-    let channels = rig.sensors.len();
-    let said = |of_channel: &dyn Fn(usize) -> f64| {
-        let mut station = station.clone();
-        for profile in &mut station.profiles {
-            profile.mean.iter_mut().enumerate().for_each(|(place, mean)| *mean *= of_channel(place % channels));
-        }
-        warned(&config.rig, &station).join("\n")
-    };
-    let smaller = said(&|channel| if channel == 1 { 1e-3 } else { 1.0 });
-    assert!(smaller.contains("sensor `S2`") && smaller.contains("times smaller"), "{smaller}");
-    let larger = said(&|channel| if channel == 1 { 10.0 } else { 0.01 });
-    assert!(larger.contains("sensor `S2`") && larger.contains("times larger"), "{larger}");
-    let all = said(&|_| 300.0);
-    assert!(all.contains("all sensors across the axis read more than") && !all.contains("than those of"), "{all}");
-    assert!(said(&|_| 1e3).contains("the unit of the readings"));
-    // Ten times the eccentricity is no unit.
-    assert!(!said(&|_| 10.0).contains("unit"));
 }
 
 /// All sensors turned by 0.5° in a setup.
