@@ -143,16 +143,3 @@ fn cost_of_one_value() {
         }
     }
 }
-
-/// For a profiler: roundness of all sections, a few times.
-#[test]
-#[ignore = "prints times, which are meaningful in a release build only"]
-fn cost_of_roundness() {
-    let stations = stations(1279);
-    let evaluate = evaluate("values = ['roundness']").unwrap();
-    for _ in 0..4 {
-        timed("roundness", &mut || {
-            stations.iter().map(|station| section_values(station, 0, &evaluate, RADIUS_MM).len()).sum()
-        });
-    }
-}
