@@ -51,27 +51,34 @@ pub struct CircleSearch<'a> {
     angles: &'a Angles,
     radius_mm: f64,
     search: Option<Warm>,
-    last_um: Option<[f64; 2]>,
+    /// Points of the last profile, and its circle's centre.
+    last: Option<(usize, [f64; 2])>,
 }
 
 impl<'a> CircleSearch<'a> {
     /// Crests are those between the angles where `between`, else the highest and lowest at an angle.
     #[must_use]
     pub fn new(reference: Reference, angles: &'a Angles, radius_mm: f64, between: bool) -> Self {
-        Self { reference, between, angles, radius_mm, search: Warm::new(reference), last_um: None }
+        Self { reference, between, angles, radius_mm, search: Warm::new(reference), last: None }
     }
 
     /// The circle of the next profile. A profile far from a circle may have several, among which the last one tells nothing.
     fn circle(&mut self, points: &Points) -> Option<Circle> {
-        let warm = match (&mut self.search, self.last_um) {
-            (Some(search), Some(last_um)) if !search::is_wide(points) => search.values(points, last_um),
+        let warm = match (&mut self.search, self.last) {
+            (Some(search), Some((count, last_um))) if count == points.len() && !search::is_wide(points) => {
+                search.values(points, last_um)
+            }
             _ => None,
         };
         let circle = match warm {
             Some(found) => points.about(found.place, found.level_um(self.reference), [Vec::new(), Vec::new()]),
             None => points.reference(self.reference)?,
         };
-        self.last_um = Some([circle.x_um, circle.y_um]);
+        if self.last.is_some_and(|(count, _)| count != points.len()) {
+            // Its contacts are places among other points.
+            self.search = Warm::new(self.reference);
+        }
+        self.last = Some((points.len(), [circle.x_um, circle.y_um]));
         Some(circle)
     }
 
@@ -249,6 +256,45 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
+
+    /// Of profiles from alike to quite different, one of them shorter and one wide, with and without a gap.
+    #[test]
+    fn circles_from_the_last_are_those_sought_anew() {
+        const COUNT: usize = 256;
+        let angles = Angles::equal(COUNT);
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        for with_gap in [false, true] {
+            let mut forms: Vec<Vec<f64>> = vec![vec![0.0; COUNT]];
+            for size in [1.0, 1e-4, 0.01, 0.1, 1.0, 1e-6, 300.0, 1.0] {
+                let mut form = forms[forms.len() - 1].clone();
+                for n in 2..20 {
+                    let (a, phase) = (size * random.random_range(-1.0..1.0), random.random_range(0.0..TAU));
+                    let wave = |point: usize| a * ((n * point) as f64 * TAU / COUNT as f64 + phase).cos();
+                    form.iter_mut().enumerate().for_each(|(point, form)| *form += wave(point));
+                }
+                if with_gap {
+                    form[20..40].fill(f64::NAN);
+                }
+                forms.push(form);
+            }
+            forms.remove(0);
+            let short = forms[3][..200].to_vec();
+            forms.insert(4, short);
+            for (reference, between) in Reference::ALL.into_iter().flat_map(|one| [(one, false), (one, true)]) {
+                let mut search = CircleSearch::new(reference, &angles, 30.0, between);
+                for (place, form) in forms.iter().enumerate() {
+                    let found = search.disturbed(form, 0.1).map(|found| found.about().ront_um);
+                    let mut anew = CircleSearch::new(reference, &angles, 30.0, between);
+                    let expected = anew.disturbed(form, 0.1).map(|found| found.about().ront_um);
+                    let (found, expected) = (found.unwrap(), expected.unwrap());
+                    assert!(
+                        (found - expected).abs() < 1e-6 * expected,
+                        "{reference:?} {between} {with_gap} {place}: {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
 
     /// Errors of orders 2 to 30, from far below the form to above it.
     #[test]
