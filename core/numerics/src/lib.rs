@@ -4,6 +4,7 @@ pub mod chebyshev;
 pub mod cloud;
 pub mod filter;
 pub mod fourier;
+pub mod golden_section;
 pub mod height_map;
 pub mod interpolation;
 pub mod lanes;

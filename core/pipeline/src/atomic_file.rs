@@ -13,6 +13,7 @@ use std::{
 
 pub use lock::FolderLock;
 use runout_error::{Error, ErrorKind, Result};
+use runout_numerics::threads;
 use under_way::{ABANDONED, UnderWay};
 pub use under_way::{Abandoned, abandon_all};
 
@@ -236,7 +237,8 @@ pub fn commit_last_after_others(files: Vec<PendingFile>) -> Result<Vec<PathBuf>>
 
 fn commit(mut files: Vec<PendingFile>, publish: impl FnOnce(&[(&Path, &Path)]) -> Result<()>) -> Result<Vec<PathBuf>> {
     let _publishing = UnderWay::now().publish(&files)?;
-    files.iter().try_for_each(PendingFile::sync)?;
+    // One after the other, each would wait for the disk by itself.
+    threads::each(&files, PendingFile::sync).into_iter().collect::<Result<()>>()?;
     let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();
     publish(&names)?;
     let mut under_way = UnderWay::now();

@@ -14,6 +14,7 @@ use super::areal::HeightMap;
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
+    golden_section,
     statistics::upper_median,
 };
 
@@ -27,6 +28,8 @@ const FEWEST_RINGS: f64 = 2.5;
 const SIGNIFICANT: f64 = 6.0;
 /// Bins of the axial spectrum for each of its resolution.
 const FINER: usize = 4;
+/// How well the strongest frequency is sought, in bins: power near it differs by less than f64 resolves.
+const REFINED: f64 = 1e-12;
 /// Harmonics of the helix at most.
 const HARMONICS: usize = 32;
 /// Points of the profile that repeats.
@@ -223,26 +226,11 @@ impl Lines {
         (best.0 > SIGNIFICANT * SIGNIFICANT * median && best.0 > self.rounding_um.powi(2)).then_some((best.1, best.2))
     }
 
-    /// The frequency at which a line is strongest, within a bin of one given: golden sections.
+    /// The frequency at which a line is strongest, within a bin of one given.
     fn refined(&self, order: usize, frequency: f64) -> f64 {
-        const GOLDEN: f64 = 0.618_033_988_749_895;
         let step = ((FINER * self.rows).next_power_of_two() as f64 * self.dy_mm).recip();
         let power = |frequency: f64| self.amplitude(order, frequency).norm_sqr();
-        let (mut low, mut high) = (frequency - step, frequency + step);
-        let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-        let mut found = inner.map(power);
-        for _ in 0..60 {
-            if found[0] > found[1] {
-                high = inner[1];
-                inner = [high - GOLDEN * (high - low), inner[0]];
-                found = [power(inner[0]), found[0]];
-            } else {
-                low = inner[0];
-                inner = [inner[1], low + GOLDEN * (high - low)];
-                found = [found[1], power(inner[1])];
-            }
-        }
-        0.5 * (low + high)
+        golden_section::maximum(frequency - step, frequency + step, REFINED * step, power)
     }
 }
 

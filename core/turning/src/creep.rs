@@ -6,11 +6,15 @@
 //! nothing else is in the levels.
 
 mod partials;
+mod shape;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use partials::Partials;
-use runout_numerics::{least_squares::dot, statistics::f_tail};
+use runout_numerics::{golden_section, least_squares::dot, statistics::f_tail};
+use shape::{Shape, TriedShapes};
 
 /// Fewest turns of a capture.
 const FEWEST: usize = 8;
@@ -24,9 +28,8 @@ const CERTAIN: f64 = 6.0;
 const AGREEMENT: f64 = 0.01;
 /// A creep that captures do not share is certain where independent levels would show it with less than this chance.
 const ALONE: f64 = 1e-10;
-/// Time constants that are tried, from one turn to this many captures, by equal ratios.
-const TRIED: usize = 61;
-const LONGEST: f64 = 10.0;
+/// How well the best time constant between those tried is sought, as a share of the distance of its neighbours.
+const REFINED: f64 = 1e-7;
 /// A time constant is determined where it is this many times its standard uncertainty.
 const DETERMINED: f64 = 3.0;
 
@@ -136,7 +139,8 @@ impl Creep {
 /// What the levels say of each sensor's creep, `[sensor][capture]`; nothing where a capture has too few turns.
 #[must_use]
 pub fn creeps(sensors: &[Vec<Levels>]) -> Vec<Option<Creep>> {
-    let prepared: Vec<Option<Sensor>> = sensors.iter().map(|captures| Sensor::new(captures)).collect();
+    let mut tried = Vec::new();
+    let prepared: Vec<Option<Sensor>> = sensors.iter().map(|captures| Sensor::new(captures, &mut tried)).collect();
     let known: Vec<&Sensor> = prepared.iter().flatten().collect();
     prepared.iter().map(|sensor| Some(sensor.as_ref()?.creep(&known))).collect()
 }
@@ -144,6 +148,10 @@ pub fn creeps(sensors: &[Vec<Levels>]) -> Vec<Option<Creep>> {
 /// One sensor's levels, each capture about its own mean.
 struct Sensor {
     captures: Vec<Levels>,
+    /// Courses at the levels of each capture.
+    tried: Vec<Arc<TriedShapes>>,
+    /// Sum of squares of each capture's levels.
+    squares: Vec<f64>,
     turns: f64,
     /// Levels that count as one observation.
     alike: f64,
@@ -167,7 +175,8 @@ struct Fitted {
 }
 
 impl Sensor {
-    fn new(captures: &[Levels]) -> Option<Self> {
+    /// `known` are the courses of captures before, most of which have their levels at the same turns.
+    fn new(captures: &[Levels], known: &mut Vec<Arc<TriedShapes>>) -> Option<Self> {
         let fewest = captures.iter().map(|capture| capture.means_um.len()).min()?;
         if fewest < FEWEST {
             return None;
@@ -177,17 +186,29 @@ impl Sensor {
         let alike = captures.iter().map(Levels::alike).fold(1.0, f64::max);
         let of_capture = (fewest as f64 / alike).min(MOST_OBSERVATIONS);
         let observations = of_capture * captures.len() as f64;
-        Some(Self { captures: captures.iter().map(about).collect(), turns, alike, observations, of_capture })
+        let captures: Vec<Levels> = captures.iter().map(about).collect();
+        let tried = captures.iter().map(|capture| TriedShapes::of(&capture.middles, turns, known)).collect();
+        let squares = captures.iter().map(|capture| dot(&capture.means_um, &capture.means_um)).collect();
+        Some(Self { captures, tried, squares, turns, alike, observations, of_capture })
     }
 
+    /// A course of any time constant.
     fn fit(&self, course: Course) -> Fitted {
+        let mut shapes: Vec<Shape> = Vec::with_capacity(self.captures.len());
+        for (capture, levels) in self.captures.iter().enumerate() {
+            let alike = (0..capture).find(|before| Arc::ptr_eq(&self.tried[*before], &self.tried[capture]));
+            shapes.push(alike.map_or_else(|| Shape::new(course, &levels.middles), |before| shapes[before].clone()));
+        }
+        self.fit_shapes(course, shapes.iter())
+    }
+
+    /// A course with its shape in each capture.
+    fn fit_shapes<'a>(&self, course: Course, shapes: impl Iterator<Item = &'a Shape>) -> Fitted {
         let mut fitted =
             Fitted { course, shared: 0.0, rates: Vec::new(), squares: Vec::new(), left: 0.0, left_each: Vec::new() };
         let (mut products, mut total) = (0.0, 0.0);
-        for capture in &self.captures {
-            let shape = shape(course, &capture.middles);
-            let (square, product) = (dot(&shape, &shape), dot(&shape, &capture.means_um));
-            let all = dot(&capture.means_um, &capture.means_um);
+        for (shape, (capture, all)) in shapes.zip(self.captures.iter().zip(&self.squares)) {
+            let (square, product) = (shape.square, dot(&shape.values, &capture.means_um));
             let rate = product / square.max(f64::MIN_POSITIVE);
             fitted.left_each.push((all - rate * product).max(0.0));
             fitted.squares.push(square);
@@ -201,35 +222,42 @@ impl Sensor {
         fitted
     }
 
+    /// The fits of all time constants that are tried, ascending.
+    fn fits_tried(&self) -> Vec<Fitted> {
+        let course = |step: usize| Course::Settling(shape::tau_tried(self.turns, step));
+        let fit =
+            |step: usize| self.fit_shapes(course(step), self.tried.iter().map(|shapes| &shapes.settling[step]));
+        (0..shape::TRIED).map(fit).collect()
+    }
+
     /// The time constant that leaves least.
-    fn settling(&self, left: impl Fn(&Fitted) -> f64) -> Fitted {
-        let of = |tau: f64| left(&self.fit(Course::Settling(tau)));
-        let tau_of = |step: usize| (LONGEST * self.turns).powf(step as f64 / (TRIED - 1) as f64);
-        let best = (0..TRIED).map(|step| (of(tau_of(step)), step)).min_by(|a, b| a.0.total_cmp(&b.0));
-        let best = best.map_or(0, |(_, step)| step);
+    fn settling(&self, tried: &[Fitted], left: impl Fn(&Fitted) -> f64) -> Fitted {
+        let best = tried.iter().enumerate().min_by(|a, b| left(a.1).total_cmp(&left(b.1)));
+        let best = best.map_or(0, |(step, _)| step);
         // Between the neighbours of the best one.
-        let (mut low, mut high) = (tau_of(best.saturating_sub(1)), tau_of((best + 1).min(TRIED - 1)));
-        for _ in 0..40 {
-            let third = (high - low) / 3.0;
-            if of(low + third) < of(high - third) { high -= third } else { low += third }
-        }
-        self.fit(Course::Settling(0.5 * (low + high)))
+        let tau = |step: usize| shape::tau_tried(self.turns, step);
+        let (low, high) = (tau(best.saturating_sub(1)), tau((best + 1).min(shape::TRIED - 1)));
+        let tau = golden_section::maximum(low, high, REFINED * (high - low), |tau| {
+            -left(&self.fit(Course::Settling(tau)))
+        });
+        self.fit(Course::Settling(tau))
     }
 
     /// The course that has more evidence: a time constant is one parameter more.
-    fn best(&self, left: impl Fn(&Fitted) -> f64) -> Fitted {
-        let (straight, settling) = (self.fit(Course::Straight), self.settling(&left));
+    fn best(&self, tried: &[Fitted], left: impl Fn(&Fitted) -> f64) -> Fitted {
+        let straight = self.fit_shapes(Course::Straight, self.tried.iter().map(|shapes| &shapes.straight));
+        let settling = self.settling(tried, &left);
         let gain = self.observations * (left(&straight) / left(&settling).max(f64::MIN_POSITIVE)).ln();
         if gain > self.observations.ln().max(0.0) { settling } else { straight }
     }
 
     fn creep(&self, all: &[&Self]) -> Creep {
-        let own = self.best(|fitted| fitted.left_each.iter().sum());
-        let shared = self.best(|fitted| fitted.left);
+        let tried = self.fits_tried();
+        let own = self.best(&tried, |fitted| fitted.left_each.iter().sum());
         if self.differ(&own) {
             return self.of_each(own);
         }
-        self.of_all(&shared, all)
+        self.of_all(&self.best(&tried, |fitted| fitted.left), all)
     }
 
     /// Whether captures creep by different amounts, far beyond what their levels leave open.
@@ -310,11 +338,6 @@ fn extra(course: Course) -> f64 {
 /// Independent differences between captures: sensors see two directions between them.
 fn freedom(captures: usize, all: &[&Sensor]) -> usize {
     (captures - 1) * all.len().min(2)
-}
-
-/// A course of rate 1 at the middles of some turns, about its mean.
-fn shape(course: Course, middles: &[f64]) -> Vec<f64> {
-    about_mean(middles.iter().map(|turns| course.at(*turns)).collect())
 }
 
 fn about_mean(mut values: Vec<f64>) -> Vec<f64> {

@@ -18,9 +18,9 @@ use runout_core::{
     table::{RecordBatch, TableSpec},
 };
 
-/// Rows in a row group. What is buffered, some 2 MB, does not depend on the number of stations, and a reader that
+/// Rows in a row group. What is buffered, some 0.5 MB a table, does not depend on the number of stations, and a reader that
 /// wants one station skips all other groups by their statistics.
-const ROWS_PER_GROUP: usize = 65_536;
+const ROWS_PER_GROUP: usize = 16_384;
 
 /// A table under a temporary name.
 pub(crate) struct TableFile {

@@ -11,7 +11,7 @@ use runout_error::{Error, ErrorKind, Result};
 use runout_turning::measurement::{Block, Capture, SampleStream};
 
 /// Batches that were read and wait: what a station's captures take while the one before is separated.
-const AHEAD: usize = 4;
+const AHEAD: usize = 6;
 /// Samples in a batch, at least: blocks are small, so that a core's own cache holds them, and threads are to meet seldom.
 const BATCH: usize = 1 << 17;
 /// Results that wait to be written.

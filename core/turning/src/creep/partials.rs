@@ -5,7 +5,7 @@ use runout_numerics::{
     statistics::{f_tail, student_95},
 };
 
-use super::{Course, Fitted, Sensor, freedom, shape};
+use super::{Course, Fitted, Sensor, freedom, shape::Shape};
 
 /// How levels change with rate and time constant, in each capture.
 pub(super) struct Partials {
@@ -21,7 +21,7 @@ pub(super) struct Partials {
 impl Partials {
     pub(super) fn new(sensor: &Sensor, fitted: &Fitted) -> Self {
         let captures = &sensor.captures;
-        let by_rate: Vec<Vec<f64>> = captures.iter().map(|capture| shape(fitted.course, &capture.middles)).collect();
+        let by_rate: Vec<Vec<f64>> = captures.iter().map(|capture| Shape::new(fitted.course, &capture.middles).values).collect();
         let mut over_capture = [fitted.course.at(sensor.turns), 0.0];
         let mut by_tau: Vec<Vec<f64>> = by_rate.iter().map(|shape| vec![0.0; shape.len()]).collect();
         if let Course::Settling(tau) = fitted.course {
@@ -31,7 +31,7 @@ impl Partials {
                 if fitted.rates.len() > 1 { fitted.shared } else { fitted.rates.get(capture).copied().unwrap_or(0.0) }
             };
             for (index, (capture, by_tau)) in captures.iter().zip(&mut by_tau).enumerate() {
-                let (high, low) = (shape(above, &capture.middles), shape(below, &capture.middles));
+                let [high, low] = [above, below].map(|course| Shape::new(course, &capture.middles).values);
                 let each = by_tau.iter_mut().zip(high.iter().zip(&low));
                 each.for_each(|(partial, (high, low))| *partial = rate(index) * (high - low) / (2.0 * step));
             }

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use arrow_array::{
-    Array,
+    Array, StringArray,
     cast::AsArray,
     types::{Float64Type, UInt32Type},
 };
@@ -24,12 +24,31 @@ pub(super) const SHORT: usize = 16;
 pub(super) const LONG: usize = 64;
 /// Rows of a chunk: 64 KiB of f64.
 const CHUNK_ROWS: usize = 8192;
+/// Rows that are compared with one another at a time.
+const MOST_ALIKE: usize = 1024;
 /// Higher levels take several times as long for some percent less.
 const DEFLATE: u8 = 1;
 
 /// A name as tables hold it.
 fn name<const N: usize>(text: &str) -> Result<Name<N>> {
     text.parse().map_err(|_| format!("a name must be of at most {N} bytes without NUL: `{text}`").into())
+}
+
+/// Rows from this one on that have its text, at least itself: names come in stretches of the same one, which are compared as a whole.
+fn alike(texts: &StringArray, row: usize) -> usize {
+    if texts.null_count() > 0 {
+        return 1;
+    }
+    let (offsets, bytes) = (&texts.value_offsets()[row..], texts.value_data());
+    let length = offsets[1] - offsets[0];
+    let as_long = offsets.windows(2).take(MOST_ALIKE).take_while(|ends| ends[1] - ends[0] == length);
+    let (mut rows, start, length) = (as_long.count(), offsets[0] as usize, length as usize);
+    // A stretch of one name is the same one row further on.
+    let moved = |rows: usize| &bytes[start + length..start + rows * length];
+    while bytes[start..start + (rows - 1) * length] != *moved(rows) {
+        rows /= 2;
+    }
+    rows
 }
 
 /// A table in a file.
@@ -78,17 +97,14 @@ impl<const N: usize> ColumnData<N> {
         match self {
             Self::Name(column) => {
                 let texts = values.as_string::<i32>();
-                // Names come in stretches of the same one.
                 let mut all: Vec<Name<N>> = Vec::with_capacity(length);
-                let mut last: Option<(&str, Name<N>)> = None;
-                for text in texts {
-                    let text = text.unwrap_or_default();
-                    let stored = match last {
-                        Some((known, stored)) if known == text => stored,
-                        _ => name(text)?,
-                    };
-                    last = Some((text, stored));
-                    all.push(stored);
+                while all.len() < length {
+                    let row = all.len();
+                    if texts.is_null(row) {
+                        all.push(name("")?);
+                    } else {
+                        all.resize(row + alike(texts, row), name(texts.value(row))?);
+                    }
                 }
                 column.append(&all)
             }
@@ -154,6 +170,23 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
+
+    #[test]
+    fn stretches_of_names_are_found() {
+        let texts = StringArray::from(["", "", "a", "a", "a", "b", "bb", "bb", "b", "ä", "ä", "ä"].to_vec());
+        let mut row = 0;
+        while row < texts.len() {
+            let rows = alike(&texts, row);
+            assert!(rows > 0 && (row..row + rows).all(|other| texts.value(other) == texts.value(row)), "{row} {rows}");
+            row += rows;
+        }
+        assert_eq!(row, texts.len());
+        assert_eq!([alike(&texts, 0), alike(&texts, 9)], [2, 3]);
+        let many = StringArray::from(vec!["S1"; 5000]);
+        assert_eq!([alike(&many, 0), alike(&many, 4999)], [MOST_ALIKE, 1]);
+        assert_eq!(alike(&many.slice(3000, 10), 2), 8);
+        assert_eq!(alike(&StringArray::from(vec![None, Some("a"), Some("a")]), 1), 1);
+    }
 
     #[test]
     fn a_column_caches_its_last_chunk_and_no_more() {

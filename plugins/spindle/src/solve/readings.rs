@@ -82,9 +82,14 @@ impl Readings {
         let matrices = |of: fn(&Profile) -> Option<&Vec<Complex64>>| -> Option<Vec<Vec<Complex64>>> {
             let one = |(profile, channels): &(&Profile, Vec<usize>)| {
                 let (all, width) = (of(profile)?, profile.channels());
-                let rows =
-                    (0..=max_order).flat_map(|order| channels.iter().map(move |row| (order * width + row) * width));
-                Some(rows.flat_map(|start| channels.iter().map(move |column| all[start + column])).collect())
+                let mut matrices = Vec::with_capacity((max_order + 1) * channels.len() * channels.len());
+                for matrix in all.chunks_exact(width * width).take(max_order + 1) {
+                    for row in channels {
+                        let row = &matrix[row * width..(row + 1) * width];
+                        matrices.extend(channels.iter().map(|column| row[*column]));
+                    }
+                }
+                Some(matrices)
             };
             ordered.iter().map(one).collect()
         };

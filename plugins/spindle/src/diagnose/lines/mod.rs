@@ -12,7 +12,7 @@ mod turns;
 
 use std::{f64::consts::PI, ops::Range};
 
-use runout_core::{Complex64, stage::Station};
+use runout_core::{Complex64, numerics::golden_section::maximum, stage::Station};
 
 use super::drift::Part;
 use crate::{layout::Layout, selection::Selection};
@@ -329,25 +329,6 @@ impl Searched<'_> {
         }
         leak
     }
-}
-
-/// Where a function with one maximum between two places has it, by golden section.
-fn maximum(mut low: f64, mut high: f64, tolerance: f64, value: impl Fn(f64) -> f64) -> f64 {
-    let share = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut a, mut b) = (high - share * (high - low), low + share * (high - low));
-    let (mut at_a, mut at_b) = (value(a), value(b));
-    while high - low > tolerance {
-        if at_a > at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - share * (high - low);
-            at_a = value(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + share * (high - low);
-            at_b = value(b);
-        }
-    }
-    0.5 * (low + high)
 }
 
 /// Amplitude and direction of the straight line nearest to the motion, over all setups. Where all sensors look one way, it is the
