@@ -40,11 +40,13 @@ pub struct Settings {
     pub left_out: Vec<usize>,
     /// Most effects that may be added.
     pub max_added: usize,
+    /// Whether effects stay that take away a part only of what stays unexplained: where that is still to be mended.
+    pub keeps_parts: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { effects: None, known: Vec::new(), left_out: Vec::new(), max_added: 6 }
+        Self { effects: None, known: Vec::new(), left_out: Vec::new(), max_added: 6, keeps_parts: false }
     }
 }
 
@@ -93,10 +95,11 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
         tracing.refuse(found.members[0], "what it explained is explained by effects that were found after it".into());
         current = without;
     }
-    if !at_the_floor(current.fit.remainder()) && tracing.drop_the_least_bad() {
+    let drops_parts = !settings.keeps_parts;
+    if drops_parts && !at_the_floor(current.fit.remainder()) && tracing.drop_the_least_bad() {
         current = tracing.refit_found(model, &current.settings)?;
     }
-    if above_chance(current.fit.remainder()) && tracing.drop_partial(current.fit.remainder()) {
+    if drops_parts && above_chance(current.fit.remainder()) && tracing.drop_partial(current.fit.remainder()) {
         current = tracing.refit_found(model, &current.settings)?;
     }
     let held_out = [declared, current.fit.remainder().clone()];

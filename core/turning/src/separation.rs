@@ -149,6 +149,8 @@ pub struct SectionAt {
     pub z_mm: f64,
     /// Where nothing is known of it: a keyway, a stretch without readings. Every value leaves these out.
     pub gaps: Gaps,
+    /// The same as the rig declares them: `gaps` are longer by what marks and edges leave open.
+    pub declared_gaps: Gaps,
     /// Share of its readings that the form was computed from.
     pub used: f64,
 }
@@ -157,7 +159,7 @@ impl SectionAt {
     /// A circle that was measured all around.
     #[must_use]
     pub fn whole(id: impl Into<String>, z_mm: f64) -> Self {
-        Self { id: id.into(), z_mm, gaps: Gaps::default(), used: 1.0 }
+        Self { id: id.into(), z_mm, gaps: Gaps::default(), declared_gaps: Gaps::default(), used: 1.0 }
     }
 
     /// Share of the profile that was there: of so many equal angles, and of the readings.

@@ -10,9 +10,10 @@ use corrected_rig::Change;
 use super::{
     config::{Pipeline, Route, exports::spare_inputs},
     evaluate::Group,
+    hidden_readings,
     observer::Observer,
     point_run::PointResult,
-    record_reader::RecordReader,
+    record_reader::{RecordReader, separate},
     result::{Evaluation, complete, true_error},
     result_writer::{Finished, ResultWriter},
     run::{projections, speeds_and_turns, with_motion_values},
@@ -94,7 +95,7 @@ fn diagnose_turns(
         },
     )?;
     let settings = &pipeline.diagnose.settings;
-    let found = model.diagnose(&mut stations, settings)?;
+    let found = hidden_readings::diagnose(&mut stations, settings, line.rig, (separator, model))?;
     let mut diagnosis = found.diagnosis;
     diagnosis.moved.clear();
     let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
@@ -112,7 +113,7 @@ fn diagnose_turns(
         stations.into_iter().zip(found.before.into_iter().zip(found.after)).enumerate()
     {
         // Before is what a run gives, which leaves known effects alone.
-        let before = if settings.known.is_empty() { separator.separate(&station)? } else { before };
+        let before = if settings.known.is_empty() { separate(separator, &station, line.rig)? } else { before };
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let complete = |separation, profiles, evaluate| {

@@ -6,6 +6,7 @@ mod config;
 pub mod diagnose;
 pub mod document;
 mod evaluate;
+mod hidden_readings;
 mod observer;
 mod ordered_collector;
 mod outdated;

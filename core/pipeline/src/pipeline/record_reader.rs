@@ -9,6 +9,7 @@ use std::{
 };
 
 use super::{
+    hidden_readings,
     observer::Observer,
     ordered_collector::OrderedCollector,
     read_ahead::{Captures, read_ahead, read_along},
@@ -199,9 +200,9 @@ fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String
 }
 
 /// Separates a station, and refuses what is not a number where it is observable, and a form that no part of
-/// `radius_mm` has.
-pub(crate) fn separate(separator: &dyn StationSeparator, station: &Station, radius_mm: f64) -> Result<Separation> {
-    let separation = separator.separate(station)?;
+/// the rig's radius has.
+pub(crate) fn separate(separator: &dyn StationSeparator, station: &Station, rig: &Rig) -> Result<Separation> {
+    let separation = hidden_readings::separate(separator, station, rig)?;
     let width = separation.unknowns.len().max(1);
     let estimates = separation.estimate.iter().zip(&separation.observable);
     let number = estimates.enumerate().find(|(_, (value, observable))| **observable && !value.is_finite());
@@ -213,7 +214,7 @@ pub(crate) fn separate(separator: &dyn StationSeparator, station: &Station, radi
         None => separation.sections.iter().enumerate().find_map(|(section, at)| {
             let unknown = separation.position(Quantity::Form(section))?;
             let squares: f64 = separation.coefficients(unknown).skip(1).map(|value| value.norm_sqr()).sum();
-            let rms_mm = 1e-3 * (0.5 * squares).sqrt();
+            let (rms_mm, radius_mm) = (1e-3 * (0.5 * squares).sqrt(), rig.part_radius_mm);
             let problem =
                 format!("the form of section {} comes out as {rms_mm:.3e} mm rms on {radius_mm} mm radius", at.id);
             (rms_mm > radius_mm).then_some(problem)

@@ -32,7 +32,10 @@ pub(super) fn complete(
     let Evaluation { evaluate, radius_mm, rig } = evaluation;
     if let Some(rig) = rig {
         let beyond_rad = profiles.iter().map(|profile| profile.bridged_beyond_rad).fold(0.0, f64::max);
-        separation.sections.iter_mut().for_each(|section| section.gaps = rig.gaps_of(&section.id).widened(beyond_rad));
+        for section in &mut separation.sections {
+            section.declared_gaps = rig.gaps_of(&section.id);
+            section.gaps = section.declared_gaps.widened(beyond_rad);
+        }
     }
     let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
     let sections = 0..result.separation.sections.len();

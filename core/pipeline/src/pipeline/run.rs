@@ -119,7 +119,7 @@ fn run_turns(
     };
     let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
     let work = |index, station: Station| {
-        let separation = separate(separator, &station, rig.part_radius_mm)?;
+        let separation = separate(separator, &station, rig)?;
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let profiles = station.profiles;

@@ -62,7 +62,7 @@ impl SurfaceBuilder {
             let fitting = max_order(self.config.angles) + 1;
             self.band_limited |= orders.iter().skip(fitting).flatten().any(|order| order.value != Complex64::ZERO);
             orders.truncate(fitting);
-            let SectionAt { id, z_mm, gaps, used } = at.clone();
+            let SectionAt { id, z_mm, gaps, used, .. } = at.clone();
             let (station, half_power_upr) = (result.station.clone(), result.half_power_upr());
             self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, orders, noise });
         }

@@ -38,7 +38,7 @@ impl Circle<'_> {
         let mut gaps = Gaps::default();
         unseen(placed, max_order).for_each(|[from, to]| gaps.add(from, to - from));
         let used = self.scan.len() as f64 / self.measured as f64;
-        SectionAt { gaps, used, ..SectionAt::whole(self.id.clone(), z_mm) }
+        SectionAt { declared_gaps: gaps.clone(), gaps, used, ..SectionAt::whole(self.id.clone(), z_mm) }
     }
 }
 

@@ -169,7 +169,7 @@ impl<'a> Comparing<'a> {
         let mut warnings: Vec<String> =
             station.profiles.iter().flat_map(|profile| profile.warnings.iter().cloned()).collect();
         for (separator, name) in separators.zip(&self.names) {
-            let separation = separate(separator, station, self.rig.part_radius_mm)?;
+            let separation = separate(separator, station, self.rig)?;
             warnings.extend(separation.warnings.iter().map(|warning| format!("{name}: {warning}")));
             estimates.push(Estimates::new(&separation, separator.sensitivity(station)?));
             // Profiles are shared; the standards' values need none.

@@ -27,8 +27,9 @@ pub(crate) fn section_values(
     let Some(form) = Form::of(result, section, radius_mm) else { return Vec::new() };
     let mut values = form.values(evaluate);
     let restored = form.restored(&|order| result.passed(order));
-    let equivalents: Vec<Vec<Value>> =
+    let mut equivalents: Vec<Vec<Value>> =
         (form.equivalents.iter().chain(&restored)).map(|harmonics| form.exactly(harmonics).values(evaluate)).collect();
+    equivalents.extend(form.as_declared().map(|form| form.values(evaluate)));
     for value in &mut values {
         let key = |value: &Value| {
             let Value { symbol, filter, reference, band_upr, .. } = value;
@@ -145,6 +146,14 @@ impl Form {
         let (freedom, held, at) = (self.freedom.clone(), self.held.clone(), self.at.clone());
         let likely = OnceCell::new();
         Self { harmonics, equivalents, variance, freedom, held, at, likely, ..*self }
+    }
+
+    /// The form up to the edges of interruptions as the rig declares them, taken as exact: there it is bridged. `None` where values go as far.
+    fn as_declared(&self) -> Option<Self> {
+        (self.at.gaps != self.at.declared_gaps).then(|| {
+            let at = SectionAt { gaps: self.at.declared_gaps.clone(), ..self.at.clone() };
+            Self { at, ..self.exactly(&self.harmonics) }
+        })
     }
 
     /// The form with what a low-pass has taken from the orders that stand out from their noise, as far up as half of their power passes; `None`
