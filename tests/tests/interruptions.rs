@@ -5,9 +5,11 @@
 use std::{num::NonZeroUsize, path::Path};
 
 use runout_core::{
+    closed_loop::diagnosis::Verdict,
     measurement::Recording,
     pipeline::{
         INCLUDE_KEY, Pipeline, Registry,
+        diagnose::diagnose,
         document::Sources,
         run::{Silent, run},
     },
@@ -80,7 +82,11 @@ fn summary(folder: &Path, name: &str, keyway: &str, interruptions: &str) -> Summ
     summary_of(folder, name, [RECORDING, keyway, interruptions, STAGES])
 }
 
-fn summary_of(folder: &Path, name: &str, [recording, keyway, interruptions, stages]: [&str; 4]) -> Summary {
+fn summary_of(folder: &Path, name: &str, parts: [&str; 4]) -> Summary {
+    run(&pipeline_of(folder, name, parts), NonZeroUsize::new(2), &Silent).unwrap()
+}
+
+fn pipeline_of(folder: &Path, name: &str, [recording, keyway, interruptions, stages]: [&str; 4]) -> Pipeline {
     let mut registry = Registry::default();
     runout_hdf5::register(&mut registry);
     runout_preprocess::register(&mut registry);
@@ -94,8 +100,7 @@ fn summary_of(folder: &Path, name: &str, [recording, keyway, interruptions, stag
          [[export]]\nplugin = \"hdf5\"\npath = \"{name}-result.h5\"\n"
     );
     let sources = Sources::from_text("pipeline.toml", &text, folder.to_owned(), &[], INCLUDE_KEY).unwrap();
-    let pipeline = Pipeline::from_sources(&sources, &registry).unwrap();
-    run(&pipeline, NonZeroUsize::new(2), &Silent).unwrap()
+    Pipeline::from_sources(&sources, &registry).unwrap()
 }
 
 fn values(summary: &Summary) -> Vec<&Value> {
@@ -139,8 +144,13 @@ fn a_keyway_is_left_out_of_every_value_and_each_says_so() {
             for (value, truth) in [(found("RONt"), truth.ront_um), (found("RONq"), truth.ronq_um)] {
                 let uncertainty = value.uncertainty.as_ref().unwrap();
                 println!("{}: {:.4}, truth {truth:.4}, std {:.4}", value.symbol, value.value, uncertainty.std);
-                assert!((value.value - truth).abs() < 4.0 * uncertainty.std + 0.004 * truth, "{value:?}, not {truth}");
+                assert!((value.value - truth).abs() < 3.0 * uncertainty.std, "{value:?}, not {truth}");
+                // The edges of the keyway are known to a sample, which the uncertainty holds; no more than that.
+                assert!(uncertainty.std < 0.01 * truth, "{uncertainty:?}");
             }
+        }
+        // The other readings say what the axis does while a sensor looks into the keyway.
+        assert!(station.chi2_per_dof.unwrap() < 1.3, "{:?}", station.chi2_per_dof);
         }
     }
 
@@ -154,6 +164,22 @@ fn a_keyway_is_left_out_of_every_value_and_each_says_so() {
     let mistaken = summary(folder.path(), "mistaken", &KEYWAY.replace("300", "30"), "");
     let ront = |summary: &Summary| values(summary).iter().find(|value| value.symbol == "RONt").unwrap().value;
     assert!(ront(&mistaken) > 3.0 * ront(&whole), "{} and {}", ront(&mistaken), ront(&whole));
+}
+
+/// An effect that is found beside a keyway has the size that it has: hidden readings follow the model that has it.
+#[test]
+fn an_effect_is_found_beside_a_keyway() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = RECORDING.replace("count = 2", "count = 1").replace("max_order = 30", "max_order = 20");
+    let effect = "[[effect]]\nplugin = \"reversal-angle\"\ntargets = [\"turned\"]\nangle_deg = 0.3\n";
+    let stages = STAGES.replace("samples_per_rev = 512", "samples_per_rev = 128");
+    let pipeline = pipeline_of(folder.path(), "shifted", [&recording, &format!("{KEYWAY}{effect}"), INTERRUPTED, &stages]);
+    let found = diagnose(&pipeline, NonZeroUsize::new(1), &Silent).unwrap();
+    let [added] = &found.added[..] else { panic!("{:?} {:?}", found.added, found.refused) };
+    let angle = &added.parameters[0];
+    println!("{} {} ± {:?}", added.effect, angle.value, angle.std);
+    assert_eq!((added.effect.as_str(), found.verdict), ("reversal-angle", Verdict::Explained));
+    assert!((angle.value - 0.3).abs() < 4.0 * angle.std.unwrap(), "{angle:?}");
 }
 
 /// A speed that wobbles by 0.1 % puts marks and angles between samples: interpolation, and a low-pass before it, do not take

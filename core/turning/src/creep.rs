@@ -225,8 +225,7 @@ impl Sensor {
     /// The fits of all time constants that are tried, ascending.
     fn fits_tried(&self) -> Vec<Fitted> {
         let course = |step: usize| Course::Settling(shape::tau_tried(self.turns, step));
-        let fit =
-            |step: usize| self.fit_shapes(course(step), self.tried.iter().map(|shapes| &shapes.settling[step]));
+        let fit = |step: usize| self.fit_shapes(course(step), self.tried.iter().map(|shapes| &shapes.settling[step]));
         (0..shape::TRIED).map(fit).collect()
     }
 
@@ -237,9 +236,8 @@ impl Sensor {
         // Between the neighbours of the best one.
         let tau = |step: usize| shape::tau_tried(self.turns, step);
         let (low, high) = (tau(best.saturating_sub(1)), tau((best + 1).min(shape::TRIED - 1)));
-        let tau = golden_section::maximum(low, high, REFINED * (high - low), |tau| {
-            -left(&self.fit(Course::Settling(tau)))
-        });
+        let tau =
+            golden_section::maximum(low, high, REFINED * (high - low), |tau| -left(&self.fit(Course::Settling(tau))));
         self.fit(Course::Settling(tau))
     }
 

@@ -7,7 +7,7 @@
 //! interruption stays as it was bridged: no reading says.
 
 use crate::stage::{Station, StationDiagnosis, StationModel, StationSeparator};
-use runout_closed_loop::closed_loop::Settings;
+use runout_closed_loop::{closed_loop::Settings, diagnosis::Verdict};
 use runout_error::Result;
 use runout_numerics::{Complex64, fourier::Fourier, least_squares::dot};
 use runout_turning::{
@@ -23,8 +23,9 @@ struct Until {
     share: f64,
 }
 const SEPARATED: Until = Until { solutions: 40, share: 3e-3 };
-/// By the closed loop, which searches among the effects found at first each time.
-const DIAGNOSED: Until = Until { solutions: 25, share: 0.02 };
+const DIAGNOSED: Until = Until { solutions: 20, share: 0.02 };
+/// Searches among all effects: readings that agree with one effect may show the next.
+const SEARCHES: usize = 2;
 /// Longest step, in those of expectation and maximisation.
 const LONGEST_STEP: f64 = 30.0;
 
@@ -50,23 +51,36 @@ pub(super) fn diagnose(
         reveal(separator, station, hidden)?;
     }
     // The loop drops the parts of profiles, which its next run needs.
+    let run = |stations: &[Station], settings: &Settings| model.diagnose(&mut stations.to_vec(), settings);
     let with_parts = Settings { keeps_parts: true, ..settings.clone() };
-    let first = model.diagnose(&mut stations.to_vec(), &with_parts)?;
-    if first.diagnosis.added.is_empty() && settings.known.is_empty() {
-        return model.diagnose(stations, settings);
+    // By effects of some kinds only: a search among all takes many times as long.
+    let reveal_by = |kinds: Vec<String>, stations: &mut [Station]| -> Result<StationDiagnosis> {
+        let of_kinds = Settings { effects: Some(kinds), ..with_parts.clone() };
+        let first = run(stations, &of_kinds)?;
+        solve_again(stations, &hidden, first, DIAGNOSED, |stations| run(stations, &of_kinds), left_after)
+    };
+    if !settings.known.is_empty() {
+        reveal_by(Vec::new(), stations)?;
     }
-    let found = first.diagnosis.added.iter().map(|added| added.effect.clone()).collect();
-    let of_found = Settings { effects: Some(found), ..with_parts };
-    let solve = |stations: &[Station]| model.diagnose(&mut stations.to_vec(), &of_found);
     let mut revealed = stations.to_vec();
-    solve_again(&mut revealed, &hidden, first, DIAGNOSED, solve, |found, station| &found.after[station].residual)?;
-    let found = model.diagnose(&mut revealed.clone(), settings)?;
-    // Readings that agree with an effect that is none would hide what is there.
-    if found.diagnosis.added.is_empty() && settings.known.is_empty() {
-        return model.diagnose(stations, settings);
+    for _ in 0..SEARCHES {
+        let added = run(&revealed, &with_parts)?.diagnosis.added;
+        if added.is_empty() {
+            break;
+        }
+        reveal_by(added.into_iter().map(|added| added.effect).collect(), &mut revealed)?;
+        let found = run(&revealed, settings)?;
+        if found.diagnosis.verdict != Verdict::Unexplained {
+            stations.clone_from_slice(&revealed);
+            return Ok(found);
+        }
     }
-    stations.clone_from_slice(&revealed);
-    Ok(found)
+    // Readings that agree with an effect that is none would hide what is there.
+    model.diagnose(stations, settings)
+}
+
+fn left_after(found: &StationDiagnosis, station: usize) -> &Residual {
+    &found.after[station].residual
 }
 
 /// Replaces the hidden readings of a station by what a separator says of them, and separates it.
@@ -91,9 +105,8 @@ fn solve_again<T: Clone>(
         let each = hidden.iter().enumerate();
         each.flat_map(|(station, hidden)| hidden.left(residual(found, station))).collect()
     };
-    let noise = |(station, hidden): (usize, &Hidden)| {
-        residual(&first, station).expected_rms_um.powi(2) * hidden.count() as f64
-    };
+    let noise =
+        |(station, hidden): (usize, &Hidden)| residual(&first, station).expected_rms_um.powi(2) * hidden.count() as f64;
     let noise: f64 = hidden.iter().enumerate().map(noise).sum();
     let mut left = left_of(&first);
     let at_first = dot(&left, &left);

@@ -21,7 +21,8 @@ pub(super) struct Partials {
 impl Partials {
     pub(super) fn new(sensor: &Sensor, fitted: &Fitted) -> Self {
         let captures = &sensor.captures;
-        let by_rate: Vec<Vec<f64>> = captures.iter().map(|capture| Shape::new(fitted.course, &capture.middles).values).collect();
+        let by_rate: Vec<Vec<f64>> =
+            captures.iter().map(|capture| Shape::new(fitted.course, &capture.middles).values).collect();
         let mut over_capture = [fitted.course.at(sensor.turns), 0.0];
         let mut by_tau: Vec<Vec<f64>> = by_rate.iter().map(|shape| vec![0.0; shape.len()]).collect();
         if let Course::Settling(tau) = fitted.course {
