@@ -5,8 +5,8 @@
 use std::{num::NonZeroUsize, path::Path};
 
 use runout_core::{
-    closed_loop::diagnosis::Verdict,
     measurement::Recording,
+    model::diagnosis::Verdict,
     pipeline::{
         INCLUDE_KEY, Pipeline, Registry,
         diagnose::diagnose,
@@ -151,7 +151,6 @@ fn a_keyway_is_left_out_of_every_value_and_each_says_so() {
         }
         // The other readings say what the axis does while a sensor looks into the keyway.
         assert!(station.chi2_per_dof.unwrap() < 1.3, "{:?}", station.chi2_per_dof);
-        }
     }
 
     // No turn is lost to readings that the keyway drives to the converter's end.
@@ -173,7 +172,8 @@ fn an_effect_is_found_beside_a_keyway() {
     let recording = RECORDING.replace("count = 2", "count = 1").replace("max_order = 30", "max_order = 20");
     let effect = "[[effect]]\nplugin = \"reversal-angle\"\ntargets = [\"turned\"]\nangle_deg = 0.3\n";
     let stages = STAGES.replace("samples_per_rev = 512", "samples_per_rev = 128");
-    let pipeline = pipeline_of(folder.path(), "shifted", [&recording, &format!("{KEYWAY}{effect}"), INTERRUPTED, &stages]);
+    let pipeline =
+        pipeline_of(folder.path(), "shifted", [&recording, &format!("{KEYWAY}{effect}"), INTERRUPTED, &stages]);
     let found = diagnose(&pipeline, NonZeroUsize::new(1), &Silent).unwrap();
     let [added] = &found.added[..] else { panic!("{:?} {:?}", found.added, found.refused) };
     let angle = &added.parameters[0];

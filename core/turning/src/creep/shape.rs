@@ -41,7 +41,9 @@ pub(super) struct TriedShapes {
 impl TriedShapes {
     /// Those that are known, or new ones, which are known then.
     pub(super) fn of(middles: &[f64], turns: f64, known: &mut Vec<Arc<Self>>) -> Arc<Self> {
-        if let Some(known) = known.iter().find(|known| known.turns == turns && known.middles == middles) {
+        if let Some(known) =
+            known.iter().find(|known| known.turns.to_bits() == turns.to_bits() && known.middles == middles)
+        {
             return Arc::clone(known);
         }
         let settling = |step: usize| Shape::new(Course::Settling(tau_tried(turns, step)), middles);
