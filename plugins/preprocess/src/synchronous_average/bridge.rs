@@ -47,7 +47,7 @@ impl Bridges {
         let orders = bridges().map(|bridge| bridge.courses.len() / 2).min()?;
         Some(format!(
             "readings are bridged over up to {longest_deg:.1}° of each turn, where the part is interrupted: what the axis does there \
-             above order {orders} is not known, nor in any stated uncertainty"
+             above order {orders}, only other readings say where they are redundant, and no stated uncertainty holds it"
         ))
     }
 
