@@ -22,7 +22,7 @@ pub mod panels;
 
 use std::{collections::HashMap, sync::Arc};
 
-use arrow_array::{BooleanArray, UInt32Array};
+use arrow_array::{BooleanArray, UInt32Array, builder::StringBuilder};
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 
 use runout_error::{Error, Result};
@@ -220,6 +220,15 @@ pub fn counts_or_null(values: impl IntoIterator<Item = Option<usize>>) -> ArrayR
 /// A column of texts.
 pub fn texts<T: AsRef<str>>(values: impl IntoIterator<Item = T>) -> ArrayRef {
     Arc::new(StringArray::from_iter_values(values))
+}
+
+/// A column of texts, each on so many rows in a row.
+pub fn stretches<T: AsRef<str>>(texts: impl IntoIterator<Item = (T, usize)>) -> ArrayRef {
+    let mut column = StringBuilder::new();
+    for (text, rows) in texts {
+        column.append_value_n(text, rows);
+    }
+    Arc::new(column.finish())
 }
 
 /// A column of texts, null where there is none.

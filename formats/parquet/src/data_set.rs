@@ -5,7 +5,6 @@ use std::{
     fmt::Write,
     fs::{self, File},
     io,
-    iter::repeat_n,
     path::{Path, PathBuf},
 };
 
@@ -15,7 +14,7 @@ use runout_core::{
     atomic_file::PendingFile,
     pipeline::batch::{Gathered, RECORDING, ResultStore, recording_column},
     stage::Exporter,
-    table::{ArrayRef, RecordBatch, TableSpec, texts},
+    table::{ArrayRef, RecordBatch, TableSpec, stretches},
 };
 
 use crate::{Parquet, table::TableFile};
@@ -128,7 +127,7 @@ impl ResultStore for DataSet {
                         Error::new("read", part.display().to_string(), format!("it has no column {}", column.name))
                     })
                 });
-                let names = std::iter::once(Ok(texts(repeat_n(recording.as_str(), rows.num_rows()))));
+                let names = std::iter::once(Ok(stretches([(recording.as_str(), rows.num_rows())])));
                 let columns: Vec<ArrayRef> = names.chain(own).collect::<Result<_>>()?;
                 file.append(&spec.rows(columns)?)
             })?;

@@ -18,7 +18,7 @@ use reading::{reading, reading_rows};
 use residual::{residual, residual_rows};
 use runout_error::Result;
 use runout_table::{
-    ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, no_numbers, numbers, texts,
+    ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, no_numbers, numbers, stretches,
     texts_or_null,
 };
 use runout_turning::station::StationResult;
@@ -229,8 +229,8 @@ fn form_rows(result: &StationResult) -> Vec<ArrayRef> {
     let angles = result.angles;
     let rows = sections.len() * angles;
     vec![
-        texts(sections.iter().flat_map(|(_, at)| repeat_n(at.id.as_str(), angles))),
-        texts(repeat_n(result.station.as_str(), rows)),
+        stretches(sections.iter().map(|(_, at)| (at.id.as_str(), angles))),
+        stretches([(result.station.as_str(), rows)]),
         numbers(sections.iter().flat_map(|(_, at)| repeat_n(at.z_mm, angles))),
         numbers(sections.iter().flat_map(|_| angles_deg(angles))),
         numbers(sections.iter().flat_map(|(unknown, _)| result.over_angle(*unknown))),
@@ -278,7 +278,7 @@ fn motion_rows(result: &StationResult, line: Option<Azimuth>, axial: bool) -> Ve
     let std = |unknown: &Option<usize>| {
         unknown.map_or_else(|| no_numbers(angles), |unknown| numbers(repeat_n(separation.angle_std(unknown), angles)))
     };
-    let mut columns = vec![texts(repeat_n(result.station.as_str(), angles)), numbers(angles_deg(angles))];
+    let mut columns = vec![stretches([(result.station.as_str(), angles)]), numbers(angles_deg(angles))];
     columns.extend(line.map(|line| numbers(repeat_n(line.degrees(), angles))));
     columns.extend(unknowns.iter().map(value));
     columns.extend(unknowns.iter().map(std));
@@ -343,9 +343,9 @@ fn harmonics_rows(result: &StationResult) -> Vec<ArrayRef> {
     };
     let each = || separation.unknowns.iter().zip(lengths());
     vec![
-        texts(each().flat_map(|(quantity, length)| repeat_n(quantity.id(), length))),
+        stretches(each().map(|(quantity, length)| (quantity.id(), length))),
         texts_or_null(each().flat_map(|(quantity, length)| repeat_n(section(quantity), length))),
-        texts(repeat_n(result.station.as_str(), count)),
+        stretches([(result.station.as_str(), count)]),
         counts(lengths().flat_map(|length| orders - length..orders)),
         number(&|place| separation.estimate[place].re),
         number(&|place| separation.estimate[place].im),

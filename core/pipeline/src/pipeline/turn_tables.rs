@@ -1,8 +1,7 @@
 //! The tables of error motion turn by turn: what to draw of synchronous and asynchronous error motion.
 
-use std::iter::repeat_n;
 
-use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, numbers_or_null, texts};
+use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, numbers_or_null, stretches};
 use runout_turning::{
     error_motion::{ErrorMotion, Spectrum, TurnsPlot},
     station::StationResult,
@@ -84,8 +83,8 @@ fn turns_rows(station: &str, plots: &[&TurnsPlot]) -> Vec<ArrayRef> {
         (0..count).map(move |step| 360.0 * step as f64 / count as f64)
     };
     vec![
-        texts(repeat_n(station, plots.iter().map(length).sum())),
-        texts(plots.iter().flat_map(|plot| repeat_n(plot.direction.as_str(), length(plot)))),
+        stretches([(station, plots.iter().map(length).sum())]),
+        stretches(plots.iter().map(|plot| (plot.direction.as_str(), length(plot)))),
         numbers(plots.iter().flat_map(angle)),
         numbers(plots.iter().flat_map(|plot| plot.synchronous.iter().copied())),
         numbers(plots.iter().flat_map(|plot| plot.lowest.iter().copied())),
@@ -131,8 +130,8 @@ fn spectrum_rows(station: &str, spectra: &[&Spectrum]) -> Vec<ArrayRef> {
         (1..=length(one)).map(move |order| speed_rpm.map(|rpm| rpm / 60.0 * order as f64))
     };
     vec![
-        texts(repeat_n(station, spectra.iter().map(length).sum())),
-        texts(spectra.iter().flat_map(|one| repeat_n(one.direction.as_str(), length(one)))),
+        stretches([(station, spectra.iter().map(length).sum())]),
+        stretches(spectra.iter().map(|one| (one.direction.as_str(), length(one)))),
         counts(spectra.iter().flat_map(|one| 1..=length(one))),
         numbers_or_null(spectra.iter().flat_map(frequency)),
         numbers(spectra.iter().flat_map(|one| one.synchronous.iter().copied())),

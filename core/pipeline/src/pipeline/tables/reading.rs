@@ -5,7 +5,7 @@ use std::iter::repeat_n;
 use super::{STATION, angles_deg, std_of};
 use crate::pipeline::station_summary::{sensor_id, setup_id};
 use runout_numerics::{Complex64, fourier::Fourier};
-use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, numbers, texts};
+use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, numbers, stretches};
 use runout_turning::{
     reading::{coefficients, variances},
     rig::Rig,
@@ -54,9 +54,9 @@ pub(super) fn reading_rows(result: &StationResult, rig: Option<&Rig>) -> Vec<Arr
         readings.extend_from_slice(fourier.synthesise(without_level));
     }
     let std = |all: Option<Vec<f64>>| all.map_or(f64::NAN, |all| (0.5 * all.iter().skip(1).sum::<f64>()).sqrt());
-    let repeated = |ids: Vec<String>| texts(ids.iter().flat_map(|id| repeat_n(id.as_str(), angles)));
+    let repeated = |ids: Vec<String>| stretches(ids.iter().map(|id| (id.as_str(), angles)));
     vec![
-        texts(repeat_n(result.station.as_str(), count * angles)),
+        stretches([(result.station.as_str(), count * angles)]),
         repeated(channels().map(|(profile, ..)| setup_id(profile, rig)).collect()),
         repeated(channels().map(|(.., sensor)| sensor_id(sensor, rig)).collect()),
         numbers((0..count).flat_map(|_| angles_deg(angles))),

@@ -1,11 +1,9 @@
 //! The table of what the fit leaves of the averaged readings.
 
-use std::iter::repeat_n;
-
 use super::STATION;
 use crate::pipeline::station_summary::{sensor_id, setup_id};
 use runout_numerics::Complex64;
-use runout_table::{ArrayRef, ColumnSpec, TableSpec, counts, numbers, texts};
+use runout_table::{ArrayRef, ColumnSpec, TableSpec, counts, numbers, stretches};
 use runout_turning::{profile::Profile, reading::variances, rig::Rig, station::StationResult};
 
 /// Where readings are redundant.
@@ -39,7 +37,6 @@ pub(super) fn residual_rows(result: &StationResult, rig: Option<&Rig>) -> Vec<Ar
     let left: Vec<_> =
         result.separation.residual.by_reading.iter().filter(|left| left.place < channels.len()).collect();
     let count: usize = left.iter().map(|left| left.harmonics.len()).sum();
-    let each = || left.iter().flat_map(|left| &left.harmonics);
     let mut ids = [Vec::with_capacity(left.len()), Vec::with_capacity(left.len())];
     let mut stds = Vec::with_capacity(count);
     for left in &left {
@@ -51,14 +48,20 @@ pub(super) fn residual_rows(result: &StationResult, rig: Option<&Rig>) -> Vec<Ar
         stds.extend(left.harmonics.iter().map(|(order, _)| std(*order)));
     }
     let repeated = |ids: &[String]| {
-        texts(ids.iter().zip(&left).flat_map(|(id, left)| repeat_n(id.as_str(), left.harmonics.len())))
+        stretches(ids.iter().zip(&left).map(|(id, left)| (id.as_str(), left.harmonics.len())))
     };
-    let part = |of: fn(&Complex64) -> f64| numbers(each().map(|(_, value)| of(value)));
+    let part = |of: fn(&Complex64) -> f64| {
+        let mut column = Vec::with_capacity(count);
+        for left in &left {
+            column.extend(left.harmonics.iter().map(|(_, value)| of(value)));
+        }
+        numbers(column)
+    };
     vec![
-        texts(repeat_n(result.station.as_str(), count)),
+        stretches([(result.station.as_str(), count)]),
         repeated(&ids[0]),
         repeated(&ids[1]),
-        counts(each().map(|(order, _)| *order)),
+        counts(left.iter().flat_map(|left| left.harmonics.iter().map(|(order, _)| *order))),
         part(|value| value.re),
         part(|value| value.im),
         numbers(stds),
