@@ -252,6 +252,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn stretches_are_texts_that_repeat() {
+        let column = stretches([("a", 2), ("", 1), ("never", 0), ("bb", 3)]);
+        assert_eq!(&column, &texts(["a", "a", "", "bb", "bb", "bb"]));
+        assert_eq!(column.null_count(), 0);
+    }
+
+    #[test]
     fn columns_say_what_they_hold() {
         let table = TableSpec::new(
             "form",
