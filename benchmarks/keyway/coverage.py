@@ -1,18 +1,41 @@
-"""How often intervals hold the truth beside a keyway; writes into the working folder.
+"""How often intervals of roundness hold the truth beside a keyway.
 
-    python benchmarks/keyway/coverage.py RUNOUT 40 linear benchmarks/keyway/scenario.toml
+    python benchmarks/keyway/coverage.py RUNOUT [RECORDINGS] [--uncertainty monte-carlo] [--margin-deg 0]
 
-Needs NumPy, SciPy and h5py. Columns decl: up to the declared edges; val: up to those of the values.
+RUNOUT is the program. It simulates recordings of scenario.toml, whose file holds the true form, and evaluates them. True values are
+those of a spline through that form, about a least-squares circle by NumPy, over all angles but the interruption that the pipeline
+declares. With --margin-deg they leave out so much more at either edge; 0.3516, the half of a sample, are the angles that the
+program's own values have. Needs NumPy, SciPy and h5py; writes into a temporary folder.
 """
-import subprocess,sys,json,numpy as np,h5py,os
+
+import argparse
+import json
+import subprocess
+import tempfile
+from pathlib import Path
+
+import h5py
+import numpy as np
 from scipy.interpolate import CubicSpline
-R=sys.argv[1]; N=int(sys.argv[2]); way=sys.argv[3] if len(sys.argv)>3 else 'linear'
-GAP=sys.argv[5] if len(sys.argv)>5 else 'interruptions = [{ from_deg = 351.5, to_deg = 4.5 }]'
-rig=open(sys.argv[4]).read(); rig=rig[rig.index('[rig]'):rig.index('[recording]')]
-pipe='title="k"\n'+rig+'''%s
+
+SCENARIO = Path(__file__).with_name("scenario.toml").read_text()
+# Declared half a degree wider than the keyway, 352° to 4°.
+DECLARED_DEG = (4.5, 351.5)
+# The spline goes through what lies beside the keyway.
+BESIDE_DEG = (4.05, 351.95)
+SYMBOLS = ("RONp", "RONq", "RONt", "RONv")
+
+
+def pipeline(uncertainty):
+    """The scenario's rig with the interruption, and what a run does with its recording."""
+    rig = SCENARIO[SCENARIO.index("[rig]") : SCENARIO.index("[recording]")]
+    return f"""
+title = "Beside a keyway"
+{rig}
+interruptions = [{{ from_deg = {DECLARED_DEG[1]}, to_deg = {DECLARED_DEG[0]} }}]
 [load]
 plugin = "hdf5"
-path = "rec.h5"
+path = "record.h5"
 [[preprocess]]
 plugin = "synchronous-average"
 samples_per_rev = 512
@@ -20,43 +43,66 @@ samples_per_rev = 512
 plugin = "harmonic-least-squares"
 [evaluate]
 values = ["roundness"]
-references = ["LSCI", "MZCI"]
+references = ["LSCI"]
 filter_upr = [50]
-uncertainty = "%s"
+uncertainty = "{uncertainty}"
 [[export]]
-plugin = "json"
-path = "out.json"
-'''%(GAP,way)
-pipe=pipe.replace('[[export]]\nplugin = "json"\npath = "out.json"\n','[[export]]\nplugin = "parquet"\npath = "out"\n')
-open('p.toml','w').write(pipe)
-def lsci(th,r):
-    A=np.c_[np.ones_like(th),np.cos(th),np.sin(th)]
-    return r-A@np.linalg.lstsq(A,r,rcond=None)[0]
-res={}
-for seed in range(N):
-    sc=open(sys.argv[4]).read().replace('seed = 3',f'seed = {100+seed}')
-    open('s.toml','w').write(sc)
-    subprocess.run([R,'simulate','s.toml','--out','rec.h5'],check=True,stdout=subprocess.DEVNULL,stderr=subprocess.DEVNULL)
-    subprocess.run([R,'run','p.toml','--threads','1'],check=True,stdout=subprocess.DEVNULL,stderr=subprocess.DEVNULL)
-    s=json.load(open('out/summary.json'))
-    f=h5py.File('rec.h5')
-    for st in s['stations']:
-        for sec in st['sections']:
-            form=f[f"truth/{st['station']}/form_um/{sec['section']}"][:]
-            n=len(form); th=np.arange(n)*2*np.pi/n
-            ok=(np.degrees(th)>4.05)&(np.degrees(th)<351.95)
-            cs=CubicSpline(th[ok],form[ok]) if GAP else CubicSpline(np.r_[th,2*np.pi],np.r_[form,form[0]],bc_type='periodic')
-            for tag,w in (('decl',0.0),('val',None)):
-                for v in sec['values']:
-                    if v['reference']!='LSCI' or v['filter']!='none': continue
-                    if v['symbol'] not in('RONt','RONq','RONp','RONv'): continue
-                    if not GAP: a,b=0,2*np.pi;ww=0
-                    elif w is None: ww=0.3516
-                    else: ww=0
-                    if GAP: a,b=np.radians(4.5+ww),np.radians(351.5-ww)
-                    x=np.linspace(a,b,16384,endpoint=bool(GAP)); d=lsci(x,cs(x))
-                    t={'RONt':d.max()-d.min(),'RONq':np.sqrt((d**2).mean()),'RONp':d.max(),'RONv':-d.min()}[v['symbol']]
-                    u=v['uncertainty']; i=u['interval_95']
-                    res.setdefault((tag,v['symbol']),[]).append(((v['value']-t),u['std'],i[0]<=t<=i[1],ww, t<i[0]))
-for k,v in sorted(res.items()):
-    e=np.array([x[0] for x in v]);s=np.array([x[1] for x in v]);print(k,len(v),'holds %.1f%%'%(100*np.mean([x[2] for x in v])),'rms err %.5f'%np.sqrt((e**2).mean()),'mean %.5f'%e.mean(),'std stated %.5f'%np.sqrt((s**2).mean()),'ww %.3f'%np.mean([x[3] for x in v]),'below %d'%sum(x[4] for x in v))
+plugin = "parquet"
+path = "out"
+"""
+
+
+def true_values(form_um, margin_deg):
+    """Values about the least-squares circle, in µm, of a form on equal angles."""
+    angle = np.arange(len(form_um)) * 360 / len(form_um)
+    beside = (angle > BESIDE_DEG[0]) & (angle < BESIDE_DEG[1])
+    spline = CubicSpline(np.radians(angle[beside]), form_um[beside])
+    angle = np.radians(np.linspace(DECLARED_DEG[0] + margin_deg, DECLARED_DEG[1] - margin_deg, 16384))
+    circle = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
+    profile = spline(angle)
+    deviation = profile - circle @ np.linalg.lstsq(circle, profile, rcond=None)[0]
+    highest, lowest = deviation.max(), -deviation.min()
+    return {"RONt": highest + lowest, "RONp": highest, "RONv": lowest, "RONq": np.sqrt(np.mean(deviation**2))}
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("runout", type=lambda path: str(Path(path).resolve()))
+    arguments.add_argument("recordings", type=int, nargs="?", default=40)
+    arguments.add_argument("--uncertainty", default="linear", choices=["linear", "monte-carlo"])
+    arguments.add_argument("--margin-deg", type=float, default=0.0)
+    given = arguments.parse_args()
+    errors, stds, held = ({symbol: [] for symbol in SYMBOLS} for _ in range(3))
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        (folder / "pipeline.toml").write_text(pipeline(given.uncertainty))
+
+        def runout(*words):
+            subprocess.run([given.runout, *words], cwd=folder, check=True, capture_output=True)
+
+        for seed in range(100, 100 + given.recordings):
+            (folder / "scenario.toml").write_text(SCENARIO.replace("seed = 3", f"seed = {seed}"))
+            runout("simulate", "scenario.toml", "--out", "record.h5")
+            runout("run", "pipeline.toml", "--threads", "1")
+            summary = json.loads((folder / "out" / "summary.json").read_text())
+            with h5py.File(folder / "record.h5") as record:
+                for station in summary["stations"]:
+                    for section in station["sections"]:
+                        form_um = record[f"truth/{station['station']}/form_um/{section['section']}"][:]
+                        truth = true_values(form_um, given.margin_deg)
+                        for value in section["values"]:
+                            symbol = value["symbol"]
+                            if symbol not in SYMBOLS or value["filter"] != "none":
+                                continue
+                            low, high = value["uncertainty"]["interval_95"]
+                            errors[symbol].append(value["value"] - truth[symbol])
+                            stds[symbol].append(value["uncertainty"]["std"])
+                            held[symbol].append(low <= truth[symbol] <= high)
+    print(f"{given.recordings} recordings, {given.uncertainty}; errors and stated standard uncertainties in µm, rms")
+    for symbol in SYMBOLS:
+        error, std = (np.sqrt(np.mean(np.square(some[symbol]))) for some in (errors, stds))
+        print(f"{symbol}  {len(held[symbol])} values  {100 * np.mean(held[symbol]):.1f} % held  error {error:.4f}  stated {std:.4f}")
+
+
+if __name__ == "__main__":
+    main()
