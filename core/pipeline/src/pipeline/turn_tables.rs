@@ -1,6 +1,5 @@
 //! The tables of error motion turn by turn: what to draw of synchronous and asynchronous error motion.
 
-
 use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, numbers_or_null, stretches};
 use runout_turning::{
     error_motion::{ErrorMotion, Spectrum, TurnsPlot},

@@ -47,9 +47,8 @@ pub(super) fn residual_rows(result: &StationResult, rig: Option<&Rig>) -> Vec<Ar
         let std = |order: usize| variances.as_ref().and_then(|all| all.get(order)).map_or(f64::NAN, |one| one.sqrt());
         stds.extend(left.harmonics.iter().map(|(order, _)| std(*order)));
     }
-    let repeated = |ids: &[String]| {
-        stretches(ids.iter().zip(&left).map(|(id, left)| (id.as_str(), left.harmonics.len())))
-    };
+    let repeated =
+        |ids: &[String]| stretches(ids.iter().zip(&left).map(|(id, left)| (id.as_str(), left.harmonics.len())));
     let part = |of: fn(&Complex64) -> f64| {
         let mut column = Vec::with_capacity(count);
         for left in &left {
