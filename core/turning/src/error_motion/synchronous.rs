@@ -9,11 +9,15 @@ use super::{
     polar::{Synchronous, seen_from},
     turns::{bounded, rms_about_mean},
 };
+use runout_numerics::fourier::quick_length;
 use runout_standards::{
     Value,
     roundness::{Angles, Points, ront_lsci_um},
     uncertainty::Uncertainty,
 };
+
+/// Points on a wave of the highest order where errors are drawn.
+const DRAWN_POINTS_A_WAVE: usize = 8;
 
 /// A value of a plot.
 pub(super) struct Measured {
@@ -52,10 +56,12 @@ impl Synchronous {
     pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64, orders: Orders) -> Option<Seen> {
         let points = RefCell::new(Points::default());
         let seen_on = |count: usize| self.seen_on(count, centre, &mut points.borrow_mut());
-        let (seen, finely) = (seen_on(angles)?, seen_on(FINER * angles)?);
-        // Draws on fewer angles tell the error as well, not the range: its ends lie between those angles.
+        // Errors raise crests between the given angles too. Draws on angles that show them tell the error as well as draws on
+        // those where the range is sought, from which it differs by little.
+        let count = quick_length(DRAWN_POINTS_A_WAVE * self.variance.len());
+        let (seen, finely) = (seen_on(count)?, seen_on(FINER * angles)?);
         let between = ront_lsci_um(&finely) - ront_lsci_um(&seen);
-        let angles = Angles::shared(angles);
+        let angles = Angles::shared(count);
         let about_moved = |plot: &[f64]| {
             let place = centre.of(&angles, plot, &mut points.borrow_mut()).unwrap_or_default();
             let seen = seen_from(place, &angles, plot);

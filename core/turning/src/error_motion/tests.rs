@@ -243,7 +243,7 @@ fn errors_of_x_and_y_go_together() {
 #[test]
 fn intervals_of_synchronous_values_hold_the_truth() {
     const TRIALS: usize = 300;
-    const HIGHEST: usize = 255;
+    const HIGHEST: usize = 359;
     let mut random = ChaCha8Rng::seed_from_u64(22);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let profiles = [profile(1.0, [-0.1, 0.1])];
