@@ -21,7 +21,7 @@ use crate::{
     errors_at::{Covariance, ErrorsAt},
 };
 use signal::QUANTILES;
-use sums::{SumTree, Sums};
+use sums::{Sliding, Sums};
 
 /// Power over the mean of the orders beside (over the noise) from which on an order is a line (stands out): noise alone exceeds it once in 8000 cases.
 const LINE: f64 = 9.0;
@@ -66,8 +66,8 @@ pub fn likely_forms(harmonics: &[Complex64], variance: &[f64], freedom: &[usize]
         Some(freedom) if *freedom > 0 => 1.0 + 2.0 * ORDERS_TOGETHER / *freedom as f64,
         _ => 1.0,
     };
-    let summed = |is_line: &[bool], signal: &[f64]| {
-        SumTree::new(count, |order| match noise(order).filter(|_| !is_line[order]) {
+    let summed = |is_line: &[bool], signal: &[f64]| -> Vec<Sums> {
+        let sums = |order: usize| match noise(order).filter(|_| !is_line[order]) {
             Some(noise) => {
                 // A square is known to itself.
                 let weight = (signal[order] + noise).powi(-2);
@@ -75,32 +75,37 @@ pub fn likely_forms(harmonics: &[Complex64], variance: &[f64], freedom: &[usize]
                 Sums { weight, power: weight * power[order], noise: weight * noise, variance }
             }
             None => Sums::default(),
-        })
+        };
+        (0..count).map(sums).collect()
     };
     let (mut is_line, mut signal) = (vec![false; count], vec![0.0; count]);
     let mut sums = summed(&is_line, &signal);
     for _ in 1..LOOKS {
+        let (mut before, mut after) = (Sliding::new(&sums), Sliding::new(&sums));
         for order in lowest..count {
             let (from, to) = window(order);
-            let others = sums.over(from, order) + sums.over(order + 1, to);
+            let others = before.over(from, order) + after.over(order + 1, to);
             signal[order] = others.signal();
             is_line[order] =
                 noise(order).is_some_and(|noise| others.weight > 0.0 && power[order] > LINE * (signal[order] + noise));
         }
         sums = summed(&is_line, &signal);
     }
-    let beside: Vec<Sums> = (0..count).map(window).map(|(from, to)| sums.over(from, to)).collect();
-    let weights = |quantile: usize| -> Vec<f64> {
-        let weight = |order: usize| {
-            let Some(own) = noise(order) else { return 1.0 };
-            let signal = beside[order].likely_signal(quantile);
-            let weight = signal / (signal + own);
-            if power[order] > LINE * own { weight.max(1.0 - own / power[order]) } else { weight }
+    let (mut beside, mut weights) = (Sliding::new(&sums), QUANTILES.map(|_| Vec::with_capacity(count)));
+    for order in 0..count {
+        let (from, to) = window(order);
+        let of_order = match noise(order) {
+            Some(own) => {
+                let least = if power[order] > LINE * own { 1.0 - own / power[order] } else { 0.0 };
+                beside.over(from, to).likely_signals().map(|signal| (signal / (signal + own)).max(least))
+            }
+            None => [1.0; QUANTILES.len()],
         };
-        (0..count).map(weight).collect()
-    };
+        weights.iter_mut().zip(of_order).for_each(|(all, weight)| all.push(weight));
+    }
     let share = 1.0 / (QUANTILES.len() - 1) as f64;
-    (0..QUANTILES.len()).map(|quantile| Likely { weights: weights(quantile), share, least: quantile == 0 }).collect()
+    let likely = |(quantile, weights)| Likely { weights, share, least: quantile == 0 };
+    weights.into_iter().enumerate().map(likely).collect()
 }
 
 /// Sets of weights that make nearly the same of harmonics with these variances are one, the middle one of them, with the shares of all. The least form

@@ -7,7 +7,7 @@ pub(super) const QUANTILES: [f64; 6] = [0.01, 0.1, 0.3, 0.5, 0.7, 0.9];
 /// Largest S that is likely before anything is found, in standard deviations of the noise's mean.
 const MOST: f64 = 10.0;
 
-/// Steps of the table of [`signal_at`] and its range.
+/// Steps of the table of [`signals_at`] and its range.
 const STEP: f64 = 0.1;
 const TABLED: [f64; 2] = [-4.0, 12.0];
 /// Columns of the table: 1/√k in eighths, from normal numbers to a single square.
@@ -17,7 +17,8 @@ const LEAST_LOG: f64 = -40.0;
 /// Steps of an integral.
 const STEPS_OF_SIGNAL: usize = 400;
 
-type Quantiles = [f64; QUANTILES.len()];
+/// One number for each quantile.
+pub(super) type Quantiles = [f64; QUANTILES.len()];
 
 /// Quantiles of S in standard deviations of the noise's mean, by 1/√k of it and by what was found of S in the same unit. A run needs few
 /// columns, each of which takes some milliseconds.
@@ -31,23 +32,27 @@ fn column(number: usize) -> &'static [Quantiles] {
     })
 }
 
-/// A quantile of S from the table, for what was found of it and for 1/√k of the noise's mean.
-pub(super) fn signal_at(quantile: usize, found: f64, root: f64) -> f64 {
+/// Quantiles of S from the table, for what was found of it and for 1/√k of the noise's mean.
+pub(super) fn signals_at(found: f64, root: f64) -> Quantiles {
     let place = root.clamp(0.0, 1.0) * (ROOTS - 1) as f64;
     let (first, share) = (place as usize, place.fract());
-    let of = |number: usize| in_column(column(number), quantile, found, number as f64 / (ROOTS - 1) as f64);
-    if share > 0.0 { of(first) + share * (of(first + 1) - of(first)) } else { of(first) }
+    let of = |number: usize| in_column(column(number), found, number as f64 / (ROOTS - 1) as f64);
+    if share > 0.0 { between(&of(first), &of(first + 1), share) } else { of(first) }
 }
 
-fn in_column(column: &[Quantiles], quantile: usize, found: f64, root: f64) -> f64 {
+fn between(low: &Quantiles, high: &Quantiles, share: f64) -> Quantiles {
+    std::array::from_fn(|quantile| low[quantile] + (high[quantile] - low[quantile]) * share)
+}
+
+fn in_column(column: &[Quantiles], found: f64, root: f64) -> Quantiles {
     let place = (found.max(TABLED[0]) - TABLED[0]) / STEP;
     let below = place.min(column.len() as f64) as usize;
     if let (Some(low), Some(high)) = (column.get(below), column.get(below + 1)) {
-        return low[quantile] + (high[quantile] - low[quantile]) * place.fract();
+        return between(low, high, place.fract());
     }
     // Far above, power and noise together are in proportion to what was found of them.
-    let last = column.last().map_or(0.0, |last| last[quantile]);
-    last + (found - TABLED[1]) * (1.0 + last * root) / (1.0 + TABLED[1] * root)
+    let last = column.last().copied().unwrap_or_default();
+    last.map(|last| last + (found - TABLED[1]) * (1.0 + last * root) / (1.0 + TABLED[1] * root))
 }
 
 /// The quantiles of S: even odds for 0 and for all up to the largest, times the likelihood of what was found. The mean of k squares over its
@@ -123,7 +128,7 @@ mod tests {
             for (index, quantile) in QUANTILES.into_iter().enumerate() {
                 let [low, high] =
                     [-0.02, 0.02].map(|by| of[((quantile + by) * 20_000.0).clamp(0.0, 19_999.0) as usize]);
-                let signal = signal_at(index, found, root);
+                let signal = signals_at(found, root)[index];
                 // Shares of 20 000 are known to 0.0035; of equal shares the window of 0.1 moves them by less than 0.05.
                 assert!(
                     low - 0.05 <= signal && signal <= high + 0.05,
@@ -132,10 +137,10 @@ mod tests {
             }
         }
         // Far above, S is what was found; any size of it has its place.
-        assert!(signal_at(3, 1e300, 0.0) >= 1e300 && signal_at(3, 1e300, 1.0).is_finite());
-        assert!((signal_at(3, 100.0, 0.0) - 100.0).abs() < 0.01);
+        assert!(signals_at(1e300, 0.0)[3] >= 1e300 && signals_at(1e300, 1.0)[3].is_finite());
+        assert!((signals_at(100.0, 0.0)[3] - 100.0).abs() < 0.01);
         // A power in proportion: the median of 1 + S over what was found is the same from there on.
-        let ratio = |found: f64| (1.0 + 0.5 * signal_at(3, found, 0.5)) / (1.0 + 0.5 * found);
+        let ratio = |found: f64| (1.0 + 0.5 * signals_at(found, 0.5)[3]) / (1.0 + 0.5 * found);
         assert!((ratio(60.0) / ratio(12.0) - 1.0).abs() < 1e-9);
     }
 }

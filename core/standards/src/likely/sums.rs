@@ -1,6 +1,6 @@
 //! Weighted sums of power and noise over stretches of orders.
 
-use super::signal::signal_at;
+use super::signal::{Quantiles, signals_at};
 
 /// Sums over some orders, each weighted.
 #[derive(Debug, Clone, Copy, Default)]
@@ -31,51 +31,55 @@ impl Sums {
         if self.weight > 0.0 { ((self.power - self.noise) / self.weight).max(0.0) } else { 0.0 }
     }
 
-    /// A quantile of what the power beyond the noise may be.
-    pub(super) fn likely_signal(&self, quantile: usize) -> f64 {
+    /// Quantiles of what the power beyond the noise may be.
+    pub(super) fn likely_signals(&self) -> Quantiles {
         let std = self.variance.sqrt();
         if std > 0.0 && self.weight > 0.0 {
-            std / self.weight * signal_at(quantile, (self.power - self.noise) / std, std / self.noise)
+            let scale = std / self.weight;
+            signals_at((self.power - self.noise) / std, std / self.noise).map(|signal| scale * signal)
         } else {
-            0.0
+            Quantiles::default()
         }
     }
 }
 
-/// Sums over any stretch of orders. Weights differ by many powers of ten, so that differences of sums from the first order on would have no
-/// digits left: sums of pairs, of pairs of these, and so on are kept.
-pub(super) struct SumTree {
-    sums: Vec<Sums>,
-    orders: usize,
+/// Sums over stretches of orders of which none begins or ends before the last one. Weights differ by many powers of ten, so that sums less those of
+/// what is left behind would have no digits left: those that begin at each order up to a middle are kept, and the one from there on.
+pub(super) struct Sliding<'a> {
+    all: &'a [Sums],
+    /// From each order of some before `middle` up to it, the nearest first.
+    up_to_middle: Vec<Sums>,
+    middle: usize,
+    /// From the middle up to `end`.
+    from_middle: Sums,
+    end: usize,
 }
 
-impl SumTree {
-    pub(super) fn new(orders: usize, of: impl Fn(usize) -> Sums) -> Self {
-        let mut sums = vec![Sums::default(); 2 * orders];
-        for order in 0..orders {
-            sums[orders + order] = of(order);
-        }
-        for pair in (1..orders).rev() {
-            sums[pair] = sums[2 * pair] + sums[2 * pair + 1];
-        }
-        Self { sums, orders }
+impl<'a> Sliding<'a> {
+    pub(super) fn new(all: &'a [Sums]) -> Self {
+        Self { all, up_to_middle: Vec::new(), middle: 0, from_middle: Sums::default(), end: 0 }
     }
 
     /// Over the orders from one up to another.
-    pub(super) fn over(&self, from: usize, to: usize) -> Sums {
-        let (mut low, mut high, mut sum) = (from + self.orders, to.max(from) + self.orders, Sums::default());
-        while low < high {
-            if low % 2 == 1 {
-                sum = sum + self.sums[low];
-                low += 1;
-            }
-            if high % 2 == 1 {
-                high -= 1;
-                sum = sum + self.sums[high];
-            }
-            (low, high) = (low / 2, high / 2);
+    pub(super) fn over(&mut self, from: usize, to: usize) -> Sums {
+        let to = to.min(self.all.len());
+        if from >= to {
+            return Sums::default();
         }
-        sum
+        for sums in &self.all[self.end.min(to)..to] {
+            self.from_middle = self.from_middle + *sums;
+        }
+        self.end = to;
+        if from >= self.middle {
+            self.up_to_middle.clear();
+            let mut sum = Sums::default();
+            for sums in self.all[from..to].iter().rev() {
+                sum = sum + *sums;
+                self.up_to_middle.push(sum);
+            }
+            (self.middle, self.from_middle) = (to, Sums::default());
+        }
+        self.up_to_middle[self.middle - from - 1] + self.from_middle
     }
 }
 
@@ -86,11 +90,14 @@ mod tests {
     /// Sums over stretches are those of their orders, however their weights differ.
     #[test]
     fn sums_of_a_stretch_lose_no_digits() {
-        let of = |order: usize| Sums { weight: if order < 20 { 1e20 } else { 1.0 + order as f64 }, ..Sums::default() };
-        let tree = SumTree::new(77, of);
-        for (from, to) in [(0, 77), (20, 77), (21, 22), (30, 30), (19, 21), (50, 76)] {
-            let expected: f64 = (from..to).map(|order| of(order).weight).sum();
-            assert!((tree.over(from, to).weight - expected).abs() <= 1e-12 * expected, "{from} {to}");
+        let weight = |order: usize| if order < 20 { 1e20 } else { 1.0 + order as f64 };
+        let all: Vec<Sums> = (0..77).map(|order| Sums { weight: weight(order), ..Sums::default() }).collect();
+        let mut sliding = Sliding::new(&all);
+        let stretches =
+            [(2, 1), (0, 3), (0, 5), (2, 30), (19, 31), (20, 31), (21, 60), (30, 30), (40, 61), (59, 77), (76, 77)];
+        for (from, to) in stretches {
+            let expected: f64 = (from..to).map(weight).sum();
+            assert!((sliding.over(from, to).weight - expected).abs() <= 1e-12 * expected, "{from} {to}");
         }
     }
 }
