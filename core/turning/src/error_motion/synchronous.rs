@@ -58,7 +58,7 @@ impl Synchronous {
         let seen_on = |count: usize| self.seen_on(count, centre, &mut points.borrow_mut());
         // Errors raise crests between the given angles too. Draws on angles that show them tell the error as well as draws on
         // those where the range is sought, from which it differs by little.
-        let count = quick_length(DRAWN_POINTS_A_WAVE * self.variance.len());
+        let count = quick_length(DRAWN_POINTS_A_WAVE * (self.band[1] + 1));
         let (seen, finely) = (seen_on(count)?, seen_on(FINER * angles)?);
         let between = ront_lsci_um(&finely) - ront_lsci_um(&seen);
         let angles = Angles::shared(count);
