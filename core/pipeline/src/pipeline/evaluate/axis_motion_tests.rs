@@ -386,8 +386,8 @@ fn intervals_hold_the_truth() {
         let all = held(count, std_um, told, 200);
         println!("{count} positions, {std_um} µm, {told:?}: {all:?}");
         for (name, held) in all {
-            // 90 % of 200; 95 % are 190 ± 3. About MZC, with errors from six degrees of freedom, 176 are held, 88 %.
-            let fewest = if matches!(told, Told::From(_)) && name.ends_with("MZC") { 172 } else { 180 };
+            // 90 % of 200; 95 % are 190 ± 3. About MZC, with errors from six degrees of freedom, 178 to 181 are held, 89 to 90 %.
+            let fewest = if matches!(told, Told::From(_)) && name.ends_with("MZC") { 174 } else { 180 };
             assert!(held >= fewest, "{count} positions, {std_um} µm, {told:?}, {name}: {held} of 200");
         }
     }
