@@ -78,9 +78,9 @@ for name, table in tables.items():
     column = pyarrow.parquet.ParquetFile(f"{out}/{name}.parquet").metadata.row_group(0).column
     columns = [column(place) for place in range(table.num_columns)]
     encodings = {one.path_in_schema: encoding for one in columns for encoding in PACKINGS if encoding in one.encodings}
-    rest = [one.path_in_schema for one in columns if "RLE_DICTIONARY" in one.encodings]
+    dictionary = [one.path_in_schema for one in columns if "RLE_DICTIONARY" in one.encodings]
     compression = {one.path_in_schema: one.compression.lower().replace("uncompressed", "none") for one in columns}
-    packing[name] = {"use_dictionary": rest, "column_encoding": encodings, "compression": compression}
+    packing[name] = {"use_dictionary": dictionary, "column_encoding": encodings, "compression": compression}
 
 
 def write_parquet():
