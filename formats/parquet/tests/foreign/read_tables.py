@@ -8,6 +8,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+# Columns of measured numbers. They are written as they are, since packing them takes long and saves little.
+MEASURED = {"form_um", "x_um", "y_um", "tilt_x_urad", "tilt_y_urad", "re", "im", "std"}
+
 folder = Path(sys.argv[1])
 form, motion, harmonics = (pq.read_table(folder / f"{name}.parquet") for name in ("form", "motion", "harmonics"))
 
@@ -24,9 +27,10 @@ for name in ("form", "motion", "harmonics"):
     assert json.loads(about["runout.inputs"])[0]["path"] == "shaft.h5"
     for index in range(metadata.num_columns):
         column = metadata.row_group(0).column(index)
-        assert column.compression == "ZSTD"
+        measured = column.path_in_schema in MEASURED
+        assert column.compression == ("UNCOMPRESSED" if measured else "ZSTD"), column
         if column.physical_type == "DOUBLE":
-            assert "BYTE_STREAM_SPLIT" in column.encodings, column
+            assert ("PLAIN" if measured else "BYTE_STREAM_SPLIT") in column.encodings, column
         if column.physical_type == "BYTE_ARRAY":
             assert column.has_dictionary_page, column
 
