@@ -69,7 +69,8 @@ impl Scan {
                 .help("set `threshold` and `hysteresis` of `marker` in [load] between its levels")
         })?;
         let kept = kept.map(|blocks| blocks.into_iter().filter(|block| !block.samples.is_empty()).collect());
-        Ok(Self { samples, marks, encoder, sample_rate_hz: time.rate_hz(), kept })
+        let sample_rate_hz = time.rate_hz().map_err(|problem| Error::new("read", &shown, problem).help(TIME_HELP))?;
+        Ok(Self { samples, marks, encoder, sample_rate_hz, kept })
     }
 }
 
@@ -136,12 +137,28 @@ impl IndexScan {
     }
 }
 
+/// Times that are kept, to see at the end whether the rate held: at least half as many.
+const MOST_PLACES: usize = 256;
+
+/// Share of the duration by which a time may be off the line from the first to the last: clocks are better by far.
+const LARGEST_DRIFT: f64 = 1e-3;
+
 /// Finds the sampling rate and whether it holds.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct TimeScan {
     samples: u64,
     first_s: f64,
     last_s: f64,
+    /// Of each so many samples one time is kept.
+    stride: u64,
+    /// Samples and their times.
+    places: Vec<(u64, f64)>,
+}
+
+impl Default for TimeScan {
+    fn default() -> Self {
+        Self { samples: 0, first_s: 0.0, last_s: 0.0, stride: 1, places: Vec::with_capacity(MOST_PLACES) }
+    }
 }
 
 impl TimeScan {
@@ -161,12 +178,36 @@ impl TimeScan {
                 }
             }
         }
+        if self.samples.is_multiple_of(self.stride) {
+            if self.places.len() == MOST_PLACES {
+                self.stride *= 2;
+                self.places.retain(|(sample, _)| sample.is_multiple_of(self.stride));
+            }
+            if self.samples.is_multiple_of(self.stride) {
+                self.places.push((self.samples, time_s));
+            }
+        }
         self.last_s = time_s;
         self.samples += 1;
         Ok(())
     }
 
-    fn rate_hz(&self) -> Option<f64> {
-        (self.samples > 1).then(|| (self.samples - 1) as f64 / (self.last_s - self.first_s))
+    /// The mean rate, where all times are where it leads: a rate that changes slowly has each time where those before it lead.
+    fn rate_hz(&self) -> std::result::Result<Option<f64>, String> {
+        if self.samples < 2 {
+            return Ok(None);
+        }
+        let duration_s = self.last_s - self.first_s;
+        let step_s = duration_s / (self.samples - 1) as f64;
+        let drift_s = |(sample, time_s): &(u64, f64)| time_s - self.first_s - step_s * *sample as f64;
+        let largest = self.places.iter().max_by(|one, other| drift_s(one).abs().total_cmp(&drift_s(other).abs()));
+        match largest.map(|place| (place.0, drift_s(place))) {
+            Some((sample, drift_s)) if drift_s.abs() > step_s.max(LARGEST_DRIFT * duration_s) => Err(format!(
+                "expected even steps, found sample {sample} {} s {} where steps of {step_s:.6e} s lead: the sampling rate changes",
+                (drift_s.abs() * 1e6).round() / 1e6,
+                if drift_s > 0.0 { "after" } else { "before" },
+            )),
+            _ => Ok(Some(1.0 / step_s)),
+        }
     }
 }
