@@ -180,7 +180,7 @@ pub fn write_height_map(grid: &HeightGrid, path: &Path, title: &str, scenario: O
     let shape = (grid.rows(), grid.columns);
     let heights = ArrayView2::from_shape(shape, &grid.height_nm).map_err(|error| pending.failure(error))?;
     let write = || -> hdf5_metno::Result<()> {
-        let file = File::with_options().with_fapl(|access| access.libver_v110()).create_excl(pending.path())?;
+        let file = node::create_file(pending.path())?;
         node::put_text(&file, "format", SURFACE_FORMAT)?;
         node::put(&file, "version", &VERSION)?;
         node::put_text(&file, "program", &format!("runout {}", provenance::VERSION))?;

@@ -314,9 +314,21 @@ pub(crate) fn written_shape(dataset: &Dataset, place: &Place) -> Result<Vec<usiz
     Ok(shape)
 }
 
-/// Creates a group without times: equal contents are equal files.
-pub(crate) fn create_group(parent: &Group, name: &str) -> hdf5_metno::Result<Group> {
-    parent.create_group_builder().obj_track_times(false).create(name)
+/// Creates a group, and those above it that are not there yet, without times: equal contents are equal files.
+pub(crate) fn create_group(parent: &Group, path: &str) -> hdf5_metno::Result<Group> {
+    let create = |parent: &Group, name: &str| parent.create_group_builder().obj_track_times(false).create(name);
+    let Some((above, name)) = path.rsplit_once('/') else { return create(parent, path) };
+    let above = if parent.link_exists(above) { parent.group(above)? } else { create_group(parent, above)? };
+    create(&above, name)
+}
+
+/// Begins a file that is not there yet: its root has no times either, and from this version on HDF5 protects its own structures by
+/// checksums.
+pub(crate) fn create_file(path: &Path) -> hdf5_metno::Result<File> {
+    File::with_options()
+        .with_fapl(|access| access.libver_v110())
+        .with_fcpl(|create| create.obj_track_times(false))
+        .create_excl(path)
 }
 
 /// Writes a text attribute.

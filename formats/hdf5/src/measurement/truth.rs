@@ -62,8 +62,8 @@ fn curve(group: &Group, place: &Place, name: &str) -> Result<Vec<f64>> {
 
 /// Writes the truth of one station below `/truth`.
 pub(super) fn write(root: &Group, rig: &Rig, station: &str, truth: &StationTruth) -> hdf5_metno::Result<()> {
-    let group = root.create_group(&format!("{TRUTH}/{station}"))?;
-    let forms = group.create_group(FORM)?;
+    let group = node::create_group(root, &format!("{TRUTH}/{station}"))?;
+    let forms = node::create_group(&group, FORM)?;
     for (section, form_um) in rig.sections.iter().zip(&truth.form_um) {
         forms.new_dataset_builder().with_data(form_um.as_slice()).create(section.as_str())?;
     }

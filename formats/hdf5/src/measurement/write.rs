@@ -66,11 +66,7 @@ pub fn write_measurement(
     pending.room_for(largest(recording, rig, options)?)?;
     {
         let failure = |error: hdf5_metno::Error| pending.caused(error);
-        let file = File::with_options()
-            // From this version on HDF5 protects its own structures by checksums.
-            .with_fapl(|access| access.libver_v110())
-            .create_excl(pending.path())
-            .map_err(failure)?;
+        let file = node::create_file(pending.path()).map_err(failure)?;
         describe(&file, options).map_err(failure)?;
         for (index, station) in recording.stations().iter().enumerate() {
             if station.name.is_empty() || station.name.contains(['/', '\0']) || station.name.starts_with('.') {
@@ -79,7 +75,7 @@ pub fn write_measurement(
             for (setup, at) in rig.setups.iter().enumerate() {
                 let mut stream = recording.open(index, setup)?;
                 let name = format!("{}/{}", at.id, station.name);
-                let group = file.create_group(&name).map_err(failure)?;
+                let group = node::create_group(&file, &name).map_err(failure)?;
                 node::put(&group, "z_mm", &station.z_mm).map_err(failure)?;
                 let writer = CaptureWriter { pending: &pending, group: &group, name: &name, rig, options };
                 writer.write(&mut *stream)?;
@@ -90,7 +86,7 @@ pub fn write_measurement(
             }
         }
         if let Some(scenario) = options.scenario {
-            let group = if file.link_exists(TRUTH) { file.group(TRUTH) } else { file.create_group(TRUTH) };
+            let group = if file.link_exists(TRUTH) { file.group(TRUTH) } else { node::create_group(&file, TRUTH) };
             group.and_then(|group| node::put_text(&group, "scenario", scenario)).map_err(failure)?;
         }
         // What the disk refuses comes out here, and not when the file is closed.

@@ -110,11 +110,7 @@ impl<const N: usize> ResultExport<N> {
 
 /// A result file with its head.
 fn create(path: &Path, title: &str) -> hdf5_metno::Result<File> {
-    let file = File::with_options()
-        .with_fapl(|access| access.libver_v110())
-        // Without times: equal contents are equal files.
-        .with_fcpl(|create| create.obj_track_times(false))
-        .create_excl(path)?;
+    let file = node::create_file(path)?;
     node::put_text(&file, "format", RESULT_FORMAT)?;
     node::put(&file, "version", &VERSION)?;
     node::put_text(&file, "title", title)?;
@@ -186,7 +182,7 @@ impl<const N: usize> Export for ResultExport<N> {
 const SURFACE: &str = "surface_map";
 
 fn put_surface(file: &File, surface: &Surface) -> hdf5_metno::Result<()> {
-    let group = file.create_group(SURFACE)?;
+    let group = node::create_group(file, SURFACE)?;
     node::put(&group, "radius_mm", &surface.radius_mm)?;
     node::put_text(&group, "interpolation", surface.interpolation)?;
     let column = |name: &str, unit: &str, shape: &[usize], values: &[f64]| -> hdf5_metno::Result<()> {
