@@ -11,15 +11,13 @@
 //! all orders. A sixth, of the least that it may be, is for the lower end of intervals alone: of a form that is a few lines, S is 0 at all
 //! orders, which even odds at each of them do not expect. An order that stands out from its noise has the power that it shows.
 
+mod form;
 mod signal;
 mod sums;
 
-use runout_numerics::{Complex64, fourier::Fourier};
+use runout_numerics::Complex64;
 
-use crate::{
-    errors::{Errors, Noise, TURNS_OF_A_DRAW},
-    errors_at::{Covariance, ErrorsAt},
-};
+pub use form::{LikelyForm, forms_to_draw, overlooked_by};
 use signal::QUANTILES;
 use sums::{Sliding, Sums};
 
@@ -34,7 +32,6 @@ const ORDERS_TOGETHER: f64 = 5.0;
 /// Forms are the same where the variances of their errors differ by less than this share of the noise, and their means by less than this share of
 /// its standard deviation.
 const SAME_FORM: f64 = 0.01;
-
 /// Weights w by order, and the share of all draws that are to be made with them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Likely {
@@ -42,6 +39,8 @@ pub struct Likely {
     share: f64,
     /// Whether they are those of the least form that is likely.
     least: bool,
+    /// Orders below are exact.
+    lowest: usize,
 }
 
 /// Whether a harmonic stands out from its noise of this variance; not where that is not known.
@@ -104,17 +103,18 @@ pub fn likely_forms(harmonics: &[Complex64], variance: &[f64], freedom: &[usize]
         weights.iter_mut().zip(of_order).for_each(|(all, weight)| all.push(weight));
     }
     let share = 1.0 / (QUANTILES.len() - 1) as f64;
-    let likely = |(quantile, weights)| Likely { weights, share, least: quantile == 0 };
+    let likely = |(quantile, weights)| Likely { weights, share, least: quantile == 0, lowest };
     weights.into_iter().enumerate().map(likely).collect()
 }
 
 /// Sets of weights that make nearly the same of harmonics with these variances are one, the middle one of them, with the shares of all. The least form
 /// is one of those that are as likely where it is the same as they are.
 fn distinct(likely: &[Likely], harmonics: &[Complex64], variance: &[f64]) -> Vec<Likely> {
-    let most = SAME_FORM * sum_of_known(variance);
+    let lowest = likely.first().map_or(0, |likely| likely.lowest);
+    let most = SAME_FORM * sum_of_known(variance, lowest);
     let is_same = |one: &Likely, other: &Likely| {
         let (mut of_variance, mut of_mean) = (0.0, 0.0);
-        for (order, (one, other)) in one.weights.iter().zip(&other.weights).enumerate().skip(2) {
+        for (order, (one, other)) in one.weights.iter().zip(&other.weights).enumerate().skip(lowest) {
             let differ = (one - other).abs();
             of_variance += variance.get(order).filter(|noise| **noise > 0.0).map_or(0.0, |noise| differ * noise);
             of_mean += harmonics.get(order).map_or(0.0, |harmonic| differ * differ * harmonic.norm_sqr());
@@ -135,82 +135,15 @@ fn distinct(likely: &[Likely], harmonics: &[Complex64], variance: &[f64]) -> Vec
             weights: group[group.len() / 2].weights.clone(),
             share: counted.map(|likely| likely.share).sum(),
             least,
+            lowest,
         }
     };
     groups.into_iter().map(one).collect()
 }
 
-/// The form as it may be by one set of weights, on equal angles: its mean, and errors about it.
-pub struct LikelyForm {
-    /// Its mean, in µm.
-    pub mean_um: Vec<f64>,
-    /// Of all draws, those that are to be made of it.
-    pub draws: usize,
-    /// Whether it is the least form that is likely, whose draws are for the lower end of intervals alone.
-    pub least: bool,
-    /// Variance of the errors, by order from 0.
-    variance: Vec<f64>,
-    /// Variance of the noise of the form found.
-    of_noise: f64,
-    noise: Noise,
-}
-
-/// The forms that so many draws are to be made of, on the angles that `fourier` has. Harmonics and their variances are those behind a filter.
-#[must_use]
-pub fn forms_to_draw(
-    likely: &[Likely],
-    harmonics: &[Complex64],
-    variance: &[f64],
-    draws: usize,
-    noise: &Noise,
-    fourier: &mut Fourier,
-) -> Vec<LikelyForm> {
-    let of_noise = sum_of_known(variance);
-    let form = |(number, likely): (usize, &Likely)| {
-        let mean = harmonics.iter().zip(&likely.weights).map(|(harmonic, weight)| harmonic * weight);
-        let variance = variance.iter().zip(&likely.weights).map(|(noise, weight)| noise * weight).collect();
-        let (mean_um, noise) = (fourier.synthesise(mean).to_vec(), noise.another(number as u64));
-        let draws = (likely.share * draws as f64).round() as usize;
-        LikelyForm { mean_um, variance, of_noise, draws, least: likely.least, noise }
-    };
-    distinct(likely, harmonics, variance).iter().enumerate().map(form).collect()
-}
-
-/// Sum of the variances that are known, of orders from 2 on.
-fn sum_of_known(variance: &[f64]) -> f64 {
-    variance.iter().skip(2).filter(|variance| **variance > 0.0).sum()
-}
-
-impl LikelyForm {
-    /// Standard deviation of an error at any one angle.
-    #[must_use]
-    pub fn std_um(&self) -> f64 {
-        (0.5 * sum_of_known(&self.variance)).sqrt()
-    }
-
-    /// The share that the form found has of noise, not of form, in the variance of its errors.
-    #[must_use]
-    pub fn share_of_noise(&self) -> f64 {
-        1.0 - sum_of_known(&self.variance) / self.of_noise
-    }
-
-    /// Draws of the errors as whole profiles; `None` where the form is exact.
-    #[must_use]
-    pub fn errors(&self) -> Option<Errors> {
-        Errors::sharing(&self.variance, 2, &self.noise)
-    }
-
-    /// Draws of the errors at some of the angles, by their numbers; `None` where the form is exact.
-    #[must_use]
-    pub fn errors_at(&self, points: &[usize], fourier: &mut Fourier) -> Option<ErrorsAt> {
-        Some(ErrorsAt::new(&Covariance::new(&self.variance, fourier)?, points, &self.noise))
-    }
-
-    /// How many transforms its draws come from as whole profiles.
-    #[must_use]
-    pub fn transforms(&self) -> usize {
-        self.draws.div_ceil(TURNS_OF_A_DRAW)
-    }
+/// Sum of the variances that are known, of orders from `lowest` on.
+fn sum_of_known(variance: &[f64], lowest: usize) -> f64 {
+    variance.iter().skip(lowest).filter(|variance| **variance > 0.0).sum()
 }
 
 #[cfg(test)]
@@ -298,7 +231,12 @@ mod tests {
     /// Whether two sets are one depends on what they make of the noise, not on where their weights differ.
     #[test]
     fn sets_are_one_where_their_forms_are() {
-        let likely = |weight: f64, least: bool| Likely { weights: vec![1.0, 1.0, 1.0, weight, 0.5], share: 0.2, least };
+        let likely = |weight: f64, least: bool| Likely {
+            weights: vec![1.0, 1.0, 1.0, weight, 0.5],
+            share: 0.2,
+            least,
+            lowest: 2,
+        };
         let sets = [likely(0.1, true), likely(0.1, false), likely(0.4, false), likely(0.402, false)];
         let shares = |third: f64| -> Vec<(f64, bool)> {
             let harmonics = [0.0, 0.0, 5.0, third, 0.1].map(Complex64::from);
@@ -315,7 +253,7 @@ mod tests {
     #[test]
     fn draws_are_about_what_the_form_may_be() {
         let (harmonics, variance) = (vec![Complex64::new(3.0, 1.0); 6], vec![0.5; 6]);
-        let likely = [Likely { weights: vec![1.0, 1.0, 0.8, 0.6, 0.0, 0.4], share: 1.0, least: false }];
+        let likely = [Likely { weights: vec![1.0, 1.0, 0.8, 0.6, 0.0, 0.4], share: 1.0, least: false, lowest: 2 }];
         let mut fourier = Fourier::new(64);
         let forms = forms_to_draw(&likely, &harmonics, &variance, 4000, &Noise::new(6, 1), &mut fourier);
         let [form] = &forms[..] else { panic!("one set of weights, one form") };

@@ -77,6 +77,8 @@ pub(super) struct Synchronous {
     second: Option<(f64, Vec<Complex64>)>,
     /// Variance E|δ|² of the plot's harmonics, by order from 0; 0 where none is known.
     pub variance: Vec<f64>,
+    /// Real degrees of freedom that it comes from, by order from 0; 0, and nothing, where it is taken as exact.
+    pub freedom: Vec<usize>,
     /// Orders of the motion that count, both ends included.
     pub band: [usize; 2],
     /// Orders of that band that are not observable.
@@ -145,6 +147,7 @@ impl Synchronous {
         let bounds = first.form_bound(separation)
             + second.as_ref().map_or(0.0, |(factor, motion)| factor.abs() * motion.form_bound(separation));
         Some(Self {
+            freedom: (0..variance.len()).map(|order| separation.degrees_of_freedom(order.min(band[1]))).collect(),
             bound: bounds,
             first: coefficients(&first),
             second: second.as_ref().map(|(factor, motion)| (*factor, coefficients(motion))),
@@ -165,6 +168,7 @@ impl Synchronous {
             first: first.collect(),
             second: None,
             variance: variance.collect(),
+            freedom: Vec::new(),
             lost: Vec::new(),
             bound: 0.0,
         }

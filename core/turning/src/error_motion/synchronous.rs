@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use super::{
     Centre, FINER, SAID,
     names::STANDARD,
-    noise::{Measure, Orders, without_noise},
+    noise::{Measure, NoiseOf, Orders, without_noise},
     polar::{Synchronous, seen_from},
     turns::{bounded, rms_about_mean},
 };
@@ -69,7 +69,8 @@ impl Synchronous {
         };
         let values = if centre.is_linear() { Measure::AboutFixedCentre } else { Measure::Of(&about_moved) };
         let found = [ront_lsci_um(&seen), rms_about_mean(&seen)];
-        let known = without_noise(found, &seen, &self.variance, lowest, seed, (&values, orders));
+        let noise = NoiseOf { variance: &self.variance, freedom: &self.freedom, lowest, seed };
+        let known = without_noise(found, &seen, &noise, (&values, orders));
         let [range_known, rms_known] = known.map_or([None, None], |known| known.map(Some));
         let measured = |found: f64, between: f64, known: Option<(f64, Uncertainty)>| match known {
             Some((share, known)) => {

@@ -11,8 +11,11 @@ use runout_numerics::{
 use runout_standards::{
     Value,
     roundness::{Angles, CircleSearch, Points, Reference, Series, Values},
-    slope::{Drawn, steepest_um_per_rad},
-    uncertainty::{DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, forms_to_draw, likely_values_of, of_rms},
+    slope::{self, steepest_um_per_rad},
+    uncertainty::{
+        DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, forms_to_draw, likely_values_of, of_rms,
+        overlooked_by,
+    },
 };
 
 /// Of so many points that may come to touch, errors cost as much as those of whole profiles.
@@ -42,6 +45,14 @@ const DRAWS_OF_ROBUST: usize = 64;
 /// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
 const DRAWN_POINTS_A_WAVE: usize = 6;
 
+/// Values of the profile at fewer angles, with what draws of its errors make of them.
+#[derive(Default)]
+struct Drawn {
+    values: Vec<(f64, Option<Uncertainty>)>,
+    /// Standard deviation of the noise, where draws do not show what is found at some angle.
+    overlooked: Option<f64>,
+}
+
 impl Form {
     /// Values about each reference behind a filter.
     pub(super) fn round(&self, filter: &Filter, references: &[Reference], propagation: Propagation) -> Vec<Value> {
@@ -49,11 +60,15 @@ impl Form {
         if labels.is_empty() {
             return Vec::new();
         }
-        let drawn = self.drawn_about(filter, references, propagation);
+        let Drawn { values: drawn, overlooked } = self.drawn_about(filter, references, propagation);
         let drawn = drawn.into_iter().map(Some).chain(std::iter::repeat(None));
         let found = self.about(filter, references).into_iter().zip(drawn);
         let found = found.zip(&labels).map(|((value, drawn), label)| {
             let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
+            let known = match (overlooked, extremes(label)) {
+                (Some(noise_um), Some(ends)) => known.map(|known| known.of_any_form(value, noise_um, ends)),
+                _ => known,
+            };
             // Where noise alone puts the value above its interval, which contacts hold the circle is no matter.
             let holds = |known: &Uncertainty| (known.interval_95[0]..=known.interval_95[1]).contains(&value);
             let both = known.as_ref().is_some_and(|known| has_kinks(label) && holds(known));
@@ -90,12 +105,7 @@ impl Form {
     }
 
     /// The same of the profile at fewer angles, with what draws of its errors make of them; nothing without known errors.
-    fn drawn_about(
-        &self,
-        filter: &Filter,
-        references: &[Reference],
-        propagation: Propagation,
-    ) -> Vec<(f64, Option<Uncertainty>)> {
+    fn drawn_about(&self, filter: &Filter, references: &[Reference], propagation: Propagation) -> Drawn {
         if propagation == Propagation::Linear
             && let Some(found) = self.drawn_where_they_touch(filter, references)
         {
@@ -103,7 +113,7 @@ impl Form {
         }
         let (variance, noise) = (self.widened(filter), &self.noise);
         if !variance.iter().skip(2).any(|variance| *variance > 0.0) {
-            return Vec::new();
+            return Drawn::default();
         }
         let angles = self.drawn_angles(filter);
         let mut fourier = Fourier::new(angles.len());
@@ -111,6 +121,7 @@ impl Form {
         let harmonics = filter.harmonics(&self.harmonics);
         let mut forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
         forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
+        let overlooked = overlooked_by(&forms, &profile_um);
         let search = |reference: &Reference| CircleSearch::new(*reference, &angles, self.radius_mm, true);
         let mut searches: Vec<CircleSearch> = references.iter().map(search).collect();
         let about: Vec<Option<Values>> =
@@ -144,7 +155,7 @@ impl Form {
             }
         });
         self.state_rms(filter, references, &mut found);
-        found
+        Drawn { values: found, overlooked }
     }
 
     /// States the uncertainty of RONq in closed form where the section is not interrupted.
@@ -166,11 +177,7 @@ impl Form {
 
     /// The same with errors drawn at the points that may come to touch, and RONq in closed form; `None` where the section is interrupted,
     /// much of the form found is noise, or such points are many.
-    fn drawn_where_they_touch(
-        &self,
-        filter: &Filter,
-        references: &[Reference],
-    ) -> Option<Vec<(f64, Option<Uncertainty>)>> {
+    fn drawn_where_they_touch(&self, filter: &Filter, references: &[Reference]) -> Option<Drawn> {
         if !self.at.gaps.is_empty() {
             return None;
         }
@@ -187,6 +194,7 @@ impl Form {
             return None;
         }
         let profile_um = self.profile(filter, &mut fourier);
+        let overlooked = overlooked_by(&forms, &profile_um);
         let mut found = Vec::new();
         for reference in references {
             let mut search = CircleSearch::new(*reference, &angles, self.radius_mm, false);
@@ -224,7 +232,7 @@ impl Form {
             found.extend(values);
         }
         self.state_rms(filter, references, &mut found);
-        Some(found)
+        Some(Drawn { values: found, overlooked })
     }
 
     /// The steepest slope, µm/°, from the harmonics, and what it may be of the true form.
@@ -256,8 +264,9 @@ impl Form {
         let mut found_slopes = fourier.synthesise(slopes).to_vec();
         self.at.gaps.blank(&mut found_slopes);
         // On the angles of the draws, from which the value differs by its crest.
-        let about = Drawn::about(&found_slopes).undisturbed();
-        let mut of_forms: Vec<_> = forms.iter().map(|form| (form.errors(), Drawn::about(&form.mean_um))).collect();
+        let about = slope::Drawn::about(&found_slopes).undisturbed();
+        let mut of_forms: Vec<_> =
+            forms.iter().map(|form| (form.errors(), slope::Drawn::about(&form.mean_um))).collect();
         let transforms = forms.iter().filter(|form| !form.least).map(LikelyForm::transforms).sum();
         let mut places = places_of(&forms);
         let found = likely_values_of(&forms, transforms, |disturbed, found| {
@@ -271,8 +280,12 @@ impl Form {
                 None => slopes.undisturbed(),
             });
         });
-        let known = found.into_iter().next().and_then(|(_, known)| known);
-        Found::from((value, known.map(|known| known.moved(value - about))))
+        let known = found.into_iter().next().and_then(|(_, known)| Some(known?.moved(value - about)));
+        let known = match overlooked_by(&forms, &found_slopes) {
+            Some(of_noise) => known.map(|known| known.of_any_form(value, of_noise, 1.0)),
+            None => known,
+        };
+        Found::from((value, known))
     }
 
     /// Roundness behind the robust Gaussian (ISO 16610-31), which is applied to each drawn profile.
@@ -318,6 +331,15 @@ fn roundness_labels(reference: Reference) -> Vec<Label> {
 fn has_kinks(label: &Label) -> bool {
     let about = [Reference::MaximumInscribed, Reference::MinimumCircumscribed];
     label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
+}
+
+/// How many extremes of the profile a value is the distance of from each other or from the reference; `None` of a mean.
+fn extremes(label: &Label) -> Option<f64> {
+    match label.symbol.as_ref() {
+        "RONt" => Some(2.0),
+        "RONp" | "RONv" => Some(1.0),
+        _ => None,
+    }
 }
 
 /// The values of [`roundness_labels`]; NaN where there is no such circle.
