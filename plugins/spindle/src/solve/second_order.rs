@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
 
 use super::estimate::Estimate;
-use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
+use crate::layout::{FirstOrder, Layout, Reading, UM_PER_MM_URAD};
 
 /// Finer grid on which form is tabulated, per angle of the profile.
 pub(crate) const OVERSAMPLING: usize = 4;
@@ -21,10 +21,17 @@ const SETTLED_UM: f64 = 1e-9;
 /// The shift asin(t/ρ) changes by less than 1e-9 of itself after two rounds: ρ varies by 1e-3 at most.
 const ROUNDS: usize = 2;
 
+/// From this share of the highest order that the angles of a profile hold, coupled orders may lie beyond it.
+const HIGH: f64 = 0.75;
+/// So much of them, in µm rms, may be taken for lower orders. The recording's own are taken out before it is averaged.
+const FOLDED_UM: f64 = 1e-4;
+
 /// Computes what exact geometry adds to linear readings.
 pub(crate) struct SecondOrder<'a> {
     layout: &'a Layout,
     radius_um: f64,
+    /// Angles here for each angle of the profile: 1, or 2 where coupled orders lie beyond those of the profile.
+    finer: usize,
     turn: Fourier,
     fine: Fourier,
     table: Vec<Vec<f64>>,
@@ -36,10 +43,16 @@ pub(crate) struct SecondOrder<'a> {
 
 impl<'a> SecondOrder<'a> {
     pub(crate) fn new(layout: &'a Layout, part_radius_mm: f64, samples_per_rev: usize) -> Self {
+        Self::finer(1, layout, part_radius_mm * 1e3, samples_per_rev)
+    }
+
+    fn finer(finer: usize, layout: &'a Layout, radius_um: f64, samples_per_rev: usize) -> Self {
+        let samples_per_rev = finer * samples_per_rev;
         let turns = (0..samples_per_rev).map(|step| step as f64 / samples_per_rev as f64);
         Self {
             layout,
-            radius_um: part_radius_mm * 1e3,
+            radius_um,
+            finer,
             turn: Fourier::new(samples_per_rev),
             fine: Fourier::new(samples_per_rev * OVERSAMPLING),
             table: Vec::new(),
@@ -58,6 +71,9 @@ impl<'a> SecondOrder<'a> {
         let layout = self.layout;
         let count = layout.readings.len();
         let max_order = excess.len() / count - 1;
+        if self.finer == 1 && self.folded_um(estimate, max_order) > FOLDED_UM {
+            *self = Self::finer(2, layout, self.radius_um, self.turn.length());
+        }
         let samples = self.turn.length();
         self.tabulate(estimate, max_order);
         let mut motions = Vec::new();
@@ -67,7 +83,8 @@ impl<'a> SecondOrder<'a> {
         for (index, reading) in layout.readings.iter().enumerate() {
             // What the face does where it moves sideways is left linear: its slope across the axis is not known.
             if reading.view.is_axial() {
-                self.met_rad.extend((0..samples).map(|step| layout.part_angle_rad(reading, step, samples)));
+                let steps = (0..samples).step_by(self.finer);
+                self.met_rad.extend(steps.map(|step| layout.part_angle_rad(reading, step, samples)));
                 excess.iter_mut().skip(index).step_by(count).for_each(|value| *value = Complex64::ZERO);
                 continue;
             }
@@ -99,7 +116,9 @@ impl<'a> SecondOrder<'a> {
                         break;
                     }
                 }
-                self.met_rad.push(met);
+                if step % self.finer == 0 {
+                    self.met_rad.push(met);
+                }
                 *value = there - here - across * sagitta_of_sine(sine_of_shift);
             }
             self.turn.analyse(curve.iter().copied(), &mut harmonics);
@@ -107,6 +126,21 @@ impl<'a> SecondOrder<'a> {
                 excess[order * count + index] = harmonic.conj();
             }
         }
+    }
+
+    /// About what an eccentricity e takes of high orders n of form beyond those that the profile's angles hold: n·e/R of their
+    /// amplitudes, in µm rms.
+    fn folded_um(&self, estimate: &Estimate, max_order: usize) -> f64 {
+        let layout = self.layout;
+        let of_reading = |reading: &Reading| estimate.eccentricity(layout, reading.setup, reading.section).norm();
+        let share = layout.readings.iter().map(of_reading).fold(0.0, f64::max) / self.radius_um;
+        let from = (HIGH * 0.5 * self.turn.length() as f64) as usize;
+        let square = |order: usize, unknown: usize| {
+            estimate.likely_form(order, unknown).norm_sqr() * (order as f64 * share).powi(2)
+        };
+        let of_form = |unknown: usize| (from..=max_order).map(|order| square(order, unknown)).sum::<f64>();
+        let forms = layout.unknowns.iter().enumerate().filter(|(_, quantity)| quantity.is_form());
+        forms.map(|(unknown, _)| (0.5 * of_form(unknown)).sqrt()).fold(0.0, f64::max)
     }
 
     /// Form of each section on the fine grid, over the part's angle.
