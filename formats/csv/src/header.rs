@@ -187,9 +187,16 @@ fn listed(names: &[String]) -> String {
     shown.join(", ")
 }
 
-/// The beginning of a text, which is not to write over the terminal.
+/// The beginning of a text, which is not to write over the terminal: control characters as `\u{1b}`.
 fn shown(text: &str) -> String {
-    text.chars().take(40).map(|character| if character.is_control() { '\u{FFFD}' } else { character }).collect()
+    let escaped = |shown: String, character: char| {
+        if character.is_control() {
+            shown + &character.escape_unicode().to_string()
+        } else {
+            shown + character.encode_utf8(&mut [0; 4])
+        }
+    };
+    text.chars().take(40).fold(String::new(), escaped)
 }
 
 /// UTF-8, or else Latin-1, whose bytes are the first 256 characters.

@@ -206,7 +206,7 @@ fn mistakes_are_reported_with_their_place() {
         ("NA", "NA", "write NaN"),
         ("# noise", "# noise", "above the header"),
         ("1 000", "1 000", "thousands"),
-        ("\u{1b}[2J", "\u{fffd}[2J", "1.5e-3"),
+        ("\u{1b}[2J", "\\u{1b}[2J", "1.5e-3"),
     ] {
         let error = read(format!("S1,Fühler,index\n{cell},1,0\n")).map(|_| ()).unwrap_err();
         expect(&error.to_string(), &[&format!("found `{shown}`")]);
