@@ -170,8 +170,10 @@ impl Header {
             "comments are understood above the header only"
         } else if !marked && cell.iter().any(u8::is_ascii_digit) {
             "numbers are written as 1.5, 1,5 or 1.5e-3: without units, and without marks between thousands"
-        } else {
+        } else if self.sensors.contains(&column) {
             "take out rows of units; where a reading is missing, leave its cell empty or write NaN"
+        } else {
+            "take out rows of units; only readings may be missing: each row needs a number in this column"
         };
         self.error(line, column, format!("expected {kind}, found `{shown}`")).help(help)
     }

@@ -212,6 +212,13 @@ fn mistakes_are_reported_with_their_place() {
         expect(&error.to_string(), &[&format!("found `{shown}`")]);
         expect(error.advice().unwrap(), &[advice]);
     }
+    for cell in ["NaN", ""] {
+        for column in ["index", "angle_deg"] {
+            let error = read(format!("S1,Fühler,{column}\n0,1,0\n0,1,{cell}\n")).map(|_| ()).unwrap_err();
+            expect(&error.to_string(), &["line 3, column 3"]);
+            expect(error.advice().unwrap(), &["only readings may be missing"]);
+        }
+    }
     let folder = tempfile::tempdir().unwrap();
     let missing = open(folder.path(), config(Some("none.csv")), &rig(&["one"]));
     expect(&missing.map(|_| ()).unwrap_err().to_string(), &["none.csv", "No such file"]);
