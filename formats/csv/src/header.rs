@@ -11,6 +11,10 @@ pub(crate) const ANGLE: &str = "angle_deg";
 /// Column of the time.
 pub(crate) const TIME: &str = "time_s";
 
+/// What to do where the header lacks a sensor: it may be another line, or be delimited by what is no delimiter.
+const HEADER_HELP: &str = "the header is the first line that does not begin with `#`: take out other lines before it. It has to name the rig's \
+    sensors by their ids, delimited by comma, semicolon or tab";
+
 /// What the header declares.
 #[derive(Debug, Clone)]
 pub(crate) struct Header {
@@ -101,7 +105,7 @@ impl Header {
         for sensor in &rig.sensors {
             sensors.push(find(&sensor.id)?.ok_or_else(|| {
                 error(format!("expected a column for the sensor `{}`, found {}", sensor.id, listed(&names)))
-                    .help("the header has to name the rig's sensors by their ids")
+                    .help(HEADER_HELP)
             })?);
         }
         let trace = match marker {

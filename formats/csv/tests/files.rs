@@ -201,6 +201,16 @@ fn mistakes_are_reported_with_their_place() {
     expect(&refusal("index,S1,Fühler\n0,1,2\n\n0,1,2\n"), &["line 3", "blank line"]);
     expect(&refusal(b"\xff\xfei\0n\0d\0"), &["UTF-16"]);
     expect(&refusal(vec![b'7'; 3 << 20]), &["line 1", "line end"]);
+    for (text, advice) in [
+        ("index,S1,Fühler\n0,1,5,2,5\n", "decimal commas by semicolon or tab"),
+        ("index,S1,Fühler\n0,1\n", "one cell for each name"),
+        ("index;S1;Fühler\n0;1;2;3\n", "one cell for each name"),
+        ("index|S1|Fühler\n0|1|2\n", "delimited by comma, semicolon or tab"),
+        ("Recorder 7\nindex,S1,Fühler\n0,1,2\n", "does not begin with `#`"),
+    ] {
+        let error = read(text).map(|_| ()).unwrap_err();
+        expect(error.advice().unwrap(), &[advice]);
+    }
     for (cell, shown, advice) in [
         ("µm", "µm", "rows of units"),
         ("NA", "NA", "write NaN"),
