@@ -292,7 +292,11 @@ fn files_are_found_by_pattern_or_by_list() {
     let mut unknown = files.clone();
     unknown[2].setup = "tow".into();
     expect(&fault(CsvConfig { files: unknown, ..by_list }), &["no setup `tow`"]);
-    expect(&fault(CsvConfig { sample_rate_hz: Some(-1.0), ..by_pattern }), &["above 0"]);
+    for rate_hz in [-1.0, 0.0, 2e9, 1e300, f64::NAN] {
+        let config = CsvConfig { sample_rate_hz: Some(rate_hz), ..by_pattern.clone() };
+        expect(&fault(config), &["above 0 and up to 1e9 Hz"]);
+    }
+    expect(&fault(CsvConfig { speed_rpm: Some(-1.0), ..by_pattern }), &["expected a number above 0"]);
 }
 
 /// A mark in volts: up for some samples each turn; the rising edge passes 2.5 V a quarter of a sample behind each 40th, the falling
