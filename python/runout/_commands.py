@@ -105,7 +105,7 @@ def plan(
     """Says what a rig can separate and how well, as the document of `plan.schema.json`.
 
     `rig` is a file or a dictionary with the keys of `[rig]`; or a pipeline of measured points, as a file or a dictionary.
-    `orders` are the first and the last. The other arguments are the options of `runout plan`.
+    `orders` are the first and the last, 2 and 150 without it. The other arguments are the options of `runout plan`.
     """
     words: list[str] = []
     if orders is not None:

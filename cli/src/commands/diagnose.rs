@@ -33,7 +33,7 @@ pub(crate) fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> R
     print(&diagnosis, json, render::diagnosis::text)
 }
 
-/// Refuses a file for the corrected rig that is something else, and a pipeline without a rig.
+/// Refuses a file for the corrected rig that is no TOML or is something else, and a pipeline without a rig.
 fn is_free(path: &Path, sources: &Sources, pipeline: &Pipeline) -> Result<(), Failure> {
     let refuse = |message: String, help: &str| Err(Failure::Name { message, help: help.into() });
     let (shown, place) = (path.display(), resolved(path));
@@ -45,6 +45,10 @@ fn is_free(path: &Path, sources: &Sources, pipeline: &Pipeline) -> Result<(), Fa
     }
     if pipeline.diagnosed_outputs().iter().any(|output| resolved(output) == place) {
         return refuse(format!("{shown} is written by an exporter"), "write the corrected rig to another file");
+    }
+    // A name that was meant for another output is not to become a rig.
+    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+        return refuse(format!("the corrected rig is a TOML file, not {shown}"), "name it --write FILE.toml");
     }
     Ok(())
 }

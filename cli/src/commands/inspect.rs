@@ -43,7 +43,10 @@ pub(crate) fn report(path: &Path) -> Result<Report> {
     let problem = "it is neither HDF5 nor Parquet, nor a table as text";
     Err(Error::new("inspect", path.display().to_string(), problem)
         .of(ErrorKind::DamagedData)
-        .help("inspect reads measurement files, results, Parquet tables and CSV files with a header"))
+        .help(
+            "inspect reads measurement files, results, Parquet tables and CSV files with a header. Columns of CSV files are delimited by comma, \
+             semicolon or tab (those of numbers with decimal commas by semicolon or tab), and lines before the header begin with `#`",
+        ))
 }
 
 /// Arrow's own schema, in Base64: the columns say the same.

@@ -250,6 +250,9 @@ fn a_folder_is_a_recording() {
     let (status, report, said) = batch(&folder, "out", &["monday", "tuesday.1/"], &[]);
     assert_eq!((status, counts(&report)), (0, [2, 0, 0, 0]), "{said} {report}");
     assert!(folder.path().join("out/form/recording=tuesday.1/0.parquet").is_file());
+    fs::write(folder.path().join("good.csv"), text).unwrap();
+    let (status, report, said) = batch(&folder, "other", &["good.csv"], &[]);
+    assert!(status != 0 && format!("{said}{report}").contains("which a file cannot replace"), "{said} {report}");
 }
 
 /// The control charts go where the exporter of the pipeline goes with its files: into the folder of the data set.

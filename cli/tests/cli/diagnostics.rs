@@ -138,6 +138,12 @@ fn set_without_a_value() {
 }
 
 #[test]
+fn set_to_nothing() {
+    let said = check_with(&["--set", "title="]);
+    assert!(said.contains("expected KEY=VALUE") && said.contains("--set title='\"\"'"), "{said}");
+}
+
+#[test]
 fn set_beyond_the_last_stage() {
     assert_snapshot!(check_with(&["--set", "preprocess.7.samples_per_rev=64"]));
 }

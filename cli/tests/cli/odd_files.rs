@@ -34,6 +34,11 @@ fn a_folder_whose_name_is_not_utf_8_can_be_worked_in() {
     let (status, said) = run("pipeline.toml".as_ref());
     assert_eq!(status, Some(0), "{said}");
     assert!(odd.join("out/summary.json").is_file());
+    let recording = odd.join("shaft.h5");
+    fs::write(&recording, b"\x89HDF\r\n\x1a\n and more").unwrap();
+    let output = assert_cmd::cargo::cargo_bin_cmd!("runout").arg("inspect").arg(&recording).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && said.contains("needs a path in UTF-8"), "{said}");
 }
 
 #[test]

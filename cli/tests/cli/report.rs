@@ -294,9 +294,8 @@ fn chromium_draws_what_the_tables_hold_and_the_controls_work() {
     assert_eq!(of("map-surface")["count"].as_u64(), Some((rings * angles) as u64));
     let whole: f64 = heights.iter().sum();
     assert!((of("map-surface")["sum"].as_f64().unwrap() - whole).abs() < 1e-6 * heights.len() as f64, "{whole}");
-    let [ring_step, angle_step] = [rings.div_ceil(160), angles.div_ceil(180)];
-    let drawn = (0..rings).step_by(ring_step).flat_map(|ring| {
-        let around = (0..angles).step_by(angle_step).chain([0]);
+    let drawn = (0..rings).step_by(rings.div_ceil(160_000 / angles)).flat_map(|ring| {
+        let around = (0..angles).chain([0]);
         around.map(|angle| heights[ring * angles + angle]).collect::<Vec<_>>()
     });
     let drawn: Vec<f64> = drawn.collect();

@@ -34,7 +34,10 @@ pub fn with_std(value: f64, std: Option<f64>) -> String {
 /// A picometre and less means nothing for form in µm: such uncertainties are rounding.
 const MOST_DECIMALS: usize = 6;
 
-/// Ascending numbers as ranges: "2-80 even", "4-80 by 4", "1, 7", "none".
+/// Ranges that are listed of irregular numbers: more hide what is beside them.
+const MOST_RANGES: usize = 16;
+
+/// Ascending numbers as ranges: "2-80 even", "4-80 by 4", "1, 7", "none"; of very many ranges the first ones, and the last number.
 #[must_use]
 pub fn ranges(numbers: &[usize]) -> String {
     let mut shown = Vec::new();
@@ -53,7 +56,13 @@ pub fn ranges(numbers: &[usize]) -> String {
         });
         rest = &rest[taken..];
     }
-    if shown.is_empty() { "none".into() } else { shown.join(", ") }
+    match numbers.last() {
+        None => "none".into(),
+        Some(last) if shown.len() > MOST_RANGES => {
+            format!("{}, … {last} ({} in all)", shown[..MOST_RANGES].join(", "), numbers.len())
+        }
+        Some(_) => shown.join(", "),
+    }
 }
 
 /// " (orders 3, 6, 9… lost)", behind a number that lacks these orders; nothing where it lacks none.
@@ -101,6 +110,10 @@ mod tests {
         assert_eq!(ranges(&[1, 2, 3, 9, 255, 257]), "1-3, 9, 255, 257");
         assert_eq!(ranges(&[3, 5, 7, 8]), "3-7 odd, 8");
         assert_eq!(ranges(&[]), "none");
+        let beside: Vec<usize> = (1..=8).flat_map(|fold| [256 * fold - 1, 256 * fold + 1]).collect();
+        assert!(ranges(&beside).ends_with("1793, 2047, 2049"), "{}", ranges(&beside));
+        let more: Vec<usize> = beside.iter().copied().chain([2303, 2305]).collect();
+        assert!(ranges(&more).ends_with("1793, 2047, 2049, … 2305 (18 in all)"), "{}", ranges(&more));
     }
 
     #[test]

@@ -16,6 +16,9 @@ use serde::Deserialize;
 
 use crate::{recording::CsvRecording, stated::Stated};
 
+/// No converter of displacement sensors is as fast: a higher number is a mistake.
+const HIGHEST_RATE_HZ: f64 = 1e9;
+
 /// `[load] plugin = "csv"`: one file a setup and station.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -80,10 +83,13 @@ impl StageConfig for CsvConfig {
             stations.push(StationKey { name: station.name.clone(), z_mm: station.z_mm });
         }
         stations.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm).then_with(|| a.name.cmp(&b.name)));
-        for (key, value) in [("sample_rate_hz", self.sample_rate_hz), ("speed_rpm", self.speed_rpm)] {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(Fault::at(key, format!("expected a number above 0, found {value}")));
-            }
+        if let Some(rate_hz) = self.sample_rate_hz.filter(|rate_hz| !(*rate_hz > 0.0 && *rate_hz <= HIGHEST_RATE_HZ)) {
+            let message =
+                format!("expected a sampling rate above 0 and up to {HIGHEST_RATE_HZ:e} Hz, found {rate_hz:?}");
+            return Err(Fault::at("sample_rate_hz", message));
+        }
+        if let Some(speed_rpm) = self.speed_rpm.filter(|speed_rpm| !(speed_rpm.is_finite() && *speed_rpm > 0.0)) {
+            return Err(Fault::at("speed_rpm", format!("expected a number above 0, found {speed_rpm}")));
         }
         if let Some(marker) = &self.marker {
             marker.check_with(context.rig).map_err(|fault| fault.under("marker"))?;

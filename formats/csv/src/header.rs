@@ -11,6 +11,10 @@ pub(crate) const ANGLE: &str = "angle_deg";
 /// Column of the time.
 pub(crate) const TIME: &str = "time_s";
 
+/// What to do where the header lacks a sensor: it may be another line, or be delimited by what is no delimiter.
+const HEADER_HELP: &str = "the header is the first line that does not begin with `#`: take out other lines before it. It has to name the rig's \
+    sensors by their ids, delimited by comma, semicolon or tab";
+
 /// What the header declares.
 #[derive(Debug, Clone)]
 pub(crate) struct Header {
@@ -101,7 +105,7 @@ impl Header {
         for sensor in &rig.sensors {
             sensors.push(find(&sensor.id)?.ok_or_else(|| {
                 error(format!("expected a column for the sensor `{}`, found {}", sensor.id, listed(&names)))
-                    .help("the header has to name the rig's sensors by their ids")
+                    .help(HEADER_HELP)
             })?);
         }
         let trace = match marker {
@@ -170,8 +174,10 @@ impl Header {
             "comments are understood above the header only"
         } else if !marked && cell.iter().any(u8::is_ascii_digit) {
             "numbers are written as 1.5, 1,5 or 1.5e-3: without units, and without marks between thousands"
-        } else {
+        } else if self.sensors.contains(&column) {
             "take out rows of units; where a reading is missing, leave its cell empty or write NaN"
+        } else {
+            "take out rows of units; only readings may be missing: each row needs a number in this column"
         };
         self.error(line, column, format!("expected {kind}, found `{shown}`")).help(help)
     }
@@ -187,9 +193,16 @@ fn listed(names: &[String]) -> String {
     shown.join(", ")
 }
 
-/// The beginning of a text, which is not to write over the terminal.
+/// The beginning of a text, which is not to write over the terminal: control characters as `\u{1b}`.
 fn shown(text: &str) -> String {
-    text.chars().take(40).map(|character| if character.is_control() { '\u{FFFD}' } else { character }).collect()
+    let escaped = |shown: String, character: char| {
+        if character.is_control() {
+            shown + &character.escape_unicode().to_string()
+        } else {
+            shown + character.encode_utf8(&mut [0; 4])
+        }
+    };
+    text.chars().take(40).fold(String::new(), escaped)
 }
 
 /// UTF-8, or else Latin-1, whose bytes are the first 256 characters.

@@ -151,5 +151,12 @@ impl Row<'_> {
 
 /// A row of too few or too many cells.
 fn ragged(header: &Header, line: u64, found: usize) -> runout_core::Error {
-    header.line_error(line, format!("expected {} cells as in the header, found {found}", header.names.len()))
+    let expected = header.names.len();
+    let help = if header.delimiter == b',' && found > expected {
+        "where the comma is the delimiter, numbers have a decimal point and no commas between thousands: delimit columns of numbers with \
+         decimal commas by semicolon or tab"
+    } else {
+        "each row has one cell for each name of the header; a cell without a reading is empty"
+    };
+    header.line_error(line, format!("expected {expected} cells as in the header, found {found}")).help(help)
 }

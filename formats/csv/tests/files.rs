@@ -201,16 +201,33 @@ fn mistakes_are_reported_with_their_place() {
     expect(&refusal("index,S1,Fühler\n0,1,2\n\n0,1,2\n"), &["line 3", "blank line"]);
     expect(&refusal(b"\xff\xfei\0n\0d\0"), &["UTF-16"]);
     expect(&refusal(vec![b'7'; 3 << 20]), &["line 1", "line end"]);
+    for (text, advice) in [
+        ("index,S1,Fühler\n0,1,5,2,5\n", "decimal commas by semicolon or tab"),
+        ("index,S1,Fühler\n0,1\n", "one cell for each name"),
+        ("index;S1;Fühler\n0;1;2;3\n", "one cell for each name"),
+        ("index|S1|Fühler\n0|1|2\n", "delimited by comma, semicolon or tab"),
+        ("Recorder 7\nindex,S1,Fühler\n0,1,2\n", "does not begin with `#`"),
+    ] {
+        let error = read(text).map(|_| ()).unwrap_err();
+        expect(error.advice().unwrap(), &[advice]);
+    }
     for (cell, shown, advice) in [
         ("µm", "µm", "rows of units"),
         ("NA", "NA", "write NaN"),
         ("# noise", "# noise", "above the header"),
         ("1 000", "1 000", "thousands"),
-        ("\u{1b}[2J", "\u{fffd}[2J", "1.5e-3"),
+        ("\u{1b}[2J", "\\u{1b}[2J", "1.5e-3"),
     ] {
         let error = read(format!("S1,Fühler,index\n{cell},1,0\n")).map(|_| ()).unwrap_err();
         expect(&error.to_string(), &[&format!("found `{shown}`")]);
         expect(error.advice().unwrap(), &[advice]);
+    }
+    for cell in ["NaN", ""] {
+        for column in ["index", "angle_deg"] {
+            let error = read(format!("S1,Fühler,{column}\n0,1,0\n0,1,{cell}\n")).map(|_| ()).unwrap_err();
+            expect(&error.to_string(), &["line 3, column 3"]);
+            expect(error.advice().unwrap(), &["only readings may be missing"]);
+        }
     }
     let folder = tempfile::tempdir().unwrap();
     let missing = open(folder.path(), config(Some("none.csv")), &rig(&["one"]));
@@ -275,7 +292,11 @@ fn files_are_found_by_pattern_or_by_list() {
     let mut unknown = files.clone();
     unknown[2].setup = "tow".into();
     expect(&fault(CsvConfig { files: unknown, ..by_list }), &["no setup `tow`"]);
-    expect(&fault(CsvConfig { sample_rate_hz: Some(-1.0), ..by_pattern }), &["above 0"]);
+    for rate_hz in [-1.0, 0.0, 2e9, 1e300, f64::NAN] {
+        let config = CsvConfig { sample_rate_hz: Some(rate_hz), ..by_pattern.clone() };
+        expect(&fault(config), &["above 0 and up to 1e9 Hz"]);
+    }
+    expect(&fault(CsvConfig { speed_rpm: Some(-1.0), ..by_pattern }), &["expected a number above 0"]);
 }
 
 /// A mark in volts: up for some samples each turn; the rising edge passes 2.5 V a quarter of a sample behind each 40th, the falling

@@ -10,6 +10,7 @@ use crate::{
     MEASUREMENT_FORMAT, RESULT_FORMAT,
     measurement::{CaptureSource, Phase, TRUTH},
     node::{self, Place},
+    utf8_path,
 };
 
 /// What a file holds.
@@ -83,6 +84,7 @@ pub struct TableReport {
 /// # Errors
 /// When it cannot be read, or does not hold what its format promises.
 pub fn inspect(path: &Path) -> Result<FileReport> {
+    utf8_path::check(path)?;
     let (file, place, _) = node::open(path, false)?;
     let version = node::number(&file, &place, "version").ok().flatten();
     let mut report = FileReport {

@@ -29,6 +29,7 @@ mod result;
 mod superblock;
 mod text;
 mod type_name;
+mod utf8_path;
 
 pub use height_map::{HeightMapConfig, read_height_map, write_height_map};
 pub use inspect::{CaptureReport, FileReport, StationReport, TableReport, inspect};

@@ -298,7 +298,7 @@ const Draw = (() => {
     return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y, of.radius_mm ? { range: [y[0], y[y.length - 1]] } : {}), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
   }
 
-  const MOST_SOLID = [160, 180]; // Rings and angles that a phone can still turn.
+  const MOST_SOLID = 160_000; // Points that a phone can still turn.
 
   // Places of a list, at most so many at equal distances.
   function some(list, most) {
@@ -308,7 +308,9 @@ const Draw = (() => {
 
   // The surface in space, with deviations so many times as large; rings are closed.
   function solid(of, { x, y, rows }, times) {
-    const [rings, angles] = [some(y, MOST_SOLID[0]), some(x, MOST_SOLID[1])];
+    // Rings are left out first: a coarser one would show waves that the surface does not have.
+    const angles = some(x, MOST_SOLID);
+    const rings = some(y, Math.max(1, Math.floor(MOST_SOLID / angles.length)));
     const round = of.radius_mm !== null && of.radius_mm !== undefined;
     const around = round ? [...angles, angles[0]] : angles;
     const each = (value) => rings.map((ring) => around.map((angle) => value(ring, angle)));
@@ -331,7 +333,8 @@ const Draw = (() => {
     const scene = round
       ? { xaxis: side(of.y), yaxis: side({ name: "x", unit: "mm" }), zaxis: side({ name: "y", unit: "mm" }), aspectmode: "data", camera: { eye: { x: 1.25, y: -2.05, z: 1.0 } } }
       : { xaxis: side(of.x), yaxis: side(of.y), zaxis: side(times === 1 ? of.height : { name: `${of.height.name} × ${times}`, unit: of.height.unit }), aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.4 } };
-    return { traces: [trace], layout: layout({ scene, height: 460, margin: { l: 0, r: 0, t: 0, b: 0 } }), rings, angles };
+    const said = rings.length > 1 && rings[1] > 1 ? `one of ${rings[1]} ${round ? "rings" : "rows"} is drawn` : "";
+    return { traces: [trace], layout: layout({ scene, height: 460, margin: { l: 0, r: 0, t: 0, b: 0 } }), rings, angles, said };
   }
 
   // One ring of a surface, or one row of a map.

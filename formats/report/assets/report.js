@@ -127,7 +127,7 @@
     };
     const solid = () => {
       const drawn = Draw.solid(of, grid, magnified());
-      times.textContent = `${magnified().toLocaleString("en")} times`;
+      times.textContent = [`${magnified().toLocaleString("en")} times`, drawn.said].filter(Boolean).join("; ");
       return put(space, { ...drawn, layout: { ...drawn.layout, uirevision: "turned" } }).then(() => drawn);
     };
     const map = () => put(flat, Draw.map(of, grid));

@@ -95,7 +95,10 @@ pub(crate) struct MapData {
     /// Nominal radius where x is the angle around a part.
     #[serde(skip_serializing_if = "Option::is_none")]
     radius_mm: Option<f64>,
-    pub(crate) thinned: bool,
+    thinned: bool,
+    /// What is left out of a surface, where something is.
+    #[serde(skip)]
+    pub(crate) note: Option<String>,
 }
 
 /// Numbers as short as they can be written.
@@ -230,13 +233,14 @@ fn map(figure: &Panels, points: &[Point]) -> MapData {
         height: AxisData::of(figure.height(), &figure.height().unit),
         xs: middles(x.from, x.to, x.count),
         ys: middles(y.from, y.to, y.count),
-        thinned: x.count == MOST_CELLS[1] || y.count == MOST_CELLS[0],
+        thinned: x.count < x.places || y.count < y.places,
+        note: None,
         heights: Numbers::of(&rows.concat()),
         radius_mm: None,
     }
 }
 
-/// The surface, unrolled; of many angles and rings each second, third, ….
+/// The surface, unrolled; of many angles and rings one of two, three, ….
 pub(crate) fn surface(surface: &Surface) -> MapData {
     let around = surface.angles.div_ceil(MOST_CELLS[1]).max(1);
     let along = surface.z_mm.len().div_ceil(MOST_CELLS[0]).max(1);
@@ -256,6 +260,17 @@ pub(crate) fn surface(surface: &Surface) -> MapData {
         heights: Numbers::of(&heights),
         radius_mm: Some(surface.radius_mm),
         thinned: around > 1 || along > 1,
+        note: left_out(around, along),
+    }
+}
+
+/// What is drawn of a surface: one of so many angles, and one of so many rings.
+fn left_out(angles: usize, rings: usize) -> Option<String> {
+    match (angles > 1, rings > 1) {
+        (false, false) => None,
+        (true, false) => Some(format!("One of {angles} angles is drawn.")),
+        (false, true) => Some(format!("One of {rings} rings is drawn.")),
+        (true, true) => Some(format!("One of {angles} angles and one of {rings} rings are drawn.")),
     }
 }
 
@@ -276,6 +291,13 @@ mod tests {
         assert_eq!(json(&[1.0]), "\"AACAPw==\"");
         assert_eq!(json(&[]), "\"\"");
         assert!(json(&[f64::NAN; 4]).starts_with('"'));
+    }
+
+    #[test]
+    fn a_surface_says_what_is_left_out() {
+        assert_eq!(left_out(1, 1), None);
+        assert_eq!(left_out(1, 3).unwrap(), "One of 3 rings is drawn.");
+        assert_eq!(left_out(2, 3).unwrap(), "One of 2 angles and one of 3 rings are drawn.");
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Resul
         @if let Some(map) = &surface_data {
             section #surface {
                 h2 { "Surface" }
-                @if map.thinned { p.note { "Of many angles and rings, each second, third, … is drawn." } }
+                @if let Some(note) = &map.note { p.note { (note) } }
                 div.map data-map="surface" {}
             }
         }

@@ -38,7 +38,7 @@ pub(crate) fn tables() -> Vec<TableSpec> {
             .figure(Figure::map("surface", "Surface as measured", ["x_mm", "y_mm", "height_nm"]))
             .figure(Figure::map(
                 "surface-corrected",
-                "Surface without the effects found",
+                "Surface without the effects found (of a run: as measured)",
                 ["x_mm", "y_mm", "corrected_nm"],
             )),
         TableSpec::new("residual", "what is left point by point", [places(), residual].concat()).figure(Figure::map(

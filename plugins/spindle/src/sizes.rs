@@ -1,5 +1,5 @@
-//! Readings of a size that shows numbers in another unit: a thousand times larger or smaller than those of other channels, or beyond
-//! the range of displacement sensors.
+//! Readings of a size that shows numbers in another unit: a thousand times larger or smaller than those of other channels, beyond
+//! the range of displacement sensors, or below their noise.
 
 use runout_core::{Complex64, rig::Rig};
 
@@ -13,9 +13,11 @@ const USUAL_RATIO: f64 = 3.0;
 const FEWEST_OTHERS: usize = 2;
 /// Amplitude above the eccentricity of a part that is measured by displacement sensors, in µm. Cams have more.
 const LARGEST_UM: f64 = 2000.0;
+/// Amplitude below the eccentricity of a part that is centred as well as can be, and below the noise of usual sensors, in µm.
+const SMALLEST_UM: f64 = 0.005;
 
 /// Names each sensor whose readings are about a thousand times smaller or larger than the median of the other sensors that look
-/// the same way, and readings of millimetres in all that look across the axis.
+/// the same way, and readings of millimetres in all that look across the axis, or of a few nanometres in all.
 pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
     let sensors = rig.sensors.len();
     let size = |sensor: usize| {
@@ -57,5 +59,15 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
             least_um / 1000.0
         )
     });
-    (0..sensors).filter_map(said).chain(beyond).collect()
+    // Setups add up in a size.
+    let setups = (readings.count / sensors.max(1)).max(1) as f64;
+    let most_um = sizes.iter().copied().fold(0.0, f64::max) / setups.sqrt();
+    let below = (most_um > 0.0 && most_um < SMALLEST_UM).then(|| {
+        format!(
+            "the readings of all sensors vary by no more than about {:.1e} µm over a turn: they may be in a larger unit than declared \
+             (millimetres or metres where µm is declared): write `unit = \"mm\"` at the sensors, or convert them to µm",
+            2.0 * most_um
+        )
+    });
+    (0..sensors).filter_map(said).chain(beyond).chain(below).collect()
 }

@@ -94,10 +94,11 @@ impl Sources {
             let (path, value) = (path.trim(), value.trim());
             if path.is_empty() || value.is_empty() {
                 let message = "expected KEY=VALUE".into();
+                // What is behind `KEY=` may be an empty text whose quotes the shell took.
+                let is_empty = assignment.contains('=') && !path.is_empty();
+                let help = is_empty.then(|| format!("an empty text has to be quoted: --set {path}='\"\"'"));
                 let (source_name, source_text) = ("--set".into(), assignment.clone());
-                return Err(
-                    Diagnostic { message, help: None, source_name, source_text, span: 0..assignment.len() }.into()
-                );
+                return Err(Diagnostic { message, help, source_name, source_text, span: 0..assignment.len() }.into());
             }
             // Quotes rarely survive a shell: what is no TOML value is meant as a string.
             let bare = DeValue::parse(value).is_err();

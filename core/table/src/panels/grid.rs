@@ -40,6 +40,8 @@ pub struct Cells {
     pub to: f64,
     /// How many there are, at least one.
     pub count: usize,
+    /// How many different places the points have; with more of them than cells, a cell holds several.
+    pub places: usize,
 }
 
 impl Cells {
@@ -52,7 +54,7 @@ impl Cells {
         places.dedup_by(|a, b| (*a - *b).abs() <= 1e-6 * (last - first));
         let half = 0.5 * (last - first) / (places.len().max(2) - 1) as f64;
         let half = if half > 0.0 { half } else { 0.5 };
-        Self { from: first - half, to: last + half, count: places.len().clamp(1, most) }
+        Self { from: first - half, to: last + half, count: places.len().clamp(1, most), places: places.len() }
     }
 
     fn index(&self, place: f64) -> usize {
@@ -71,5 +73,9 @@ mod tests {
         assert_eq!(cells.count, 50);
         assert_eq!([0.0, 2.0, 4.9].map(|place| cells.index(place)), [0, 20, 49]);
         assert_eq!(Cells::of([3.0, 3.0].into_iter(), 320).count, 1);
+        for (most, count) in [(50, 50), (49, 49)] {
+            let cells = Cells::of((0..50).map(f64::from), most);
+            assert_eq!((cells.count, cells.places), (count, 50));
+        }
     }
 }

@@ -32,7 +32,7 @@ use crate::{
     MEASUREMENT_FORMAT, VERSION, heaps,
     links::Links,
     node::{self, Place},
-    superblock,
+    superblock, utf8_path,
 };
 
 /// `[load] plugin = "hdf5"`: a measurement file of version 1.
@@ -110,6 +110,7 @@ const SAME_STATION_MM: f64 = 0.001;
 impl Hdf5Recording {
     /// Opens a file and checks everything but the samples themselves.
     fn open(path: &Path, rig: &Rig, marker: Option<Marker>, follow_links: bool) -> Result<Self> {
+        utf8_path::check(path)?;
         let (file, place, links) = node::open(path, follow_links)?;
         check_format(&file, &place)?;
         let mut remarks = Vec::new();

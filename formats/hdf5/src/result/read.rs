@@ -20,6 +20,7 @@ use super::{SURFACE, table::LONG};
 use crate::{
     RESULT_FORMAT,
     node::{self, Place},
+    utf8_path,
 };
 
 /// Rows of a table, or points of a surface, that fit in memory.
@@ -48,6 +49,7 @@ pub struct StoredResult {
 /// # Errors
 /// When it is no result, or does not hold what one holds.
 pub fn read_result(path: &Path) -> Result<StoredResult> {
+    utf8_path::check(path)?;
     let (file, place, _) = node::open(path, false)?;
     if node::text(&file, &place, "format")?.as_deref() != Some(RESULT_FORMAT) {
         let error =

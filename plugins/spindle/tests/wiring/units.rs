@@ -24,6 +24,12 @@ fn readings_in_another_unit_are_said_by_run() {
     let all = said(&|_| 300.0);
     assert!(all.contains("all sensors across the axis read more than") && !all.contains("than those of"), "{all}");
     assert!(said(&|_| 1e3).contains("the unit of the readings"));
-    // Ten times the eccentricity is no unit.
+    let all = said(&|_| 1e-4);
+    assert!(
+        all.contains("the readings of all sensors vary by no more than") && !all.contains("than those of"),
+        "{all}"
+    );
+    // Ten times the eccentricity is no unit, nor is a tenth.
     assert!(!said(&|_| 10.0).contains("unit"));
+    assert!(!said(&|_| 0.1).contains("unit"));
 }
