@@ -143,9 +143,11 @@ fn contents(folder: &std::path::Path) -> std::collections::BTreeMap<std::path::P
 
 #[test]
 fn equal_runs_give_equal_files() {
-    let folder = campaign(&(pipeline() + "\n[[export]]\nplugin = \"hdf5\"\npath = \"out/result.h5\"\n"));
+    let text = pipeline() + "\n[[export]]\nplugin = \"hdf5\"\npath = \"out/result.h5\"\n\n[surface]\n";
+    let folder = campaign(&text);
     let run = || {
         assert_eq!(folder.run(&["run", "pipeline.toml"]).status, 0);
+        assert_eq!(folder.run(&["simulate", "scenario.toml", "--out", "out/again.h5"]).status, 0);
         contents(&folder.path().join("out"))
     };
     let first = run();

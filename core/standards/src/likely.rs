@@ -153,8 +153,10 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
+    use runout_numerics::fourier::Fourier;
 
     use super::*;
+    use crate::errors::Noise;
 
     /// One order in four has a hundredth of the others' noise (as with three sensors, whose gain depends on the order): what little form there
     /// is between a few lines is seen in these, and noise of the others is not taken for form.

@@ -170,6 +170,11 @@ fn times_have_to_be_even() {
     let (capture, ..) = read(rows(&["1,0", "1,1", "1,2", "1,3"])).unwrap();
     assert!((capture.sample_rate_hz.unwrap() - 10.0).abs() < 1e-12);
     expect(&refusal(rows(&["0", "0,1", "0,2", "0,4"])), &["line 5, column 1 (`time_s`)", "even steps", "0.4"]);
+    // Each step is near the mean of those before it: 0.5 ms at first, 2.5 ms at last.
+    let slower: Vec<String> =
+        (0..2000).map(|sample| format!("{:.9}", 1e-3 * f64::from(sample).powf(1.2)).replace('.', ",")).collect();
+    let slower: Vec<&str> = slower.iter().map(String::as_str).collect();
+    expect(&refusal(rows(&slower)), &["even steps", "before where steps of", "the sampling rate changes"]);
     expect(&refusal(rows(&["0", "0,1", "0,1"])), &["line 4", "above 0.1"]);
     expect(&refusal(rows(&["0", ""])), &["line 3, column 1", "expected a number"]);
     let folder = tempfile::tempdir().unwrap();

@@ -335,7 +335,7 @@ fn has_kinks(label: &Label) -> bool {
 
 /// How many extremes of the profile a value is the distance of from each other or from the reference; `None` of a mean.
 fn extremes(label: &Label) -> Option<f64> {
-    match label.symbol.as_ref() {
+    match label.symbol {
         "RONt" => Some(2.0),
         "RONp" | "RONv" => Some(1.0),
         _ => None,
