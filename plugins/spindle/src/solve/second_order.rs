@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 
 use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
 
-use super::estimate::Estimate;
-use crate::layout::{FirstOrder, Layout, Reading, UM_PER_MM_URAD};
+use super::{estimate::Estimate, solution::COUPLED};
+use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
 
 /// Finer grid on which form is tabulated, per angle of the profile.
 pub(crate) const OVERSAMPLING: usize = 4;
@@ -30,6 +30,8 @@ const FOLDED_UM: f64 = 1e-4;
 pub(crate) struct SecondOrder<'a> {
     layout: &'a Layout,
     radius_um: f64,
+    /// Of the part's axis from the spindle's, about.
+    eccentricity_um: f64,
     /// Angles here for each angle of the profile: 1, or 2 where coupled orders lie beyond those of the profile.
     finer: usize,
     turn: Fourier,
@@ -42,16 +44,17 @@ pub(crate) struct SecondOrder<'a> {
 }
 
 impl<'a> SecondOrder<'a> {
-    pub(crate) fn new(layout: &'a Layout, part_radius_mm: f64, samples_per_rev: usize) -> Self {
-        Self::finer(1, layout, part_radius_mm * 1e3, samples_per_rev)
+    pub(crate) fn new(layout: &'a Layout, part_radius_mm: f64, samples_per_rev: usize, eccentricity_um: f64) -> Self {
+        Self::finer(1, layout, part_radius_mm * 1e3, samples_per_rev, eccentricity_um)
     }
 
-    fn finer(finer: usize, layout: &'a Layout, radius_um: f64, samples_per_rev: usize) -> Self {
+    fn finer(finer: usize, layout: &'a Layout, radius_um: f64, samples_per_rev: usize, eccentricity_um: f64) -> Self {
         let samples_per_rev = finer * samples_per_rev;
         let turns = (0..samples_per_rev).map(|step| step as f64 / samples_per_rev as f64);
         Self {
             layout,
             radius_um,
+            eccentricity_um,
             finer,
             turn: Fourier::new(samples_per_rev),
             fine: Fourier::new(samples_per_rev * OVERSAMPLING),
@@ -72,7 +75,7 @@ impl<'a> SecondOrder<'a> {
         let count = layout.readings.len();
         let max_order = excess.len() / count - 1;
         if self.finer == 1 && self.folded_um(estimate, max_order) > FOLDED_UM {
-            *self = Self::finer(2, layout, self.radius_um, self.turn.length());
+            *self = Self::finer(2, layout, self.radius_um, self.turn.length(), self.eccentricity_um);
         }
         let samples = self.turn.length();
         self.tabulate(estimate, max_order);
@@ -129,11 +132,14 @@ impl<'a> SecondOrder<'a> {
     }
 
     /// About what an eccentricity e takes of high orders n of form beyond those that the profile's angles hold: n·e/R of their
-    /// amplitudes, in µm rms.
+    /// amplitudes, in µm rms; 0 where orders are solved together.
     fn folded_um(&self, estimate: &Estimate, max_order: usize) -> f64 {
         let layout = self.layout;
-        let of_reading = |reading: &Reading| estimate.eccentricity(layout, reading.setup, reading.section).norm();
-        let share = layout.readings.iter().map(of_reading).fold(0.0, f64::max) / self.radius_um;
+        let share = self.eccentricity_um / self.radius_um;
+        // Where orders are solved together, they are coupled on the angles of the profile.
+        if share * max_order as f64 > COUPLED {
+            return 0.0;
+        }
         let from = (HIGH * 0.5 * self.turn.length() as f64) as usize;
         let square = |order: usize, unknown: usize| {
             estimate.likely_form(order, unknown).norm_sqr() * (order as f64 * share).powi(2)

@@ -39,7 +39,7 @@ const SETTLED_UM: f64 = 1e-9;
 const APART_UM: f64 = 1e-6;
 /// The highest order times eccentricity over radius, n·e/R, from which on orders may be solved together: half of it is the
 /// share of form that goes to either side.
-const COUPLED: f64 = 0.2;
+pub(super) const COUPLED: f64 = 0.2;
 /// Passes of all orders together, at most.
 const JOINT_PASSES: usize = 30;
 /// Form or motion of an order above so many times its readings is not what they show.
@@ -137,9 +137,14 @@ impl Solver<'_> {
     ) -> (Estimate, Vec<Complex64>) {
         let mut estimate = self.estimate(operators, &readings.mean, readings.max_order);
         let mut linear = readings.mean.clone();
-        let mut geometry = self
-            .second_order
-            .then(|| SecondOrder::new(self.layout, self.selection.rig.part_radius_mm, readings.samples_per_rev));
+        let mut geometry = self.second_order.then(|| {
+            SecondOrder::new(
+                self.layout,
+                self.selection.rig.part_radius_mm,
+                readings.samples_per_rev,
+                self.eccentricity_um(readings),
+            )
+        });
         let mut excess = vec![Complex64::ZERO; readings.mean.len()];
         let rms = |squares: f64| (0.5 * squares / readings.count as f64).sqrt();
         let coupled = self.couples(readings);
