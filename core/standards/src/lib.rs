@@ -6,6 +6,7 @@ pub mod cylindricity;
 pub mod drawn;
 mod errors;
 mod errors_at;
+mod extreme;
 pub mod gaps;
 mod likely;
 pub mod mean_deviation;

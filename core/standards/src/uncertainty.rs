@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
+pub use crate::extreme::{extreme, stand_in};
 pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms, overlooked_by, stands_out};
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
@@ -271,7 +272,7 @@ fn point(sorted: &[f64], share: f64) -> f64 {
     at(below) + (at(below + 1) - at(below)) * position.fract()
 }
 
-fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
+pub(crate) fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
     draws.sort_by(f64::total_cmp);
     let count = draws.len().max(1) as f64;
     let mean = draws.iter().sum::<f64>() / count;
@@ -282,66 +283,6 @@ fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
         interval_95: [(2.0 * value - point(draws, 1.0 - TAIL)).max(floor), 2.0 * value - point(draws, TAIL)],
         draws: draws.len(),
     }
-}
-
-/// Weights by order of a profile that is to stand for the truth: what noise adds to an extreme can be drawn about the truth
-/// only, and about what was found, which has noise already, too little would be drawn.
-///
-/// An order is weighted by the share of its power that is not noise (Wiener's filter): taken from its own power where that
-/// is nine times the noise or more, else from the mean over the orders from 2/3 to 4/3 of it, at least four to each side;
-/// mean power that noise alone exceeds in 2 % of all cases counts as noise. Orders below `lowest`, and those without a known
-/// variance, keep all.
-#[must_use]
-pub fn stand_in(harmonics: &[Complex64], variance: &[f64], lowest: usize) -> Vec<f64> {
-    let noise = |order: usize| variance.get(order).copied().filter(|variance| *variance > 0.0).unwrap_or(0.0);
-    let count = harmonics.len();
-    // Sums from an order on, from the highest down: of two of them, the difference is the sum between, and as power falls
-    // with the order it loses few digits.
-    let mut above = vec![(0.0, 0.0); count + 1];
-    for order in (0..count).rev() {
-        let (power, noises) = above[order + 1];
-        above[order] = (power + harmonics[order].norm_sqr(), noises + noise(order));
-    }
-    let weight = |order: usize| {
-        let (own, own_noise) = (harmonics[order].norm_sqr(), noise(order));
-        if order < lowest || own_noise == 0.0 {
-            return 1.0;
-        }
-        let beside = (order / 3).max(4);
-        let (from, to) = (order.saturating_sub(beside).max(lowest), (order + beside + 1).min(count));
-        let number = (to - from) as f64;
-        let power = (above[from].0 - above[to].0) / number;
-        let noise = (above[from].1 - above[to].1) / number;
-        let signal = power - noise;
-        let together = if signal > 2.0 * noise / number.sqrt() { signal / power } else { 0.0 };
-        if own > 9.0 * own_noise { together.max(1.0 - own_noise / own) } else { together }
-    };
-    (0..count).map(weight).collect()
-}
-
-/// Share of the standard deviation of noise to which it is known: it is taken from 20 complex degrees of freedom.
-const NOISE_KNOWN_TO: f64 = 0.11;
-/// The same in real degrees of freedom.
-const NOISE_FREEDOM: f64 = 40.0;
-
-/// What noise adds to an extreme in the mean, and the uncertainty of the extreme without that share, `value` − share: from
-/// the value at the profile that [stands for the truth](stand_in) and from those drawn about it. The interval reaches as far
-/// to both sides as the draws do to the farther one, and at least as far as Student's distribution says.
-#[must_use]
-pub fn extreme(value: f64, at_stand_in: f64, mut drawn: Vec<f64>) -> Option<(f64, Uncertainty)> {
-    if drawn.len() < 2 || !value.is_finite() || !at_stand_in.is_finite() || drawn.iter().any(|draw| !draw.is_finite()) {
-        return None;
-    }
-    let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
-    // Chance draws of no noise may lie below.
-    let share = (mean - at_stand_in).max(0.0);
-    let known = summed_up(&mut drawn, mean);
-    let reach = known.interval_95.map(|end| (end - mean).abs()).into_iter().fold(0.0, f64::max);
-    let reach = reach.max(student_95(NOISE_FREEDOM) * known.std).hypot(NORMAL_95 * NOISE_KNOWN_TO * share);
-    // No range is below 0, also where noise adds more to it in the mean than was found.
-    let middle = (value - share).max(0.0);
-    let interval_95 = [(middle - reach).max(0.0), middle + reach];
-    Some((share, Uncertainty { std: known.std.hypot(NOISE_KNOWN_TO * share), interval_95, ..known }))
 }
 
 /// A seed that depends on names only, so that it is the same however the work is shared.

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
 
-use super::{estimate::Estimate, solution::COUPLED};
+use super::estimate::Estimate;
 use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
 
 /// Finer grid on which form is tabulated, per angle of the profile.
@@ -21,6 +21,9 @@ const SETTLED_UM: f64 = 1e-9;
 /// The shift asin(t/ρ) changes by less than 1e-9 of itself after two rounds: ρ varies by 1e-3 at most.
 const ROUNDS: usize = 2;
 
+/// The highest order times eccentricity over radius, n·e/R, from which on orders may be solved together: half of it is the
+/// share of form that goes to either side.
+pub(super) const COUPLED: f64 = 0.2;
 /// From this share of the highest order that the angles of a profile hold, coupled orders may lie beyond it.
 const HIGH: f64 = 0.75;
 /// So much of them, in µm rms, may be taken for lower orders. The recording's own are taken out before it is averaged.

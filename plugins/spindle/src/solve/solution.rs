@@ -19,7 +19,7 @@ use super::{
     propagation::Propagation,
     readings::{Readings, Scatter},
     residual::{by_reading, residual},
-    second_order::SecondOrder,
+    second_order::{COUPLED, SecondOrder},
     weights,
 };
 use crate::{
@@ -37,9 +37,6 @@ const CARRIED: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e5];
 const SETTLED_UM: f64 = 1e-9;
 /// Orders one by one are given up when they still move more than this after all passes.
 const APART_UM: f64 = 1e-6;
-/// The highest order times eccentricity over radius, n·e/R, from which on orders may be solved together: half of it is the
-/// share of form that goes to either side.
-pub(super) const COUPLED: f64 = 0.2;
 /// Passes of all orders together, at most.
 const JOINT_PASSES: usize = 30;
 /// Form or motion of an order above so many times its readings is not what they show.
