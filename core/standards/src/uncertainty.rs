@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
-pub use crate::extreme::{extreme, stand_in};
 pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms, overlooked_by, stands_out};
+pub use crate::stand_in::stand_in;
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 
@@ -272,7 +272,7 @@ fn point(sorted: &[f64], share: f64) -> f64 {
     at(below) + (at(below + 1) - at(below)) * position.fract()
 }
 
-pub(crate) fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
+fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
     draws.sort_by(f64::total_cmp);
     let count = draws.len().max(1) as f64;
     let mean = draws.iter().sum::<f64>() / count;
@@ -283,6 +283,31 @@ pub(crate) fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
         interval_95: [(2.0 * value - point(draws, 1.0 - TAIL)).max(floor), 2.0 * value - point(draws, TAIL)],
         draws: draws.len(),
     }
+}
+
+/// Share of the standard deviation of noise to which it is known: it is taken from 20 complex degrees of freedom.
+const NOISE_KNOWN_TO: f64 = 0.11;
+/// The same in real degrees of freedom.
+const NOISE_FREEDOM: f64 = 40.0;
+
+/// What noise adds to an extreme in the mean, and the uncertainty of the extreme without that share, `value` − share: from
+/// the value at the profile that [stands for the truth](stand_in) and from those drawn about it. The interval reaches as far
+/// to both sides as the draws do to the farther one, and at least as far as Student's distribution says.
+#[must_use]
+pub fn extreme(value: f64, at_stand_in: f64, mut drawn: Vec<f64>) -> Option<(f64, Uncertainty)> {
+    if drawn.len() < 2 || !value.is_finite() || !at_stand_in.is_finite() || drawn.iter().any(|draw| !draw.is_finite()) {
+        return None;
+    }
+    let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
+    // Chance draws of no noise may lie below.
+    let share = (mean - at_stand_in).max(0.0);
+    let known = summed_up(&mut drawn, mean);
+    let reach = known.interval_95.map(|end| (end - mean).abs()).into_iter().fold(0.0, f64::max);
+    let reach = reach.max(student_95(NOISE_FREEDOM) * known.std).hypot(NORMAL_95 * NOISE_KNOWN_TO * share);
+    // No range is below 0, also where noise adds more to it in the mean than was found.
+    let middle = (value - share).max(0.0);
+    let interval_95 = [(middle - reach).max(0.0), middle + reach];
+    Some((share, Uncertainty { std: known.std.hypot(NOISE_KNOWN_TO * share), interval_95, ..known }))
 }
 
 /// A seed that depends on names only, so that it is the same however the work is shared.

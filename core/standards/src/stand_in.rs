@@ -1,16 +1,6 @@
-//! What noise adds to an extreme of a profile, such as a peak to valley, and the extreme without it.
+//! A profile that stands for the truth where what noise adds to an extreme is drawn.
 
-use runout_numerics::{
-    Complex64,
-    statistics::{NORMAL_95, student_95},
-};
-
-use crate::uncertainty::{Uncertainty, summed_up};
-
-/// Share of the standard deviation of noise to which it is known: it is taken from 20 complex degrees of freedom.
-const NOISE_KNOWN_TO: f64 = 0.11;
-/// The same in real degrees of freedom.
-const NOISE_FREEDOM: f64 = 40.0;
+use runout_numerics::Complex64;
 
 /// Weights by order of a profile that is to stand for the truth: what noise adds to an extreme can be drawn about the truth
 /// only, and about what was found, which has noise already, too little would be drawn.
@@ -45,24 +35,4 @@ pub fn stand_in(harmonics: &[Complex64], variance: &[f64], lowest: usize) -> Vec
         if own > 9.0 * own_noise { together.max(1.0 - own_noise / own) } else { together }
     };
     (0..count).map(weight).collect()
-}
-
-/// What noise adds to an extreme in the mean, and the uncertainty of the extreme without that share, `value` − share: from
-/// the value at the profile that [stands for the truth](stand_in) and from those drawn about it. The interval reaches as far
-/// to both sides as the draws do to the farther one, and at least as far as Student's distribution says.
-#[must_use]
-pub fn extreme(value: f64, at_stand_in: f64, mut drawn: Vec<f64>) -> Option<(f64, Uncertainty)> {
-    if drawn.len() < 2 || !value.is_finite() || !at_stand_in.is_finite() || drawn.iter().any(|draw| !draw.is_finite()) {
-        return None;
-    }
-    let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
-    // Chance draws of no noise may lie below.
-    let share = (mean - at_stand_in).max(0.0);
-    let known = summed_up(&mut drawn, mean);
-    let reach = known.interval_95.map(|end| (end - mean).abs()).into_iter().fold(0.0, f64::max);
-    let reach = reach.max(student_95(NOISE_FREEDOM) * known.std).hypot(NORMAL_95 * NOISE_KNOWN_TO * share);
-    // No range is below 0, also where noise adds more to it in the mean than was found.
-    let middle = (value - share).max(0.0);
-    let interval_95 = [(middle - reach).max(0.0), middle + reach];
-    Some((share, Uncertainty { std: known.std.hypot(NOISE_KNOWN_TO * share), interval_95, ..known }))
 }
