@@ -233,13 +233,15 @@ fn errors_of_x_and_y_go_together() {
     let fixed = Synchronous::new(&separation, &spread.projection, Direction::X, 0.0).unwrap();
     assert_eq!((fixed.variance[5], fixed.variance[9]), (0.04, 0.04));
     let known = values(&separation, &[profile(1.0, [-0.1, 0.1])], LSC)("synchronous-radial-x").uncertainty.unwrap();
-    // ½·(0.04 + 0.04) is the variance at an angle; a range has two ends.
-    assert!((0.1..0.4).contains(&known.std), "{known:?}");
+    // ½·(0.04 + 0.04) is the variance at an angle, 0.08 that of a range if both ends were independent: 0.28. Either kind of
+    // draws gives 0.32 to 0.35, both together more, as they lie 0.4 apart.
+    assert!((0.2..0.5).contains(&known.std), "{known:?}");
 }
 
 /// 95 % intervals of synchronous values hold the truth where noise of high orders adds a good part of what is read: tilts of
-/// 1 µrad rms that fall with order⁻¹ and order⁻² to 20, errors of 0.1 and 0.3 µrad at every angle in orders to 359, which have two
-/// of the angles on a wave; 94.7 to 98.3 % of 300 do.
+/// 1 µrad rms that fall with order⁻¹ to 20 and of 0.03 µrad with order⁻², errors of 0.1 and 0.3 µrad at every angle in orders to 359, which have two
+/// of the angles on a wave. As they hold two kinds of draws, they are wider than they need be; they may not be twice as wide as what was found
+/// errs.
 #[test]
 fn intervals_of_synchronous_values_hold_the_truth() {
     const TRIALS: usize = 300;
@@ -247,10 +249,11 @@ fn intervals_of_synchronous_values_hold_the_truth() {
     let mut random = ChaCha8Rng::seed_from_u64(22);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let profiles = [profile(1.0, [-0.1, 0.1])];
-    for (fall, std) in [(-1, 0.1), (-2, 0.3)] {
-        let rms = (2..=20).map(|order| 0.5 * f64::from(order).powi(2 * fall)).sum::<f64>().sqrt();
+    for (fall, std, tilt_urad) in [(-1, 0.1, 1.0), (-2, 0.3, 0.03)] {
+        let rms = (2..=20).map(|order| 0.5 * f64::from(order).powi(2 * fall)).sum::<f64>().sqrt() / tilt_urad;
         let symbols = ["residual-synchronous-tilt-x", "residual-synchronous-tilt-rotating", "synchronous-radial-x"];
         let (mut inside, mut found_bias, mut raw_bias) = ([0; 3], [0.0; 3], [0.0; 3]);
+        let (mut squares, mut widths) = ([0.0; 3], [0.0; 3]);
         for trial in 0..TRIALS {
             let mut exact = separation(&[]);
             exact.estimate = vec![Complex64::ZERO; 4 * (HIGHEST + 1)];
@@ -287,6 +290,8 @@ fn intervals_of_synchronous_values_hold_the_truth() {
                 inside[index] += usize::from(low <= truth && truth <= high);
                 found_bias[index] += (found.value - truth) / TRIALS as f64;
                 raw_bias[index] += (raw - truth) / TRIALS as f64;
+                squares[index] += (found.value - truth).powi(2) / TRIALS as f64;
+                widths[index] += (high - low) / TRIALS as f64;
                 assert!(
                     low <= found.value && found.value <= high && found.source.contains("that noise adds"),
                     "{found:?}"
@@ -294,12 +299,16 @@ fn intervals_of_synchronous_values_hold_the_truth() {
             }
         }
         let percent = inside.map(|inside| 100.0 * inside as f64 / TRIALS as f64);
-        println!("order^{fall}, {std}: {percent:.1?} %, off by {found_bias:.3?}, with noise {raw_bias:.3?}");
+        let wider = [0, 1, 2].map(|index| widths[index] / (2.0 * 1.96 * f64::sqrt(squares[index])));
+        println!(
+            "order^{fall}, {std}: {percent:.1?} %, {wider:.2?} times as wide as the errors, off by {found_bias:.3?}, with noise {raw_bias:.3?}"
+        );
         for (percent, (bias, raw)) in percent.iter().zip(found_bias.iter().zip(raw_bias)) {
             // 95 % of 300 are 285 ± 3.8.
-            assert!((91.5..=99.5).contains(percent), "{percent} %");
-            assert!(bias.abs() < 0.15 * raw, "{bias} of {raw}");
+            assert!(*percent >= 91.5, "{percent} %");
+            assert!(bias.abs() < 0.1 * raw, "{bias} of {raw}");
         }
+        assert!(wider.iter().all(|wider| (0.9..2.0).contains(wider)), "{wider:?} times as wide");
     }
 }
 
