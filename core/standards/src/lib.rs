@@ -4,6 +4,7 @@ pub mod areal;
 pub mod control_chart;
 pub mod cylindricity;
 pub mod drawn;
+mod drawn_angles;
 mod errors;
 mod errors_at;
 pub mod gaps;

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use crate::drawn_angles::{crest_order, drawn_angles};
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
 pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms, overlooked_by, stands_out};

@@ -4,8 +4,9 @@
 
 use super::{Angles, Points};
 
-/// By how much a crest may exceed its highest point at six angles a wave.
-pub(super) const LIFT: f64 = 0.16;
+/// By how much, in parts of the largest of some errors, their crest may exceed its highest point: with steps a and b down from it to those beside,
+/// (a − b)²/(8 (a + b)), an eighth of the larger step at most.
+pub(super) const LIFT: f64 = 0.25;
 
 /// A height at the top of the parabola through it and its neighbours, where it is no lower (no higher) than both, and how far aside that is in
 /// steps; else itself.

@@ -5,7 +5,10 @@ use crate::{
     spread::{Direction, Projection, face_shares},
 };
 use runout_numerics::{Complex64, fourier::Fourier};
-use runout_standards::roundness::{Angles, Points, Reference};
+use runout_standards::{
+    roundness::{Angles, Points, Reference},
+    uncertainty::crest_order,
+};
 
 /// What the values of a polar plot are referred to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -182,6 +185,16 @@ impl Synchronous {
     /// The coefficient of an order in a direction that does not turn.
     pub(crate) fn harmonic(&self, order: usize) -> Option<Complex64> {
         self.first.get(order).copied().filter(|_| self.second.is_none())
+    }
+
+    /// How sharp the crests of the motion are, and those of its errors.
+    pub(super) fn crest_orders(&self) -> [f64; 2] {
+        let power = |coefficients: &[Complex64]| -> Vec<f64> { coefficients.iter().map(Complex64::norm_sqr).collect() };
+        let mut motion = power(&self.first);
+        if let Some((factor, second)) = &self.second {
+            motion.iter_mut().zip(power(second)).for_each(|(power, second)| *power += factor * factor * second);
+        }
+        [crest_order(motion.into_iter()), crest_order(self.variance.iter().copied())]
     }
 
     /// The plot on equal angles of the spindle from 0.

@@ -9,14 +9,13 @@ use super::{
     polar::{Synchronous, seen_from},
     turns::{bounded, rms_about_mean},
 };
-use runout_numerics::fourier::quick_length;
 use runout_standards::{
     Value,
     roundness::{Angles, Points, ront_lsci_um},
-    uncertainty::Uncertainty,
+    uncertainty::{Uncertainty, drawn_angles},
 };
 
-/// Points on a wave of the highest order where errors are drawn.
+/// Points on a wave where errors are drawn.
 const DRAWN_POINTS_A_WAVE: usize = 8;
 
 /// A value of a plot.
@@ -58,7 +57,7 @@ impl Synchronous {
         let seen_on = |count: usize| self.seen_on(count, centre, &mut points.borrow_mut());
         // Errors raise crests between the given angles too. Draws on angles that show them tell the error as well as draws on
         // those where the range is sought, from which it differs by little.
-        let count = quick_length(DRAWN_POINTS_A_WAVE * (self.band[1] + 1));
+        let count = drawn_angles(DRAWN_POINTS_A_WAVE, self.crest_orders(), self.band[1] + 1);
         let (seen, finely) = (seen_on(count)?, seen_on(FINER * angles)?);
         let between = ront_lsci_um(&finely) - ront_lsci_um(&seen);
         let angles = Angles::shared(count);

@@ -1,20 +1,20 @@
 //! Roundness of one section: values about reference circles, and the steepest slope.
 
-use std::{borrow::Cow, rc::Rc};
+use std::borrow::Cow;
 
 use super::{Filter, Found, Label, POINTS_A_WAVE, config::Propagation, labelled_with_reasons, section::Form};
 use runout_numerics::{
     Complex64,
     filter::{Degree, Smoother, robust_gaussian},
-    fourier::{Fourier, quick_length},
+    fourier::Fourier,
 };
 use runout_standards::{
     Value,
     roundness::{Angles, CircleSearch, Points, Reference, Series, Values},
     slope::{self, steepest_um_per_rad},
     uncertainty::{
-        DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, forms_to_draw, likely_values_of, of_rms,
-        overlooked_by,
+        DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, crest_order, drawn_angles, forms_to_draw,
+        likely_values_of, of_rms, overlooked_by,
     },
 };
 
@@ -42,7 +42,7 @@ const MOST_NOISE_OF_SLOPE: f64 = 0.004;
 /// Draws of what is filtered robustly, point by point and some times over.
 const DRAWS_OF_ROBUST: usize = 64;
 
-/// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value.
+/// Points on a wave where errors are drawn: there a value's error is sought, not the value.
 const DRAWN_POINTS_A_WAVE: usize = 6;
 
 /// Values of the profile at fewer angles, with what draws of its errors make of them.
@@ -115,10 +115,10 @@ impl Form {
         if !variance.iter().skip(2).any(|variance| *variance > 0.0) {
             return Drawn::default();
         }
-        let angles = self.drawn_angles(filter);
+        let harmonics = filter.harmonics(&self.harmonics);
+        let angles = Angles::shared(angles_to_draw(&harmonics, &variance, filter.highest(self.held.highest)));
         let mut fourier = Fourier::new(angles.len());
         let profile_um = self.profile(filter, &mut fourier);
-        let harmonics = filter.harmonics(&self.harmonics);
         let mut forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
         forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
         let overlooked = overlooked_by(&forms, &profile_um);
@@ -169,12 +169,6 @@ impl Form {
         }
     }
 
-    /// Angles on which errors are drawn.
-    fn drawn_angles(&self, filter: &Filter) -> Rc<Angles> {
-        let waves = filter.highest(self.held.highest);
-        Angles::shared(quick_length(DRAWN_POINTS_A_WAVE * waves))
-    }
-
     /// The same with errors drawn at the points that may come to touch, and RONq in closed form; `None` where the section is interrupted,
     /// much of the form found is noise, or such points are many.
     fn drawn_where_they_touch(&self, filter: &Filter, references: &[Reference]) -> Option<Drawn> {
@@ -182,13 +176,13 @@ impl Form {
             return None;
         }
         let variance = self.widened(filter);
-        let few = quick_length(DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).min(self.angles);
-        let angles = Angles::shared(few);
         if !variance.iter().skip(2).any(|variance| *variance > 0.0) {
             return None;
         }
-        let mut fourier = Fourier::new(angles.len());
         let harmonics = filter.harmonics(&self.harmonics);
+        let few = angles_to_draw(&harmonics, &variance, filter.highest(self.held.highest)).min(self.angles);
+        let angles = Angles::shared(few);
+        let mut fourier = Fourier::new(angles.len());
         let forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, &self.noise, &mut fourier);
         if forms.iter().any(|form| !form.least && form.share_of_noise() > MOST_NOISE) {
             return None;
@@ -258,7 +252,7 @@ impl Form {
             return Found { value, uncertainty: None, no_uncertainty: Some(reason) };
         }
         let waves = filter.highest(self.held.highest).max(2);
-        let mut fourier = Fourier::new((DRAWN_POINTS_A_WAVE * waves).next_power_of_two());
+        let mut fourier = Fourier::new(angles_to_draw(&slopes, &variance, waves));
         let mut forms = forms_to_draw(self.likely(), &slopes, &variance, DRAWS, &self.noise, &mut fourier);
         forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
         let mut found_slopes = fourier.synthesise(slopes).to_vec();
@@ -307,6 +301,14 @@ impl Form {
         let found = found.collect();
         self.labelled(labels, found, &filter)
     }
+}
+
+/// Angles on which errors of this variance are drawn, where the profile has these harmonics up to the highest order.
+fn angles_to_draw(harmonics: &[Complex64], variance: &[f64], highest: usize) -> usize {
+    let up_to = highest + 1;
+    let form = crest_order(harmonics.iter().take(up_to).map(Complex64::norm_sqr));
+    let errors = crest_order(variance.iter().take(up_to).copied());
+    drawn_angles(DRAWN_POINTS_A_WAVE, [form, errors], highest)
 }
 
 /// Which of the forms each draw is of.
