@@ -1,5 +1,5 @@
-//! What the work does not wait for: captures are read ahead of it, results written behind it, each by a thread of its
-//! own.
+//! What the averaging of turns does not wait for: captures are read ahead of it, stations worked on behind it and results written behind that, each
+//! by a thread of its own.
 
 use std::{
     collections::VecDeque,
@@ -14,7 +14,7 @@ use runout_turning::measurement::{Block, Capture, SampleStream};
 const AHEAD: usize = 6;
 /// Samples in a batch, at least: blocks are small, so that a core's own cache holds them, and threads are to meet seldom.
 const BATCH: usize = 1 << 17;
-/// Results that wait to be written.
+/// Stations that wait to be worked on, and results that wait to be written.
 const BEHIND: usize = 1;
 
 /// An opened capture, and what it belongs to.
@@ -191,6 +191,18 @@ impl<K: Copy + Send> SampleStream for Reading<'_, K> {
     }
 }
 
+/// Does `work`, and `then` on another thread with each item that it hands on, in the same order. Handing on is false where that thread has
+/// stopped, by a panic that goes on here.
+pub(super) fn work_behind<T: Send>(then: impl FnMut(T) + Send, work: impl FnOnce(&mut dyn FnMut(T) -> bool)) {
+    let (sender, items) = sync_channel(BEHIND);
+    thread::scope(|scope| {
+        scope.spawn(move || items.into_iter().for_each(then));
+        work(&mut |item| sender.send(item).is_ok());
+        // The thread waits for more.
+        drop(sender);
+    });
+}
+
 /// Does `work`, and `take`s in the same order on another thread what it hands on.
 pub(super) fn write_behind<T: Send, R>(
     mut take: impl FnMut(T) -> Result<()> + Send,
@@ -308,6 +320,17 @@ mod tests {
     fn work_that_stops_early_stops_the_reading() {
         let endless = std::iter::repeat_with(|| ((), Ok(counting(u64::MAX, false))));
         assert!(read_ahead(endless, |captures| captures.open()?.next_block(&mut Block::default())).unwrap());
+    }
+
+    #[test]
+    fn stations_are_worked_on_in_order_and_a_panic_stops_the_averaging() {
+        let mut done = Vec::new();
+        work_behind(|number| done.push(number), |hand_on| assert!((0..100).all(hand_on)));
+        assert_eq!(done, (0..100).collect::<Vec<_>>());
+        let endless =
+            |hand_on: &mut dyn FnMut(u64) -> bool| assert!((0..u64::MAX).position(|number| !hand_on(number)).is_some());
+        let panicked = std::panic::catch_unwind(|| work_behind(|number| assert!(number < 7), endless));
+        assert!(panicked.is_err());
     }
 
     #[test]

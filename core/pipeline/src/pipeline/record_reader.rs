@@ -12,7 +12,7 @@ use super::{
     hidden_readings,
     observer::Observer,
     ordered_collector::OrderedCollector,
-    read_ahead::{Captures, read_ahead, read_along},
+    read_ahead::{Captures, read_ahead, read_along, work_behind},
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
 use runout_error::{Error, ErrorKind, Result};
@@ -49,7 +49,7 @@ impl RecordReader<'_> {
     /// what comes of it, in the order of the stations.
     ///
     /// Each worker takes the next station, and waits only where it is too far ahead of the others: few results exist at a
-    /// time.
+    /// time. Where a processor is left, it averages the turns only, and a thread of its own does the rest.
     pub(crate) fn run<T: Send>(
         &self,
         threads: Option<NonZeroUsize>,
@@ -84,20 +84,28 @@ impl RecordReader<'_> {
                     let spikes = &spikes[station * setups + setup];
                     (station, self.recorded(readers, station, setup, spikes))
                 });
-            let work_on = |captures: &mut dyn Captures<usize>| {
+            let average = |captures: &mut dyn Captures<usize>,
+                           hand_on: &mut dyn FnMut((usize, Result<Station>)) -> bool| {
                 while let Some(index) = captures.coming() {
                     let spikes = &spikes[index * setups..(index + 1) * setups];
-                    let result =
-                        self.station(&stations[index], captures, spikes).and_then(|station| work(index, station));
-                    if !ordered_collector.pass(index, result) {
-                        failed.store(true, Ordering::Relaxed);
+                    if !hand_on((index, self.station(&stations[index], captures, spikes))) {
+                        break;
                     }
                 }
             };
+            let complete = |(index, station): (usize, Result<Station>)| {
+                if !ordered_collector.pass(index, station.and_then(|station| work(index, station))) {
+                    failed.store(true, Ordering::Relaxed);
+                }
+            };
             if workers < processors {
-                read_ahead(captures, work_on);
+                read_ahead(captures, |captures| work_behind(complete, |hand_on| average(captures, hand_on)));
             } else {
-                read_along(captures, work_on);
+                let mut complete = |station| {
+                    complete(station);
+                    true
+                };
+                read_along(captures, |captures| average(captures, &mut complete));
             }
         };
         let along = self.recording.checksum();
