@@ -1,9 +1,9 @@
 """Times runout and the peers in turns on the same campaign and prints a Markdown table.
 
-usage: compare.py RUNOUT PEERS SCRATCH ROUNDS NAME STATIONS
+usage: compare.py RUNOUT PEERS SCRATCH ROUNDS NAME STATIONS [PROGRAM ...]
 
-NAME is f64 or i16, as write_record.py wrote them. Standard library only: a process starts with its parent's peak memory to its name, and this one is
-small.
+NAME is f64 or i16, as write_record.py wrote them. Each PROGRAM is another runout, such as an earlier one, timed in the same turns. Standard library
+only: a process starts with its parent's peak memory to its name, and this one is small.
 """
 import json
 import os
@@ -11,9 +11,10 @@ import statistics
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
-runout, peers, scratch, rounds, name, stations = sys.argv[1:7]
+runout, peers, scratch, rounds, name, stations, *others = sys.argv[1:]
 here = Path(__file__).parent
 runout, peers, scratch = (Path(path).resolve() for path in (runout, peers, scratch))
 out = scratch / "out"
@@ -28,9 +29,9 @@ def answer(command):
     return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
-def run_runout(threads, *settings):
+def run_runout(threads, *settings, program=runout):
     """Wall and processor seconds of the whole process, and its peak memory in MiB."""
-    command = [runout, "run", str(here / "pipeline.toml"), "--threads", str(threads), *settings]
+    command = [program, "run", str(here / "pipeline.toml"), "--threads", str(threads), *settings]
     for key, value in (
         ("load.path", f"{scratch}/record-{name}-{stations}.h5"),
         ("export.0.path", out),
@@ -47,10 +48,10 @@ def run_runout(threads, *settings):
     return {"seconds": seconds, "busy": usage.ru_utime + usage.ru_stime, "peak_mib": usage.ru_maxrss / 1024}
 
 
-def run_values(threads):
+def run_values(threads, program=runout):
     """The same, and the standards' values with their uncertainty, as a run gives them by default."""
     everything = 'evaluate.values=["roundness", "cylindricity", "texture", "error-motion"]'
-    return run_runout(threads, "--set", everything)
+    return run_runout(threads, "--set", everything, program=program)
 
 
 def run_peers(processes):
@@ -68,7 +69,10 @@ def own():
     return used.user + used.system + used.children_user + used.children_system
 
 
-found = {(who, workers): [] for who in (run_runout, run_values, run_peers) for workers in WORKERS}
+beside = [(partial(run_runout, program=path), partial(run_values, program=path)) for path in others]
+# This program is the last to write what is checked below.
+timed = [*(run for both in beside for run in both), run_runout, run_values, run_peers]
+found = {(who, workers): [] for who in timed for workers in WORKERS}
 for who, workers in found:
     who(workers)  # files into the page cache, programs into memory
 began, elsewhere = time.perf_counter(), busy() - own()
@@ -84,14 +88,14 @@ def median(who, workers, value):
 
 rows = []
 for workers in WORKERS:
-    ours, theirs = median(run_runout, workers, "seconds"), median(run_peers, workers, "seconds")
+    own_s, theirs = median(run_runout, workers, "seconds"), median(run_peers, workers, "seconds")
     cells = [
         name,
         f"{workers}",
-        f"{ours:.2f}",
+        f"{own_s:.2f}",
         f"{median(run_runout, workers, 'busy'):.2f}",
         f"{theirs:.2f}",
-        f"{theirs / ours:.2f}",
+        f"{theirs / own_s:.2f}",
         f"{median(run_values, workers, 'seconds'):.2f}",
         f"{median(run_runout, workers, 'peak_mib'):.0f}",
         f"{median(run_values, workers, 'peak_mib'):.0f}",
@@ -112,5 +116,11 @@ theirs = found[run_peers, 1][-1]["form_error_um"]
 print(f"\nForm against the record's own, rms µm, median and worst station: runout {checked['form_error_um'][0]:.5f} "
       f"{checked['form_error_um'][1]:.5f}, peers {theirs[0]:.5f} {theirs[1]:.5f}.")
 print(f"Motion, worst station: runout x {checked['motion_error_um'][0]:.5f}, y {checked['motion_error_um'][1]:.5f}.")
+if others:
+    columns = [f"{workers} worker{'s' * (workers > 1)}{values}" for values in ("", ", with values") for workers in WORKERS]
+    print(f"\n| program | {' | '.join(f'{column}, s' for column in columns)} |\n| --- {'| --- ' * len(columns)}|")
+    for program, both in zip(["this one", *others], [(run_runout, run_values), *beside]):
+        seconds = [f"{median(who, workers, 'seconds'):.3f}" for who in both for workers in WORKERS]
+        print(f"| {program} | {' | '.join(seconds)} |")
 if elsewhere > 0.3:
     print("\nOther programs kept the machine busy meanwhile: do not trust these times.")

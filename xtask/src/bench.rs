@@ -32,11 +32,14 @@ struct Options {
     stations: usize,
     rounds: usize,
     i16: bool,
+    /// Other versions of runout, timed in the same turns.
+    beside: Vec<PathBuf>,
 }
 
 impl Options {
     fn read(words: &[&str]) -> Outcome<Self> {
-        let mut options = Self { scratch: target().join("bench"), stations: 40, rounds: 5, i16: false };
+        let mut options =
+            Self { scratch: target().join("bench"), stations: 40, rounds: 5, i16: false, beside: Vec::new() };
         let mut words = words.iter();
         while let Some(word) = words.next() {
             let mut number = || {
@@ -47,8 +50,15 @@ impl Options {
                 "--stations" => options.stations = number()?,
                 "--rounds" => options.rounds = number()?,
                 "--i16" => options.i16 = true,
+                "--beside" => {
+                    let file = words.next().ok_or("--beside needs a program")?;
+                    let path = std::path::absolute(file).map_err(|error| format!("{file}: {error}"))?;
+                    options.beside.push(path);
+                }
                 option if option.starts_with('-') => {
-                    return Err(format!("unknown option `{option}`; known: --stations K, --rounds N, --i16"));
+                    return Err(format!(
+                        "unknown option `{option}`; known: --stations K, --rounds N, --i16, --beside PROGRAM"
+                    ));
                 }
                 folder => {
                     options.scratch = std::path::absolute(folder).map_err(|error| format!("{folder}: {error}"))?;
@@ -149,7 +159,8 @@ fn time_campaign(options: &Options) -> Outcome<bool> {
     for name in KINDS.into_iter().take(if options.i16 { 2 } else { 1 }) {
         let mut compare = script("compare.py");
         compare.arg(target().join("release/runout")).arg(&peers).arg(&options.scratch);
-        run(compare.arg(options.rounds.to_string()).arg(name).arg(options.stations.to_string()))?;
+        compare.arg(options.rounds.to_string()).arg(name).arg(options.stations.to_string());
+        run(compare.args(&options.beside))?;
     }
     Ok(true)
 }

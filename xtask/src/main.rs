@@ -48,8 +48,8 @@ cargo xtask COMMAND
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types, and the Python package's classes of stages from them
   wheel [--dev] build the Python package into target/wheels; --dev in the profile of the tests, which is quick and its code slow
-  bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16]
-                time a campaign of 98 million samples beside the same work in NumPy and SciPy; 1.6 GB in target/bench
+  bench-campaign [SCRATCH] [--stations K] [--rounds N] [--i16] [--beside PROGRAM]...
+                time a campaign of 98 million samples beside the same work in NumPy and SciPy, and beside other versions of runout; 1.6 GB in target/bench
   bench-peers [SCRATCH] [--stations K] [--rounds N]
                 the same with samples of 64 bits and of 16, and write the table into benchmarks/README.md
   bench-stages [SCRATCH] [--rounds N]

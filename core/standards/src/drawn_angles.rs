@@ -9,7 +9,7 @@ use runout_numerics::fourier::quick_length;
 /// those that are left.
 #[must_use]
 pub fn crest_order(power: impl Iterator<Item = f64>) -> f64 {
-    let known = power.enumerate().filter(|(_, power)| *power > 0.0);
+    let known = power.enumerate().filter(|(_, power)| *power > 0.0 && power.is_finite());
     let (sum, curved) =
         known.fold((0.0, 0.0), |(sum, curved), (order, power)| (sum + power, curved + power * (order as f64).powi(2)));
     if sum > 0.0 { (3.0 * curved / sum).sqrt() } else { 0.0 }
@@ -32,7 +32,7 @@ mod tests {
         assert!((equal / 300.0 - 1.0).abs() < 0.01, "{equal}");
         let line = crest_order((0..100).map(|order| if order == 7 { 1.0 } else { 0.0 }));
         assert!((line / (7.0 * 3.0_f64.sqrt()) - 1.0).abs() < 1e-12, "{line}");
-        assert!(crest_order([0.0, f64::NAN].into_iter()) == 0.0);
+        assert!(crest_order([0.0, f64::NAN, f64::INFINITY].into_iter()) == 0.0);
         // As without a low-pass; as few as show all orders; by the sharper of both.
         assert_eq!(drawn_angles(8, [equal, 0.0], 299), 2560);
         assert_eq!(drawn_angles(8, [0.0, 0.0], 299), 640);

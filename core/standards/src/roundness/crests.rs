@@ -4,8 +4,8 @@
 
 use super::{Angles, Points};
 
-/// By how much, in parts of the largest of some errors, their crest may exceed its highest point: with steps a and b down from it to those beside,
-/// (a − b)²/(8 (a + b)), an eighth of the larger step at most.
+/// By how much, in parts of the largest of some errors, they change a crest more than a height: within half a step, the weights of the three heights
+/// in a parabola are 1.25 together, without sign. A crest exceeds its highest point by an eighth of the step to one beside it at most, half of this.
 pub(super) const LIFT: f64 = 0.25;
 
 /// A height at the top of the parabola through it and its neighbours, where it is no lower (no higher) than both, and how far aside that is in

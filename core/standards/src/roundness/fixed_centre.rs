@@ -16,8 +16,8 @@ use runout_numerics::lanes::product;
 pub struct FixedCentre {
     deviations: Vec<f64>,
     squares: f64,
-    /// The most that a crest between the angles is above its highest point.
-    rise: f64,
+    /// The largest step from one angle to the next.
+    step: f64,
     highest: Ranked,
     /// Of the deviations with the other sign.
     lowest: Ranked,
@@ -30,9 +30,9 @@ impl FixedCentre {
         let highest = Ranked::new(deviations.iter().copied());
         let lowest = Ranked::new(deviations.iter().map(|deviation| -deviation));
         let squares = product(&deviations, &deviations);
-        let rise = |point: usize| (crest_at(&deviations, point) - deviations[point]).abs();
-        let rise = (0..deviations.len()).map(rise).fold(0.0, f64::max);
-        Self { deviations, squares, rise, highest, lowest }
+        let next = deviations.iter().cycle().skip(1);
+        let step = deviations.iter().zip(next).map(|(here, next)| (next - here).abs()).fold(0.0, f64::max);
+        Self { deviations, squares, step, highest, lowest }
     }
 
     /// Values of the deviations themselves.
@@ -63,8 +63,8 @@ impl FixedCentre {
         let all = &self.deviations[..];
         let at = |point: usize| all[point] + drawn.at(point);
         let crest = |point: usize| lifted(around(point, all.len()).map(at));
-        // Crests of a sum exceed those of the deviations by no more.
-        let rise = self.rise + LIFT * drawn.largest_um();
+        // A crest of the sum exceeds its highest point by an eighth of a step of the sum, which is up to twice the largest error longer.
+        let rise = 0.5 * LIFT * (self.step + 2.0 * drawn.largest_um());
         let high = self.highest.highest(drawn.largest_um() + rise, crest);
         let low = self.lowest.highest(drawn.largest_um() + rise, |point| -crest(point));
         let [low, high] = if let (Some((high, _)), Some((low, _))) = (high, low) {
@@ -78,7 +78,8 @@ impl FixedCentre {
                 let height = deviation + error;
                 if height > ends.high - rise {
                     high = high.max(crest(point));
-                } else if height < ends.low + rise {
+                }
+                if height < ends.low + rise {
                     low = low.min(crest(point));
                 }
             }
@@ -93,9 +94,4 @@ impl FixedCentre {
         let crossed = product(&self.deviations, errors) + product(&self.deviations[errors.len()..], others);
         self.squares + 2.0 * crossed + drawn.squares_um2()
     }
-}
-
-/// The crest at a point.
-fn crest_at(deviations: &[f64], point: usize) -> f64 {
-    lifted(around(point, deviations.len()).map(|point| deviations[point]))
 }
