@@ -117,11 +117,9 @@ impl<const D: usize> Cloud<D> {
     /// When the range ends above [`len`](Self::len).
     #[must_use]
     pub fn extremes(&self, range: Range<usize>, place: &[f64; D]) -> (f64, f64) {
-        let levels = &self.levels[range.clone()];
-        let features: [&[f64]; D] = std::array::from_fn(|k| &self.features[k][range.clone()]);
-        let look = Extremes { levels, features, place };
+        let seen = self.seen(range, place);
         // Of few points, the choice of registers costs more than they save.
-        if levels.len() < WIDE { look.call() } else { vectorised(look) }
+        if seen.levels.len() < WIDE { Extremes(seen).call() } else { vectorised(Extremes(seen)) }
     }
 
     /// Heights over `place` of the first points, as many as `heights` has.
@@ -135,36 +133,90 @@ impl<const D: usize> Cloud<D> {
     }
 
     /// The first point of a range at exactly this height, as [`extremes`](Self::extremes) gave it.
+    ///
+    /// # Panics
+    /// When the range ends above [`len`](Self::len).
     #[must_use]
     #[allow(clippy::float_cmp, reason = "the same operations in the same order")]
-    pub fn find(&self, mut range: Range<usize>, place: &[f64; D], height: f64) -> Option<usize> {
-        range.find(|point| self.height(*point, place) == height)
+    pub fn find(&self, range: Range<usize>, place: &[f64; D], height: f64) -> Option<usize> {
+        let (from, mut found) = (range.start, None);
+        let take = |point: usize| {
+            found = Some(from + point);
+            false
+        };
+        vectorised(Those { seen: self.seen(range, place), wanted: |own: f64| own == height, take });
+        found
+    }
+
+    /// Fills `points` with those whose height over `place` is below `low` or above `high`, ascending.
+    pub fn outside(&self, place: &[f64; D], [low, high]: [f64; 2], points: &mut Vec<usize>) {
+        points.clear();
+        let take = |point: usize| {
+            points.push(point);
+            true
+        };
+        let wanted = |height: f64| height < low || height > high;
+        vectorised(Those { seen: self.seen(0..self.len(), place), wanted, take });
+    }
+
+    fn seen<'a>(&'a self, range: Range<usize>, place: &'a [f64; D]) -> Seen<'a, D> {
+        let features = std::array::from_fn(|k| &self.features[k][range.clone()]);
+        Seen { levels: &self.levels[range], features, place }
     }
 }
 
-/// A look at the heights of some points.
-struct Extremes<'a, const D: usize> {
+/// Some points, seen from a place.
+struct Seen<'a, const D: usize> {
     levels: &'a [f64],
     features: [&'a [f64]; D],
     place: &'a [f64; D],
 }
+
+impl<const D: usize> Seen<'_, D> {
+    /// Points that fill whole lanes.
+    #[inline(always)]
+    fn whole(&self) -> usize {
+        self.levels.len() - self.levels.len() % LANES
+    }
+
+    /// Heights of the points from `offset` on.
+    #[inline(always)]
+    fn heights(&self, offset: usize) -> [f64; LANES] {
+        let mut heights: [f64; LANES] = load(self.levels, offset);
+        for k in 0..D {
+            let column: [f64; LANES] = load(self.features[k], offset);
+            for lane in 0..LANES {
+                heights[lane] -= column[lane] * self.place[k];
+            }
+        }
+        heights
+    }
+
+    /// Heights of the points that do not fill lanes, the rest NaN.
+    #[inline(always)]
+    fn last_heights(&self) -> [f64; LANES] {
+        let whole = self.whole();
+        std::array::from_fn(|lane| if whole + lane < self.levels.len() { self.height(whole + lane) } else { f64::NAN })
+    }
+
+    #[inline(always)]
+    fn height(&self, point: usize) -> f64 {
+        (0..D).fold(self.levels[point], |height, k| height - self.features[k][point] * self.place[k])
+    }
+}
+
+/// The lowest and the highest of some heights.
+struct Extremes<'a, const D: usize>(Seen<'a, D>);
 
 impl<const D: usize> NullaryFnOnce for Extremes<'_, D> {
     type Output = (f64, f64);
 
     #[inline(always)]
     fn call(self) -> (f64, f64) {
-        let Self { levels, features, place } = self;
+        let Self(seen) = self;
         let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
-        let whole = levels.len() - levels.len() % LANES;
-        for offset in (0..whole).step_by(LANES) {
-            let mut heights: [f64; LANES] = load(levels, offset);
-            for k in 0..D {
-                let column: [f64; LANES] = load(features[k], offset);
-                for lane in 0..LANES {
-                    heights[lane] -= column[lane] * place[k];
-                }
-            }
+        for offset in (0..seen.whole()).step_by(LANES) {
+            let heights = seen.heights(offset);
             for lane in 0..LANES {
                 // Comparisons with NaN are false: what is not there changes nothing.
                 low[lane] = if heights[lane] < low[lane] { heights[lane] } else { low[lane] };
@@ -173,11 +225,40 @@ impl<const D: usize> NullaryFnOnce for Extremes<'_, D> {
         }
         let mut found =
             (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max));
-        for point in whole..levels.len() {
-            let height = (0..D).fold(levels[point], |height, k| height - features[k][point] * place[k]);
+        for point in seen.whole()..seen.levels.len() {
+            let height = seen.height(point);
             found = (found.0.min(height), found.1.max(height));
         }
         found
+    }
+}
+
+/// Takes the points whose heights are wanted, in their order, as long as `take` returns true.
+struct Those<'a, const D: usize, W, T> {
+    seen: Seen<'a, D>,
+    wanted: W,
+    take: T,
+}
+
+impl<const D: usize, W: Fn(f64) -> bool, T: FnMut(usize) -> bool> NullaryFnOnce for Those<'_, D, W, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { seen, wanted, mut take } = self;
+        // What is called in one place is inlined.
+        for offset in (0..seen.levels.len()).step_by(LANES) {
+            let heights = if offset < seen.whole() { seen.heights(offset) } else { seen.last_heights() };
+            let mut are_wanted = [false; LANES];
+            let mut some = false;
+            for lane in 0..LANES {
+                are_wanted[lane] = wanted(heights[lane]);
+                some |= are_wanted[lane];
+            }
+            if some && (0..LANES).any(|lane| are_wanted[lane] && !take(offset + lane)) {
+                return;
+            }
+        }
     }
 }
 
@@ -201,6 +282,14 @@ mod tests {
             assert_eq!(cloud.extremes(range.clone(), &place), (low, high), "{range:?}");
             let found = cloud.find(range.clone(), &place, high);
             assert_eq!(found.map(|point| cloud.height(point, &place)), heights().next().map(|_| high));
+            assert!(found.is_none_or(|point| range.contains(&point)));
         }
+        let (place, mut points) = ([0.3, -0.8], vec![7]);
+        cloud.outside(&place, [-0.1, 0.2], &mut points);
+        let is_outside = |point: &usize| !(-0.1..=0.2).contains(&cloud.height(*point, &place));
+        let expected: Vec<usize> =
+            (0..61).filter(|point| !cloud.levels()[*point].is_nan()).filter(is_outside).collect();
+        assert_eq!(points, expected);
+        assert!(points.iter().any(|point| *point < 56) && points.iter().any(|point| *point >= 56), "{points:?}");
     }
 }

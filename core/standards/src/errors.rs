@@ -103,7 +103,6 @@ pub struct Errors {
     /// The errors last drawn, before they are turned.
     drawn_um: Vec<f64>,
     largest_um: f64,
-    squares_um2: f64,
     start: usize,
     turn: usize,
 }
@@ -115,15 +114,13 @@ pub struct DrawnErrors<'a> {
     /// Place of the first angle's error.
     from: usize,
     largest_um: f64,
-    squares_um2: f64,
 }
 
 impl<'a> DrawnErrors<'a> {
     /// These, in µm.
     #[must_use]
     pub fn new(errors_um: &'a [f64]) -> Self {
-        let (largest_um, squares_um2) = size(errors_um);
-        Self { drawn_um: errors_um, from: 0, largest_um, squares_um2 }
+        Self { drawn_um: errors_um, from: 0, largest_um: largest(errors_um) }
     }
 
     /// The error at an angle by its number, in µm.
@@ -150,12 +147,6 @@ impl<'a> DrawnErrors<'a> {
     #[must_use]
     pub fn largest_um(&self) -> f64 {
         self.largest_um
-    }
-
-    /// Sum of their squares, in µm².
-    #[must_use]
-    pub fn squares_um2(&self) -> f64 {
-        self.squares_um2
     }
 }
 
@@ -195,7 +186,7 @@ impl Errors {
         let sources: Vec<Source> = sources.into_iter().map(source).collect();
         let some = sources.iter().flat_map(|source| &source.amplitudes).any(|amplitude| *amplitude != Complex64::ZERO);
         let (drawn_um, start, turn) = (Vec::new(), 0, 0);
-        some.then_some(Self { sources, drawn_um, largest_um: 0.0, squares_um2: 0.0, start, turn })
+        some.then_some(Self { sources, drawn_um, largest_um: 0.0, start, turn })
     }
 
     /// The standard deviation of an error at any one angle.
@@ -242,12 +233,11 @@ impl Errors {
             self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
             // As the first source says.
             self.start = self.sources.first().map_or(0, |source| source.draws.start(length));
-            (self.largest_um, self.squares_um2) = size(&self.drawn_um);
+            self.largest_um = largest(&self.drawn_um);
         }
         let from = (self.start + self.turn * length / TURNS_OF_A_DRAW) % length;
         self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
-        let Self { drawn_um, largest_um, squares_um2, .. } = self;
-        DrawnErrors { drawn_um, from, largest_um: *largest_um, squares_um2: *squares_um2 }
+        DrawnErrors { drawn_um: &self.drawn_um, from, largest_um: self.largest_um }
     }
 
     /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
@@ -258,19 +248,18 @@ impl Errors {
     }
 }
 
-/// The largest of some errors, without sign, and the sum of their squares.
-fn size(errors: &[f64]) -> (f64, f64) {
+/// The largest of some errors, without sign.
+fn largest(errors: &[f64]) -> f64 {
     const LANES: usize = 8;
     // Lanes that do not wait for each other.
-    let (mut largest, mut squares) = ([0.0_f64; LANES], [0.0; LANES]);
+    let mut largest = [0.0_f64; LANES];
     for chunk in errors.chunks(LANES) {
-        for (error, (largest, squares)) in chunk.iter().zip(largest.iter_mut().zip(&mut squares)) {
+        for (error, largest) in chunk.iter().zip(&mut largest) {
             let size = error.abs();
             *largest = if size > *largest { size } else { *largest };
-            *squares += size * size;
         }
     }
-    (largest.into_iter().fold(0.0, f64::max), squares.iter().sum())
+    largest.into_iter().fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -4,9 +4,14 @@
 //! changes by more than e + |c|. A reference through the points that were near the ends before is therefore that of all points
 //! where the others were further away than that; where they were not, all have to be looked at.
 
+#![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
+
+use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
+
 /// Points within this many times the usual largest error of the ends are looked at.
 const MARGIN: f64 = 4.0;
-const LANES: usize = 8;
+/// Points that are looked at together: as many as fill two wide registers, which do not wait for each other.
+const LANES: usize = 16;
 
 /// The points that may come to touch.
 #[derive(Debug, Clone)]
@@ -126,30 +131,68 @@ impl Course {
 
     /// Of drawn values less what they are above their deviations; none is missing.
     pub(crate) fn less(drawn: &[f64], offset: &[f64]) -> Self {
-        Self::of_both(drawn, offset, |drawn, offset| drawn - offset)
+        vectorised(Sums { first: drawn, parts: [offset, &[]], sign: -1.0 })
     }
 
-    /// Of deviations with errors added; none is missing.
-    pub(crate) fn with_errors(deviations: &[f64], errors: &[f64]) -> Self {
-        Self::of_both(deviations, errors, |deviation, error| deviation + error)
+    /// Of deviations with errors added, the first ones and the others; none is missing.
+    pub(crate) fn with_errors(deviations: &[f64], errors: [&[f64]; 2]) -> Self {
+        vectorised(Sums { first: deviations, parts: errors, sign: 1.0 })
     }
+}
 
-    fn of_both(first: &[f64], second: &[f64], deviation: impl Fn(f64, f64) -> f64) -> Self {
-        // Lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
+/// A profile and another one in two parts, with a sign. Monte Carlo asks for the course of both together many thousand times.
+struct Sums<'a> {
+    first: &'a [f64],
+    parts: [&'a [f64]; 2],
+    sign: f64,
+}
+
+impl NullaryFnOnce for Sums<'_> {
+    type Output = Course;
+
+    #[inline(always)]
+    fn call(self) -> Course {
+        let Self { first, parts, sign } = self;
         let (mut low, mut high, mut squares) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES], [0.0; LANES]);
-        for (first, second) in first.chunks(LANES).zip(second.chunks(LANES)) {
-            for (lane, (first, second)) in first.iter().zip(second).enumerate() {
-                let deviation = deviation(*first, *second);
-                low[lane] = if deviation < low[lane] { deviation } else { low[lane] };
-                high[lane] = if deviation > high[lane] { deviation } else { high[lane] };
-                squares[lane] += deviation * deviation;
+        let (mut rest_low, mut rest_high, mut rest_squares) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        let mut done = 0;
+        for part in parts {
+            let first = &first[done..done + part.len()];
+            let whole = part.len() - part.len() % LANES;
+            for offset in (0..whole).step_by(LANES) {
+                let [first, second]: [[f64; LANES]; 2] = [load(first, offset), load(part, offset)];
+                for lane in 0..LANES {
+                    let sum = first[lane] + sign * second[lane];
+                    low[lane] = if sum < low[lane] { sum } else { low[lane] };
+                    high[lane] = if sum > high[lane] { sum } else { high[lane] };
+                    squares[lane] += sum * sum;
+                }
             }
+            for (first, second) in first[whole..].iter().zip(&part[whole..]) {
+                let sum = first + sign * second;
+                (rest_low, rest_high) = (rest_low.min(sum), rest_high.max(sum));
+                rest_squares += sum * sum;
+            }
+            done += part.len();
         }
-        Self {
-            low: low.into_iter().fold(f64::INFINITY, f64::min),
-            high: high.into_iter().fold(f64::NEG_INFINITY, f64::max),
-            squares: squares.iter().sum(),
-            points: first.len(),
+        Course {
+            low: rest_low.min(folded(low, f64::min)),
+            high: rest_high.max(folded(high, f64::max)),
+            squares: rest_squares + folded(squares, |one, other| one + other),
+            points: done,
         }
     }
+}
+
+/// All lanes in one, each half with the other.
+#[inline(always)]
+fn folded(mut lanes: [f64; LANES], with: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut half = LANES;
+    while half > 1 {
+        half /= 2;
+        for lane in 0..half {
+            lanes[lane] = with(lanes[lane], lanes[lane + half]);
+        }
+    }
+    lanes[0]
 }

@@ -53,7 +53,7 @@ impl Disturbed {
         let heights = || sections.iter().map(|section| section.z_mm);
         let forms = sections.iter().flat_map(|section| section.form_um).copied();
         let is_zone = reference == Reference::MinimumZone;
-        let zone = if is_zone { Zone::new(points, forms, &cylinder, &near) } else { None };
+        let zone = if is_zone { Zone::new(points, forms, &cylinder) } else { None };
         let at = near.points.iter().map(|point| all[*point]).collect();
         let heights_mm = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
         Some(Self { reference, radius_mm, near, at, cylinder, about, heights_mm, offset_um, zone })

@@ -1,6 +1,6 @@
 //! What noise adds to the values of a polar plot.
 
-use runout_numerics::{Complex64, fourier::Fourier, statistics::median};
+use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     roundness::{self, FixedCentre},
     uncertainty::{
@@ -70,17 +70,20 @@ pub(super) fn without_noise(
         likely.iter_mut().zip(fourier.synthesise(noise)).for_each(|(value, noise)| *value -= noise);
         drawn_about(found, &likely, Errors::new(variance, lowest, seed)?, &mut fourier, measure)
     };
-    let [[first, second], [other_first, other_second]] = match orders {
+    let ([range, rms], [other_range, other_rms]) = match orders {
         Orders::Many => {
             let about_stand_in = about(&stand_in(&harmonics, variance, lowest))?;
-            [about_stand_in, likely_values(found, plot, &harmonics, noise, &mut fourier, measure)?]
+            (about_stand_in, likely_values(found, plot, &harmonics, noise, &mut fourier, measure)?)
         }
-        Orders::Few => [about(&clear_of_noise(&harmonics, variance, lowest))?, about(&vec![1.0; harmonics.len()])?],
+        Orders::Few => {
+            let about_clear = about(&clear_of_noise(&harmonics, variance, lowest))?;
+            (about_clear, about(&vec![1.0; harmonics.len()])?.map(|(_, known)| known))
+        }
     };
-    Some([joined(first, &other_first), joined(second, &other_second)])
+    Some([joined(range, &other_range), joined(rms, &other_rms)])
 }
 
-/// From draws of what the true motion may be. What noise adds is what the value found has more than their median.
+/// From draws of what the true motion may be.
 fn likely_values(
     found: [f64; 2],
     plot: &[f64],
@@ -88,7 +91,7 @@ fn likely_values(
     noise: &NoiseOf,
     fourier: &mut Fourier,
     measure: &Measure,
-) -> Option<[Shared; 2]> {
+) -> Option<[Uncertainty; 2]> {
     let NoiseOf { variance, freedom, lowest, seed } = *noise;
     let likely = likely_forms(harmonics, variance, freedom, lowest);
     // As wide as it is badly known.
@@ -98,23 +101,17 @@ fn likely_values(
     let numbers = Noise::new(variance.len(), seed);
     let forms = forms_to_draw(&likely, harmonics, &widened, DRAWS, &numbers, fourier);
     let drawn: Vec<[f64; 2]> = forms.iter().flat_map(|form| values_of(form, fourier, measure)).collect();
-    let least = forms.first().filter(|form| form.least).map_or(0, |form| form.draws);
-    // Chance draws may lie above.
-    let about = [0, 1].map(|value| {
-        let middle = median(drawn[least..].iter().map(|drawn| drawn[value]));
-        middle.min(found[value])
-    });
     let transforms = forms.iter().filter(|form| !form.least).map(LikelyForm::transforms).sum();
     let mut each = drawn.iter();
     let known = likely_values_of(&forms, transforms, |disturbed, values| {
-        values.extend(if disturbed { each.next().copied().unwrap_or(about) } else { about });
+        values.extend(if disturbed { each.next().copied().unwrap_or(found) } else { found });
     });
     let [(_, range), (_, rms)] = <[_; 2]>::try_from(known).ok()?;
     let range = match overlooked_by(&forms, plot) {
         Some(of_noise) => range?.of_any_form(found[0], of_noise, 2.0),
         None => range?,
     };
-    Some([(found[0] - about[0], range), (found[1] - about[1], rms?)])
+    Some([range, rms?])
 }
 
 /// The values of as many draws of a form as it says.
@@ -177,7 +174,7 @@ fn drawn_about(
 }
 
 /// With an interval that holds both.
-fn joined((share, known): Shared, (_, other): &Shared) -> Shared {
+fn joined((share, known): Shared, other: &Uncertainty) -> Shared {
     let low = known.interval_95[0].min(other.interval_95[0]);
     let high = known.interval_95[1].max(other.interval_95[1]);
     let std = known.std.max((high - low) / (2.0 * NORMAL_95));

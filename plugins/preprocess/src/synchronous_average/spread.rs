@@ -1,8 +1,11 @@
 //! How far turns lie apart in what they say of the axis's motion: lowest and highest at each angle, in one pass.
 
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
+
 use std::f64::consts::TAU;
 
 use runout_core::{
+    numerics::lanes::{NullaryFnOnce, load, vectorised},
     separation::Quantity,
     spread::{Direction, Projection, Spread},
 };
@@ -75,6 +78,56 @@ impl Motion {
     }
 }
 
+/// Points that are looked at together.
+const LANES: usize = 8;
+
+/// Takes a turn in one direction into the lowest and the highest at each angle, and gives the sum of its squares.
+struct Widening<'a> {
+    low: &'a mut [f64],
+    high: &'a mut [f64],
+    first: &'a [f64],
+    /// Of a direction that turns: a factor of the second motion, cos and sin of the angle, and that motion.
+    turned: Option<(f64, [&'a [f64]; 3])>,
+}
+
+impl NullaryFnOnce for Widening<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let Self { low, high, first, turned } = self;
+        let mut squares = [0.0; LANES];
+        let whole = first.len() - first.len() % LANES;
+        for offset in (0..whole).step_by(LANES) {
+            let mut values: [f64; LANES] = load(first, offset);
+            if let Some((factor, columns)) = turned {
+                let [cos, sin, second]: [[f64; LANES]; 3] = columns.map(|column| load(column, offset));
+                for lane in 0..LANES {
+                    values[lane] = cos[lane] * values[lane] + factor * sin[lane] * second[lane];
+                }
+            }
+            let (mut lows, mut highs): ([f64; LANES], [f64; LANES]) = (load(low, offset), load(high, offset));
+            for lane in 0..LANES {
+                squares[lane] += values[lane] * values[lane];
+                lows[lane] = if values[lane] < lows[lane] { values[lane] } else { lows[lane] };
+                highs[lane] = if values[lane] > highs[lane] { values[lane] } else { highs[lane] };
+            }
+            low[offset..offset + LANES].copy_from_slice(&lows);
+            high[offset..offset + LANES].copy_from_slice(&highs);
+        }
+        let mut squares: f64 = squares.iter().sum();
+        for point in whole..first.len() {
+            let value = match turned {
+                Some((factor, [cos, sin, second])) => cos[point] * first[point] + factor * sin[point] * second[point],
+                None => first[point],
+            };
+            squares += value * value;
+            (low[point], high[point]) = (low[point].min(value), high[point].max(value));
+        }
+        squares
+    }
+}
+
 /// A direction, the motion that counts and with which factor another one.
 type Place = (Direction, usize, Option<(usize, f64)>);
 
@@ -121,26 +174,9 @@ impl Extremes {
         self.squares.resize(self.directions.len(), 0.0);
         let extremes = self.low.chunks_exact_mut(angles).zip(self.high.chunks_exact_mut(angles)).zip(&mut self.squares);
         for ((_, first, second), ((low, high), squares)) in self.directions.iter().zip(extremes) {
-            let first = &motion[first * angles..(first + 1) * angles];
-            let extremes = low.iter_mut().zip(high);
-            // Written out, so that neither a branch nor the rules for what is no number stand in the loop.
-            let mut square = 0.0;
-            let mut widen = |(low, high): (&mut f64, &mut f64), value: f64| {
-                square += value * value;
-                *low = if value < *low { value } else { *low };
-                *high = if value > *high { value } else { *high };
-            };
-            match second {
-                None => extremes.zip(first).for_each(|(extremes, value)| widen(extremes, *value)),
-                Some((second, factor)) => {
-                    let second = &motion[second * angles..(second + 1) * angles];
-                    let turned = self.cos.iter().zip(&self.sin).zip(first.iter().zip(second));
-                    for (extremes, ((cos, sin), (first, second))) in extremes.zip(turned) {
-                        widen(extremes, cos * first + factor * sin * second);
-                    }
-                }
-            }
-            *squares += square;
+            let row = |row: usize| &motion[row * angles..(row + 1) * angles];
+            let turned = second.map(|(second, factor)| (factor, [&self.cos[..], &self.sin, row(second)]));
+            *squares += vectorised(Widening { low, high, first: row(*first), turned });
         }
     }
 
