@@ -52,6 +52,8 @@ pub fn inspect(path: &Path) -> Result<Option<TextReport>> {
                     known.rows += 1;
                 }
                 None if line.bytes.starts_with(b"#") => {}
+                // JSON, or JSON Lines.
+                None if matches!(line.bytes.trim_ascii_start().first(), Some(b'{' | b'[')) => return Ok(None),
                 None if line.bytes.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace()) => {
                     return Ok(None);
                 }
@@ -122,12 +124,13 @@ mod tests {
 
     #[test]
     fn what_is_no_table_is_none() {
-        let nothing: [&[u8]; 6] = [
+        let nothing: [&[u8]; 7] = [
             b"",
             b"# comments only\n",
             b"one column\n1\n",
             b"a,b\n",
             b"a,b\n1,2,3,4\n",
+            b"{\"time_s\":0.0,\"S1\":1.0}\n{\"time_s\":0.1,\"S1\":1.1}\n",
             b"\x7fELF\x02\x01\0,\0\n1,2\n",
         ];
         for text in nothing {
