@@ -1,6 +1,7 @@
 //! Files that appear whole or not at all, one by one or together.
 
 mod faults;
+mod full_disk;
 mod lock;
 mod publication;
 mod under_way;
@@ -119,8 +120,8 @@ impl PendingFile {
 
     /// The error of an attempt to write this file, named by its final name.
     pub fn caused(&self, error: impl std::error::Error + Send + Sync + 'static) -> Error {
-        if is_full(&error) {
-            return self.failure("no space is left there").of(ErrorKind::Io).help(NO_SPACE);
+        if full_disk::is_cause(&error) {
+            return self.failure("no space is left there").of(ErrorKind::Io).help(full_disk::HELP);
         }
         Error::caused("write", self.destination.display().to_string(), error)
     }
@@ -141,17 +142,6 @@ impl Drop for PendingFile {
             UnderWay::now().remove(&self.temporary);
         }
     }
-}
-
-/// What to do where a disk is full.
-const NO_SPACE: &str = "make room, or write elsewhere; files of earlier runs are as they were";
-
-/// Whether the disk is full, or as full as this user may fill it. Libraries in C give the system's number as text.
-fn is_full(error: &(dyn std::error::Error + 'static)) -> bool {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    let mut kinds = causes.filter_map(|error| error.downcast_ref::<std::io::Error>()).map(std::io::Error::kind);
-    let of_system = |kind| matches!(kind, ErrorKindOfSystem::StorageFull | ErrorKindOfSystem::QuotaExceeded);
-    kinds.any(of_system) || error.to_string().contains("No space left on device")
 }
 
 /// What temporary names end in.
@@ -334,24 +324,6 @@ mod tests {
         });
         assert!(ended && Path::new(&format!("/proc/{}", child.id())).exists(), "it was not asked for");
         child.wait().unwrap();
-    }
-
-    #[test]
-    fn a_full_disk_is_named_as_such() {
-        let folder = tempfile::tempdir().unwrap();
-        let pending = PendingFile::new(folder.path().join("form.parquet")).unwrap();
-        let full = std::io::Error::from(ErrorKindOfSystem::StorageFull);
-        // As HDF5 gives it, in the middle of a text.
-        let in_words = std::io::Error::other(
-            "file write failed: errno = 28, error message = 'No space left on device', buf = 0x7f45",
-        );
-        for error in [full, in_words] {
-            let error = pending.caused(error);
-            assert!(error.to_string().ends_with("form.parquet: no space is left there"), "{error}");
-            assert!(error.kind() == ErrorKind::Io && error.advice().is_some());
-        }
-        let other = pending.caused(std::io::Error::from(ErrorKindOfSystem::PermissionDenied));
-        assert!(!other.to_string().contains("space"), "{other}");
     }
 
     #[test]

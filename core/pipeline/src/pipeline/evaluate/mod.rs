@@ -139,6 +139,8 @@ fn labelled_with_reasons(
 #[cfg(test)]
 mod axis_motion_tests;
 #[cfg(test)]
+mod bump_tests;
+#[cfg(test)]
 mod cost_tests;
 #[cfg(test)]
 mod coverage_tests;
