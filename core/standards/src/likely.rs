@@ -29,6 +29,8 @@ const BESIDE: usize = 4;
 const LOOKS: usize = 3;
 /// Orders that have their variance from the same turns: it is known no better from several.
 const ORDERS_TOGETHER: f64 = 5.0;
+/// Of fewer squares, the mean of 1/v² is taken as of so many: that of four or fewer has none.
+const FEWEST_SQUARES: f64 = 8.0;
 /// Forms are the same where the variances of their errors differ by less than this share of the noise, and their means by less than this share of
 /// its standard deviation.
 const SAME_FORM: f64 = 0.01;
@@ -65,13 +67,21 @@ pub fn likely_forms(harmonics: &[Complex64], variance: &[f64], freedom: &[usize]
         Some(freedom) if *freedom > 0 => 1.0 + 2.0 * ORDERS_TOGETHER / *freedom as f64,
         _ => 1.0,
     };
+    // Orders whose variance is found too small weigh too much, and have too much power for it: E 1/v² is ν/((ν − 4) σ²) times E 1/v.
+    let too_small = |order: usize| match freedom.get(order) {
+        Some(freedom) if *freedom > 0 => {
+            let freedom = (*freedom as f64).max(FEWEST_SQUARES);
+            freedom / (freedom - 4.0)
+        }
+        _ => 1.0,
+    };
     let summed = |is_line: &[bool], signal: &[f64]| -> Vec<Sums> {
         let sums = |order: usize| match noise(order).filter(|_| !is_line[order]) {
             Some(noise) => {
                 // A square is known to itself.
                 let weight = (signal[order] + noise).powi(-2);
                 let variance = (weight * noise).powi(2) * widened(order);
-                Sums { weight, power: weight * power[order], noise: weight * noise, variance }
+                Sums { weight, power: weight * power[order], noise: weight * noise * too_small(order), variance }
             }
             None => Sums::default(),
         };

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::drawn_angles::{crest_order, drawn_angles};
+pub use crate::drawn_angles::{angles_for_parabolas, crest_order, drawn_angles};
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
 pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms, overlooked_by, stands_out};
@@ -82,13 +82,15 @@ impl Uncertainty {
     /// The same of a value with kinks: an interval that reaches as far below the value as above it, the farther of both.
     ///
     /// Where an error changes which contacts hold a circle (nearly opposite contacts of MICI and MCCI), draws about the value
-    /// do not show on which side of it the truth lies.
+    /// do not show on which side of it the truth lies. Where the value lies above its interval, draws lie above the truth as it lies above them:
+    /// the centre of a form with two lobes moves along its long axis with the least error, and only upwards from the true value.
     #[must_use]
     pub fn on_both_sides(mut self, value: f64) -> Self {
         let [low, high] = self.interval_95;
         let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
         let reach = (value - low).max(high - value);
-        self.interval_95 = [(value - reach).max(floor), value + reach];
+        let ends = if value > high { [low - reach, high] } else { [value - reach, value + reach] };
+        self.interval_95 = [ends[0].max(floor), ends[1]];
         self
     }
 
@@ -261,7 +263,8 @@ pub fn of_rms(
     let middle = rms * rms - noise;
     // Chance may leave less than a part of what noise alone has.
     let reach = NORMAL_95 * ((spread - fourth).max(0.5 * fourth) + unknown).sqrt();
-    let interval_95 = [-reach, reach].map(|reach| (middle + reach).max(0.0).sqrt());
+    // It may also leave less than there is: then the interval begins at 0, and has its reach.
+    let interval_95 = [(middle - reach).max(0.0).sqrt(), (middle.max(0.0) + reach).sqrt()];
     Some(Uncertainty { std: (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95), interval_95, draws: 0 })
 }
 

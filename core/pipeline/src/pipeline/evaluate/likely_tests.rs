@@ -14,6 +14,7 @@ use super::{
     tests::{RADIUS_MM, evaluate, station},
 };
 use runout_numerics::Complex64;
+use runout_standards::Value;
 
 /// Angles at which a profile is measured.
 const ANGLES: usize = 512;
@@ -325,6 +326,37 @@ fn intervals_of_fine_waves_hold_where_lobes_and_low_orders_have_the_power() {
             // 95 % of 60 are 57 ± 1.7, three of those below it.
             assert!(held >= 52, "{fine_um} µm, noise {noise_um} µm to 1/n^{falls}, {name}: {held} of 60");
         }
+    }
+}
+
+/// Lobes that are alike in little noise: crests of 15 compete for the highest behind a filter; of two, the centre moves along the long axis.
+#[test]
+fn intervals_of_like_lobes_hold_where_noise_is_small() {
+    for (order, filter, passed, names) in
+        [(15, "Gaussian 15 UPR", 0.5, &["RONt LSCI", "RONp LSCI", "RONt MZCI"][..]), (2, "none", 1.0, &["RONt MCCI"])]
+    {
+        let evaluate = evaluate(&UNFILTERED.replace("[]", "[15]")).unwrap();
+        let (noise_um, profiles, mut held) = (0.0016, 60, BTreeMap::new());
+        for number in 0..profiles {
+            let mut random = ChaCha8Rng::seed_from_u64(91_000 + number);
+            let waves: Waves = vec![(order, 1.5, TAU * random.random::<f64>())];
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let measured: Vec<f64> = profile(&waves, ANGLES).iter().map(|value| value + noise_um * normal()).collect();
+            let variance = 4.0 * noise_um * noise_um / ANGLES as f64;
+            let mut result = station(0.0, &harmonics(&measured), HIGHEST, variance, &[]);
+            result.station = format!("like lobes {number}");
+            let found = section_values(&result, 0, &evaluate, RADIUS_MM);
+            let waves = vec![(order, passed * 1.5, waves[0].2)];
+            for (name, truth) in truth(&waves, &mut random).into_iter().filter(|(name, _)| names.contains(name)) {
+                let is_same = |value: &&Value| format!("{} {}", value.symbol, value.reference) == name;
+                let same = found.iter().filter(|value| value.filter == filter).find(is_same).unwrap();
+                let [low, high] = same.uncertainty.as_ref().unwrap().interval_95;
+                *held.entry(name).or_insert(0) += u64::from(low <= truth && truth <= high);
+            }
+        }
+        println!("{order} lobes, {filter}: {held:?} of {profiles}");
+        // 85 % of 60 are 51: forms of one line are those that what is drawn expects least.
+        assert!(held.values().all(|held| *held >= 51), "{order} lobes: {held:?}");
     }
 }
 

@@ -13,8 +13,8 @@ use runout_standards::{
     roundness::{Angles, CircleSearch, Points, Reference, Series, Values},
     slope::{self, steepest_um_per_rad},
     uncertainty::{
-        DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, crest_order, drawn_angles, forms_to_draw,
-        likely_values_of, of_rms, overlooked_by,
+        DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, angles_for_parabolas, crest_order, drawn_angles,
+        forms_to_draw, likely_values_of, of_rms, overlooked_by,
     },
 };
 
@@ -69,10 +69,7 @@ impl Form {
                 (Some(noise_um), Some(ends)) => known.map(|known| known.of_any_form(value, noise_um, ends)),
                 _ => known,
             };
-            // Where noise alone puts the value above its interval, which contacts hold the circle is no matter.
-            let holds = |known: &Uncertainty| (known.interval_95[0]..=known.interval_95[1]).contains(&value);
-            let both = known.as_ref().is_some_and(|known| has_kinks(label) && holds(known));
-            (value, if both { known.map(|known| known.on_both_sides(value)) } else { known })
+            (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
         });
         let mut found: Vec<Found> = found.map(Found::from).collect();
         if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
@@ -116,7 +113,8 @@ impl Form {
             return Drawn::default();
         }
         let harmonics = filter.harmonics(&self.harmonics);
-        let angles = Angles::shared(angles_to_draw(&harmonics, &variance, filter.highest(self.held.highest)));
+        let angles =
+            Angles::shared(angles_to_draw(&harmonics, &variance, filter.highest(self.held.highest), usize::MAX));
         let mut fourier = Fourier::new(angles.len());
         let profile_um = self.profile(filter, &mut fourier);
         let mut forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
@@ -180,7 +178,7 @@ impl Form {
             return None;
         }
         let harmonics = filter.harmonics(&self.harmonics);
-        let few = angles_to_draw(&harmonics, &variance, filter.highest(self.held.highest)).min(self.angles);
+        let few = angles_to_draw(&harmonics, &variance, filter.highest(self.held.highest), self.angles);
         let angles = Angles::shared(few);
         let mut fourier = Fourier::new(angles.len());
         let forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, &self.noise, &mut fourier);
@@ -252,7 +250,7 @@ impl Form {
             return Found { value, uncertainty: None, no_uncertainty: Some(reason) };
         }
         let waves = filter.highest(self.held.highest).max(2);
-        let mut fourier = Fourier::new(angles_to_draw(&slopes, &variance, waves));
+        let mut fourier = Fourier::new(angles_to_draw(&slopes, &variance, waves, usize::MAX));
         let mut forms = forms_to_draw(self.likely(), &slopes, &variance, DRAWS, &self.noise, &mut fourier);
         forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
         let mut found_slopes = fourier.synthesise(slopes).to_vec();
@@ -275,11 +273,11 @@ impl Form {
             });
         });
         let known = found.into_iter().next().and_then(|(_, known)| Some(known?.moved(value - about)));
-        let known = match overlooked_by(&forms, &found_slopes) {
-            Some(of_noise) => known.map(|known| known.of_any_form(value, of_noise, 1.0)),
-            None => known,
-        };
-        Found::from((value, known))
+        // Noise has raised what lies above its interval, at high orders of which a recording shows least how much is form.
+        let raised = known.as_ref().is_some_and(|known| known.interval_95[1] < value);
+        let any_form = raised || overlooked_by(&forms, &found_slopes).is_some();
+        let std = (0.5 * of_errors).sqrt();
+        Found::from((value, if any_form { known.map(|known| known.of_any_form(value, std, 1.0)) } else { known }))
     }
 
     /// Roundness behind the robust Gaussian (ISO 16610-31), which is applied to each drawn profile.
@@ -303,12 +301,14 @@ impl Form {
     }
 }
 
-/// Angles on which errors of this variance are drawn, where the profile has these harmonics up to the highest order.
-fn angles_to_draw(harmonics: &[Complex64], variance: &[f64], highest: usize) -> usize {
+/// Angles on which errors of this variance are drawn, where the profile has these harmonics up to the highest order; `most`, unless parabolas need more.
+fn angles_to_draw(harmonics: &[Complex64], variance: &[f64], highest: usize, most: usize) -> usize {
     let up_to = highest + 1;
-    let form = crest_order(harmonics.iter().take(up_to).map(Complex64::norm_sqr));
-    let errors = crest_order(variance.iter().take(up_to).copied());
-    drawn_angles(DRAWN_POINTS_A_WAVE, [form, errors], highest)
+    let power = || harmonics.iter().take(up_to).map(Complex64::norm_sqr);
+    let variance = || variance.iter().take(up_to).copied();
+    let finely = angles_for_parabolas(power(), variance()).min(POINTS_A_WAVE * highest);
+    let orders = [crest_order(power()), crest_order(variance())];
+    drawn_angles(DRAWN_POINTS_A_WAVE, orders, highest).min(most).max(finely)
 }
 
 /// Which of the forms each draw is of.
