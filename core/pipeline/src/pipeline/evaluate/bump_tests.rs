@@ -9,15 +9,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{
+    likely_tests::{ANGLES, DENSE, HIGHEST, harmonics},
     section_values,
     tests::{RADIUS_MM, evaluate, station},
 };
 use runout_numerics::Complex64;
-
-const ANGLES: usize = 512;
-const HIGHEST: usize = 250;
-/// Angles at which the true profile is looked at.
-const DENSE: usize = 4096;
 
 /// Three lobes and a bump of 1 µm, of which the width is a share of the turn.
 fn profile(lobes_um: f64, width: f64) -> impl Fn(usize) -> f64 {
@@ -27,15 +23,6 @@ fn profile(lobes_um: f64, width: f64) -> impl Fn(usize) -> f64 {
         let bump = if aside.abs() < 0.5 { (PI * aside).cos().powi(2) } else { 0.0 };
         bump + lobes_um * (3.0 * TAU * turns).cos()
     }
-}
-
-fn harmonics(heights: &[f64]) -> Vec<(usize, Complex64)> {
-    let cis: Vec<Complex64> = (0..ANGLES).map(|turn| Complex64::cis(-TAU * turn as f64 / ANGLES as f64)).collect();
-    let of = |order: usize| {
-        let sum: Complex64 = heights.iter().enumerate().map(|(at, height)| height * cis[(order * at) % ANGLES]).sum();
-        (order, 2.0 / ANGLES as f64 * sum)
-    };
-    (2..=HIGHEST).map(of).collect()
 }
 
 /// The mean of |z| of the sum of waves.

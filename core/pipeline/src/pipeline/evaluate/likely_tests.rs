@@ -17,11 +17,11 @@ use runout_numerics::Complex64;
 use runout_standards::Value;
 
 /// Angles at which a profile is measured.
-const ANGLES: usize = 512;
+pub(super) const ANGLES: usize = 512;
 /// Highest order that is kept of it.
-const HIGHEST: usize = 250;
+pub(super) const HIGHEST: usize = 250;
 /// Angles at which the true profile is looked at.
-const DENSE: usize = 4096;
+pub(super) const DENSE: usize = 4096;
 
 /// A form as waves (order, amplitude, phase).
 type Waves = Vec<(usize, f64, f64)>;
@@ -67,7 +67,7 @@ fn steepest(waves: &Waves) -> f64 {
 }
 
 /// Harmonics by sums over all angles.
-fn harmonics(profile: &[f64]) -> Vec<(usize, Complex64)> {
+pub(super) fn harmonics(profile: &[f64]) -> Vec<(usize, Complex64)> {
     let cis: Vec<Complex64> = (0..ANGLES).map(|turn| Complex64::cis(-TAU * turn as f64 / ANGLES as f64)).collect();
     let of = |order: usize| {
         let sum: Complex64 =
