@@ -54,7 +54,8 @@ impl<const D: usize, const N: usize> Chebyshev<D, N> {
     }
 
     /// Solves for one cost b (s first, then A, then B, as far as they are there) and limits of each coordinate of s.
-    /// Heights count as equal within `tolerance`.
+    /// Heights count as equal within `tolerance`; where points are so nearly the same that rounding exchanges them for each other again and
+    /// again, within what ends this.
     ///
     /// `None` where there is no point, or rounding leaves no way on.
     pub fn solve(
@@ -78,7 +79,11 @@ impl<const D: usize, const N: usize> Chebyshev<D, N> {
         limits: &[(f64, f64); D],
         tolerance: f64,
     ) -> Option<Optimum<D, N>> {
+        let mut tolerance = tolerance;
         for step in 0..MOST {
+            if step > 0 && step % HASTY == 0 {
+                tolerance *= 2.0;
+            }
             let rows = basis.map(|contact| row(contact, cloud));
             let inverse = inverse(rows)?;
             let right = basis.map(|contact| right(contact, cloud, limits));

@@ -10,7 +10,7 @@ const THROUGH: usize = 16;
 const POWER: i32 = 16;
 /// The polynomial serves where it errs by less than this share of the curve's amplitudes; its second derivative then errs by
 /// some ten times that of theirs.
-const SHARE: f64 = 1e-11;
+const SHARE: f64 = 1e-10;
 
 /// Re Σ cₙ e^{inα}, of which values on equal angles from 0 are known: at any angle, by a polynomial through the 16 nearest of
 /// them where these are dense enough to give all digits, else from the series.

@@ -7,6 +7,7 @@ pub mod drawn;
 mod drawn_angles;
 mod errors;
 mod errors_at;
+mod extremes;
 pub mod gaps;
 mod likely;
 pub mod mean_deviation;

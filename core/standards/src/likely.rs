@@ -17,7 +17,7 @@ mod sums;
 
 use runout_numerics::Complex64;
 
-pub use form::{LikelyForm, forms_to_draw, overlooked_by};
+pub use form::{Lacking, LikelyForm, forms_to_draw, lacking_at_extreme, overlooked_by};
 use signal::QUANTILES;
 use sums::{Sliding, Sums};
 

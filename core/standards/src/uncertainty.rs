@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 pub use crate::drawn_angles::{angles_for_parabolas, crest_order, drawn_angles};
 pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
 pub use crate::errors_at::{Covariance, ErrorsAt};
-pub use crate::likely::{Likely, LikelyForm, forms_to_draw, likely_forms, overlooked_by, stands_out};
+pub use crate::likely::{
+    Lacking, Likely, LikelyForm, forms_to_draw, lacking_at_extreme, likely_forms, overlooked_by, stands_out,
+};
 pub use crate::stand_in::stand_in;
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
@@ -118,6 +120,15 @@ impl Uncertainty {
         *low = low.min((value - ends * LARGEST_OF_ALL * std).max(0.0));
         *high = high.max(value + NORMAL_95 * ends.sqrt() * std);
         self.std = self.std.max((*high - *low) / (2.0 * NORMAL_95));
+        self
+    }
+
+    /// The same where draws are of forms that may [lack](Lacking) so much of an extreme.
+    #[must_use]
+    pub fn with_lacking(mut self, lacking: Lacking) -> Self {
+        let [low, high] = self.interval_95;
+        let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        self.interval_95 = [(low - lacking.down_um).max(floor), high + lacking.up_um];
         self
     }
 

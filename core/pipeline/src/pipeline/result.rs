@@ -40,8 +40,8 @@ pub(super) fn complete(
     let mut result = StationResult { station, z_mm, angles, separation, profiles, values, motion_values, truth };
     let sections = 0..result.separation.sections.len();
     result.values = sections.clone().map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
-    let missing = sections.flat_map(|section| missing_circles(&result, section, evaluate, radius_mm));
-    let missing: Vec<String> = missing.collect();
+    let missing = |section: usize| missing_circles(&result, section, evaluate, radius_mm, &result.values[section]);
+    let missing: Vec<String> = sections.flat_map(missing).collect();
     result.separation.warnings.extend(missing);
     result
 }

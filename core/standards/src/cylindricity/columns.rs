@@ -72,6 +72,12 @@ impl Columns {
         self.zeta.push(zeta);
     }
 
+    pub(crate) fn truncate(&mut self, count: usize) {
+        for column in [&mut self.u, &mut self.v, &mut self.levels, &mut self.zeta] {
+            column.truncate(count);
+        }
+    }
+
     pub(crate) fn reserve(&mut self, more: usize) {
         for column in [&mut self.u, &mut self.v, &mut self.levels, &mut self.zeta] {
             column.reserve(more);

@@ -9,6 +9,7 @@ mod least_squares;
 mod lines;
 mod points;
 mod search;
+mod series;
 mod zone;
 
 use super::near::Course;
@@ -16,6 +17,7 @@ pub use super::reference::{Reference, Undetermined};
 pub use disturbed::Disturbed;
 pub use lines::{Generatrices, MedianLine};
 pub use points::{Points, Section};
+pub use series::Series;
 
 /// A reference cylinder.
 #[derive(Debug, Clone, PartialEq)]

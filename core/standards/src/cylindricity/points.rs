@@ -40,6 +40,10 @@ pub struct Points {
 /// A point: sine and cosine of its angle, z in mm, radial deviation in µm.
 pub(super) type Place = ((f64, f64), f64, f64);
 
+fn is_there(z_mm: f64, form_um: f64) -> bool {
+    z_mm.is_finite() && form_um.is_finite()
+}
+
 impl Points {
     /// Points (angle in rad, z in mm, radial deviation in µm) about a nominal radius (positive).
     #[must_use]
@@ -60,26 +64,39 @@ impl Points {
 
     /// So many points, looked at twice.
     pub(super) fn of(radius_mm: f64, count: usize, points: impl Iterator<Item = Place> + Clone) -> Self {
-        let radius = 1e3 * radius_mm;
-        let there = |z: f64, form: f64| z.is_finite() && form.is_finite();
-        let heights = points.clone().filter(|(_, z, form)| there(*z, *form)).map(|(_, z, _)| z);
+        let radius_um = 1e3 * radius_mm;
+        let heights = points.clone().filter(|(_, z, form)| is_there(*z, *form)).map(|(_, z, _)| z);
         let (bottom, top) =
             heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
         let (middle_mm, half_mm) = (0.5 * (bottom + top), 0.5 * (top - bottom));
-        let (mut held, mut span_um) = (Columns::default(), 0.0_f64);
-        held.reserve(count);
-        for ((sin, cos), z, form) in points {
-            let scale = 1.0 + form / radius;
-            let level = form + form * form / (2.0 * radius);
-            if there(z, form) {
-                span_um = span_um.max(level.abs());
-                held.push([scale * cos, scale * sin, level, (z - middle_mm) / half_mm]);
-            } else {
-                held.push([0.0, 0.0, f64::NAN, 0.0]);
-            }
-        }
         let least_squares = OnceLock::new();
-        Self { radius_um: radius, middle_mm, half_um: 1e3 * half_mm, held, span_um, least_squares }
+        let half_um = 1e3 * half_mm;
+        let mut all = Self { radius_um, middle_mm, half_um, held: Columns::default(), span_um: 0.0, least_squares };
+        all.held.reserve(count);
+        points.for_each(|point| all.push(point));
+        all
+    }
+
+    /// Adds a point. LSCY, where it is known, stays that of the points before.
+    pub(super) fn push(&mut self, ((sin, cos), z_mm, form_um): Place) {
+        if is_there(z_mm, form_um) {
+            let scale = 1.0 + form_um / self.radius_um;
+            let level = form_um + form_um * form_um / (2.0 * self.radius_um);
+            self.span_um = self.span_um.max(level.abs());
+            self.held.push([scale * cos, scale * sin, level, self.zeta(z_mm)]);
+        } else {
+            self.held.push([0.0, 0.0, f64::NAN, 0.0]);
+        }
+    }
+
+    /// Leaves the first points only.
+    pub(super) fn truncate(&mut self, count: usize) {
+        self.held.truncate(count);
+    }
+
+    /// Where a height is along the wall: −1 and 1 at its ends.
+    pub(super) fn zeta(&self, z_mm: f64) -> f64 {
+        1e3 * (z_mm - self.middle_mm) / self.half_um
     }
 
     /// Points, those that are missing included.

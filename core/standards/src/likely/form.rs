@@ -1,9 +1,10 @@
 //! The form as it may be, on equal angles: its mean, errors about it, and whether that is what was found.
 
-use runout_numerics::{Complex64, fourier::Fourier};
+use runout_numerics::{Complex64, fourier::Fourier, statistics::NORMAL_95};
 
 use super::{Likely, distinct, sum_of_known};
 use crate::{
+    drawn_angles::crest_order,
     errors::{Errors, Noise, TURNS_OF_A_DRAW},
     errors_at::{Covariance, ErrorsAt},
 };
@@ -11,6 +12,8 @@ use crate::{
 /// What a form leaves of the one found, of k orders, is noise up to √(2 ln 20k) of its standard deviations: noise exceeds that at some angle in one
 /// of 50 cases.
 const ANGLES_AN_ORDER: f64 = 20.0;
+/// An extreme is alone where no other height is within so many standard deviations of the noise.
+const ALONE: f64 = 3.0;
 /// What is left is no matter below this share of the errors' standard deviation.
 const NO_MATTER: f64 = 0.5;
 
@@ -26,8 +29,9 @@ pub struct LikelyForm {
     variance: Vec<f64>,
     /// Orders below are exact.
     lowest: usize,
-    /// Variance of the noise of the form found.
+    /// Variance of the noise of the form found, and the [`crest_order`] of it.
     of_noise: f64,
+    noise_order: f64,
     /// How many orders have what the mean leaves of the form found: (Σ v)²/Σ v² of their variances v = (1 − w) σ².
     orders_left: f64,
     noise: Noise,
@@ -44,6 +48,8 @@ pub fn forms_to_draw(
     fourier: &mut Fourier,
 ) -> Vec<LikelyForm> {
     let of_noise = sum_of_known(variance, likely.first().map_or(0, |likely| likely.lowest));
+    let lowest = likely.first().map_or(0, |likely| likely.lowest);
+    let noise_order = crest_order((0..).zip(variance).map(|(order, noise)| if order < lowest { 0.0 } else { *noise }));
     let form = |(number, likely): (usize, &Likely)| {
         let mean = harmonics.iter().zip(&likely.weights).map(|(harmonic, weight)| harmonic * weight);
         let left = variance.iter().zip(&likely.weights).skip(likely.lowest).filter(|(noise, _)| **noise > 0.0);
@@ -59,6 +65,7 @@ pub fn forms_to_draw(
             variance,
             lowest: likely.lowest,
             of_noise,
+            noise_order,
             orders_left,
             draws,
             least: likely.least,
@@ -77,6 +84,48 @@ pub fn overlooked_by(forms: &[LikelyForm], found_um: &[f64]) -> Option<f64> {
     let overlooking: usize = likely().filter(|form| form.overlooks(found_um)).map(|form| form.draws).sum();
     let of_noise = forms.first()?.of_noise;
     (2 * overlooking > draws).then(|| (0.5 * of_noise).sqrt())
+}
+
+/// What the forms may lack of an extreme: by how much farther up and down the true one may be than draws of them show, in µm.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lacking {
+    /// Above the draws.
+    pub up_um: f64,
+    /// Below them.
+    pub down_um: f64,
+}
+
+impl std::ops::Add for Lacking {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { up_um: self.up_um + other.up_um, down_um: self.down_um + other.down_um }
+    }
+}
+
+/// What these forms lack of the highest of the heights found (the lowest by `sign` −1), where nothing competes with it: farther from it than a wave of the highest noise,
+/// no height is within [`ALONE`] standard deviations of the noise. Noise then raises it as often as it lowers it, whatever the form, so that
+/// the true extreme is about the one found as the noise is; forms of waves at random expect it where their waves are. The interval holds both.
+#[must_use]
+pub fn lacking_at_extreme(forms: &[LikelyForm], found_um: &[f64], sign: f64) -> Lacking {
+    let likely = || forms.iter().filter(|form| !form.least && form.draws > 0);
+    let (Some(first), count) = (forms.first(), found_um.len()) else { return Lacking::default() };
+    let std_um = (0.5 * first.of_noise).sqrt();
+    let heights = || found_um.iter().map(|height| sign * height);
+    let highest = heights().enumerate().fold((0, f64::NEG_INFINITY), |best, at| if at.1 > best.1 { at } else { best });
+    let near = (count as f64 / first.noise_order.max(1.0)).ceil() as usize;
+    let competes = |(place, height): (usize, f64)| {
+        let aside = place.abs_diff(highest.0);
+        aside.min(count - aside) > near && height > highest.1 - ALONE * std_um
+    };
+    if std_um.is_nan() || heights().enumerate().any(competes) {
+        return Lacking::default();
+    }
+    let draws: f64 = likely().map(|form| form.draws as f64).sum();
+    let mean = |of: &dyn Fn(&LikelyForm) -> f64| likely().map(|form| form.draws as f64 * of(form)).sum::<f64>() / draws;
+    let left_um = mean(&|form| highest.1 - sign * form.mean_um[highest.0]);
+    let wider_um = NORMAL_95 * (std_um - mean(&LikelyForm::std_um));
+    Lacking { up_um: (left_um + wider_um).max(0.0), down_um: (wider_um - left_um).max(0.0) }
 }
 
 impl LikelyForm {

@@ -36,12 +36,25 @@ impl Points {
         }
     }
 
+    /// Peak to valley about a circle.
+    pub(super) fn ront_um(&self, circle: &Circle) -> f64 {
+        let [low, high] = self.ends_um(circle);
+        high - low
+    }
+
+    /// Lowest and highest deviation from a circle.
+    fn ends_um(&self, circle: &Circle) -> [f64; 2] {
+        let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
+        let common = self.common(&place);
+        let (low, high) = self.cloud.extremes(0..self.len(), &place);
+        [low, high].map(|height| self.deviation(height + common) - circle.deviation_um)
+    }
+
     /// Values about a circle, RONq of the first `count` points, the others of all.
     pub(super) fn values_of_first(&self, circle: &Circle, count: usize) -> Values {
         let place = [circle.x_um - self.origin_um[0], circle.y_um - self.origin_um[1]];
         let common = self.common(&place);
-        let (low, high) = self.cloud.extremes(0..self.len(), &place);
-        let [low, high] = [low, high].map(|height| self.deviation(height + common) - circle.deviation_um);
+        let [low, high] = self.ends_um(circle);
         let [u, v] = [self.cloud.column(0), self.cloud.column(1)].map(|column| &column[..count]);
         let squares = least_squares::Squares {
             levels: &self.cloud.levels()[..count],

@@ -7,7 +7,7 @@ use super::{
 use runout_numerics::fourier::Fourier;
 use runout_standards::{
     Value,
-    cylindricity::{Disturbed, Points, Reference, Section, Values},
+    cylindricity::{Disturbed, Points, Reference, Section, Series, Values},
     uncertainty::{Errors, LARGEST},
 };
 
@@ -28,6 +28,7 @@ impl Wall {
         }
         let usual_um =
             self.errors(filter).map(|errors| LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max));
+        let harmonics: Vec<_> = self.rings.iter().map(|ring| filter.harmonics(&ring.harmonics)).collect();
         let mut disturbed: Vec<Option<Disturbed>> = Vec::new();
         self.evaluate(
             filter,
@@ -35,20 +36,20 @@ impl Wall {
             (self.draws(), DecidedBy::AllSections),
             About::WithoutNoise,
             |sections, largest_um, found| {
-                let points = largest_um.is_none().then(|| Points::of_sections(self.radius_mm, sections));
+                let is_first = disturbed.is_empty();
+                let points = is_first.then(|| Points::of_sections(self.radius_mm, sections));
+                let mut series =
+                    (!is_first && largest_um.is_none()).then(|| Series::new(sections, &harmonics, self.radius_mm));
                 for (index, reference) in references.iter().enumerate() {
-                    let about = if let (None, Some(points)) = (largest_um, &points) {
+                    let about = if let Some(points) = &points {
+                        // The first wall is the one that errors are drawn about.
                         let prepare = |usual_um| {
                             Disturbed::new(*reference, sections, points, self.radius_mm, usual_um, !self.placed)
                         };
-                        let found = || points.reference(*reference).map(|cylinder| points.values(&cylinder));
-                        // The first wall is the one that errors are drawn about.
-                        if disturbed.len() < references.len() {
-                            disturbed.push(usual_um.and_then(prepare));
-                            disturbed.last().and_then(Option::as_ref).map_or_else(found, |wall| Some(wall.about()))
-                        } else {
-                            found()
-                        }
+                        disturbed.push(usual_um.and_then(prepare));
+                        disturbed.last().and_then(Option::as_ref).map(Disturbed::about)
+                    } else if let Some(series) = &mut series {
+                        series.about(*reference).ok().map(|found| found.1)
                     } else {
                         let prepared = disturbed.get_mut(index).and_then(Option::as_mut);
                         prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))

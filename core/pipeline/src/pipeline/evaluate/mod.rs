@@ -147,6 +147,8 @@ mod coverage_tests;
 #[cfg(test)]
 mod evaluable_tests;
 #[cfg(test)]
+mod extreme_tests;
+#[cfg(test)]
 mod likely_tests;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Roundness of one section: values about reference circles, and the steepest slope.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, ops::Add};
 
 use super::{Filter, Found, Label, POINTS_A_WAVE, config::Propagation, labelled_with_reasons, section::Form};
 use runout_numerics::{
@@ -13,8 +13,8 @@ use runout_standards::{
     roundness::{Angles, CircleSearch, Points, Reference, Series, Values},
     slope::{self, steepest_um_per_rad},
     uncertainty::{
-        DRAWS, LARGEST, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, angles_for_parabolas, crest_order, drawn_angles,
-        forms_to_draw, likely_values_of, of_rms, overlooked_by,
+        DRAWS, LARGEST, Lacking, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, angles_for_parabolas, crest_order,
+        drawn_angles, forms_to_draw, lacking_at_extreme, likely_values_of, of_rms, overlooked_by,
     },
 };
 
@@ -42,6 +42,9 @@ const MOST_NOISE_OF_SLOPE: f64 = 0.004;
 /// Draws of what is filtered robustly, point by point and some times over.
 const DRAWS_OF_ROBUST: usize = 64;
 
+/// Points on a wave where values are found: contacts between them are sought from there.
+const FOUND_POINTS_A_WAVE: usize = 12;
+
 /// Points on a wave where errors are drawn: there a value's error is sought, not the value.
 const DRAWN_POINTS_A_WAVE: usize = 6;
 
@@ -51,6 +54,8 @@ struct Drawn {
     values: Vec<(f64, Option<Uncertainty>)>,
     /// Standard deviation of the noise, where draws do not show what is found at some angle.
     overlooked: Option<f64>,
+    /// What draws may lack of the lowest and the highest height.
+    lacking: [Lacking; 2],
 }
 
 impl Form {
@@ -60,14 +65,18 @@ impl Form {
         if labels.is_empty() {
             return Vec::new();
         }
-        let Drawn { values: drawn, overlooked } = self.drawn_about(filter, references, propagation);
+        let Drawn { values: drawn, overlooked, lacking } = self.drawn_about(filter, references, propagation);
         let drawn = drawn.into_iter().map(Some).chain(std::iter::repeat(None));
         let found = self.about(filter, references).into_iter().zip(drawn);
         let found = found.zip(&labels).map(|((value, drawn), label)| {
             let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
             let known = match (overlooked, extremes(label)) {
-                (Some(noise_um), Some(ends)) => known.map(|known| known.of_any_form(value, noise_um, ends)),
-                _ => known,
+                (_, []) => known,
+                (Some(noise_um), ends) => known.map(|known| known.of_any_form(value, noise_um, ends.len() as f64)),
+                (None, ends) => {
+                    let lacking = ends.iter().map(|end| lacking[*end as usize]).fold(Lacking::default(), Add::add);
+                    known.map(|known| known.with_lacking(lacking))
+                }
             };
             (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
         });
@@ -85,7 +94,7 @@ impl Form {
     fn about(&self, filter: &Filter, references: &[Reference]) -> Vec<f64> {
         let waves = filter.highest(self.held.highest);
         // The given angles and others between them, so that no crest is far from one.
-        let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
+        let angles = self.angles * (FOUND_POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
         let harmonics = filter.harmonics(&self.harmonics);
         let mut fourier = Fourier::new(angles);
         let mut profile_um = Cow::Borrowed(fourier.synthesise(harmonics.iter().copied()));
@@ -95,8 +104,12 @@ impl Form {
         let mut series = Series::new(&harmonics, &profile_um, self.radius_mm);
         let mut found = Vec::new();
         for reference in references {
-            let about = series.about(*reference).ok().map(|found| found.1);
-            add_values(about, *reference, &mut found);
+            if *reference == Reference::LeastSquares {
+                let about = series.about(*reference).ok().map(|found| found.1);
+                add_values(about, *reference, &mut found);
+            } else {
+                found.push(series.ront_um(*reference).unwrap_or(f64::NAN));
+            }
         }
         found
     }
@@ -120,6 +133,7 @@ impl Form {
         let mut forms = forms_to_draw(self.likely(), &harmonics, &variance, DRAWS, noise, &mut fourier);
         forms.iter_mut().for_each(|form| self.at.gaps.blank(&mut form.mean_um));
         let overlooked = overlooked_by(&forms, &profile_um);
+        let lacking = [-1.0, 1.0].map(|sign| lacking_at_extreme(&forms, &profile_um, sign));
         let search = |reference: &Reference| CircleSearch::new(*reference, &angles, self.radius_mm, true);
         let mut searches: Vec<CircleSearch> = references.iter().map(search).collect();
         let about: Vec<Option<Values>> =
@@ -153,7 +167,7 @@ impl Form {
             }
         });
         self.state_rms(filter, references, &mut found);
-        Drawn { values: found, overlooked }
+        Drawn { values: found, overlooked, lacking }
     }
 
     /// States the uncertainty of RONq in closed form where the section is not interrupted.
@@ -187,6 +201,7 @@ impl Form {
         }
         let profile_um = self.profile(filter, &mut fourier);
         let overlooked = overlooked_by(&forms, &profile_um);
+        let lacking = [-1.0, 1.0].map(|sign| lacking_at_extreme(&forms, &profile_um, sign));
         let mut found = Vec::new();
         for reference in references {
             let mut search = CircleSearch::new(*reference, &angles, self.radius_mm, false);
@@ -224,7 +239,7 @@ impl Form {
             found.extend(values);
         }
         self.state_rms(filter, references, &mut found);
-        Some(Drawn { values: found, overlooked })
+        Some(Drawn { values: found, overlooked, lacking })
     }
 
     /// The steepest slope, µm/°, from the harmonics, and what it may be of the true form.
@@ -335,12 +350,20 @@ fn has_kinks(label: &Label) -> bool {
     label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
 }
 
-/// How many extremes of the profile a value is the distance of from each other or from the reference; `None` of a mean.
-fn extremes(label: &Label) -> Option<f64> {
+/// An extreme of a profile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    Valley,
+    Peak,
+}
+
+/// Of which extremes of the profile a value is the distance, from each other or from the reference; none of a mean.
+fn extremes(label: &Label) -> &'static [End] {
     match label.symbol {
-        "RONt" => Some(2.0),
-        "RONp" | "RONv" => Some(1.0),
-        _ => None,
+        "RONt" => &[End::Valley, End::Peak],
+        "RONp" => &[End::Peak],
+        "RONv" => &[End::Valley],
+        _ => &[],
     }
 }
 

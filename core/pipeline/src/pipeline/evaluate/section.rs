@@ -6,7 +6,7 @@ use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
-    roundness::{Angles, Points, Reference},
+    roundness::{Angles, Points, Reference, Undetermined},
     uncertainty::{
         DRAWS, Errors, Likely, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, likely_forms, monte_carlo_of, noise_95,
         seed, stands_out, student_95,
@@ -43,23 +43,38 @@ pub(crate) fn section_values(
     values
 }
 
-/// Why a section does not have the reference circles that are asked for, each with its reason: an interruption may leave an arc.
+/// Which of its values a section lacks for want of a reference circle, each with its reason: an interruption may leave an arc.
 pub(crate) fn missing_circles(
     result: &StationResult,
     section: usize,
     evaluate: &Evaluate,
     radius_mm: f64,
+    values: &[Value],
 ) -> Vec<String> {
-    let form = Form::of(result, section, radius_mm).filter(|form| !form.at.gaps.is_empty());
-    let Some(form) = form.filter(|_| evaluate.has(Group::Roundness)) else { return Vec::new() };
+    let form = Form::of(result, section, radius_mm).filter(|_| evaluate.has(Group::Roundness));
+    let Some(form) = form else { return Vec::new() };
+    let ront = || values.iter().filter(|value| value.symbol == "RONt");
+    let mut filters: Vec<&str> = ront().map(|value| value.filter.as_str()).collect();
+    filters.dedup();
+    let lacks = |reference: &Reference| {
+        let has = |filter: &str| ront().any(|value| value.reference == reference.symbol() && value.filter == filter);
+        let without: Vec<&str> = filters.iter().copied().filter(|filter| !has(filter)).collect();
+        (!without.is_empty() || filters.is_empty()).then_some((*reference, without))
+    };
+    let lacking: Vec<(Reference, Vec<&str>)> = evaluate.references.iter().filter_map(lacks).collect();
+    if lacking.is_empty() {
+        return Vec::new();
+    }
     let profile_um = form.profile(&Filter::low_pass(None), &mut Fourier::new(form.angles));
     let mut points = Points::default();
     points.set_profile(&Angles::equal(form.angles), &profile_um, radius_mm);
-    let missing = evaluate.references.iter().filter_map(|reference| {
-        let reason = points.determine(*reference).err()?;
-        Some(format!("section {}: no RONt about {}: {reason}", form.at.id, reference.symbol()))
-    });
-    missing.collect()
+    let reason = |(reference, without): (Reference, Vec<&str>)| {
+        let reason = points.determine(reference).err().unwrap_or(Undetermined::NotFound);
+        let all = without.len() == filters.len();
+        let which = if all { String::new() } else { format!(" (filter: {})", without.join(", ")) };
+        format!("section {}: no RONt about {}{which}: {reason}", form.at.id, reference.symbol())
+    };
+    lacking.into_iter().map(reason).collect()
 }
 
 /// The largest |dr/dθ| of a profile on equal angles, by central differences over three points; NaN where no point has

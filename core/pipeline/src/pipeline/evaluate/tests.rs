@@ -127,12 +127,17 @@ fn an_interruption_is_in_no_value_and_each_says_so() {
 fn an_arc_says_which_circle_it_does_not_have() {
     let mut result = station(0.0, &[lobes(9, 2.0)], 60, 1e-8, &[]);
     let evaluate = evaluate("references = ['LSCI', 'MICI', 'MCCI']\nfilter_upr = []").unwrap();
-    assert!(missing_circles(&result, 0, &evaluate, RADIUS_MM).is_empty());
+    let values = section_values(&result, 0, &evaluate, RADIUS_MM);
+    assert!(missing_circles(&result, 0, &evaluate, RADIUS_MM, &values).is_empty());
+    // A value that is not there is said to be missing also where the circle could be found.
+    let but_one: Vec<Value> = values.iter().filter(|value| value.reference != "MICI").cloned().collect();
+    let missing = missing_circles(&result, 0, &evaluate, RADIUS_MM, &but_one);
+    assert!(missing.len() == 1 && missing[0].contains("no RONt about MICI"), "{missing:?}");
     result.separation.sections[0].gaps.add(0.0, 200_f64.to_radians());
     let values = section_values(&result, 0, &evaluate, RADIUS_MM);
     let about = |reference: &str| values.iter().any(|value| value.symbol == "RONt" && value.reference == reference);
     assert_eq!(["LSCI", "MICI", "MCCI"].map(about), [true, false, true]);
-    let missing = missing_circles(&result, 0, &evaluate, RADIUS_MM);
+    let missing = missing_circles(&result, 0, &evaluate, RADIUS_MM, &values);
     assert!(missing.len() == 1 && missing[0].contains("section a: no RONt about MICI"), "{missing:?}");
     assert!(missing[0].contains("not bounded"), "{missing:?}");
 }
