@@ -23,6 +23,8 @@ use sums::{Sliding, Sums};
 
 /// Power over the mean of the orders beside (over the noise) from which on an order is a line (stands out): noise alone exceeds it once in 8000 cases.
 const LINE: f64 = 9.0;
+/// The same for the least form: noise alone exceeds it at one of 1000 orders once in 1000 cases.
+const CERTAIN_LINE: f64 = 14.0;
 /// Orders to each side, at least.
 const BESIDE: usize = 4;
 /// Looks for lines: large ones hide others.
@@ -105,8 +107,13 @@ pub fn likely_forms(harmonics: &[Complex64], variance: &[f64], freedom: &[usize]
         let (from, to) = window(order);
         let of_order = match noise(order) {
             Some(own) => {
-                let least = if power[order] > LINE * own { 1.0 - own / power[order] } else { 0.0 };
-                beside.over(from, to).likely_signals().map(|signal| (signal / (signal + own)).max(least))
+                let shown = |line: f64| if power[order] > line * own { 1.0 - own / power[order] } else { 0.0 };
+                let (of_least, of_others) = (shown(CERTAIN_LINE), shown(LINE));
+                let mut weights = beside.over(from, to).likely_signals().map(|signal| signal / (signal + own));
+                for (quantile, weight) in weights.iter_mut().enumerate() {
+                    *weight = weight.max(if quantile == 0 { of_least } else { of_others });
+                }
+                weights
             }
             None => [1.0; QUANTILES.len()],
         };

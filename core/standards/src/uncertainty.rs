@@ -54,12 +54,10 @@ impl Uncertainty {
         Self { std, interval_95: [low, value + reach], draws: 0 }
     }
 
-    /// The same where its draws come from so many transforms of several draws each, which give a standard deviation no
-    /// better than two real degrees of freedom a transform do: the interval is wider by Student's factor, about its
-    /// middle.
+    /// The same where its draws come from so many transforms of several draws each: the interval is [wider](widening) about its middle.
     #[must_use]
     fn of_transforms(self, transforms: f64) -> Self {
-        self.widened(student_95(2.0 * transforms) / NORMAL_95)
+        self.widened(widening(transforms))
     }
 
     /// The same with an interval so many times as wide about its middle.
@@ -182,12 +180,16 @@ pub fn likely_values_of(
     transforms: usize,
     draw: impl FnMut(bool, &mut Vec<f64>),
 ) -> Vec<(f64, Option<Uncertainty>)> {
-    let least = forms.first().filter(|form| form.least).map_or(0, |form| form.draws);
+    let (least, alone) = forms.first().map_or((0, false), |form| (form.draws, form.least));
     let likely = |drawn: &mut [f64], value: f64| {
-        let (of_least, drawn) = drawn.split_at_mut(least.min(drawn.len()));
+        let mut of_least = drawn[..least.min(drawn.len())].to_vec();
+        let drawn = if alone { &mut drawn[of_least.len()..] } else { drawn };
         let known = summed_up(drawn, value);
         of_least.sort_by(f64::total_cmp);
-        let begin = of_least.first().map_or(f64::INFINITY, |_| point(of_least, TAIL));
+        let middle = point(&of_least, 0.5);
+        // As wide as few transforms need, where the whole is not widened for all of them.
+        let wider = widening(of_least.len().div_ceil(TURNS_OF_A_DRAW) as f64) / widening(transforms.max(1) as f64);
+        let begin = middle - wider.max(1.0) * (middle - point(&of_least, TAIL));
         let squares: f64 = drawn.iter().map(|draw| (draw - value).powi(2)).sum();
         let std = (squares / drawn.len().max(1) as f64).sqrt();
         Uncertainty { std, interval_95: [point(drawn, TAIL).min(begin), point(drawn, 1.0 - TAIL)], ..known }
@@ -277,6 +279,12 @@ pub fn of_rms(
     // It may also leave less than there is: then the interval begins at 0, and has its reach.
     let interval_95 = [(middle - reach).max(0.0).sqrt(), (middle.max(0.0) + reach).sqrt()];
     Some(Uncertainty { std: (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95), interval_95, draws: 0 })
+}
+
+/// How much wider intervals are whose draws come from so many transforms of several draws each, which give a standard deviation no better than
+/// two real degrees of freedom a transform do.
+fn widening(transforms: f64) -> f64 {
+    student_95(2.0 * transforms) / NORMAL_95
 }
 
 /// Value at a share of sorted draws.

@@ -23,7 +23,8 @@ pub struct LikelyForm {
     pub mean_um: Vec<f64>,
     /// Of all draws, those that are to be made of it.
     pub draws: usize,
-    /// Whether it is the least form that is likely, whose draws are for the lower end of intervals alone.
+    /// Whether its draws are for the lower end of intervals alone, as those of the least form are. Where that is also one of the others, it is the
+    /// first, too.
     pub least: bool,
     /// Variance of the errors, by order from 0.
     variance: Vec<f64>,
