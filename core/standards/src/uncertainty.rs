@@ -1,5 +1,7 @@
 //! Uncertainty of values that depend on a profile non-linearly, by Monte Carlo (GUM supplement 1, JCGM 101:2008).
 
+use std::f64::consts::SQRT_2;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -107,6 +109,25 @@ impl Uncertainty {
         let mut moved = self.moved(value - about);
         moved.interval_95 = [moved.interval_95[0].min(drawn[0]), moved.interval_95[1].max(drawn[1])];
         moved
+    }
+
+    /// The same of a peak to valley about a centre that is held loosely along one direction: it changes by no more than the centre moves, and is
+    /// no smaller than that about the best centre, of which it lies `above_um` and which noise raises by no more than twice its largest error.
+    #[must_use]
+    pub fn of_loose_centre(mut self, value: f64, above_um: f64, std: f64) -> Self {
+        let floor = (value - above_um - 2.0 * LARGEST_OF_ALL * std).max(0.0);
+        self.interval_95[0] = self.interval_95[0].min(floor);
+        self
+    }
+
+    /// The same where the curvature of the profile at two opposite contacts holds the centre: a centre that is right to `centre_std` adds that to
+    /// the errors at both ends, whichever of them it moves towards.
+    #[must_use]
+    pub fn of_bent_contacts(value: f64, above_um: f64, std: f64, centre_std: f64) -> Self {
+        let floor = (value - above_um - 2.0 * LARGEST_OF_ALL * std).max(0.0);
+        let std = centre_std.hypot(SQRT_2 * std);
+        let reach = NORMAL_95 * std;
+        Self { std, interval_95: [(value - reach).max(floor), value + reach], draws: 0 }
     }
 
     /// The same of an extreme of a profile, or of the distance of two (`ends`), whatever the true profile is: noise of the standard deviation `std`

@@ -21,6 +21,7 @@ mod determine;
 mod disturbed;
 mod equal_heights;
 mod fixed_centre;
+mod hold;
 mod least_squares;
 mod points;
 mod search;
@@ -31,6 +32,7 @@ use super::near::Course;
 pub use super::reference::{Reference, Undetermined};
 pub use disturbed::{CircleSearch, Disturbed};
 pub use fixed_centre::FixedCentre;
+pub use hold::Hold;
 pub use points::{Angles, Points};
 pub use series::{Series, between_angles};
 

@@ -10,7 +10,7 @@ use runout_numerics::{
 };
 use runout_standards::{
     Value,
-    roundness::{Angles, CircleSearch, Points, Reference, Series, Values},
+    roundness::{Angles, CircleSearch, Hold, Points, Reference, Series, Values},
     slope::{self, steepest_um_per_rad},
     uncertainty::{
         DRAWS, LARGEST, Lacking, LikelyForm, TURNS_OF_A_DRAW, Uncertainty, angles_for_parabolas, crest_order,
@@ -80,6 +80,9 @@ impl Form {
             };
             (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
         });
+        let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
+        self.state_loose(filter, references, &labels, &mut found);
+        let found = found.into_iter();
         let mut found: Vec<Found> = found.map(Found::from).collect();
         if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
             let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
@@ -88,6 +91,48 @@ impl Form {
             found.insert(last + 1, self.steepest(filter));
         }
         labelled_with_reasons(labels, found, filter, &self.held, self.at.coverage(self.angles))
+    }
+
+    /// States what errors make of RONt about MICI and MCCI whose centre nearly opposite contacts hold loosely.
+    fn state_loose(
+        &self,
+        filter: &Filter,
+        references: &[Reference],
+        labels: &[Label],
+        found: &mut [(f64, Option<Uncertainty>)],
+    ) {
+        if !references.iter().any(|reference| has_kinks_about(reference.symbol())) || !self.at.gaps.is_empty() {
+            return;
+        }
+        let (harmonics, variance) = (filter.harmonics(&self.harmonics), self.widened(filter));
+        let of_order = |power: i32| {
+            let orders = variance.iter().enumerate().skip(2).filter(|(_, variance)| **variance > 0.0);
+            (0.5 * orders.map(|(order, variance)| (order as f64).powi(power) * variance).sum::<f64>()).sqrt()
+        };
+        let [std_um, slope_um] = [0, 2].map(of_order);
+        let highest = filter.highest(self.held.highest);
+        let angles = Angles::shared(angles_to_draw(&harmonics, &variance, highest, usize::MAX));
+        let mut fourier = Fourier::new(angles.len());
+        let profile_um = self.profile(filter, &mut fourier);
+        let mut zone_um = None;
+        for reference in references {
+            let is_own = |label: &Label| label.symbol == "RONt" && label.reference == reference.symbol();
+            let Some(place) = labels.iter().position(is_own).filter(|place| found[*place].1.is_some()) else {
+                continue;
+            };
+            let hold = Hold::of(*reference, &angles, &profile_um, self.radius_mm);
+            let Some(hold) = hold.filter(|hold| *hold != Hold::Firm) else { continue };
+            let zone_um = *zone_um.get_or_insert_with(|| self.about(filter, &[Reference::MinimumZone])[0]);
+            let (value, known) = &mut found[place];
+            let above_um = *value - zone_um;
+            *known = known.take().map(|known| match hold {
+                Hold::Firm => known,
+                Hold::Opposite => known.of_loose_centre(*value, above_um, std_um),
+                Hold::Bent(variance) => {
+                    Uncertainty::of_bent_contacts(*value, above_um, std_um, variance.sqrt() * slope_um)
+                }
+            });
+        }
     }
 
     /// Values about reference circles, of the profile between the angles too.
@@ -346,8 +391,12 @@ fn roundness_labels(reference: Reference) -> Vec<Label> {
 
 /// Whether errors change which contacts hold the circle that a value is about, and with them the value's slopes.
 fn has_kinks(label: &Label) -> bool {
-    let about = [Reference::MaximumInscribed, Reference::MinimumCircumscribed];
-    label.symbol == "RONt" && about.iter().any(|reference| reference.symbol() == label.reference)
+    label.symbol == "RONt" && has_kinks_about(&label.reference)
+}
+
+/// The same of RONt about the reference with this symbol.
+fn has_kinks_about(symbol: &str) -> bool {
+    [Reference::MaximumInscribed, Reference::MinimumCircumscribed].iter().any(|reference| reference.symbol() == symbol)
 }
 
 /// An extreme of a profile.
