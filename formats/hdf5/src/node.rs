@@ -1,6 +1,6 @@
 //! Groups, datasets and attributes with their place in the file, so that every error can name it.
 
-use std::{fmt, path::Path, sync::Arc};
+use std::{fmt, io::Read, path::Path, sync::Arc};
 
 use hdf5_metno::{
     Attribute, Dataset, Datatype, File, Group, H5Type, Location, LocationType,
@@ -84,6 +84,11 @@ pub(crate) fn open(path: &Path, follow_links: bool) -> Result<(File, Place, Arc<
     // The file system's own answer is clearer than the library's.
     let input = InputFile::new(path)?;
     let file = File::open(path).map_err(|error| {
+        if is_text(path) {
+            return Error::new("open", &shown, "no HDF5 file, but text")
+                .of(ErrorKind::DamagedData)
+                .help("a recording in text is read by [load] plugin = \"csv\"");
+        }
         Error::new("open", &shown, format!("no HDF5 file, or a damaged one: {error}"))
             .of(ErrorKind::DamagedData)
             .help("a file whose writing was interrupted is often truncated")
@@ -93,6 +98,14 @@ pub(crate) fn open(path: &Path, follow_links: bool) -> Result<(File, Place, Arc<
     let links = Arc::new(Links::of(&file, &input, follow_links));
     let place = Place { links: Some(Arc::clone(&links)), ..Place::root(path) };
     Ok((file, place, links))
+}
+
+/// Whether a file begins with characters and nothing else.
+fn is_text(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(1024).read_to_end(&mut start));
+    let is_character = |byte: &u8| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~' | 0x80..);
+    read.is_ok() && !start.is_empty() && start.iter().all(is_character)
 }
 
 /// Names of the members of a group, sorted.

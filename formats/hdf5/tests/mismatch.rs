@@ -163,6 +163,6 @@ fn what_is_no_measurement_is_refused() {
     assert!(text.contains("none.h5") && text.contains("No such file"), "{text}");
     let path = folder.path().join("text.h5");
     std::fs::write(&path, "index,S1\n").unwrap();
-    assert!(message(load(&path, &rig)).contains("no HDF5 file"));
+    assert!(message(load(&path, &rig)).contains("no HDF5 file, but text"));
     assert!(!message(load(Path::new("/"), &rig)).is_empty());
 }

@@ -106,11 +106,12 @@ impl std::ops::Add for Lacking {
 
 /// What these forms lack of the highest of the heights found (the lowest by `sign` −1), where nothing competes with it: farther from it than a wave of the highest noise,
 /// no height is within [`ALONE`] standard deviations of the noise. Noise then raises it as often as it lowers it, whatever the form, so that
-/// the true extreme is about the one found as the noise is; forms of waves at random expect it where their waves are. The interval holds both.
+/// the true extreme is about the one found as the noise is; forms of waves at random expect it where their waves are. An interval that holds both holds
+/// the truth whatever the form. `None` where others compete.
 #[must_use]
-pub fn lacking_at_extreme(forms: &[LikelyForm], found_um: &[f64], sign: f64) -> Lacking {
+pub fn lacking_at_extreme(forms: &[LikelyForm], found_um: &[f64], sign: f64) -> Option<Lacking> {
     let likely = || forms.iter().filter(|form| !form.least && form.draws > 0);
-    let (Some(first), count) = (forms.first(), found_um.len()) else { return Lacking::default() };
+    let (first, count) = (forms.first()?, found_um.len());
     let std_um = (0.5 * first.of_noise).sqrt();
     let heights = || found_um.iter().map(|height| sign * height);
     let highest = heights().enumerate().fold((0, f64::NEG_INFINITY), |best, at| if at.1 > best.1 { at } else { best });
@@ -120,13 +121,13 @@ pub fn lacking_at_extreme(forms: &[LikelyForm], found_um: &[f64], sign: f64) -> 
         aside.min(count - aside) > near && height > highest.1 - ALONE * std_um
     };
     if std_um.is_nan() || heights().enumerate().any(competes) {
-        return Lacking::default();
+        return None;
     }
     let draws: f64 = likely().map(|form| form.draws as f64).sum();
     let mean = |of: &dyn Fn(&LikelyForm) -> f64| likely().map(|form| form.draws as f64 * of(form)).sum::<f64>() / draws;
     let left_um = mean(&|form| highest.1 - sign * form.mean_um[highest.0]);
     let wider_um = NORMAL_95 * (std_um - mean(&LikelyForm::std_um));
-    Lacking { up_um: (left_um + wider_um).max(0.0), down_um: (wider_um - left_um).max(0.0) }
+    Some(Lacking { up_um: (left_um + wider_um).max(0.0), down_um: (wider_um - left_um).max(0.0) })
 }
 
 impl LikelyForm {

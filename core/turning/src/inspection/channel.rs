@@ -115,7 +115,8 @@ impl Channel {
         } else if self.last.is_none() {
             Some(format!("none of its {} samples is a number up to 1 m", self.seen))
         } else {
-            Some(format!("all {} samples read {} µm", self.seen, self.lowest))
+            // Of −0, too, 0.
+            Some(format!("all {} samples read {} µm", self.seen, self.lowest + 0.0))
         }
     }
 

@@ -157,7 +157,9 @@ fn a_sensor_pegged_from_the_start_is_clipped() {
 #[test]
 fn a_dead_channel_is_an_error_that_names_it() {
     let none = "none of its 3000 samples is a number up to 1 m";
-    for (value, said) in [(2.5, "all 3000 samples read 2.5 µm"), (f64::NAN, none), (1e9, none)] {
+    for (value, said) in
+        [(2.5, "all 3000 samples read 2.5 µm"), (-0.0, "all 3000 samples read 0 µm"), (f64::NAN, none), (1e9, none)]
+    {
         for limits in [None, Some([-10.0, 10.0])] {
             let channels = vec![sine(3 * TURN, 3.0, 0.0), vec![value; 3 * TURN]];
             let error = inspect(stream(&channels, limits, 100)).unwrap_err().to_string();

@@ -107,9 +107,28 @@ fn lobes(random: &mut ChaCha8Rng, order: usize) -> Waves {
     vec![(order, random.random_range(0.8..2.0), TAU * random.random::<f64>())]
 }
 
+/// Two scratches that noise hides in part, many lobes that are alike, and two whose opposite contacts hold MICI and MCCI loosely.
 #[test]
-#[ignore = "prints a table"]
-fn extremes_table() {
+fn intervals_hold_the_truth_of_extremes_unlike_those_of_waves() {
+    const PROFILES: u64 = 60;
+    let check = |case: &str, all: BTreeMap<&'static str, Held>| {
+        for (name, held) in all.into_iter().filter(|(name, _)| *name != "dr/dtheta LSCI") {
+            println!("{case}, {name}: {} of {}", held.inside(), held.profiles);
+            // 95 % of 60 are 57 ± 1.7; three of those below it. By draws of waves at random, 15 to 45 are held.
+            assert!(held.profiles == PROFILES as u32 && held.inside() >= 52, "{case}, {name}: {held:?}");
+        }
+    };
+    for (noise_um, cutoff_upr) in [(0.05, None), (0.008, Some(50))] {
+        check("scratch", held(|random| scratch(random, 2.0), noise_um, cutoff_upr, PROFILES));
+    }
+    for (order, noise_um, cutoff_upr) in [(15, 0.2, None), (2, 0.05, None), (2, 0.004, Some(15))] {
+        check(&format!("{order} lobes"), held(|random| lobes(random, order), noise_um, cutoff_upr, PROFILES));
+    }
+}
+
+#[test]
+#[ignore = "prints the table of docs/uncertainty.md"]
+fn intervals_of_extremes_unlike_those_of_waves() {
     let print = |case: &str, all: BTreeMap<&'static str, Held>| {
         for (name, held) in all {
             let n = f64::from(held.profiles);
@@ -124,7 +143,7 @@ fn extremes_table() {
             );
         }
     };
-    const N: u64 = 100;
+    const N: u64 = 200;
     let falling = |random: &mut ChaCha8Rng| -> Waves {
         (2..=HIGHEST).map(|n| (n, 2.0 * (n as f64).powf(-1.2), TAU * random.random::<f64>())).collect()
     };

@@ -54,8 +54,8 @@ struct Drawn {
     values: Vec<(f64, Option<Uncertainty>)>,
     /// Standard deviation of the noise, where draws do not show what is found at some angle.
     overlooked: Option<f64>,
-    /// What draws may lack of the lowest and the highest height.
-    lacking: [Lacking; 2],
+    /// What draws may lack of the lowest and the highest height, where none competes with it.
+    lacking: [Option<Lacking>; 2],
 }
 
 impl Form {
@@ -70,14 +70,11 @@ impl Form {
         let found = self.about(filter, references).into_iter().zip(drawn);
         let found = found.zip(&labels).map(|((value, drawn), label)| {
             let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
-            let known = match (overlooked, extremes(label)) {
-                (_, []) => known,
-                (Some(noise_um), ends) => known.map(|known| known.of_any_form(value, noise_um, ends.len() as f64)),
-                (None, ends) => {
-                    let lacking = ends.iter().map(|end| lacking[*end as usize]).fold(Lacking::default(), Add::add);
-                    known.map(|known| known.with_lacking(lacking))
-                }
-            };
+            let lacking: Vec<Option<Lacking>> = extremes(label).iter().map(|end| lacking[*end as usize]).collect();
+            let known = known.map(|known| match overlooked {
+                Some(noise_um) if lacking.contains(&None) => known.of_any_form(value, noise_um, lacking.len() as f64),
+                _ => known.with_lacking(lacking.into_iter().flatten().fold(Lacking::default(), Add::add)),
+            });
             (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
         });
         let mut found: Vec<(f64, Option<Uncertainty>)> = found.collect();
@@ -303,9 +300,10 @@ impl Form {
         let share = of_errors / slopes.iter().skip(2).map(Complex64::norm_sqr).sum::<f64>();
         if share > MOST_NOISE_OF_SLOPE {
             let reason = format!(
-                "errors are {:.0} % of the slope's variance, most of them at the highest orders, where the recording does not show how much \
-                 is form; a filter with a lower cut-off leaves less of them",
-                (100.0 * share).min(100.0)
+                "errors are {:.1} % of the slope's variance (over {:.1} %), most of them at the highest orders, where the recording does not \
+                 show how much is form; a filter with a lower cut-off leaves less of them",
+                (100.0 * share).min(100.0),
+                100.0 * MOST_NOISE_OF_SLOPE
             );
             return Found { value, uncertainty: None, no_uncertainty: Some(reason) };
         }
