@@ -129,6 +129,7 @@ fn intervals_hold_the_truth_of_extremes_unlike_those_of_waves() {
 #[test]
 #[ignore = "prints the table of docs/uncertainty.md"]
 fn intervals_of_extremes_unlike_those_of_waves() {
+    const N: u64 = 200;
     let print = |case: &str, all: BTreeMap<&'static str, Held>| {
         for (name, held) in all {
             let n = f64::from(held.profiles);
@@ -143,7 +144,6 @@ fn intervals_of_extremes_unlike_those_of_waves() {
             );
         }
     };
-    const N: u64 = 200;
     let falling = |random: &mut ChaCha8Rng| -> Waves {
         (2..=HIGHEST).map(|n| (n, 2.0 * (n as f64).powf(-1.2), TAU * random.random::<f64>())).collect()
     };

@@ -229,7 +229,7 @@ fn intervals_of_the_steepest_slope_hold_the_truth() {
     for (fall, last, std_um) in [(-1, 60, 0.0043), (-1, 60, 0.01), (-2, 20, 0.0043)] {
         let rms: f64 = (2..=last).map(|order| 0.5 * f64::from(order).powi(2 * fall)).sum::<f64>().sqrt();
         let variance = 2.0 * std_um * std_um / (HIGHEST - 1) as f64;
-        let (mut inside, mut noise) = (0, 0.0);
+        let (mut inside, mut noise, mut half, mut squares) = (0, 0.0, 0.0, 0.0);
         for trial in 0..TRIALS {
             let mut waves: Vec<(usize, Complex64)> = vec![(0, Complex64::ZERO); HIGHEST + 1];
             for order in 2..=last {
@@ -251,16 +251,22 @@ fn intervals_of_the_steepest_slope_hold_the_truth() {
             let [low, high] = found.uncertainty.unwrap().interval_95;
             inside += usize::from(low <= truth && truth <= high);
             noise += (found.value / truth - 1.0) / TRIALS as f64;
+            half += 0.5 * (high - low) / TRIALS as f64;
+            squares += (found.value - truth).powi(2) / TRIALS as f64;
         }
         let percent = 100.0 * inside as f64 / TRIALS as f64;
-        println!("order^{fall} to {last}, {std_um} µm: {percent:.1} %, noise adds {:.1} %", 100.0 * noise);
+        let wide = half / (1.96 * squares.sqrt());
+        println!(
+            "order^{fall} to {last}, {std_um} µm: {percent:.1} %, {wide:.2} of 1.96 rms, noise adds {:.1} %",
+            100.0 * noise
+        );
         // 95 % of 300 are 285 ± 3.8; of forms that end, the lower end is that of none above their last order, which holds more.
-        assert!((91.5..=99.8).contains(&percent), "{percent} %");
+        assert!(percent >= 91.5 && wide < 1.5, "{percent} %, {wide}");
     }
     // Σ n²σ² of errors of 10 nm in 254 orders is 4.4 µm²; of a wave of order 3 it is 9a², 11 times as much for 2.3 µm.
     let hidden = of(&[(3, Complex64::from(2.3))], &[2.0 * 1e-4 / 254.0; HIGHEST + 1], 0);
     assert!(hidden.uncertainty.is_none(), "{hidden:?}");
-    assert!(hidden.no_uncertainty.is_some_and(|reason| reason.contains("9 % of the slope's variance")));
+    assert!(hidden.no_uncertainty.is_some_and(|reason| reason.contains(" % of the slope's variance (over 0.4 %)")));
 }
 
 /// Also where no other value of the part was asked for.
