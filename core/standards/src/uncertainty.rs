@@ -147,7 +147,8 @@ impl Uncertainty {
     pub fn with_lacking(mut self, lacking: Lacking) -> Self {
         let [low, high] = self.interval_95;
         let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
-        self.interval_95 = [(low - lacking.down_um).max(floor), high + lacking.up_um];
+        let Lacking { left_um, wider_um } = lacking;
+        self.interval_95 = [(low - (wider_um - left_um).max(0.0)).max(floor), high + (wider_um + left_um).max(0.0)];
         self
     }
 
@@ -207,10 +208,7 @@ pub fn likely_values_of(
         let drawn = if alone { &mut drawn[of_least.len()..] } else { drawn };
         let known = summed_up(drawn, value);
         of_least.sort_by(f64::total_cmp);
-        let middle = point(&of_least, 0.5);
-        // As wide as few transforms need, where the whole is not widened for all of them.
-        let wider = widening(of_least.len().div_ceil(TURNS_OF_A_DRAW) as f64) / widening(transforms.max(1) as f64);
-        let begin = middle - wider.max(1.0) * (middle - point(&of_least, TAIL));
+        let begin = point(&of_least, TAIL);
         let squares: f64 = drawn.iter().map(|draw| (draw - value).powi(2)).sum();
         let std = (squares / drawn.len().max(1) as f64).sqrt();
         Uncertainty { std, interval_95: [point(drawn, TAIL).min(begin), point(drawn, 1.0 - TAIL)], ..known }

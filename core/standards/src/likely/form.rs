@@ -87,20 +87,21 @@ pub fn overlooked_by(forms: &[LikelyForm], found_um: &[f64]) -> Option<f64> {
     (2 * overlooking > draws).then(|| (0.5 * of_noise).sqrt())
 }
 
-/// What the forms may lack of an extreme: by how much farther up and down the true one may be than draws of them show, in µm.
+/// What the forms may lack of an extreme, in µm.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lacking {
-    /// Above the draws.
-    pub up_um: f64,
-    /// Below them.
-    pub down_um: f64,
+    /// By how much that of their means is less than the one found.
+    pub left_um: f64,
+    /// By how much the errors at one angle reach farther than those of draws.
+    pub wider_um: f64,
 }
 
 impl std::ops::Add for Lacking {
     type Output = Self;
 
+    /// Of a distance of two extremes, of which the errors do not depend on each other.
     fn add(self, other: Self) -> Self {
-        Self { up_um: self.up_um + other.up_um, down_um: self.down_um + other.down_um }
+        Self { left_um: self.left_um + other.left_um, wider_um: self.wider_um.hypot(other.wider_um) }
     }
 }
 
@@ -127,7 +128,7 @@ pub fn lacking_at_extreme(forms: &[LikelyForm], found_um: &[f64], sign: f64) -> 
     let mean = |of: &dyn Fn(&LikelyForm) -> f64| likely().map(|form| form.draws as f64 * of(form)).sum::<f64>() / draws;
     let left_um = mean(&|form| highest.1 - sign * form.mean_um[highest.0]);
     let wider_um = NORMAL_95 * (std_um - mean(&LikelyForm::std_um));
-    Some(Lacking { up_um: (left_um + wider_um).max(0.0), down_um: (wider_um - left_um).max(0.0) })
+    Some(Lacking { left_um, wider_um })
 }
 
 impl LikelyForm {
