@@ -142,12 +142,19 @@ impl Uncertainty {
         self
     }
 
+    /// Of an extreme that is alone, or of the distance of two, about a centre that errors do not move: as large as the errors there, whatever the form.
+    #[must_use]
+    pub fn of_extremes_alone(value: f64, std: f64) -> Self {
+        let reach = NORMAL_95 * std;
+        Self { std, interval_95: [(value - reach).max(0.0), value + reach], draws: 0 }
+    }
+
     /// The same where draws are of forms that may [lack](Lacking) so much of an extreme.
     #[must_use]
     pub fn with_lacking(mut self, lacking: Lacking) -> Self {
         let [low, high] = self.interval_95;
         let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
-        let Lacking { left_um, wider_um } = lacking;
+        let Lacking { left_um, wider_um, .. } = lacking;
         self.interval_95 = [(low - (wider_um - left_um).max(0.0)).max(floor), high + (wider_um + left_um).max(0.0)];
         self
     }

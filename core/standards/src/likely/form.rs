@@ -94,6 +94,8 @@ pub struct Lacking {
     pub left_um: f64,
     /// By how much the errors at one angle reach farther than those of draws.
     pub wider_um: f64,
+    /// Standard deviation of the errors at one angle.
+    pub std_um: f64,
 }
 
 impl std::ops::Add for Lacking {
@@ -101,7 +103,11 @@ impl std::ops::Add for Lacking {
 
     /// Of a distance of two extremes, of which the errors do not depend on each other.
     fn add(self, other: Self) -> Self {
-        Self { left_um: self.left_um + other.left_um, wider_um: self.wider_um.hypot(other.wider_um) }
+        Self {
+            left_um: self.left_um + other.left_um,
+            wider_um: self.wider_um.hypot(other.wider_um),
+            std_um: self.std_um.hypot(other.std_um),
+        }
     }
 }
 
@@ -128,7 +134,7 @@ pub fn lacking_at_extreme(forms: &[LikelyForm], found_um: &[f64], sign: f64) -> 
     let mean = |of: &dyn Fn(&LikelyForm) -> f64| likely().map(|form| form.draws as f64 * of(form)).sum::<f64>() / draws;
     let left_um = mean(&|form| highest.1 - sign * form.mean_um[highest.0]);
     let wider_um = NORMAL_95 * (std_um - mean(&LikelyForm::std_um));
-    Some(Lacking { left_um, wider_um })
+    Some(Lacking { left_um, wider_um, std_um })
 }
 
 impl LikelyForm {

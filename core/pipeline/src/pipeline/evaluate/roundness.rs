@@ -71,8 +71,14 @@ impl Form {
         let found = found.zip(&labels).map(|((value, drawn), label)| {
             let known = drawn.and_then(|(about, known)| Some(known?.moved(value - about)));
             let lacking: Vec<Option<Lacking>> = extremes(label).iter().map(|end| lacking[*end as usize]).collect();
-            let known = known.map(|known| match overlooked {
-                Some(noise_um) if lacking.contains(&None) => known.of_any_form(value, noise_um, lacking.len() as f64),
+            let all: Option<Vec<Lacking>> = lacking.iter().copied().collect();
+            let all = all.filter(|all| !all.is_empty()).map(|all| all.into_iter().fold(Lacking::default(), Add::add));
+            let is_fixed = label.reference == Reference::LeastSquares.symbol() && self.at.gaps.is_empty();
+            let known = known.map(|known| match (overlooked, all) {
+                (_, Some(all)) if is_fixed => Uncertainty::of_extremes_alone(value, all.std_um),
+                (Some(noise_um), None) if !lacking.is_empty() => {
+                    known.of_any_form(value, noise_um, lacking.len() as f64)
+                }
                 _ => known.with_lacking(lacking.into_iter().flatten().fold(Lacking::default(), Add::add)),
             });
             (value, if has_kinks(label) { known.map(|known| known.on_both_sides(value)) } else { known })
