@@ -16,6 +16,7 @@ mod plane_map;
 mod positions;
 mod roundness;
 mod section;
+mod steepest;
 mod texture;
 mod wall;
 
