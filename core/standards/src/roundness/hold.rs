@@ -17,8 +17,13 @@ pub enum Hold {
     /// By two that are nearly opposite, one of them two peaks that are close together.
     Opposite,
     /// By two that are nearly opposite, at each of which the profile bends away: across their chord, the centre is the mean of where the profile's slope
-    /// at either contact is 0. Of independent slopes with the variance 1, this is the variance of that mean.
-    Bent(f64),
+    /// at either contact is 0.
+    Bent {
+        /// Of independent slopes with the variance 1, that of that mean.
+        variance: f64,
+        /// How much the profile bends at the flatter contact, in µm/rad².
+        bend_um: f64,
+    },
 }
 
 impl Hold {
@@ -52,7 +57,8 @@ impl Hold {
         };
         let [one, opposite] = [one, opposite].map(flatness);
         let sum = one + opposite;
-        Some(Self::Bent((one / sum).powi(2) + (opposite / sum).powi(2)))
+        let variance = (one / sum).powi(2) + (opposite / sum).powi(2);
+        Some(Self::Bent { variance, bend_um: one.max(opposite).recip() })
     }
 }
 
@@ -74,7 +80,10 @@ mod tests {
                 .map(|reference| Hold::of(reference, &angles, &form_um, 20.0))
         };
         for hold in of(&[(2.0, 2.0, 0.3), (3.0, 0.001, 1.0)]) {
-            assert!(matches!(hold, Some(Hold::Bent(variance)) if (variance - 0.5).abs() < 0.02), "{hold:?}");
+            assert!(
+                matches!(hold, Some(Hold::Bent { variance, bend_um }) if (variance - 0.5).abs() < 0.02 && (bend_um - 8.0).abs() < 0.1),
+                "{hold:?}"
+            );
         }
         assert_eq!(of(&[(3.0, 2.0, 0.3), (5.0, 0.1, 1.0)]), [Some(Hold::Firm); 2]);
         // Ripple on two lobes: of either contact several peaks are close together.

@@ -34,6 +34,9 @@ fn reach(reference: Reference) -> f64 {
 /// crests of noise, which draws of the true form do not have.
 const MOST_NOISE: f64 = 0.25;
 
+/// A profile's own bend holds the centre of MICI and MCCI where it is so many times the standard deviation of that of the errors.
+const MOST_BENT: f64 = 4.0;
+
 /// Draws of what is filtered robustly, point by point and some times over.
 const DRAWS_OF_ROBUST: usize = 64;
 
@@ -107,7 +110,7 @@ impl Form {
             let orders = variance.iter().enumerate().skip(2).filter(|(_, variance)| **variance > 0.0);
             (0.5 * orders.map(|(order, variance)| (order as f64).powi(power) * variance).sum::<f64>()).sqrt()
         };
-        let [std_um, slope_um] = [0, 2].map(of_order);
+        let [std_um, slope_um, bend_um] = [0, 2, 4].map(of_order);
         let highest = filter.highest(self.held.highest);
         let angles = Angles::shared(angles_to_draw(&harmonics, &variance, highest, usize::MAX));
         let mut fourier = Fourier::new(angles.len());
@@ -125,10 +128,11 @@ impl Form {
             let above_um = *value - zone_um;
             *known = known.take().map(|known| match hold {
                 Hold::Firm => known,
-                Hold::Opposite => known.of_loose_centre(*value, above_um, std_um),
-                Hold::Bent(variance) => {
+                // Errors that bend the profile as much as its form does make several contacts of one.
+                Hold::Bent { variance, bend_um: of_form_um } if of_form_um > MOST_BENT * bend_um => {
                     Uncertainty::of_bent_contacts(*value, above_um, std_um, variance.sqrt() * slope_um)
                 }
+                Hold::Opposite | Hold::Bent { .. } => known.of_loose_centre(*value, above_um, std_um),
             });
         }
     }
