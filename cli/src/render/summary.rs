@@ -30,6 +30,7 @@ pub(crate) fn text(summary: &Summary) -> String {
     let stations = &summary.stations;
     let mut page = Page::default();
     page.line(&summary.title);
+    refuted(&mut page, summary);
     if stations.is_empty() {
         named::section(&mut page, &summary.values);
         values::limits(&mut page, summary);
@@ -52,6 +53,30 @@ pub(crate) fn text(summary: &Summary) -> String {
     let outputs: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
     page.into_text()
+}
+
+/// Behind a number that its own data refute.
+const REFUTED: &str = " !";
+
+/// Says first which values their own data refute, and by what.
+fn refuted(page: &mut Page, summary: &Summary) {
+    let (reasons, values) = summary.refuted();
+    let count: usize = reasons.iter().map(|(_, count)| count).sum();
+    if count == 0 {
+        return;
+    }
+    page.line(format_args!("The data refute {count} of {values} values, marked by{REFUTED}"));
+    for (reason, _) in reasons.iter().take(FEW_STATIONS) {
+        page.line(format_args!("  {reason}"));
+    }
+    if reasons.len() > FEW_STATIONS {
+        page.line(format_args!("  and {} more reasons: every one is listed with --json", reasons.len() - FEW_STATIONS));
+    }
+}
+
+/// The mark of a number that its own data refute.
+fn mark(refuted_by: Option<&String>) -> &'static str {
+    if refuted_by.is_some() { REFUTED } else { "" }
 }
 
 /// Form, motion and what the fit leaves.
@@ -176,14 +201,15 @@ fn std_of(value: &Value) -> Option<f64> {
 
 /// A value with its standard uncertainty, or with its 95 % interval where this does not hold the value: noise adds to ranges.
 fn with_uncertainty(value: &Value) -> String {
-    let Some(known) = &value.uncertainty else { return significant(value.value, 4) };
+    let mark = mark(value.refuted_by.as_ref());
+    let Some(known) = &value.uncertainty else { return significant(value.value, 4) + mark };
     let [low, high] = known.interval_95;
     if (low..=high).contains(&value.value) {
-        return with_std(value.value, Some(known.std));
+        return with_std(value.value, Some(known.std)) + mark;
     }
     // As many decimals as the uncertainty has.
     let number = |number: f64| with_std(number, Some(known.std)).split(' ').next().unwrap_or_default().to_owned();
-    format!("{} (95 %: {} to {})", number(value.value), number(low), number(high))
+    format!("{} (95 %: {} to {}){mark}", number(value.value), number(low), number(high))
 }
 
 fn form_heading(stations: &[StationSummary]) -> String {
@@ -263,7 +289,9 @@ fn form_gathered(stations: &[StationSummary]) -> Table {
         gather("rms ± µm".into(), 2, &|section| section.form_std_um);
         for first in first_values(stations) {
             let (symbol, unit) = (&first.symbol, unit(&first.unit));
-            gather(format!("{}{lost}", label(first)), 4, &|section| Some(value_of(section, symbol)?.value));
+            let refuted = of.iter().find_map(|section| value_of(section, symbol)?.refuted_by.as_ref());
+            let name = format!("{}{lost}{}", label(first), mark(refuted));
+            gather(name, 4, &|section| Some(value_of(section, symbol)?.value));
             gather(format!("{symbol} ± {unit}"), 2, &|section| std_of(value_of(section, symbol)?));
         }
         gather("true error µm".into(), 2, &|section| section.truth_form_rms_error_um);

@@ -127,7 +127,7 @@ impl Check {
         Self {
             test,
             of: of.into(),
-            statistic,
+            statistic: if statistic.is_finite() { statistic } else { f64::MAX },
             dof: dof.iter().copied().filter(|dof| dof.is_finite()).collect(),
             p: p.min(1.0),
             factor: 1.0,
@@ -208,6 +208,22 @@ pub fn refuted_by(checks: &[Check]) -> Option<String> {
 /// Findings in one sentence at most.
 const MOST_SAID: usize = 3;
 
+/// All findings in words, the least likely first; of many of one test, the first ones and how many more there are.
+#[must_use]
+pub fn findings(checks: &[Check]) -> Vec<String> {
+    let mut found: Vec<&Check> = checks.iter().filter(|check| !check.finding.is_empty()).collect();
+    found.sort_by(|a, b| a.test.cmp(&b.test).then(a.p.total_cmp(&b.p)));
+    let of_test = |same: &[&Check]| -> Vec<String> {
+        let mut said: Vec<String> = same.iter().take(MOST_SAID).map(|check| check.finding.clone()).collect();
+        if same.len() > MOST_SAID {
+            let more = same.len() - MOST_SAID;
+            said.push(format!("{more} more findings of the test {}: the table consistency has all", same[0].test.name()));
+        }
+        said
+    };
+    found.chunk_by(|a, b| a.test == b.test).flat_map(of_test).collect()
+}
+
 /// A chance in words: "p 0.003", "p < 1e-99".
 #[must_use]
 pub fn chance(p: f64) -> String {
@@ -242,6 +258,7 @@ mod tests {
         assert_eq!(refuted_by(&many).as_deref(), Some("p 0.000000001; p 0.001; p 0.002; and 1 more"));
         let placed = of(1e-4).within("station s1");
         assert_eq!((placed.of.as_str(), placed.finding.as_str()), ("station s1, radius", "station s1: p 0.0001"));
+        assert_eq!(findings(&many).len(), 4);
         assert_eq!(of(0.02).widening(1.4).did, Action::Widened);
         assert!(!of(1e-4).named().refutes());
         assert_eq!([chance(0.0), chance(2.3e-5), chance(0.0123)], ["p < 1e-99", "p 2e-5", "p 0.012"]);

@@ -41,6 +41,6 @@ pub mod structure;
 #[cfg(test)]
 mod testing;
 
-pub use check::{Action, Check, Test, refuted_by};
+pub use check::{Action, Check, Test, findings, refuted_by};
 pub use linear::{Judgement, LinearFit, judge};
 pub use structure::{Kind, Order, Partition, Structure};

@@ -72,6 +72,22 @@ impl Summary {
         all
     }
 
+    /// What refutes values of this result, each reason once with the number of values, and how many values there are.
+    #[must_use]
+    pub fn refuted(&self) -> (Vec<(&str, usize)>, usize) {
+        let placed = self.placed_values();
+        let all = placed.iter().map(|placed| placed.value.refuted_by.as_deref());
+        let all: Vec<Option<&str>> = all.chain(self.values.iter().map(|value| value.refuted_by.as_deref())).collect();
+        let mut reasons: Vec<(&str, usize)> = Vec::new();
+        for reason in all.iter().flatten() {
+            match reasons.iter_mut().find(|(known, _)| known == reason) {
+                Some((_, count)) => *count += 1,
+                None => reasons.push((reason, 1)),
+            }
+        }
+        (reasons, all.len())
+    }
+
     /// The run's warnings, then each station's behind its name.
     pub fn all_warnings(&self) -> impl Iterator<Item = String> + '_ {
         let of_station = |station: &'_ StationSummary| -> Vec<String> {

@@ -34,6 +34,11 @@ pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (Stri
 
 /// What the residual and the warnings give, where nothing is to be decided.
 fn without_limits(summary: &Summary) -> (String, &'static str) {
+    let (refuted, values) = summary.refuted();
+    if let Some((reason, _)) = refuted.first() {
+        let count: usize = refuted.iter().map(|(_, count)| count).sum();
+        return (format!("The data refute {count} of {values} values, marked by !: {reason}."), "bad");
+    }
     let known = summary.stations.iter().filter(|station| station.chi2_per_dof.is_some()).count();
     let misfits = summary.stations.iter().filter(|station| station.is_misfit(known)).count();
     let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();

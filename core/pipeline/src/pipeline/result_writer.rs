@@ -19,7 +19,7 @@ use crate::{
     summary::{LostOrders, NamedValue, PartSummary, StationSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
-use runout_consistency::Check;
+use runout_consistency::{Check, findings};
 use runout_error::{Error, Result};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
@@ -238,9 +238,7 @@ impl ResultWriter {
         let left_out = self.station_tables.remark();
         self.summary.notes.extend(left_out.clone());
         self.summary.warnings.extend(left_out);
-        let findings = self.summary.consistency.iter().filter(|check| !check.finding.is_empty());
-        let findings: Vec<String> = findings.map(|check| check.finding.clone()).collect();
-        self.summary.warnings.extend(findings);
+        self.summary.warnings.extend(findings(&self.summary.consistency));
         self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
         self.summary.warnings.extend(inflated(&self.summary.stations));
         let mut placed = self.summary.placed_values();
