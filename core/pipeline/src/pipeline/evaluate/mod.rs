@@ -16,6 +16,7 @@ mod plane_map;
 mod positions;
 mod roundness;
 mod section;
+mod section_gaps;
 mod steepest;
 mod texture;
 mod wall;
