@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{
-    FARTHEST_UM, FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS,
+    FARTHEST_UM, FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS, WRAPPED_SHARE,
     spikes::{Extents, Spike},
 };
 use crate::measurement::{Block, Defect, DefectKind};
@@ -38,6 +38,14 @@ impl Rule {
                 [(low.min(high) + margin).max(-FARTHEST_UM), (low.max(high) - margin).min(FARTHEST_UM)]
             }
             Self::Flat { .. } | Self::None => [-FARTHEST_UM, FARTHEST_UM],
+        }
+    }
+
+    /// Step between two samples from which on a channel has wrapped round.
+    fn wrapped_step(&self, channel: usize) -> f64 {
+        match self {
+            Self::Limits(limits) => WRAPPED_SHARE * (limits[channel][1] - limits[channel][0]).abs(),
+            Self::Flat { .. } | Self::None => f64::INFINITY,
         }
     }
 }
@@ -131,6 +139,7 @@ impl Channel {
         past: &[f64],
     ) {
         let [low, high] = rule.inside(index);
+        let wrapped_step = rule.wrapped_step(index);
         for frame in frames {
             let place = block.start + frame as u64;
             let at = frame * channels + index;
@@ -169,6 +178,9 @@ impl Channel {
                 let step = (value - last).abs();
                 if step > 0.0 {
                     self.finest_step = self.finest_step.min(step);
+                }
+                if step >= wrapped_step {
+                    mark(&mut block.defects, index, DefectKind::WrappedRound, place..place + 1);
                 }
             }
             self.last = Some(value);
@@ -274,9 +286,19 @@ impl LaneWork for Look<'_> {
         let flat = matches!(self.rule, Rule::Flat { .. });
         // Fewer equal samples than these can be neither clipped nor stuck.
         let few = if flat { 1.0 } else { FLAT_RUN - 1.0 };
+        let wraps = |lane: usize| {
+            let wrapped_step = self.rule.wrapped_step(offset + lane);
+            // Only readings that lie so far apart can be a step of this size.
+            let swing = highest[lane].max(before[lane]) - lowest[lane].min(before[lane]);
+            swing >= wrapped_step && {
+                let readings = std::iter::once(&before[lane]).chain(frames.iter().skip(offset + lane).step_by(count));
+                let next = readings.clone().skip(1);
+                readings.zip(next).any(|(one, next)| (next - one).abs() >= wrapped_step)
+            }
+        };
         let quiet = (0..C).all(|lane| {
             let [low, high] = self.rule.inside(offset + lane);
-            zero[lane] == 0.0 && lowest[lane] > low && highest[lane] < high && most[lane] < few
+            zero[lane] == 0.0 && lowest[lane] > low && highest[lane] < high && most[lane] < few && !wraps(lane)
         });
         if !quiet {
             for (lane, channel) in group.iter_mut().enumerate() {
