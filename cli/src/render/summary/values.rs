@@ -24,11 +24,11 @@ pub(crate) fn part(page: &mut Page, summary: &Summary) {
     page.headed_table("The whole part", &table);
 }
 
-/// What was found of each limit, by its worst value.
+/// What was found of each limit, by the worst of the values that decide it.
 pub(crate) fn limits(page: &mut Page, summary: &Summary) {
     let mut table = Table::new(1, ["limit", "values", "proven", "the worst", "95 % interval", "decision"]);
     for limit in &summary.limits {
-        let worst = worst(limit);
+        let worst = deciding(limit);
         let proven = limit.values.iter().filter(|value| value.decision == Decision::Conforms).count();
         let interval = worst.and_then(|value| value.interval_95);
         table.row([
@@ -67,15 +67,17 @@ fn decided(limit: &LimitSummary, worst: Option<&LimitValue>) -> String {
     }
 }
 
-/// The value nearest to a limit, or farthest beyond it.
-fn worst(limit: &LimitSummary) -> Option<&LimitValue> {
+/// Of the values that the decision follows from, the one nearest to a limit, or farthest beyond it: of an undecided limit a value that is
+/// undecided itself, so that its reason is that of the decision.
+fn deciding(limit: &LimitSummary) -> Option<&LimitValue> {
     let room = |value: &LimitValue| {
         let [from, to] = value.interval_95.unwrap_or([value.value; 2]);
         let above = limit.limit.lower.map_or(f64::INFINITY, |lower| from - lower);
         let below = limit.limit.upper.map_or(f64::INFINITY, |upper| upper - to);
         above.min(below)
     };
-    limit.values.iter().min_by(|a, b| room(a).total_cmp(&room(b)))
+    let decide = limit.values.iter().filter(|value| value.decision == limit.decision);
+    decide.min_by(|a, b| room(a).total_cmp(&room(b)))
 }
 
 /// "s31, section a, MZCI, 5.31".
