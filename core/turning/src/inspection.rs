@@ -22,9 +22,11 @@
 //!   it is handed on, and [reported](Inspection::reporting).
 
 mod channel;
+mod rule;
 mod spikes;
 
-use channel::{Channel, Look, Rule};
+use channel::{Channel, Look};
+use rule::Rule;
 pub use spikes::Spike;
 
 use crate::measurement::{Block, Capture, SampleStream};

@@ -88,3 +88,49 @@ fn place(value: &LimitValue) -> String {
         [value.station.clone(), section, Some(value.reference.clone()), filter, Some(significant(value.value, 4))];
     words.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use runout_core::summary::Limit;
+
+    use super::*;
+
+    fn value(interval_95: [f64; 2], decision: Decision, missing: Option<&str>) -> LimitValue {
+        LimitValue {
+            station: None,
+            section: None,
+            reference: "MZCI".into(),
+            filter: "none".into(),
+            band_upr: [2, 63],
+            value: 0.5 * (interval_95[0] + interval_95[1]),
+            interval_95: Some(interval_95),
+            within: true,
+            decision,
+            missing: missing.map(str::to_owned),
+        }
+    }
+
+    /// The value nearest to the limit keeps it; another one is undecided, and says why.
+    #[test]
+    fn the_reason_of_a_limit_is_that_of_a_value_that_decides_it() {
+        let limit: Limit = toml::from_str("symbol = 'RONt'\nupper = 7.0\nunit = 'um'").unwrap();
+        let near = value([6.8, 6.9], Decision::Conforms, None);
+        let lacks = value([5.1, 5.2], Decision::Undecided, Some("its filter passes more than there is"));
+        let covers = value([6.9, 7.1], Decision::Undecided, None);
+        let beyond = value([7.2, 7.3], Decision::DoesNotConform, None);
+        for (values, decision, said) in [
+            (vec![near.clone(), lacks.clone()], Decision::Undecided, "undecided: its filter passes more than there is"),
+            (vec![near.clone(), lacks, covers], Decision::Undecided, "undecided: the interval holds the limit"),
+            (vec![near.clone(), beyond], Decision::DoesNotConform, "does not conform"),
+            (vec![near], Decision::Conforms, "conforms"),
+            (Vec::new(), Decision::Undecided, "undecided: no value"),
+        ] {
+            let summary = LimitSummary { limit: limit.clone(), decision, values };
+            let deciding = deciding(&summary);
+            assert!(deciding.is_none_or(|value| value.decision == decision));
+            assert_eq!(decided(&summary, deciding), said);
+        }
+    }
+}

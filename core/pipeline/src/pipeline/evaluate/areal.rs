@@ -4,7 +4,7 @@ use std::{borrow::Cow, collections::BTreeSet};
 
 use super::{
     ArealFilter, Content, Evaluate, Filter, FormRemoval, Found, Group, Label, PartSummary, labelled_with_reasons,
-    texture::found,
+    section_gaps::SectionGaps, texture::found,
 };
 use runout_error::Result;
 use runout_numerics::{

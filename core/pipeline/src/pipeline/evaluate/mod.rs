@@ -151,6 +151,8 @@ mod evaluable_tests;
 #[cfg(test)]
 mod extreme_tests;
 #[cfg(test)]
+mod gap_tests;
+#[cfg(test)]
 mod likely_tests;
 #[cfg(test)]
 mod tests;
