@@ -42,7 +42,7 @@ pub struct Summary {
     pub values: Vec<NamedValue>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
-    /// What the user should know.
+    /// What the user should know: of the whole, then of each station, behind the station's name.
     pub warnings: Vec<String>,
     /// Those of `warnings` that say nothing wrong: what the layout cannot separate, what the result is made of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -68,12 +68,9 @@ impl Summary {
         all
     }
 
-    /// The run's warnings, then each station's behind its name.
-    pub fn all_warnings(&self) -> impl Iterator<Item = String> + '_ {
-        let of_station = |station: &'_ StationSummary| -> Vec<String> {
-            station.warnings.iter().map(|warning| format!("{}: {warning}", station.station)).collect()
-        };
-        self.warnings.iter().cloned().chain(self.stations.iter().flat_map(of_station))
+    /// The warnings that are no notes: `--fail-on-warning` counts them.
+    pub fn findings(&self) -> impl Iterator<Item = &String> {
+        self.warnings.iter().filter(|warning| !self.notes.contains(warning))
     }
 }
 
@@ -141,7 +138,7 @@ pub struct StationSummary {
     pub residual_orders: Option<[usize; 2]>,
     /// True error of the motions, where the recording carries the truth.
     pub truth: Option<MotionTruth>,
-    /// What the user should know of this station.
+    /// What the user should know of this station; it is in the warnings of the whole too.
     pub warnings: Vec<String>,
 }
 
