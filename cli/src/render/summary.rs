@@ -12,7 +12,7 @@ use runout_core::{
 
 use super::{
     count,
-    number::{lacking, ranges, significant, spread, with_std},
+    number::{lacking, place, ranges, rounded_place, significant, spread, with_std},
     page::Page,
     table::Table,
     unit,
@@ -47,9 +47,7 @@ pub(crate) fn text(summary: &Summary) -> String {
         surface(&mut page, summary);
         named::section(&mut page, &summary.values);
     }
-    let mut warnings = summary.warnings.clone();
-    warnings.extend(stations.iter().flat_map(|station| station.warnings.iter().cloned()));
-    page.bullets("Warnings and notes", &warnings);
+    page.warnings(&summary.warnings);
     let outputs: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
     page.into_text()
@@ -230,7 +228,7 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
         let mut row = vec![
             name.to_owned(),
             section.section.clone(),
-            significant(section.z_mm, 5),
+            place(section.z_mm),
             with_std(section.form_rms_um, section.form_std_um),
         ];
         let lost = lost_in(section);
@@ -279,7 +277,7 @@ fn form_gathered(stations: &[StationSummary]) -> Table {
                 table.row(row);
             }
         };
-        gather("z mm".into(), 5, &|section| Some(section.z_mm));
+        gather("z mm".into(), 5, &|section| Some(rounded_place(section.z_mm)));
         // All sections of a rig lose the same orders, or nearly so.
         let mut lost: Vec<usize> = of.iter().flat_map(|section| lost_in(section)).copied().collect();
         lost.sort_unstable();
@@ -368,7 +366,7 @@ fn lost_orders(page: &mut Page, summary: &Summary) {
 
 fn surface(page: &mut Page, summary: &Summary) {
     let Some(surface) = &summary.surface else { return };
-    let [from, to] = surface.z_mm.map(|z_mm| significant(z_mm, 5));
+    let [from, to] = surface.z_mm.map(place);
     page.heading("Surface");
     page.line(format_args!("  {} angles × {} rings, z {from} to {to} mm", surface.angles, surface.rings));
     page.line(format_args!("  between sections: {}", surface.interpolation));
@@ -378,7 +376,7 @@ fn surface(page: &mut Page, summary: &Summary) {
     for meeting in meetings.iter().take(FEW_STATIONS) {
         table.row([
             meeting.sections.join(" and "),
-            significant(meeting.z_mm, 5),
+            place(meeting.z_mm),
             significant(meeting.rms_um, 3),
             known(meeting.expected_rms_um, 3),
             significant(meeting.max_um, 3),

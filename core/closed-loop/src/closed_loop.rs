@@ -131,6 +131,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
         lost_orders: None,
         truth: None,
         warnings,
+        notes: Vec::new(),
         outputs: Vec::new(),
     };
     Ok(Closed { diagnosis, before, after, settings: applied })

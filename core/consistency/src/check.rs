@@ -217,7 +217,10 @@ pub fn findings(checks: &[Check]) -> Vec<String> {
         let mut said: Vec<String> = same.iter().take(MOST_SAID).map(|check| check.finding.clone()).collect();
         if same.len() > MOST_SAID {
             let more = same.len() - MOST_SAID;
-            said.push(format!("{more} more findings of the test {}: the table consistency has all", same[0].test.name()));
+            said.push(format!(
+                "{more} more findings of the test {}: the table consistency has all",
+                same[0].test.name()
+            ));
         }
         said
     };

@@ -46,7 +46,7 @@ pub struct Summary {
     pub consistency: Vec<Check>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
-    /// What the user should know.
+    /// What the user should know: of the whole, then of each station, behind the station's name.
     pub warnings: Vec<String>,
     /// Those of `warnings` that say nothing wrong: what the layout cannot separate, what the result is made of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -88,12 +88,9 @@ impl Summary {
         (reasons, all.len())
     }
 
-    /// The run's warnings, then each station's behind its name.
-    pub fn all_warnings(&self) -> impl Iterator<Item = String> + '_ {
-        let of_station = |station: &'_ StationSummary| -> Vec<String> {
-            station.warnings.iter().map(|warning| format!("{}: {warning}", station.station)).collect()
-        };
-        self.warnings.iter().cloned().chain(self.stations.iter().flat_map(of_station))
+    /// The warnings that are no notes: `--fail-on-warning` counts them.
+    pub fn findings(&self) -> impl Iterator<Item = &String> {
+        self.warnings.iter().filter(|warning| !self.notes.contains(warning))
     }
 }
 
@@ -161,7 +158,7 @@ pub struct StationSummary {
     pub residual_orders: Option<[usize; 2]>,
     /// True error of the motions, where the recording carries the truth.
     pub truth: Option<MotionTruth>,
-    /// What the user should know of this station.
+    /// What the user should know of this station; it is in the warnings of the whole too.
     pub warnings: Vec<String>,
 }
 

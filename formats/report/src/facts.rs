@@ -41,7 +41,7 @@ fn without_limits(summary: &Summary) -> (String, &'static str) {
     }
     let known = summary.stations.iter().filter(|station| station.chi2_per_dof.is_some()).count();
     let misfits = summary.stations.iter().filter(|station| station.is_misfit(known)).count();
-    let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();
+    let warnings = summary.findings().count();
     let warned = match warnings {
         0 => String::new(),
         1 => " One warning is below.".into(),

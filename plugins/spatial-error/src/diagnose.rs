@@ -157,6 +157,7 @@ impl PointModel for SpatialError {
             lost_orders: None,
             truth: None,
             warnings: Vec::new(),
+            notes: Vec::new(),
             outputs: Vec::new(),
         };
         diagnosis.warnings.append(&mut outcome.remarks);

@@ -127,6 +127,7 @@ fn summary(stations: usize) -> Summary {
             meetings: vec![meeting],
         }),
         outputs: vec!["out/form.parquet".into()],
+        warnings: (0..stations).map(|index| format!("s{index:02}: the speed is 3 % off the stated one")).collect(),
         ..Summary::default()
     }
 }

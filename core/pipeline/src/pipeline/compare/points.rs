@@ -18,6 +18,7 @@ use crate::{
         document::{Document, Sources},
         evaluate::Evaluated,
         registry::Context,
+        warnings::of_station,
     },
     points::PointColumn,
     stage::{Outcome, PointSeparator, Request, Source},
@@ -128,8 +129,10 @@ impl<'a> ComparingPoints<'a> {
             method: name.clone(),
             unused: Vec::new(),
             lost_orders: LostOrders::default(),
-            notes: separator.notes().iter().chain(&outcome.remarks).chain(&outcome.notes).cloned().collect(),
+            notes: separator.notes().iter().chain(&outcome.notes).cloned().collect(),
         });
+        let of_methods = outcomes.iter().flat_map(|(name, _, outcome)| of_station(name, &outcome.remarks));
+        let warnings = points.remarks.iter().cloned().chain(of_methods).collect();
         let of: Vec<(&str, &Outcome)> = outcomes.iter().map(|(name, _, outcome)| (name.as_str(), outcome)).collect();
         Ok(Comparison {
             title: pipeline.title.clone(),
@@ -145,7 +148,7 @@ impl<'a> ComparingPoints<'a> {
             values: values(&of),
             columns: self::columns(&of),
             outputs,
-            warnings: Vec::new(),
+            warnings,
         })
     }
 

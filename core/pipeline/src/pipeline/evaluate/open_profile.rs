@@ -8,7 +8,7 @@ use crate::stage::OpenProfile;
 use runout_numerics::stretches::covered;
 use runout_standards::{
     Value,
-    drawn::{Drawn, Sensitivity},
+    drawn::{Drawn, Sensitivity, share_in_words},
     roundness::Reference,
     straightness::Straightness,
     texture::{self, Kind, Settings},
@@ -131,10 +131,9 @@ fn with_reason(
     sensitivity: Result<Sensitivity, &str>,
 ) -> Found {
     let reason = match (drawn, sensitivity) {
-        (Ok(drawn), Ok(sensitivity)) if drawn.share() > largest_share(sensitivity) => format!(
-            "errors are {:.2} % of the variance of what it is taken from; of an open profile no interval holds 95 % then",
-            100.0 * drawn.share()
-        ),
+        (Ok(drawn), Ok(sensitivity)) if drawn.share() > largest_share(sensitivity) => {
+            share_in_words(drawn.share()) + "; of an open profile no interval holds 95 % then"
+        }
         (Ok(drawn), sensitivity) => {
             let found = found(Some(drawn), index, value, sensitivity);
             return if sensitivity == Ok(Sensitivity::Extreme) { with_uncertain_shift(found) } else { found };
