@@ -20,6 +20,7 @@ use super::{
     mean::Analysis,
     orders_held,
     outliers::{Outliers, PendingTurn, Verdict},
+    passed::Fractions,
     size::Size,
     split::Means,
     spread::Motion,
@@ -48,8 +49,8 @@ pub(super) struct Outcome {
     pub bridged: Option<String>,
     /// By how much interruptions are wider at each end than the rig declares.
     pub bridged_beyond_rad: f64,
-    /// All positions lay on samples: nothing was interpolated.
-    pub exact: bool,
+    /// What passes of each order where the interpolation weakens some that are kept.
+    pub passed: Option<Vec<Complex64>>,
 }
 
 /// The resampling of one capture under way. All buffers live as long as it.
@@ -77,7 +78,8 @@ pub(super) struct Resampling<'a> {
     outliers: Option<Outliers>,
     used_samples: f64,
     rejected: Vec<RejectedTurn>,
-    exact: bool,
+    /// Where positions lie between samples, where that weakens orders that are kept.
+    fractions: Option<Fractions>,
 }
 
 impl<'a> Resampling<'a> {
@@ -115,7 +117,7 @@ impl<'a> Resampling<'a> {
             outliers: config.outlier_sigma.map(|sigma| Outliers::new(sigma, channels)),
             used_samples: 0.0,
             rejected: Vec::new(),
-            exact: true,
+            fractions: (!on_samples && average.is_weakened(capture)).then_some(Fractions::NONE),
         }
     }
 
@@ -178,7 +180,9 @@ impl<'a> Resampling<'a> {
             rejected: self.rejected,
             bridged_beyond_rad: if self.bridges.any() { self.beyond_rad } else { 0.0 },
             bridged: self.bridges.warning(),
-            exact: self.exact,
+            passed: self.fractions.zip(self.capture.median_turn_samples()).map(|(fractions, turn_samples)| {
+                fractions.passed(self.kernel, turn_samples, self.harmonics.len() / self.capture.channels().max(1))
+            }),
         }
     }
 
@@ -216,7 +220,9 @@ impl<'a> Resampling<'a> {
             self.rejected.push(turn.rejected(turn.number, reason));
             return;
         }
-        self.exact &= exact;
+        if let Some(fractions) = &mut self.fractions {
+            fractions.note(&self.positions);
+        }
         let looked_at = self.outliers.is_some() || self.means.looks_at_next();
         let readings = self.means.next();
         fused(Interpolation {
