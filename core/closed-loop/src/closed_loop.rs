@@ -14,7 +14,11 @@ use super::{
     },
     report::{added, blind, inconsistent, level, moved, verdict},
 };
-use runout_consistency::{Kind, Partition, keys::keys, order::OrderModels};
+use runout_consistency::{
+    Kind, Partition,
+    keys::{Keys, keys},
+    order::OrderModels,
+};
 use runout_error::Result;
 use runout_numerics::least_squares::{dot, orthonormal};
 
@@ -135,6 +139,14 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
         outputs: Vec::new(),
     };
     Ok(Closed { diagnosis, before, after, settings: applied })
+}
+
+/// The keys of an effect beside everything that is fitted: what is declared, and `found` besides.
+fn keys_of(columns: &[Vec<f64>], candidates: usize, fit: &impl Fit, found: &[Vec<f64>]) -> Keys {
+    let Remainder { residual, structure, .. } = fit.remainder();
+    let fitted: Vec<Vec<f64>> = fit.declared_columns().iter().chain(found).cloned().collect();
+    let models = structure.order.as_ref().and_then(|order| OrderModels::of(order, residual, &fitted));
+    keys(columns, candidates, residual, &fitted, structure, models.as_ref())
 }
 
 pub(super) struct Tracing<'a, M> {
@@ -260,10 +272,7 @@ impl<M: Model> Tracing<'_, M> {
         let lowered = before.chi2() - trial.chi2;
         let parts = before.structure.of_kind(Kind::Blocks).map(Partition::count).max().unwrap_or(1);
         let each = -lowered / parts.max(1) as f64;
-        let fixed_columns: Vec<Vec<f64>> = current.fit.declared_columns().iter().chain(&basis).cloned().collect();
-        let models = (before.structure.order.as_ref())
-            .and_then(|order| OrderModels::of(order, &before.residual, &fixed_columns));
-        let keys = keys(&columns, count, &before.residual, &fixed_columns, &before.structure, models.as_ref());
+        let keys = keys_of(&columns, count, &current.fit, &basis);
         let evidence = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
         let reason = if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
             Some(weak(&evidence))
