@@ -5,15 +5,16 @@ use std::collections::BTreeMap;
 use super::{
     Effect, Fit, Model, Remainder, Setting,
     diagnosis::{Diagnosis, Refused},
-    evidence::{Evidence, agreement},
+    evidence::Evidence,
     fit::{INDEPENDENT, Refit, refit},
     found::Found,
     judgement::{
         BIC_LIMIT, OVERLAP, P_LIMIT, above_chance, at_the_floor, disturbed, independent, is, mixed, no_gain, overlap,
         raises_held_out, unit, weak,
     },
-    report::{added, blind, level, moved, verdict},
+    report::{added, blind, inconsistent, level, moved, verdict},
 };
+use runout_consistency::{Kind, Partition, keys::keys, order::OrderModels};
 use runout_error::Result;
 use runout_numerics::least_squares::{dot, orthonormal};
 
@@ -25,10 +26,6 @@ pub(super) const SAME: f64 = 1e-9;
 const SHORTLIST: (usize, f64) = (6, 0.2);
 /// Effects of single parts on that list at most.
 const PARTS_LISTED: usize = 2;
-/// Chance of independent data agreeing as well on an effect that is not there, above which it is refused.
-const AGREEMENT: f64 = 0.01;
-/// The same for groups of points whose noise is not known: each of them is held out once, which tests an effect as well.
-const GROUP_AGREEMENT: f64 = 0.05;
 /// How a loop is to be run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -108,8 +105,9 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     let before = model.whole().fit(&settings.known)?;
     let current = tracing.refit_found(model.whole(), &found)?;
     let (current, others) = tracing.combinations(model.whole(), current, SAME_BIC);
+    let consistency = current.fit.consistency();
     let left = at_the_floor(current.fit.remainder());
-    let verdict = verdict(current.fit.remainder(), tracing.found.is_empty());
+    let verdict = verdict(current.fit.remainder(), &consistency, tracing.found.is_empty());
     tracing.settle(&current);
     let applied = current.settings.clone();
     let after = mixed(current, others, &before, settings.known.len());
@@ -117,6 +115,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     if !left {
         unexplained.extend(after.unexplained());
     }
+    unexplained.extend(consistency.iter().filter(|check| check.bars_verdict()).map(inconsistent));
     let warnings = tracing.ended_by_limits();
     let diagnosis = Diagnosis {
         verdict,
@@ -126,6 +125,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
         nothing_separated: false,
         moved: moved(&before, &after),
         unexplained,
+        consistency,
         blind_to: blind(model.effects(), &tracing.considered(), &after),
         refused: tracing.refused,
         lost_orders: None,
@@ -256,25 +256,27 @@ impl<M: Model> Tracing<'_, M> {
         let (effect, trial, evidence) = trials.next()?;
         let after = trial.fit.clone();
         let columns = independent(current.fit.signature(effect), &basis);
-        let (stretches, lowered) = (before.stretches.len(), before.chi2() - trial.chi2);
-        let each = -lowered / stretches.max(1) as f64;
-        let agreed = if before.noise_is_known() { AGREEMENT } else { GROUP_AGREEMENT };
-        let chance = agreement(&columns, &before.residual, &before.stretches);
+        let lowered = before.chi2() - trial.chi2;
+        let parts = before.structure.of_kind(Kind::Blocks).map(Partition::count).max().unwrap_or(1);
+        let each = -lowered / parts.max(1) as f64;
+        let fixed_columns: Vec<Vec<f64>> = current.fit.declared_columns().iter().chain(&basis).cloned().collect();
+        let models = (before.structure.order.as_ref())
+            .and_then(|order| OrderModels::of(order, &before.residual, &fixed_columns));
+        let keys = keys(&columns, count, &before.residual, &fixed_columns, &before.structure, models.as_ref());
+        let evidence = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
         let reason = if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
             Some(weak(&evidence))
-        } else if stretches > 1 && !above_chance(&before) && before.noise_is_known() && each > BIC_LIMIT {
+        } else if parts > 1 && !above_chance(&before) && before.noise_is_known() && each > BIC_LIMIT {
             // Noise may be all that is left, and in each part it is not known better because there are more parts.
             Some(format!(
-                "it would explain too little of each of {stretches} parts of the data: Δχ² {each:.1}, above {BIC_LIMIT}"
+                "it would explain too little of each of {parts} parts of the data: Δχ² {each:.1}, above {BIC_LIMIT}"
             ))
         } else if lowered <= before.disturbed_chi2 {
             Some(disturbed(lowered, before.disturbed_chi2))
         } else if raises_held_out(&before, &after, self.model.is_seen_besides(effect)) {
             Some(no_gain(&before, &after))
         } else {
-            chance.filter(|chance| *chance > agreed).map(|chance| {
-                format!("{stretches} independent parts of the data do not agree on it: p {chance:.3}, above {agreed}")
-            })
+            keys.refused
         };
         if let Some(reason) = reason {
             self.refuse(effect, reason);

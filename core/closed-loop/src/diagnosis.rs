@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, fmt, path::PathBuf};
 
+use runout_consistency::{Check, refuted_by};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,9 @@ pub struct Diagnosis {
     pub moved: Vec<Moved>,
     /// What no known effect explains.
     pub unexplained: Vec<Unexplained>,
+    /// The tests of the final model on its own data.
+    #[serde(default)]
+    pub consistency: Vec<Check>,
     /// Effects that these data cannot show at all.
     pub blind_to: Vec<Blind>,
     /// Effects that looked likely and were refused, with the reason.
@@ -46,8 +50,9 @@ impl Diagnosis {
     pub fn headline(&self) -> String {
         let undecided = self.added.iter().filter(|one| !one.confounded_with.is_empty());
         let sets: Vec<String> = undecided.map(Added::members).collect();
-        let verdict = self.in_words();
-        if sets.is_empty() { verdict.into() } else { format!("{verdict}. Not decided: {}", sets.join("; ")) }
+        let refuted = refuted_by(&self.consistency).map(|said| format!(": {said}")).unwrap_or_default();
+        let verdict = format!("{}{refuted}", self.in_words());
+        if sets.is_empty() { verdict } else { format!("{verdict}. Not decided: {}", sets.join("; ")) }
     }
 
     fn in_words(&self) -> &'static str {

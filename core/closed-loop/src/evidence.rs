@@ -1,6 +1,6 @@
 //! Evidence for an effect: how much it explains, and how likely noise alone would do as much.
 
-use runout_numerics::{least_squares::dot, statistics::f_tail};
+use runout_numerics::statistics::f_tail;
 
 /// How a model with more parameters compares with one with fewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,33 +54,6 @@ impl Evidence {
 /// Degrees of freedom of a noise that is known.
 const KNOWN: f64 = 1e6;
 
-/// Chance that independent data (`stretches` of the residual) agree so well on an effect that is not there; `None` where there are
-/// too few of them to decide. `columns` are the effect's signature, orthonormal.
-///
-/// Within a stretch, errors may depend on each other as no covariance says: a slow wander leaks into all orders alike. So the
-/// effect's size is set against how far its sizes in the stretches differ. (The sandwich estimator with clusters: Liang, Zeger,
-/// Biometrika 73 (1986) 13; with Student's distribution for few of them.)
-#[must_use]
-pub fn agreement(columns: &[Vec<f64>], residual: &[f64], stretches: &[usize]) -> Option<f64> {
-    if stretches.len() < FEWEST_STRETCHES || columns.is_empty() {
-        return None;
-    }
-    let sizes: Vec<f64> = columns.iter().map(|column| dot(column, residual)).collect();
-    let left =
-        |at: usize| residual[at] - columns.iter().zip(&sizes).map(|(column, size)| size * column[at]).sum::<f64>();
-    let along = |at: usize| columns.iter().zip(&sizes).map(|(column, size)| size * column[at]).sum::<f64>();
-    let (mut start, mut scatter) = (0, 0.0);
-    for length in stretches {
-        let score: f64 = (start..start + length).map(|at| along(at) * left(at)).sum();
-        scatter += score * score;
-        start += length;
-    }
-    let freedom = (stretches.len() - 1) as f64;
-    let square: f64 = sizes.iter().map(|size| size * size).sum();
-    let variance = scatter * stretches.len() as f64 / freedom;
-    Some(f_tail(square * square / variance.max(f64::MIN_POSITIVE), 1.0, freedom))
-}
-
 /// A group of data, for [`far_worse`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Group {
@@ -126,32 +99,9 @@ pub fn far_worse(groups: &[Group]) -> Vec<usize> {
 /// Groups of which one can be called worse than the others, at least.
 const FEWEST_GROUPS: usize = 3;
 
-/// Least number of stretches that show how far they differ.
-const FEWEST_STRETCHES: usize = 4;
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Two effects of the same size in sum: one is in every stretch, one in a single stretch only.
-    #[test]
-    fn stretches_have_to_agree() {
-        let unit = |at: &dyn Fn(usize) -> f64| {
-            let column: Vec<f64> = (0..80).map(at).collect();
-            let norm = dot(&column, &column).sqrt();
-            column.into_iter().map(|value| value / norm).collect::<Vec<f64>>()
-        };
-        let column = unit(&|at| (at as f64 * 1.7).sin());
-        let noise: Vec<f64> = (0..80_u32).map(|at| f64::from(at.wrapping_mul(2_654_435_761)) / 4.3e9 - 0.5).collect();
-        let stretches = [10; 8];
-        let everywhere: Vec<f64> = column.iter().zip(&noise).map(|(value, noise)| 20.0 * value + noise).collect();
-        let only_here = |at: usize, value: &f64| if at < 10 { 160.0 * value } else { 0.0 };
-        let once: Vec<f64> = column.iter().enumerate().map(|(at, value)| only_here(at, value) + noise[at]).collect();
-        let [agree, differ] =
-            [everywhere, once].map(|residual| agreement(std::slice::from_ref(&column), &residual, &stretches));
-        assert!(agree.unwrap() < 1e-6 && differ.unwrap() > 0.1, "{agree:?} {differ:?}");
-        assert_eq!(agreement(&[column], &noise, &[80]), None);
-    }
 
     /// Groups of normal noise of 0.7, of which one is twelve times as large.
     #[test]

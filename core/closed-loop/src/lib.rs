@@ -20,6 +20,7 @@
 //!     std: Some(0.1),
 //!     group: (0..40).map(|reading| reading % 5).collect(),
 //!     groups: (0..5).map(|group| format!("group {group}")).collect(),
+//!     ..Observations::default()
 //! };
 //! let level = Declared { name: "level".into(), unit: "um".into(), column: vec![1.0; 40] };
 //! let rate = Parameter { name: "rate".into(), unit: "um".into(), tolerance: 0.1 };
@@ -49,7 +50,10 @@ mod parts;
 mod report;
 mod taken_back;
 
+use std::sync::Arc;
+
 use self::diagnosis::{Estimated, Unexplained};
+use runout_consistency::{Check, Structure};
 use runout_error::Result;
 
 /// A declared model of a measurement, and what it could lack.
@@ -136,6 +140,16 @@ pub trait Fit {
     /// already taken out of it.
     fn signature(&self, effect: usize) -> Vec<Vec<f64>>;
 
+    /// The orthonormal columns of what is declared, in the coordinates of the residual; nothing where these leave it out.
+    fn declared_columns(&self) -> &[Vec<f64>] {
+        &[]
+    }
+
+    /// The tests of the fit on its own data, beside those of single effects.
+    fn consistency(&self) -> Vec<Check> {
+        Vec::new()
+    }
+
     /// How the results (form, motion) change with each parameter of an effect: root mean square, per unit of it.
     fn bias(&self, effect: usize) -> Vec<Bias>;
 
@@ -219,9 +233,8 @@ pub struct Remainder {
     /// In standard deviations of its noise, projected to where nothing that is fitted can reach; of mean square 1 for each
     /// degree of freedom where only noise is left.
     pub residual: Vec<f64>,
-    /// Lengths of the stretches of `residual` that come from independent data (stations), one after the other; nothing where it
-    /// is one.
-    pub stretches: Vec<usize>,
+    /// What is declared of the readings that `residual` is of; entry by entry.
+    pub structure: Arc<Structure>,
     /// Its degrees of freedom.
     pub dof: usize,
     /// Root mean square of what is left, in the data's unit.

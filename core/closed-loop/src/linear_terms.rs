@@ -8,6 +8,7 @@ use std::{ops::Range, sync::Arc};
 
 use super::{Effect, Model, Remainder, Setting};
 pub use fit::LinearFit;
+use runout_consistency::{Kind, Structure};
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::least_squares::{Basis, dot};
 
@@ -24,6 +25,8 @@ pub struct Observations {
     pub group: Vec<usize>,
     /// The groups' names.
     pub groups: Vec<String>,
+    /// What else is declared of the readings: order, partitions. Where the noise is not known, the groups are [blocks](Kind::Blocks) of it.
+    pub structure: Structure,
 }
 
 /// A declared parameter, which is always fitted.
@@ -78,6 +81,7 @@ struct Data {
     members: Vec<Vec<usize>>,
     /// Where each observation was before they were put in the order of the groups.
     places: Vec<usize>,
+    structure: Arc<Structure>,
     unseen: Vec<HeldOut>,
     /// Effects that are declared with their values: never refitted.
     known: Vec<usize>,
@@ -113,6 +117,12 @@ impl LinearTerms {
             let group = members.get_mut(*group).ok_or_else(|| refuse(format!("there is no group {group}")))?;
             group.push(point);
         }
+        let mut structure = std::mem::take(&mut observations.structure).sorted(&places);
+        if observations.std.is_none() && structure.of_kind(Kind::Blocks).next().is_none() {
+            // Where the noise is not known, neither is how far neighbouring points depend on each other: groups have to agree.
+            structure =
+                structure.divided("groups", Kind::Blocks, observations.group.clone(), observations.groups.clone());
+        }
         let basis = Basis::of(declared.iter().map(|known| known.column.clone()).collect());
         if basis.dependent() {
             let names: Vec<&str> = declared.iter().map(|known| known.name.as_str()).collect();
@@ -130,6 +140,7 @@ impl LinearTerms {
             terms,
             members,
             places,
+            structure: Arc::new(structure),
             unseen,
             known,
             ends,
@@ -236,13 +247,12 @@ impl Model for LinearTerms {
             held_out_expected_rms: std.map_or(f64::NAN, |std| std * joint.left_out_gain(&data.members, values.len())),
             held_out_chi2: dot(&held_out, &held_out) / (scale * scale),
             residual: residual.iter().map(|value| value / scale).collect(),
-            // Where the noise is not known, neither is how far neighbouring points depend on each other: groups have to agree.
-            stretches: if std.is_some() { Vec::new() } else { data.members.iter().map(Vec::len).collect() },
+            structure: Arc::clone(&data.structure),
             dof,
             unit: unit.clone(),
         };
         let coefficients = data.basis.coefficients(&left);
-        Ok(LinearFit::new(Arc::clone(data), applied.to_vec(), coefficients, &joint, remainder, &residual))
+        Ok(LinearFit::new(Arc::clone(data), applied.to_vec(), coefficients, joint, remainder, &residual))
     }
 }
 

@@ -2,10 +2,11 @@
 
 use super::{
     Effect, Fit, Model, Remainder, Setting,
-    diagnosis::{Added, BiasPerUnit, Blind, Estimated, Level, Moved, Step, Verdict},
+    diagnosis::{Added, BiasPerUnit, Blind, Estimated, Level, Moved, Step, Unexplained, Verdict},
     found::Found,
     judgement::at_the_floor,
 };
+use runout_consistency::Check;
 use runout_numerics::least_squares::norm;
 
 /// An effect of its usual size that would show with less than this many standard deviations is not seen.
@@ -16,15 +17,21 @@ pub(super) fn known(value: f64) -> Option<f64> {
 }
 
 /// What is left in the end, in one word. Without a noise level known from elsewhere, or without a residual, nothing says that noise
-/// only is left.
-pub(super) fn verdict(left: &Remainder, nothing_added: bool) -> Verdict {
-    match (left.noise_is_known() && left.dof > 0, at_the_floor(left), nothing_added) {
+/// only is left; and noise only is not left where a test of the data says so.
+pub(super) fn verdict(left: &Remainder, consistency: &[Check], nothing_added: bool) -> Verdict {
+    let consistent = at_the_floor(left) && !consistency.iter().any(Check::bars_verdict);
+    match (left.noise_is_known() && left.dof > 0, consistent, nothing_added) {
         (true, false, _) => Verdict::Unexplained,
         (true, true, true) => Verdict::AtNoiseFloor,
         (true, true, false) => Verdict::Explained,
         (false, _, true) => Verdict::NothingFound,
         (false, _, false) => Verdict::Improved,
     }
+}
+
+/// What a test of the data says against the model.
+pub(super) fn inconsistent(check: &Check) -> Unexplained {
+    Unexplained { sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
 }
 
 /// `held_out` is what a fit without the held-out data leaves of them.

@@ -4,7 +4,10 @@ use std::sync::LazyLock;
 
 use statrs::{
     distribution::{ContinuousCDF, StudentsT},
-    function::beta::checked_beta_reg,
+    function::{
+        beta::checked_beta_reg,
+        gamma::{checked_gamma_lr, checked_gamma_ur},
+    },
 };
 
 /// Half of the 95 % interval of a normal distribution, in standard deviations: its quantile of 97.5 %.
@@ -65,6 +68,36 @@ pub fn f_tail(f: f64, a: f64, b: f64) -> f64 {
         return 1.0;
     }
     checked_beta_reg(0.5 * b, 0.5 * a, b / (b + a * f)).unwrap_or(1.0)
+}
+
+/// Chance that χ² with some degrees of freedom is above `chi2`: the regularised incomplete gamma function Q(k/2, χ²/2) (DLMF 8.2);
+/// 1 where either is not above 0.
+///
+/// ```
+/// use runout_numerics::statistics::chi2_tail;
+///
+/// // With 2 degrees it is e^(−χ²/2).
+/// assert!((chi2_tail(3.0, 2.0) - (-1.5_f64).exp()).abs() < 1e-12);
+/// ```
+#[must_use]
+pub fn chi2_tail(chi2: f64, freedom: f64) -> f64 {
+    if !(chi2 > 0.0 && freedom > 0.0) {
+        return 1.0;
+    }
+    if chi2.is_infinite() {
+        return 0.0;
+    }
+    checked_gamma_ur(0.5 * freedom, 0.5 * chi2).unwrap_or(1.0)
+}
+
+/// Chances that χ² with some degrees of freedom is above and below `chi2`.
+#[must_use]
+pub fn chi2_above_and_below(chi2: f64, freedom: f64) -> [f64; 2] {
+    let above = chi2_tail(chi2, freedom);
+    if !(chi2 > 0.0 && freedom > 0.0) {
+        return [above, 0.0];
+    }
+    [above, checked_gamma_lr(0.5 * freedom, 0.5 * chi2).unwrap_or(1.0)]
 }
 
 /// Median, of an even number of values the mean of the two in the middle; NaN of nothing.

@@ -12,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use runout_closed_loop::diagnosis::{self, Correction};
+use runout_consistency::Check;
 use runout_numerics::statistics::f_tail;
 use runout_standards::Value;
 use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
@@ -40,6 +41,9 @@ pub struct Summary {
     /// Values of a domain that are not those of a form: of measured points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<NamedValue>,
+    /// The tests of the data on themselves: what was tested, what it found and what was done.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub consistency: Vec<Check>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
     /// What the user should know.

@@ -61,4 +61,8 @@ pub struct Value {
     /// Why no uncertainty is stated, where the errors are known and intervals by them do not hold; null otherwise.
     #[serde(default)]
     pub no_uncertainty: Option<String>,
+    /// What of its own data refutes it: then its uncertainty is widened to what is left unexplained, and no limit is kept by it; null
+    /// otherwise.
+    #[serde(default)]
+    pub refuted_by: Option<String>,
 }

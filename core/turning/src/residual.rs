@@ -1,5 +1,6 @@
 //! What a fit leaves of the averaged readings.
 
+use runout_consistency::Check;
 use runout_numerics::Complex64;
 
 /// What a fit leaves of the averaged readings.
@@ -18,6 +19,8 @@ pub struct Residual {
     pub orders: Option<[usize; 2]>,
     /// What is left of each reading at the redundant orders; none where the fit is not one of single orders.
     pub by_reading: Vec<ReadingResidual>,
+    /// The tests of the readings on themselves.
+    pub checks: Vec<Check>,
 }
 
 /// What a fit leaves of one averaged reading.

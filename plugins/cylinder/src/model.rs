@@ -168,6 +168,7 @@ impl LinearModel for LeastSquaresCylinder {
             std: None,
             group,
             groups,
+            ..Observations::default()
         };
         let column = vec![1.0; observations.values.len()];
         let radius = Declared { name: "radius less nominal".into(), unit: "um".into(), column };

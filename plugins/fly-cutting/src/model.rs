@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Error, Result,
+    consistency::Structure,
     model::{
         Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
         diagnosis::{Estimated, Unexplained},
@@ -227,7 +228,11 @@ impl CutFit {
                 .map_or(f64::NAN, |std| std * (1.0 + parameters as f64 / count.max(1) as f64).sqrt()),
             held_out_chi2: if data.held_out.len() > 0 { held_out_chi2 } else { f64::NAN },
             disturbed_chi2: 0.0,
-            stretches: if std_um.is_some() { Vec::new() } else { parts(count) },
+            structure: Arc::new(if std_um.is_some() {
+                Structure::default()
+            } else {
+                Structure::default().in_stretches("parts of the map", &parts(count))
+            }),
             residual,
             dof,
             unit: "um".into(),

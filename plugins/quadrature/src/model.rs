@@ -143,6 +143,7 @@ impl LinearModel for Quadrature {
             unit: UNIT.into(),
             std: None,
             groups: (1..=self.0.blocks).map(|block| format!("block {block}")).collect(),
+            ..Observations::default()
         };
         let highest = self.0.max_order;
         let limit = format!("`separate.max_order` is {highest}");

@@ -101,7 +101,14 @@ impl Signal {
 /// When the columns are dependent.
 pub(crate) fn least_squares(values: Vec<f64>, columns: Vec<Declared>) -> Result<Vec<f64>> {
     let group = vec![0; values.len()];
-    let observations = Observations { values, unit: UNIT.into(), std: None, group, groups: vec!["all".into()] };
+    let observations = Observations {
+        values,
+        unit: UNIT.into(),
+        std: None,
+        group,
+        groups: vec!["all".into()],
+        ..Observations::default()
+    };
     Ok(LinearTerms::new(observations, columns, Vec::new())?.fit(&[])?.declared().to_vec())
 }
 

@@ -235,6 +235,7 @@ impl RotaryAxis {
             std: (campaign.noise != Noise::Unknown).then_some(typical),
             group: data.command.clone(),
             groups: campaign.commands_deg.iter().map(|deg| format!("{} = {deg}°", axis.letter())).collect(),
+            ..Observations::default()
         };
         let declared = data.declared.iter().enumerate().map(|(index, column)| Declared {
             name: format!("shape {}", index + 1),

@@ -165,6 +165,7 @@ impl LinearModel for RTest {
             std: Some(self.0.std_um),
             group: (0..3).flat_map(|_| 0..count).collect(),
             groups: used.iter().map(|(_, c)| format!("C = {c}°")).collect(),
+            ..Observations::default()
         };
         let object = points.input.display();
         let model = LinearTerms::new(observations, declared.collect(), terms.collect())

@@ -104,6 +104,7 @@ impl PointModel for SpatialError {
         let trend_std = after.trend_std(&campaign);
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
         let mut diagnosis = Diagnosis {
+            consistency: Vec::new(),
             verdict: verdict(&campaign, added.is_empty(), unexplained.is_empty()),
             before: levels[0].clone(),
             added: added

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::Structure,
     model::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained},
     numerics::least_squares::Basis,
 };
@@ -76,9 +77,10 @@ impl Model for TracesModel {
         let scale = data.std_um.unwrap_or(1.0);
         let squares: f64 = left.iter().map(|value| value * value).sum();
         let stretch = count.div_ceil(STRETCHES).max(1);
+        let stretches: Vec<usize> = (0..count).step_by(stretch).map(|start| stretch.min(count - start)).collect();
         let remainder = Remainder {
             residual: left.iter().map(|value| value / scale).collect(),
-            stretches: (0..count).step_by(stretch).map(|start| stretch.min(count - start)).collect(),
+            structure: Arc::new(Structure::default().in_stretches("z-blocks", &stretches)),
             dof,
             rms: (squares / count.max(1) as f64).sqrt(),
             noise_floor: data.std_um.map_or(f64::NAN, |std| std * (dof as f64 / count.max(1) as f64).sqrt()),

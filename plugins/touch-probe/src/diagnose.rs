@@ -128,6 +128,7 @@ impl TouchProbe {
             std: (weights.noise != Noise::Residual).then_some(scale),
             group,
             groups,
+            ..Observations::default()
         };
         let object = points.input.display().to_string();
         let model = LinearTerms::new(observations, declared.collect(), terms.collect())

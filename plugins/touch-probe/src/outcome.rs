@@ -62,6 +62,7 @@ impl Found<'_> {
             lost_orders: Some(LostOrders::of([("lobing", lobing), ("form", form)])),
             remarks: self.remarks(&lobes),
             notes: self.notes(&lobes),
+            ..Outcome::default()
         })
     }
 

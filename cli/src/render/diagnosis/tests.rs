@@ -27,6 +27,7 @@ fn blind(effect: &str, target: &str, value: f64) -> Blind {
 
 fn at_the_floor() -> Diagnosis {
     Diagnosis {
+        consistency: Vec::new(),
         verdict: Verdict::AtNoiseFloor,
         before: level(0.0066, 1.02),
         added: vec![],
@@ -87,6 +88,7 @@ fn diagnosed() -> Diagnosis {
         lost_orders: if value == "RONt" { vec![3, 6, 9, 12] } else { vec![] },
     };
     Diagnosis {
+        consistency: Vec::new(),
         verdict: Verdict::Unexplained,
         before: level(0.0593, 83.1),
         added: vec![nonlinearity, gain],
@@ -146,6 +148,7 @@ fn noise_that_is_not_known_and_another_unit() {
         ..diagnosed().added.remove(0)
     };
     let diagnosis = Diagnosis {
+        consistency: Vec::new(),
         verdict: Verdict::Improved,
         before: level(3.4),
         added: vec![added],

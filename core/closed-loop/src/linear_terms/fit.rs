@@ -1,6 +1,6 @@
 //! A fit of linear terms: what it leaves, what it says of the declared parameters, and what else might be in the residual.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::{Data, HeldOut, subtract};
 use crate::{
@@ -8,6 +8,7 @@ use crate::{
     diagnosis::Unexplained,
     evidence::{Group, far_worse},
 };
+use runout_consistency::{self as consistency, Check, Judgement, judge};
 use runout_numerics::{
     farthest,
     least_squares::{Basis, dot},
@@ -22,8 +23,12 @@ pub struct LinearFit {
     /// Variance of each declared parameter that comes from not knowing the effects.
     doubt: Vec<f64>,
     remainder: Remainder,
+    /// Everything that is fitted: the declared columns, then those of the applied effects that are not known.
+    joint: Basis,
     /// Of each group of the observations, in the data's unit.
     groups: Vec<Group>,
+    /// The tests of the fit, once they are asked for.
+    judgement: OnceLock<Judgement>,
     /// Variances of the applied effects' parameters.
     variance: Vec<(usize, Vec<f64>)>,
 }
@@ -34,13 +39,74 @@ impl LinearFit {
         data: Arc<Data>,
         applied: Vec<Setting>,
         coefficients: Vec<f64>,
-        joint: &Basis,
+        joint: Basis,
         remainder: Remainder,
         residual: &[f64],
     ) -> Self {
-        let groups = data.members.iter().map(|points| group(points, residual, joint)).collect();
+        let groups = data.members.iter().map(|points| group(points, residual, &joint)).collect();
         let doubt = vec![0.0; coefficients.len()];
-        Self { data, applied, coefficients, doubt, remainder, groups, variance: Vec::new() }
+        let (variance, judgement) = (Vec::new(), OnceLock::new());
+        Self { data, applied, coefficients, doubt, remainder, joint, groups, judgement, variance }
+    }
+
+    /// The tests of the fit on its own readings; factors are those of the declared parameters, then of the effects' that are not known.
+    #[must_use]
+    pub fn judgement(&self) -> &Judgement {
+        self.judgement.get_or_init(|| {
+            let names: Vec<String> = self.parameters().collect();
+            let weights = self.joint.weights();
+            let mut residual = self.residual();
+            self.joint.remove_from(&mut residual);
+            let fit = consistency::LinearFit {
+                residual: &residual,
+                basis: self.joint.columns(),
+                names: &names,
+                weights: &weights,
+                noise: self.data.observations.std.map(|std| (std, f64::INFINITY)),
+                unit: &self.data.observations.unit.replace("um", "µm"),
+            };
+            let mut judgement = judge(fit, &self.data.structure);
+            if self.remainder.noise_is_known() {
+                let dof = self.remainder.dof as f64;
+                judgement
+                    .checks
+                    .insert(0, consistency::linear::residual(self.remainder.chi2_per_dof(), dof, f64::INFINITY));
+            }
+            judgement
+        })
+    }
+
+    /// What the data say against all that the fit says; nothing where they agree with it.
+    #[must_use]
+    pub fn refuted_by(&self) -> Option<String> {
+        consistency::refuted_by(&self.judgement().checks)
+    }
+
+    /// Names of everything that is fitted.
+    fn parameters(&self) -> impl Iterator<Item = String> + '_ {
+        let declared = self.data.declared.iter().map(|declared| declared.name.clone());
+        let effects = self.free().filter_map(|effect| self.data.effects.get(effect));
+        declared.chain(effects.flat_map(|effect| {
+            let name = effect.name();
+            effect.parameters.iter().map(move |parameter| format!("{name} {}", parameter.name))
+        }))
+    }
+
+    /// Applied effects that are fitted.
+    fn free(&self) -> impl Iterator<Item = usize> + '_ {
+        self.applied.iter().map(|setting| setting.effect).filter(|effect| !self.data.known.contains(effect))
+    }
+
+    /// Factors on the standard uncertainties of an effect's parameters.
+    fn factors_of(&self, effect: usize) -> Vec<f64> {
+        let count = |effect: usize| self.data.effects.get(effect).map_or(0, |effect| effect.parameters.len());
+        let before: usize = self.free().take_while(|other| *other != effect).map(count).sum();
+        let factors = self.judgement().factors.iter().skip(self.data.declared.len() + before);
+        if self.data.known.contains(&effect) {
+            vec![1.0; count(effect)]
+        } else {
+            factors.copied().take(count(effect)).collect()
+        }
     }
 
     /// Declared parameters, in their order.
@@ -53,7 +119,12 @@ impl LinearFit {
     pub fn effects(&self) -> impl Iterator<Item = (&Effect, &[f64], Vec<f64>)> + '_ {
         self.applied.iter().filter_map(|setting| {
             let known = self.variance.iter().find(|(effect, _)| *effect == setting.effect);
-            let variance = known.map_or_else(|| vec![f64::NAN; setting.values.len()], |(_, variance)| variance.clone());
+            let mut variance =
+                known.map_or_else(|| vec![f64::NAN; setting.values.len()], |(_, variance)| variance.clone());
+            if known.is_some() {
+                let factors = self.factors_of(setting.effect);
+                variance.iter_mut().zip(factors).for_each(|(variance, factor)| *variance *= factor * factor);
+            }
             Some((self.data.effects.get(setting.effect)?, setting.values.as_slice(), variance))
         })
     }
@@ -108,6 +179,14 @@ impl Fit for LinearFit {
         columns
     }
 
+    fn declared_columns(&self) -> &[Vec<f64>] {
+        self.data.basis.columns()
+    }
+
+    fn consistency(&self) -> Vec<Check> {
+        self.judgement().checks.clone()
+    }
+
     fn bias(&self, effect: usize) -> Vec<Bias> {
         let parameters = self.data.effects.get(effect).map_or(&[][..], |effect| &effect.parameters);
         let leverage = self.data.leverage(effect).into_iter().zip(parameters);
@@ -126,12 +205,14 @@ impl Fit for LinearFit {
         let level = self.remainder.chi2_per_dof();
         let noise = std.map_or(level, |std| std * std * level.max(1.0));
         let unit_variance = self.data.basis.unit_variance();
+        let left = level * std.map_or(1.0, |std| std * std);
+        let factors = &self.judgement().factors;
         let declared = self.data.declared.iter().zip(&self.coefficients).zip(unit_variance.iter().zip(&self.doubt));
-        let declared = declared.map(|((declared, number), (variance, doubt))| Outcome {
+        let declared = declared.zip(factors).map(|(((declared, number), (variance, doubt)), factor)| Outcome {
             value: declared.name.clone(),
             section: None,
             number: *number,
-            std: (noise * variance + doubt).sqrt(),
+            std: (noise.max(factor * factor * left) * variance + doubt).sqrt(),
             unit: declared.unit.clone(),
         });
         let unseen = self.data.unseen.iter().map(|unseen| Outcome {

@@ -38,6 +38,7 @@ fn made(std: Option<f64>) -> Made {
         std,
         group: group.clone(),
         groups: (0..6).map(|group| format!("group {group}")).collect(),
+        ..Observations::default()
     };
     let declared =
         |name: &str, column: &Vec<f64>| Declared { name: name.into(), unit: "um".into(), column: column.clone() };
@@ -145,6 +146,7 @@ fn held_out_noise_is_as_expected() {
             std: Some(0.3),
             group: (0..24).map(|index| index / 4).collect(),
             groups: (0..6).map(|group| format!("group {group}")).collect(),
+            ..Observations::default()
         };
         let declared = vec![declared("level", column(|_| 1.0)), declared("slope", column(|x| x))];
         let model = LinearTerms::new(observations, declared, vec![term("square", vec![column(|x| x * x)])]).unwrap();
@@ -185,6 +187,7 @@ fn what_only_one_group_determines_is_predicted_as_nothing() {
         std: None,
         group: vec![0, 0, 1, 1],
         groups: vec!["first".into(), "second".into()],
+        ..Observations::default()
     };
     let level = Declared { name: "level".into(), unit: "um".into(), column: vec![1.0; 4] };
     let step = term("step", vec![vec![0.0, 0.0, 1.0, 1.0]]);

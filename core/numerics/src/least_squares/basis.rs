@@ -111,6 +111,31 @@ impl Basis {
         self.orthonormal.len()
     }
 
+    /// The orthonormal columns Q, `[column][point]`.
+    #[must_use]
+    pub fn columns(&self) -> &[Vec<f64>] {
+        &self.orthonormal
+    }
+
+    /// What each coefficient is of the values, `[coefficient][point]`: x = weights·values; 0 for a dependent column.
+    #[must_use]
+    pub fn weights(&self) -> Vec<Vec<f64>> {
+        let points = self.orthonormal.first().map_or(0, Vec::len);
+        let mut weights = vec![vec![0.0; points]; self.shares.len()];
+        for (column, orthonormal) in self.inverse().iter().zip(&self.orthonormal) {
+            for (weights, share) in weights.iter_mut().zip(column).filter(|(_, share)| **share != 0.0) {
+                weights.iter_mut().zip(orthonormal).for_each(|(weight, entry)| *weight += share * entry);
+            }
+        }
+        weights
+    }
+
+    /// ln √det AᵀA of the independent columns: the sum of ln R_kk.
+    #[must_use]
+    pub fn log_determinant(&self) -> f64 {
+        self.independent.iter().filter_map(|column| self.shares[*column].last()).map(|own| own.ln()).sum()
+    }
+
     /// Whether a column is in the span of those before it.
     #[must_use]
     pub fn dependent(&self) -> bool {
@@ -251,6 +276,11 @@ mod tests {
         // Var(slope) = 1/Σ(s − s̄)².
         assert!((covariance[1][1] - 0.2).abs() < 1e-12 && (basis.unit_variance()[1] - 0.2).abs() < 1e-12);
         assert!(Basis::of(vec![vec![0.0; 3]]).dependent(), "a column of zeros");
+        let slope = basis.weights().iter().map(|weights| dot(weights, &[1.0, 3.0, 5.0, 7.0])).collect::<Vec<f64>>();
+        assert!(slope.iter().zip(found).all(|(one, other)| (one - other).abs() < 1e-12), "{slope:?}");
+        // det of [4 6; 6 14] is 20, and a dependent column has no part in it.
+        let line = Basis::of(vec![vec![1.0; 4], vec![0.0, 1.0, 2.0, 3.0], vec![2.0; 4]]);
+        assert!((line.log_determinant() - 0.5 * 20.0_f64.ln()).abs() < 1e-12);
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::{
     stage::{Evaluable, EvaluableKind, Exporter, Form, Outcome, PlaneMap, PointSeparator},
 };
 use runout_closed_loop::diagnosis::{Correction, Diagnosis};
+use runout_consistency::refuted_by;
 use runout_error::{Error, Result};
 use runout_numerics::height_map::HeightMap;
 use runout_standards::areal::without_polynomial;
@@ -48,15 +49,17 @@ impl PointResult<'_> {
         points: &Points,
         observer: &dyn Observer,
     ) -> Result<Finished> {
-        let Outcome { convention, tables, values, evaluables, lost_orders, mut remarks, notes } = self.outcome;
+        let Outcome { convention, tables, values, checks, evaluables, lost_orders, mut remarks, notes } = self.outcome;
         check_declared(&evaluables, &pipeline.route.evaluables())?;
-        let evaluated = Evaluated::of(&evaluables, &pipeline.evaluate)?;
+        let mut evaluated = Evaluated::of(&evaluables, &pipeline.evaluate)?;
+        evaluated.refute(refuted_by(&checks).as_deref());
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
         if let Some(diagnosis) = self.diagnosis {
             writer.diagnosed(diagnosis);
         }
         writer.take_values(values, evaluated, convention);
+        writer.take_checks(checks);
         writer.lost_orders(lost_orders);
         writer.note(notes);
         writer.take_heights(evaluables.iter().find_map(Evaluable::plane_map).map(above_plane).transpose()?);

@@ -1,6 +1,7 @@
 //! Values of one station, and its error where the truth is known.
 
 use super::evaluate::{Evaluate, missing_circles, section_values};
+use runout_consistency::refuted_by;
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_turning::station::StationResult;
 use runout_turning::{
@@ -43,6 +44,10 @@ pub(super) fn complete(
     let missing = |section: usize| missing_circles(&result, section, evaluate, radius_mm, &result.values[section]);
     let missing: Vec<String> = sections.flat_map(missing).collect();
     result.separation.warnings.extend(missing);
+    if let Some(by) = refuted_by(&result.separation.residual.checks) {
+        let values = result.values.iter_mut().flatten().chain(&mut result.motion_values);
+        values.for_each(|value| value.refuted_by = Some(by.clone()));
+    }
     result
 }
 

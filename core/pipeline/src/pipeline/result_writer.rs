@@ -10,7 +10,7 @@ use super::{
     evaluate::{Evaluate, Evaluated, Group, add_areal, add_generatrices, decide, part_summary},
     station_summary::summarise,
     steadiness::inflated,
-    tables::{StationTables, correction_rows, named_value_rows},
+    tables::{StationTables, consistency_rows, correction_rows, named_value_rows},
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
@@ -19,6 +19,7 @@ use crate::{
     summary::{LostOrders, NamedValue, PartSummary, StationSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
+use runout_consistency::Check;
 use runout_error::{Error, Result};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
@@ -135,6 +136,8 @@ impl ResultWriter {
             sections.add(result);
         }
         self.summary.stations.push(summarise(result, rig));
+        let checks = &result.separation.residual.checks;
+        self.summary.consistency.extend(checks.iter().map(|check| check.clone().within(&result.station)));
         Ok(())
     }
 
@@ -157,6 +160,11 @@ impl ResultWriter {
         self.note(evaluated.remarks.clone());
         self.evaluated = evaluated;
         self.convention = convention;
+    }
+
+    /// Takes the tests of the points on themselves.
+    pub(super) fn take_checks(&mut self, checks: Vec<Check>) {
+        self.summary.consistency.extend(checks);
     }
 
     /// The surface, where someone takes it; and the values of all sections together.
@@ -230,6 +238,9 @@ impl ResultWriter {
         let left_out = self.station_tables.remark();
         self.summary.notes.extend(left_out.clone());
         self.summary.warnings.extend(left_out);
+        let findings = self.summary.consistency.iter().filter(|check| !check.finding.is_empty());
+        let findings: Vec<String> = findings.map(|check| check.finding.clone()).collect();
+        self.summary.warnings.extend(findings);
         self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
         self.summary.warnings.extend(inflated(&self.summary.stations));
         let mut placed = self.summary.placed_values();
@@ -247,6 +258,7 @@ impl ResultWriter {
         let last: Vec<TableRows> =
             std::iter::once(values).chain(named).chain(correction_rows(&self.summary.effects)?).collect();
         self.write(&last)?;
+        self.write(consistency_rows(&self.summary.consistency)?.as_slice())?;
         let about = if self.of_form {
             self.station_tables.about(&self.summary)
         } else {

@@ -29,7 +29,7 @@ use runout_turning::{
     surface::Surface,
 };
 pub(super) use values::holds_values;
-pub(crate) use values::{correction_rows, corrections, named_value_rows, named_values};
+pub(crate) use values::{consistency, consistency_rows, correction_rows, corrections, named_value_rows, named_values};
 use values::{values, values_rows};
 
 const STATION: &str = "name of the axial station";

@@ -9,11 +9,12 @@ use crate::{
     summary::NamedValue,
 };
 use runout_closed_loop::{
-    Effect, Model,
+    Effect, Fit, Model,
     closed_loop::{self, Settings},
     diagnosis::{Diagnosis, LostOrders},
     linear_terms::{LinearFit, LinearTerms},
 };
+use runout_consistency::Check;
 use runout_error::Result;
 use runout_table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts};
 use runout_turning::surface::Surface;
@@ -135,6 +136,8 @@ pub struct Outcome {
     pub tables: Vec<TableRows>,
     /// Values.
     pub values: Vec<NamedValue>,
+    /// The tests of the points on themselves.
+    pub checks: Vec<Check>,
     /// What the standards' values are computed from.
     pub evaluables: Vec<Evaluable>,
     /// Orders that the points do not separate; nothing where the domain has no orders.
@@ -183,6 +186,7 @@ impl<M: LinearModel> PointModel for M {
         let terms = self.terms(points)?.with_known(&settings.known).considering(settings.effects.as_deref());
         let closed = closed_loop::diagnose(&terms, settings)?;
         let mut after = self.outcome(points, &closed.after)?;
+        after.checks.extend(closed.diagnosis.consistency.iter().cloned());
         after.tables.push(residual_rows(&terms, &closed.before, &closed.after)?);
         let mut diagnosis = closed.diagnosis;
         diagnosis.warnings.append(&mut after.remarks);
@@ -198,6 +202,7 @@ pub fn separate_declared(model: &impl LinearModel, points: &Points) -> Result<Ou
     let terms = model.terms(points)?;
     let fit = terms.fit(&[])?;
     let mut outcome = model.outcome(points, &fit)?;
+    outcome.checks.extend(fit.consistency());
     outcome.tables.push(residual_rows(&terms, &fit, &fit)?);
     Ok(outcome)
 }

@@ -47,6 +47,10 @@ pub struct NamedValue {
     /// Why no uncertainty is stated of a standard's value; absent where one is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_uncertainty: Option<String>,
+    /// What of its own data refutes it: then its uncertainty is widened to what is left unexplained, and no limit is kept by it;
+    /// absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refuted_by: Option<String>,
 }
 
 impl NamedValue {
@@ -65,6 +69,7 @@ impl NamedValue {
             reference: None,
             filter: None,
             no_uncertainty: None,
+            refuted_by: None,
         }
     }
 
@@ -72,6 +77,12 @@ impl NamedValue {
     #[must_use]
     pub fn of(self, of: impl Into<String>) -> Self {
         Self { of: Some(of.into()), ..self }
+    }
+
+    /// The same, refuted by what its own data say.
+    #[must_use]
+    pub fn refuted_by(self, by: Option<String>) -> Self {
+        Self { refuted_by: by.or(self.refuted_by), ..self }
     }
 
     /// A standard's value of an open profile or a height map.
@@ -88,6 +99,7 @@ impl NamedValue {
             reference: Some(value.reference.clone()),
             filter: Some(value.filter.clone()),
             no_uncertainty: value.no_uncertainty.clone(),
+            refuted_by: value.refuted_by.clone(),
         }
     }
 

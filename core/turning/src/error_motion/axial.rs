@@ -132,6 +132,7 @@ impl ErrorMotion<'_> {
             reference: centre_of_chart().symbol().into(),
             coverage: 1.0,
             uncertainty,
+            refuted_by: None,
         }
     }
 }

@@ -218,6 +218,7 @@ impl ErrorMotion<'_> {
             reference: Centre::PolarChart.symbol().into(),
             coverage: 1.0,
             uncertainty: bounded(between_setups(&each, self.carried(direction, spreads, widest)), plot.bound),
+            refuted_by: None,
         })
     }
 
@@ -263,6 +264,7 @@ impl ErrorMotion<'_> {
             reference: "turns at one angle".into(),
             coverage: 1.0,
             uncertainty,
+            refuted_by: None,
         };
         let [std, rms_std] = [widest, rms_across].map(|across| self.carried(direction, spreads, across));
         [

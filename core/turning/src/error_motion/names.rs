@@ -195,6 +195,7 @@ fn fundamental(id: &str, direction: Direction, what: &str, value: f64, uncertain
         reference: centre_of_chart().symbol().into(),
         coverage: 1.0,
         uncertainty,
+        refuted_by: None,
     }
 }
 

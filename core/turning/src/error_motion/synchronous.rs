@@ -122,6 +122,7 @@ impl Synchronous {
                 reference: centre.symbol().into(),
                 coverage: 1.0,
                 uncertainty: bounded(known.clone(), bound),
+                refuted_by: None,
             }
         })
     }

@@ -53,6 +53,7 @@ mod tests {
             reference: "LSC".into(),
             coverage: 1.0,
             uncertainty: None,
+            refuted_by: None,
         };
         let of = |order: usize| {
             let separation = Separation {

@@ -151,7 +151,8 @@ impl SpindleFit {
         let (std_um, readings) = (bound_um / 12_f64.sqrt(), &layout.readings);
         let on_axis = readings.iter().any(|reading| reading.section == section && reading.view == View::OnAxis);
         let solved = &self.stations[station];
-        let before: usize = self.remainder.stretches[..station].iter().sum();
+        let stations = self.remainder.structure.partitions.first();
+        let before = stations.and_then(|parts| parts.level.iter().position(|at| *at == station)).unwrap_or(0);
         let form = Quantity::Form(section);
         let harmonic = |order: usize| {
             let seen: Vec<Complex64> =

@@ -1,6 +1,8 @@
 //! What a fit leaves of the readings, and of the turns that are held out.
 
-use runout_core::{Complex64, model::Remainder};
+use std::sync::Arc;
+
+use runout_core::{Complex64, consistency::Structure, model::Remainder};
 
 use super::{
     data::{Shared, StationData},
@@ -51,7 +53,7 @@ pub(super) fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, a
     let share = |sum: f64, count: usize| if count > 0 { (sum / count as f64).sqrt() } else { f64::NAN };
     Remainder {
         residual,
-        stretches,
+        structure: Arc::new(Structure::default().in_stretches("stations", &stretches)),
         dof,
         rms: share(squares, readings),
         noise_floor: if known { share(expected, readings) } else { f64::NAN },

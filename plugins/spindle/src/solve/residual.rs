@@ -62,6 +62,7 @@ pub(crate) fn residual(
         dof: 2 * dof,
         orders,
         by_reading: Vec::new(),
+        checks: Vec::new(),
     }
 }
 

@@ -109,7 +109,7 @@ impl Route {
             Self::Points { .. } if self.gives_form() => tables.push(own.optional()),
             Self::Points { .. } => tables.push(own),
         }
-        tables.push(tables::corrections());
+        tables.extend([tables::corrections(), tables::consistency()]);
         tables
     }
 }

@@ -37,6 +37,12 @@ impl Evaluated {
         Ok(all)
     }
 
+    /// Marks all values as refuted by what their data say.
+    pub(crate) fn refute(&mut self, by: Option<&str>) {
+        let Some(by) = by else { return };
+        self.values.iter_mut().for_each(|(_, value)| value.refuted_by = Some(by.to_owned()));
+    }
+
     /// As values of a result.
     pub(crate) fn named(&self) -> impl Iterator<Item = NamedValue> + '_ {
         self.values.iter().map(|(of, value)| NamedValue::standard(of, value))

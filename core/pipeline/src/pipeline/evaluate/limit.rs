@@ -8,7 +8,8 @@ impl Limit {
         let value = placed.value;
         let [low, high] = [self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY)];
         let interval_95 = value.uncertainty.as_ref().map(|uncertainty| uncertainty.interval_95);
-        let missing = missing(value);
+        let refuted = value.refuted_by.as_ref().map(|by| format!("its own data refute the value: {by}"));
+        let missing = refuted.or_else(|| missing(value));
         let decision = match interval_95 {
             _ if missing.is_some() => Decision::Undecided,
             Some([from, to]) if from >= low && to <= high => Decision::Conforms,

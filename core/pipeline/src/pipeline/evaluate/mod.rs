@@ -133,6 +133,7 @@ fn labelled_with_reasons(
             reference: label.reference,
             coverage,
             uncertainty,
+            refuted_by: None,
         })
         .collect()
 }

@@ -180,5 +180,6 @@ fn labelled(label: Label, found: Found, filter: &str, profile: &OpenProfile) -> 
         coverage: there as f64 / profile.deviation_um.len().max(1) as f64,
         uncertainty: found.uncertainty,
         no_uncertainty: found.no_uncertainty,
+        refuted_by: None,
     })
 }

@@ -67,6 +67,7 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
         coverage: there,
         uncertainty: None,
         no_uncertainty: Some(POINT_BY_POINT.into()),
+        refuted_by: None,
     });
     Ok((values.collect(), remark.into_iter().collect()))
 }

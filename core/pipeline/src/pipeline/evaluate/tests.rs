@@ -699,6 +699,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
         reference: reference.into(),
         coverage: 1.0,
         uncertainty: std.map(|std| uncertainty(std, value)),
+        refuted_by: None,
     };
     let section = |id: &str, values| SectionSummary {
         section: id.into(),

@@ -4,6 +4,7 @@ use serde_json::json;
 
 use crate::summary::{NamedValue, Summary};
 use runout_closed_loop::diagnosis::Correction;
+use runout_consistency::Check;
 use runout_error::Result;
 use runout_standards::{Value, uncertainty::Uncertainty};
 use runout_table::{
@@ -69,6 +70,7 @@ pub(super) fn values() -> TableSpec {
                 "why no uncertainty is stated; null where one is, or where the errors are not known",
             )
             .or_null(),
+            refuted(),
         ],
     )
 }
@@ -102,6 +104,7 @@ pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
         uncertainty(|uncertainty| uncertainty.interval_95[1]),
         counts_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(|uncertainty| uncertainty.draws))),
         texts_or_null(rows.iter().map(|row| row.value.no_uncertainty.as_deref())),
+        texts_or_null(rows.iter().map(|row| row.value.refuted_by.as_deref())),
     ]
 }
 
@@ -129,6 +132,7 @@ pub(crate) fn named_values(of_form: bool) -> TableSpec {
             ColumnSpec::text("filter", "the filter applied; null but for a standard's value").or_null(),
             ColumnSpec::text("no_uncertainty", "why no uncertainty is stated of a standard's value; null otherwise")
                 .or_null(),
+            refuted(),
         ],
     )
 }
@@ -151,8 +155,62 @@ pub(crate) fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<T
         texts_or_null(values.iter().map(|value| value.reference.as_ref())),
         texts_or_null(values.iter().map(|value| value.filter.as_ref())),
         texts_or_null(values.iter().map(|value| value.no_uncertainty.as_ref())),
+        texts_or_null(values.iter().map(|value| value.refuted_by.as_ref())),
     ])?;
     Ok(TableRows { table: spec.name, rows })
+}
+
+fn refuted() -> ColumnSpec {
+    ColumnSpec::text("refuted_by", "what of its own data refutes it; null where nothing does").or_null()
+}
+
+/// The table of the tests of the data on themselves.
+#[must_use]
+pub(crate) fn consistency() -> TableSpec {
+    TableSpec::new(
+        "consistency",
+        "tests of the data on themselves",
+        vec![
+            ColumnSpec::name("test", "which test"),
+            ColumnSpec::text("of", "what was tested: a value, an effect, an order, a block"),
+            ColumnSpec::number(
+                "statistic",
+                "",
+                "the test's statistic: a ratio of variances where nothing else is said",
+            ),
+            ColumnSpec::number("dof", "", "its degrees of freedom").or_null(),
+            ColumnSpec::number("dof_below", "", "those of what it is compared with; null where that is known")
+                .or_null(),
+            ColumnSpec::number("p", "", "chance of such a statistic on sound data"),
+            ColumnSpec::number("factor", "", "factor on the standard uncertainties concerned"),
+            ColumnSpec::text("finding", "what it found; empty where nothing"),
+            ColumnSpec::name("did", "what was done: nothing, widened, refused, named, verdict"),
+        ],
+    )
+    .optional()
+}
+
+/// Rows of [`consistency`]; none where nothing was tested.
+///
+/// # Errors
+/// Never in practice: the columns are of one length.
+pub(crate) fn consistency_rows(checks: &[Check]) -> Result<Option<TableRows>> {
+    if checks.is_empty() {
+        return Ok(None);
+    }
+    let spec = consistency();
+    let rows = spec.rows(vec![
+        texts(checks.iter().map(|check| check.test.name())),
+        texts(checks.iter().map(|check| &check.of)),
+        numbers(checks.iter().map(|check| check.statistic)),
+        numbers_or_null(checks.iter().map(|check| check.dof.first().copied())),
+        numbers_or_null(checks.iter().map(|check| check.dof.get(1).copied())),
+        numbers(checks.iter().map(|check| check.p)),
+        numbers(checks.iter().map(|check| check.factor)),
+        texts(checks.iter().map(|check| &check.finding)),
+        texts(checks.iter().map(|check| check.did.name())),
+    ])?;
+    Ok(Some(TableRows { table: spec.name, rows }))
 }
 
 /// The table of the effects that a result is corrected for.

@@ -1,0 +1,205 @@
+//! Single readings that are not like the others: named, never dropped.
+//!
+//! A robust fit (Huber, Ann. Math. Statist. 35 (1964) 73) says which readings are suspect; the noise is known from the others, and each
+//! reading's studentised deviation is that from the fit without the suspects (Belsley, Kuh, Welsch, *Regression Diagnostics*, 1980, 2.1).
+
+use nalgebra::{DMatrix, DVector};
+use runout_numerics::statistics::{f_tail, median_absolute_deviation};
+
+use crate::check::{Check, Test, chance};
+use crate::structure::Structure;
+
+/// Iterations of the robust fit.
+const ITERATIONS: usize = 8;
+/// Huber's limit, in standard deviations.
+const HUBER: f64 = 1.345;
+/// Standard deviations of a normal distribution in its median absolute deviation.
+const OF_DEVIATION: f64 = 1.4826;
+/// Robust standard deviations from which a reading is suspect.
+const SUSPECT: f64 = 4.0;
+/// Share of the readings that may be suspect.
+const MOST: f64 = 0.05;
+/// Chance, times the readings, below which a reading is named.
+const NAMED: f64 = 0.01;
+/// Degrees of freedom from which single readings are judged.
+const FEWEST: usize = 8;
+
+/// Readings that are not like the others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rows {
+    /// Their indices, farthest first.
+    pub rows: Vec<usize>,
+    /// What each is off by from the fit without them, in the readings' unit.
+    pub off_by: Vec<f64>,
+    /// The studentised deviation of the farthest reading, named or not.
+    pub farthest: f64,
+    /// Chance of it, times the readings.
+    pub p: f64,
+    /// Degrees of freedom of the noise without suspects.
+    pub dof: f64,
+    /// Standard deviation of one reading with all of them, and without those named.
+    pub std: [f64; 2],
+}
+
+/// Looks for such readings; `basis` are the orthonormal columns of the least-squares fit that left `residual`. `None` where too few
+/// readings are left.
+#[must_use]
+pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
+    let count = residual.len();
+    let dof = count.checked_sub(basis.len()).filter(|dof| *dof >= FEWEST)?;
+    let all = residual.iter().map(|value| value * value).sum::<f64>() / dof as f64;
+    let columns = DMatrix::from_fn(count, basis.len(), |row, column| basis[column][row]);
+    let values = DVector::from_column_slice(residual);
+    let mut left = values.clone();
+    let mut std = 0.0;
+    for _ in 0..ITERATIONS {
+        // A fit of p columns takes a share of the readings with it.
+        std = OF_DEVIATION * median_absolute_deviation(left.as_slice()) * (count as f64 / dof as f64).sqrt();
+        if std <= 0.0 {
+            return None;
+        }
+        let weight = |value: f64| (HUBER * std / value.abs().max(f64::MIN_POSITIVE)).min(1.0);
+        left = &values - weighted(&columns, &values, &left.map(weight))?;
+    }
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|a, b| left[*b].abs().total_cmp(&left[*a].abs()));
+    let most = ((MOST * count as f64).ceil() as usize).min(dof.saturating_sub(FEWEST / 2));
+    let mut suspects: Vec<usize> =
+        order.iter().copied().take(most).take_while(|row| left[*row].abs() > SUSPECT * std).collect();
+    if suspects.is_empty() {
+        suspects = order[..1].to_vec();
+    }
+    let kept = DVector::from_fn(count, |row, _| if suspects.contains(&row) { 0.0 } else { 1.0 });
+    let fitted = weighted(&columns, &values, &kept)?;
+    let below = (dof - suspects.len()) as f64;
+    let off = &values - fitted;
+    let squares: f64 = off.iter().zip(kept.iter()).map(|(value, kept)| kept * value * value).sum();
+    let noise = (squares / below).sqrt();
+    // Variance of a suspect's prediction, in units of the noise.
+    let normal =
+        columns.tr_mul(&DMatrix::from_fn(count, basis.len(), |row, column| kept[row] * columns[(row, column)]));
+    let inverse = normal.try_inverse()?;
+    let predicted = |row: usize| {
+        let own = columns.row(row);
+        (own * &inverse * own.transpose())[(0, 0)]
+    };
+    let mut judged: Vec<(usize, f64)> =
+        suspects.iter().map(|row| (*row, off[*row].abs() / (noise * (1.0 + predicted(*row)).sqrt()))).collect();
+    judged.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // Behind the last suspect is the farthest of the others.
+    let next = order
+        .iter()
+        .find(|row| !suspects.contains(row))
+        .map_or(0.0, |row| off[*row].abs() / (noise * (1.0 - predicted(*row)).max(f64::EPSILON).sqrt()));
+    let tail = |t: f64| (f_tail(t * t, 1.0, below) * count as f64).min(1.0);
+    let behind = |rank: usize| judged.get(rank).map_or(next, |(_, t)| *t);
+    let apart = |rank: usize| judged[rank - 1].1 > (1.0 + (rank as f64).sqrt().recip()) * behind(rank);
+    let named = (1..=judged.len()).rev().find(|rank| apart(*rank) && tail(judged[*rank - 1].1) < NAMED).unwrap_or(0);
+    let rows: Vec<usize> = judged[..named].iter().map(|(row, _)| *row).collect();
+    let farthest = judged.first().map_or(0.0, |(_, t)| *t);
+    Some(Rows {
+        off_by: rows.iter().map(|row| off[*row]).collect(),
+        rows,
+        farthest,
+        p: tail(farthest),
+        dof: below,
+        std: [all.sqrt(), noise],
+    })
+}
+
+/// What a weighted fit of the columns makes of the values at every row.
+fn weighted(columns: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64>) -> Option<DVector<f64>> {
+    if columns.ncols() == 0 {
+        return Some(DVector::zeros(values.len()));
+    }
+    let scaled =
+        DMatrix::from_fn(columns.nrows(), columns.ncols(), |row, column| weights[row] * columns[(row, column)]);
+    let normal = columns.tr_mul(&scaled);
+    let found = normal.cholesky()?.solve(&scaled.tr_mul(values));
+    Some(columns * found)
+}
+
+impl Rows {
+    /// The test in words: which rows, how far off, and what they do to the noise.
+    #[must_use]
+    pub fn check(&self, structure: &Structure, unit: &str) -> Check {
+        let names: Vec<String> = self.rows.iter().map(|row| structure.row(*row)).collect();
+        let check = Check::new(Test::Rows, names.join(", "), self.farthest, &[self.dof], self.p);
+        if self.rows.is_empty() {
+            return check;
+        }
+        let off = |row: usize| format!("{} is off by {:.3} {unit}", names[row], self.off_by[row]);
+        let said: Vec<String> = (0..self.rows.len().min(MOST_NAMED)).map(off).collect();
+        let more = if self.rows.len() > MOST_NAMED {
+            format!(" and {} more", self.rows.len() - MOST_NAMED)
+        } else {
+            String::new()
+        };
+        let finding = format!(
+            "{}{more} ({}); without {} one reading has a standard deviation of {:.3} in place of {:.3} {unit}",
+            said.join(", "),
+            chance(self.p),
+            if self.rows.len() == 1 { "it" } else { "them" },
+            self.std[1],
+            self.std[0]
+        );
+        Check { finding, did: crate::check::Action::Verdict, ..check }
+    }
+}
+
+/// Rows named one by one at most.
+const MOST_NAMED: usize = 5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Random;
+    use runout_numerics::least_squares::Basis;
+
+    fn line(count: usize) -> Basis {
+        Basis::of(vec![vec![1.0; count], (0..count).map(|at| at as f64).collect()])
+    }
+
+    #[test]
+    fn one_wild_reading_of_many_is_named_and_sound_ones_are_not() {
+        let mut random = Random::new(7);
+        for count in [24, 540] {
+            let basis = line(count);
+            let (mut false_names, mut one, mut three, mut edge) = (0, 0, 0, 0);
+            for _ in 0..200 {
+                let left = |mut values: Vec<f64>| {
+                    basis.remove_from(&mut values);
+                    unlike(&values, basis.columns()).unwrap()
+                };
+                let noise: Vec<f64> = (0..count).map(|_| 0.9 * random.normal()).collect();
+                false_names += usize::from(!left(noise.clone()).rows.is_empty());
+                let mut wild = noise.clone();
+                wild[5] += 12.0;
+                let found = left(wild.clone());
+                one += usize::from(found.rows == [5] && found.std[1] < found.std[0]);
+                // At the end of the line, where it decides most of the slope.
+                let mut last = noise.clone();
+                last[count - 1] -= 12.0;
+                edge += usize::from(left(last).rows == [count - 1]);
+                wild[7] -= 20.0;
+                wild[9] += 15.0;
+                let mut rows = left(wild).rows;
+                rows.sort_unstable();
+                three += usize::from(rows == [5, 7, 9]);
+            }
+            assert!(false_names < 4 && one > 190 && edge > 185, "{count}: {false_names} {one} {edge}");
+            assert!(if count > 100 { three > 190 } else { true }, "{count}: {three}");
+        }
+    }
+
+    #[test]
+    fn words_name_the_row_and_what_it_does() {
+        let found = Rows { rows: vec![3], off_by: vec![50.0], farthest: 30.0, p: 1e-20, dof: 500.0, std: [2.39, 0.9] };
+        let check = found.check(&Structure::default().naming((0..9).map(|row| format!("touch {row}")).collect()), "µm");
+        assert_eq!(
+            check.finding,
+            "touch 3 is off by 50.000 µm (p 1e-20); without it one reading has a standard deviation of 0.900 in place of 2.390 µm"
+        );
+        assert!(unlike(&[0.0; 20], &[]).is_none() && unlike(&[1.0; 4], &[]).is_none());
+    }
+}
