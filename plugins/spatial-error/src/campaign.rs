@@ -6,6 +6,7 @@ use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
     Error, Result,
+    consistency::Check,
     points::{PointColumn, PointKind::Number, Points},
 };
 
@@ -37,9 +38,24 @@ pub(crate) const COLUMNS: [PointColumn; 9] = [
     PointColumn::needed("x_mm", Number, "mm", "command of X"),
     PointColumn::needed("y_mm", Number, "mm", "command of Y"),
     PointColumn::needed("z_mm", Number, "mm", "command of Z"),
-    PointColumn::optional("dx_um", Number, "um", "actual less commanded place along x; absent or empty where it was not measured"),
-    PointColumn::optional("dy_um", Number, "um", "actual less commanded place along y; absent or empty where it was not measured"),
-    PointColumn::optional("dz_um", Number, "um", "actual less commanded place along z; absent or empty where it was not measured"),
+    PointColumn::optional(
+        "dx_um",
+        Number,
+        "um",
+        "actual less commanded place along x; absent or empty where it was not measured",
+    ),
+    PointColumn::optional(
+        "dy_um",
+        Number,
+        "um",
+        "actual less commanded place along y; absent or empty where it was not measured",
+    ),
+    PointColumn::optional(
+        "dz_um",
+        Number,
+        "um",
+        "actual less commanded place along z; absent or empty where it was not measured",
+    ),
     PointColumn::optional("time_s", Number, "s", "time; without it the rows are in the order of time, evenly"),
     PointColumn::optional("repeat", Number, "", "number of the pass"),
     PointColumn::optional("std_um", Number, "um", "standard uncertainty of one coordinate of this row"),
@@ -72,6 +88,10 @@ pub struct Campaign {
     pub span: Span,
     /// What looks wrong.
     pub remarks: Vec<String>,
+    /// Components that are absent.
+    pub notes: Vec<String>,
+    /// Components that count as not measured.
+    pub checks: Vec<Check>,
 }
 
 impl Campaign {
@@ -96,7 +116,7 @@ impl Campaign {
         }
         let rows: Vec<[f64; 3]> = (0..count).map(|row| commands.map(|column| column[row])).collect();
         let (places_mm, place_of) = distinct(&rows);
-        let Measured { axes: measured, readings_um, mut remarks } = Measured::of(points, &rows)?;
+        let Measured { axes: measured, readings_um, notes, checks } = Measured::of(points, &rows)?;
         let time = scaled(optional("time_s").map(|column| column.values.as_slice()), count);
         let repeat = match optional("repeat") {
             Some(column) => column
@@ -115,7 +135,7 @@ impl Campaign {
         if let Some(row) = stated.and_then(|values| values.iter().position(|value| *value <= 0.0)) {
             return Err(refuse(format!("row {} of the column `std_um` must be above 0 µm", row + 1)));
         }
-        remarks.extend(looks_wrong(&rows, &readings_um, &measured));
+        let mut remarks = looks_wrong(&rows, &readings_um, &measured);
         remarks.extend(points.copies());
         let noise = match (stated, std_um) {
             (Some(stated), _) => Noise::Column(stated.to_vec()),
@@ -132,7 +152,22 @@ impl Campaign {
         let timed = optional("time_s").is_some();
         let volume = Volume::around(&places_mm, tool_mm, chain);
         let span = Span::of(&places_mm);
-        Ok(Self { file, places_mm, place_of, readings_um, measured, time, timed, repeat, noise, volume, span, remarks })
+        Ok(Self {
+            file,
+            places_mm,
+            place_of,
+            readings_um,
+            measured,
+            time,
+            timed,
+            repeat,
+            noise,
+            volume,
+            span,
+            remarks,
+            notes,
+            checks,
+        })
     }
 
     /// Variance of the noise of a reading, in µm²; `None` where it is not known.

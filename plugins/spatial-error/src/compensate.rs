@@ -228,7 +228,8 @@ impl Chain {
         }
         let mut remains = displaced + &jacobian * &add;
         unknown.iter().for_each(|axis| remains[*axis] = f64::NAN);
-        for axis in (0..count).filter(|axis| whole[*axis] > 0.0 && jacobian.column(*axis).norm() <= NONE * whole[*axis]) {
+        for axis in (0..count).filter(|axis| whole[*axis] > 0.0 && jacobian.column(*axis).norm() <= NONE * whole[*axis])
+        {
             add[axis] = f64::NAN;
         }
         Correction { add: add.iter().copied().collect(), remains_um: remains.into(), limited: held.contains(&true) }

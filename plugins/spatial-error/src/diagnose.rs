@@ -2,6 +2,7 @@
 
 use runout_core::{
     Error, Result,
+    consistency::Check,
     model::{
         Effect,
         closed_loop::Settings,
@@ -22,7 +23,6 @@ use crate::{
     level::level,
     likelihood::Prior,
     noise::Noise,
-    rough::Rough,
     solve::{Solution, families, prior, solve},
     suspects::{Group, groups},
     terms::Term,
@@ -97,14 +97,12 @@ impl PointModel for SpatialError {
         if unexplained.is_empty() {
             unexplained.extend(groups(&campaign, &after).iter().map(|group| together(&campaign, group)));
         }
-        let rough = Rough::of(&campaign, &after);
-        let more = rough.iter().filter(|rough| rough.is_more());
-        unexplained.extend(more.map(|rough| rough.unexplained(campaign.measured.len())));
+        unexplained.extend(outcome.checks.iter().filter(|check| check.bars_verdict()).map(inconsistent));
         let levels = [&before, &after].map(|solution| level(&campaign, solution));
         let trend_std = after.trend_std(&campaign);
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
         let mut diagnosis = Diagnosis {
-            consistency: Vec::new(),
+            consistency: outcome.checks.clone(),
             verdict: verdict(&campaign, added.is_empty(), unexplained.is_empty()),
             before: levels[0].clone(),
             added: added
@@ -198,7 +196,9 @@ impl SpatialError {
             column.map_or(f64::NAN, |column| solution.joint.trend[column])
         };
         let mut squares = 0.0;
-        for (wanted, size) in jump.terms.iter().map(|wanted| (wanted, size(wanted))).filter(|(_, size)| size.is_finite()) {
+        for (wanted, size) in
+            jump.terms.iter().map(|wanted| (wanted, size(wanted))).filter(|(_, size)| size.is_finite())
+        {
             let adds = campaign.places_mm.iter().map(|place| wanted.at(&campaign.volume, *place, 0.0));
             squares += adds.flatten().map(|adds| (adds * size).powi(2)).sum::<f64>();
         }
@@ -244,6 +244,11 @@ fn together(campaign: &Campaign, group: &Group) -> Unexplained {
         rms_um: (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt(),
         place: format!("neighbouring places: {}", group.named(campaign)),
     }
+}
+
+/// What a test of the readings on themselves found.
+fn inconsistent(check: &Check) -> Unexplained {
+    Unexplained { sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
 }
 
 /// Takes effects that are declared with their values out of the readings.

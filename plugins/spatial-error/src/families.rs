@@ -83,8 +83,7 @@ pub(crate) fn most_likely(
     for (field, (all, best)) in guesses.iter_mut().zip(best).enumerate() {
         let first = field * PARAMETERS;
         all[best].parameters = part(&estimate.parameters, field);
-        all[best].covariance =
-            estimate.covariance.view((first, first), (PARAMETERS, PARAMETERS)).into_owned();
+        all[best].covariance = estimate.covariance.view((first, first), (PARAMETERS, PARAMETERS)).into_owned();
     }
     Some(Likely { families, estimate, guesses })
 }

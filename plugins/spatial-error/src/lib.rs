@@ -5,6 +5,7 @@
 //! name moves a chain of rigid bodies.
 
 mod campaign;
+mod checks;
 mod compensate;
 mod conclusion;
 mod config;

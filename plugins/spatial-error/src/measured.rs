@@ -4,7 +4,11 @@
 //! filled in or computed, and as a reading without noise it would decide the placement of all components.
 
 use nalgebra::DVector;
-use runout_core::{Error, Result, points::Points};
+use runout_core::{
+    Error, Result,
+    consistency::{Check, Test},
+    points::Points,
+};
 
 use crate::campaign::COMPONENTS;
 
@@ -19,8 +23,10 @@ pub(crate) struct Measured {
     pub axes: Vec<usize>,
     /// In µm; NaN of the others.
     pub readings_um: Vec<[f64; 3]>,
-    /// Which component was not measured, and why it counts as such.
-    pub remarks: Vec<String>,
+    /// Components that are absent.
+    pub notes: Vec<String>,
+    /// Components that count as not measured.
+    pub checks: Vec<Check>,
 }
 
 impl Measured {
@@ -36,33 +42,41 @@ impl Measured {
         }
         let plane = plane(places_mm);
         let residual = columns.map(|column| column.map_or(0.0, |values| beside(values, &plane)));
-        let least = CONSTANT * residual.iter().copied().fold(0.0, f64::max);
-        let (mut axes, mut remarks) = (Vec::new(), Vec::new());
+        let largest = residual.iter().copied().fold(0.0, f64::max);
+        let (mut axes, mut notes, mut checks) = (Vec::new(), Vec::new(), Vec::new());
         for axis in 0..3 {
             let component = COMPONENTS[axis];
             match columns[axis] {
-                None => remarks.push(format!("{component} is not measured: it is not predicted and not compensated")),
-                Some(_) if residual[axis] < least => remarks.push(format!(
-                    "`{component}_um` varies by {:.1e} µm beside a plane over the places, less than {CONSTANT} of the other components: it \
-                     counts as not measured, and is not predicted and not compensated",
-                    residual[axis]
-                )),
+                None => notes.push(format!("{component} is not measured: it is not predicted and not compensated")),
+                Some(_) if residual[axis] < CONSTANT * largest => {
+                    let share = residual[axis] / largest;
+                    let check = Check::new(Test::Measured, component, share * share, &[], 0.0).finding(|| {
+                        format!(
+                            "`{component}_um` varies by {:.1e} µm beside a plane over the places, {share:.1e} of the other components: it counts \
+                             as not measured, and is not predicted and not compensated",
+                            residual[axis]
+                        )
+                    });
+                    checks.push(check.named());
+                }
                 Some(_) => axes.push(axis),
             }
         }
         let reading = |row: usize| {
-            let number = |axis: usize| columns[axis].filter(|_| axes.contains(&axis)).map_or(f64::NAN, |column| column[row]);
+            let number =
+                |axis: usize| columns[axis].filter(|_| axes.contains(&axis)).map_or(f64::NAN, |column| column[row]);
             [0, 1, 2].map(number)
         };
         let readings_um = (0..places_mm.len()).map(reading).collect();
-        Ok(Self { axes, readings_um, remarks })
+        Ok(Self { axes, readings_um, notes, checks })
     }
 }
 
 /// Orthonormal columns of a constant and the coordinates.
 fn plane(places_mm: &[[f64; 3]]) -> Vec<DVector<f64>> {
     let constant = DVector::from_element(places_mm.len(), 1.0);
-    let coordinates = (0..3).map(|axis| DVector::from_iterator(places_mm.len(), places_mm.iter().map(|place| place[axis])));
+    let coordinates =
+        (0..3).map(|axis| DVector::from_iterator(places_mm.len(), places_mm.iter().map(|place| place[axis])));
     let mut basis: Vec<DVector<f64>> = Vec::new();
     for mut column in std::iter::once(constant).chain(coordinates) {
         let whole = column.norm();

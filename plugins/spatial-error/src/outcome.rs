@@ -8,6 +8,7 @@ use runout_core::{
 
 use crate::{
     campaign::{COMPONENTS, Campaign},
+    checks::{checks, factors},
     compensate::{Chain, Correction},
     conclusion::{At, Conclusion},
     joint::{LeftOut, Predicted},
@@ -88,7 +89,8 @@ impl Conclusion<'_> {
     /// When the query cannot be read.
     pub(crate) fn outcome(&self) -> Result<Outcome> {
         let places = self.separator.query.places(self.campaign)?;
-        let queries = self.queries(&places);
+        let checks = checks(self.campaign, self.solution);
+        let queries = self.queries(&places, factors(&checks));
         let left_out = self.solution.left_out();
         let tables = vec![
             self.rows("prediction", prediction_columns(&queries))?,
@@ -101,7 +103,8 @@ impl Conclusion<'_> {
                          orders count from the middle of the measured volume"
                 .into(),
             tables,
-            values: self.values(&queries, &left_out),
+            values: self.values(&queries, &left_out, &checks),
+            checks,
             remarks: remarks::remarks(self, &queries, &left_out),
             notes: remarks::notes(self, &queries),
             ..Outcome::default()
@@ -114,11 +117,15 @@ impl Conclusion<'_> {
         Ok(TableRows { rows: spec.rows(columns)?, table: spec.name })
     }
 
-    fn queries(&self, places: &[[f64; 3]]) -> Vec<At> {
+    /// Predictions and corrections at places, with a factor on the standard uncertainty of each component.
+    fn queries(&self, places: &[[f64; 3]], factors: [f64; 3]) -> Vec<At> {
         let (campaign, solution) = (self.campaign, self.solution);
         let prior = solution.prior_std_um(campaign).map(|std_um| std_um * std_um);
         let largest = prior.iter().copied().fold(0.0, f64::max);
-        let predicted = solution.predict(campaign, places, true);
+        let mut predicted = solution.predict(campaign, places, true);
+        for at in predicted.iter_mut().flat_map(|at| at.iter_mut().zip(factors)) {
+            at.0.variance_um2 *= at.1 * at.1;
+        }
         let rough = solution.rough_um(campaign, places);
         let one = |((place_mm, predicted), rough_um): ((&[f64; 3], [Predicted; 3]), [f64; 3])| {
             let place_mm = *place_mm;
@@ -209,7 +216,8 @@ pub(crate) fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64;
             let drift: f64 = moving
                 .iter()
                 .map(|column| {
-                    let now = terms[*column].at(&campaign.volume, campaign.places_mm[*place], campaign.time[row])[*axis];
+                    let now =
+                        terms[*column].at(&campaign.volume, campaign.places_mm[*place], campaign.time[row])[*axis];
                     trend[*column] * (now - solution.data.design[field][(*place, *column)])
                 })
                 .sum();

@@ -9,7 +9,6 @@ use crate::{
     joint::{Covariance, Joint, LeftOut, Predictor, Query},
     neighbours::{NEAREST, Neighbours},
     noise::Noise,
-    rough::Rough,
     solve::{Solution, estimated_from},
     suspects::{drift, groups},
     terms::Term,
@@ -25,7 +24,6 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
     let Conclusion { campaign, solution, .. } = conclusion;
     let mut all = campaign.remarks.clone();
     all.extend(of_span(campaign, solution, queries));
-    all.extend(of_stated(campaign));
     let limited = queries.iter().filter(|query| query.correction.as_ref().is_some_and(|one| one.limited)).count();
     if limited > 0 {
         all.push(format!(
@@ -41,10 +39,6 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
         )
     }));
     all.extend(drift(campaign, solution));
-    let rough = Rough::of(campaign, solution);
-    all.extend(rough.iter().filter(|rough| rough.is_more()).map(|rough| {
-        format!("{}: it is no noise, no axis takes it away, and `remains_rms` contains it", rough.words())
-    }));
     all
 }
 
@@ -52,6 +46,7 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
 pub(crate) fn notes(conclusion: &Conclusion, queries: &[At]) -> Vec<String> {
     let Conclusion { separator, campaign, solution, .. } = conclusion;
     let mut all = vec![of_field(campaign, solution)];
+    all.extend(campaign.notes.iter().cloned());
     all.extend(of_noise(campaign));
     all.extend(of_numbers(campaign, solution));
     let extrapolated = queries.iter().filter(|query| query.extrapolated).count();
@@ -118,7 +113,10 @@ fn name(term: Term) -> String {
 pub(crate) fn of_field(campaign: &Campaign, solution: &Solution) -> String {
     let each = |of: &dyn Fn(&Covariance) -> String| {
         let fields = solution.measured.iter().zip(&solution.covariances);
-        fields.map(|(axis, covariance)| format!("{} {}", COMPONENTS[*axis], of(covariance))).collect::<Vec<_>>().join(", ")
+        fields
+            .map(|(axis, covariance)| format!("{} {}", COMPONENTS[*axis], of(covariance)))
+            .collect::<Vec<_>>()
+            .join(", ")
     };
     let what =
         if Solution::nugget_counts(campaign) { "from place to place beyond noise" } else { "nugget, noise included" };
@@ -141,20 +139,6 @@ fn of_noise(campaign: &Campaign) -> Option<String> {
         Noise::Unknown => Some("the noise is not known: it is in the nugget, which predictions do not include".into()),
         Noise::Column(_) | Noise::Stated(_) => None,
     }
-}
-
-/// Repeats that scatter unlike the stated uncertainty.
-fn of_stated(campaign: &Campaign) -> Option<String> {
-    if !matches!(campaign.noise, Noise::Column(_) | Noise::Stated(_)) {
-        return None;
-    }
-    let (places, readings) = (&campaign.place_of, &campaign.readings_um);
-    let known = crate::noise::of_repeats(places, campaign.places_mm.len(), readings, &campaign.measured, &campaign.time);
-    let Noise::Repeats { std_um, .. } = known else { return None };
-    let ratios = campaign.measured.iter().map(|axis| std_um[*axis] / campaign.noise_um(*axis));
-    let worst = ratios.max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs())).unwrap_or(1.0);
-    (!(0.6..1.7).contains(&worst))
-        .then(|| format!("repeats scatter {worst:.2} times as much as the stated uncertainty: is `std_um` right?"))
 }
 
 fn of_numbers(campaign: &Campaign, solution: &Solution) -> Vec<String> {

@@ -1,6 +1,9 @@
 //! What varies from place to place, against the noise of a reading: no axis follows it, and it is no noise.
 
-use runout_core::{model::diagnosis::Unexplained, numerics::statistics::f_tail};
+use runout_core::{
+    consistency::{Check, Test},
+    numerics::statistics::chi2_tail,
+};
 
 use crate::{
     campaign::{COMPONENTS, Campaign},
@@ -8,11 +11,6 @@ use crate::{
     noise::Noise,
     solve::Solution,
 };
-
-/// Degrees of freedom that are as good as infinite.
-const MANY: f64 = 1e9;
-/// Chance below which a nugget is more than the noise.
-const CHANCE: f64 = 0.005;
 
 /// A component's estimated nugget, and the noise of its readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,36 +40,22 @@ impl Rough {
             let index = field * PARAMETERS + PARAMETERS - 1;
             let (nugget_um, noise_um) = (solution.covariances[field].nugget_um, campaign.noise_um(*axis));
             let far = (nugget_um / noise_um).ln();
-            let above = 0.5 * f_tail(far * far / (estimate.covariance[(index, index)] + of_noise), 1.0, MANY);
+            let above = 0.5 * chi2_tail(far * far / (estimate.covariance[(index, index)] + of_noise), 1.0);
             let p = if far > 0.0 { above * solution.measured.len() as f64 } else { 1.0 };
             Self { axis: *axis, nugget_um, noise_um, p }
         };
         solution.measured.iter().enumerate().map(each).collect()
     }
 
-    /// Whether it is more than the noise.
-    pub(crate) fn is_more(&self) -> bool {
-        self.p < CHANCE
-    }
-
-    /// In words.
-    pub(crate) fn words(&self) -> String {
-        let Self { axis, nugget_um, noise_um, .. } = self;
-        format!(
-            "{} varies from place to place by {nugget_um:.1} µm (standard deviation), {:.1} times the noise of {noise_um:.1} µm",
-            COMPONENTS[*axis],
-            nugget_um / noise_um
-        )
-    }
-
-    /// As something that no effect explains.
-    pub(crate) fn unexplained(&self, components: usize) -> Unexplained {
-        Unexplained {
-            sensor: None,
-            setup: None,
-            orders: [0, 0],
-            rms_um: self.nugget_um / (components as f64).sqrt(),
-            place: format!("{}: no axis follows it", self.words()),
-        }
+    /// As a test: nothing where it is the noise at most.
+    pub(crate) fn check(&self) -> Check {
+        let Self { axis, nugget_um, noise_um, p } = *self;
+        let (component, ratio) = (COMPONENTS[axis], nugget_um / noise_um);
+        Check::new(Test::Residual, component, ratio * ratio, &[], p).finding(|| {
+            format!(
+                "{component} varies from place to place by {nugget_um:.1} µm (standard deviation), {ratio:.1} times the noise of \
+                 {noise_um:.1} µm: no axis takes it away, and `remains_rms` contains it"
+            )
+        })
     }
 }

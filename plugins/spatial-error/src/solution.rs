@@ -86,8 +86,8 @@ impl Solution {
                 let at = &all[some[index]];
                 for axis in 0..3 {
                     let (other, at) = (other[index][axis], at[axis]);
-                    extra[axis] += weight[axis]
-                        * ((other.mean_um - at.mean_um).powi(2) + (other.variance_um2 - at.variance_um2));
+                    extra[axis] +=
+                        weight[axis] * ((other.mean_um - at.mean_um).powi(2) + (other.variance_um2 - at.variance_um2));
                 }
             }
         }
@@ -212,9 +212,8 @@ impl Solution {
     #[must_use]
     pub(crate) fn prior_std_um(&self, campaign: &Campaign) -> [f64; 3] {
         let counts = Self::nugget_counts(campaign);
-        let of_field = |covariance: &Covariance| {
-            covariance.sill_um.hypot(if counts { covariance.nugget_um } else { 0.0 })
-        };
+        let of_field =
+            |covariance: &Covariance| covariance.sill_um.hypot(if counts { covariance.nugget_um } else { 0.0 });
         self.by_axis(self.covariances.iter().map(of_field), f64::NAN)
     }
 

@@ -60,8 +60,8 @@ pub(crate) fn independent(campaign: &Campaign, terms: &[Term]) -> (Vec<Term>, Ve
     let mut basis: Vec<DVector<f64>> = Vec::new();
     for term in terms {
         let rows = campaign.place_of.iter().zip(&campaign.time);
-        let column: Vec<f64> =
-            rows.flat_map(|(place, time)| {
+        let column: Vec<f64> = rows
+            .flat_map(|(place, time)| {
                 let adds = term.at(&campaign.volume, campaign.places_mm[*place], *time);
                 campaign.measured.iter().map(move |axis| adds[*axis])
             })

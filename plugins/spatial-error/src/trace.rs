@@ -155,8 +155,7 @@ impl<'a> Tracing<'a> {
 
     fn start(&self) -> Option<State> {
         let data = self.data(&self.declared);
-        let Likely { families, estimate, .. } =
-            most_likely(&data, &self.prior, self.families, Criterion::Full, None)?;
+        let Likely { families, estimate, .. } = most_likely(&data, &self.prior, self.families, Criterion::Full, None)?;
         Some(State { found: Vec::new(), families, estimate })
     }
 

@@ -13,8 +13,8 @@ use rand_distr::StandardNormal;
 
 use crate::{
     campaign::Campaign,
-    joint::{Data, Field, Joint, Sums},
     families::{Guess, likely},
+    joint::{Data, Field, Joint, Sums},
     likelihood::{PARAMETERS, Prior, covariances},
     solve::{Solution, prior},
 };

@@ -1,6 +1,9 @@
 //! Values of a result: the trend, each component's covariance, and the error before and after compensation.
 
-use runout_core::summary::NamedValue;
+use runout_core::{
+    consistency::{Check, Test, refuted_by},
+    summary::NamedValue,
+};
 
 use crate::{
     campaign::COMPONENTS,
@@ -13,10 +16,13 @@ use crate::{
 };
 
 impl Conclusion<'_> {
-    pub(crate) fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]]) -> Vec<NamedValue> {
+    pub(crate) fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]], checks: &[Check]) -> Vec<NamedValue> {
         let mut values = self.of_trend();
-        for axis in 0..3 {
-            values.extend(self.of_covariance(axis));
+        for (axis, component) in COMPONENTS.into_iter().enumerate() {
+            // A nugget above the noise refutes no number: it is one of them.
+            let is_own = |check: &&Check| check.test != Test::Residual && check.of.starts_with(component);
+            let refuted = refuted_by(&checks.iter().filter(is_own).cloned().collect::<Vec<_>>());
+            values.extend(self.of_covariance(axis).into_iter().map(|value| value.refuted_by(refuted.clone())));
             values.extend(of_left_out(axis, left_out));
         }
         values.extend(of_compensation(queries));

@@ -8,6 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use runout_core::{
+    consistency::Test,
     model::{closed_loop::Settings, diagnosis::Verdict},
     points::Points,
     stage::{Outcome, PointSeparator},
@@ -37,7 +38,7 @@ fn a_component_that_was_not_measured_changes_no_other() {
     let made = scenario(61).simulate();
     let separator = separator("query = { grid_mm = [200, 150, 175] }");
     let absent = separator.separate(&without(&made, "dy_um")).unwrap();
-    assert!(absent.remarks.iter().any(|remark| remark.contains("dy is not measured")), "{:?}", absent.remarks);
+    assert!(absent.notes.iter().any(|note| note.contains("dy is not measured")), "{:?}", absent.notes);
     let others = ["dx_um", "dz_um"];
     let expected = predictions(&absent, &others);
     assert!(expected.iter().flatten().all(|value| value.is_finite()));
@@ -61,8 +62,11 @@ fn a_component_that_was_not_measured_changes_no_other() {
             assert_eq!(value(&outcome, symbol, Some("dy")).value, None, "{kind} {symbol}");
         }
         assert!(value(&outcome, "remains_rms", None).value.unwrap().is_finite());
-        let said = outcome.remarks.join("\n");
-        assert!(said.contains("`dy_um`") && said.contains("not measured"), "{kind}: {said}");
+        let said = &outcome.checks[0];
+        assert!(
+            said.finding.contains("`dy_um`") && said.finding.contains("not measured") && !said.refutes(),
+            "{said:?}"
+        );
         let rows = table(&outcome, "compensation");
         assert!(column(&rows, "correct_y_um").iter().all(|add| add.is_nan()), "{kind}");
         assert!(column(&rows, "correct_x_um").iter().all(|add| add.is_finite()), "{kind}");
@@ -82,7 +86,8 @@ fn a_loop_without_a_component_finds_what_the_others_show() {
     let found = separator.model().unwrap().diagnose(&without(&made, "dz_um"), &settings).unwrap().diagnosis;
     assert_eq!(found.verdict, Verdict::Explained, "{:?} {:?}", found.added, found.unexplained);
     assert_eq!((found.added.len(), found.added[0].effect.as_str()), (1, "positioning"));
-    let blind = |effect: &str, target: &str| found.blind_to.iter().any(|one| one.effect == effect && one.targets == [target]);
+    let blind =
+        |effect: &str, target: &str| found.blind_to.iter().any(|one| one.effect == effect && one.targets == [target]);
     assert!(blind("scale", "Z") && blind("thermal-drift", "z") && !blind("scale", "X"), "{:?}", found.blind_to);
 }
 
@@ -147,5 +152,61 @@ fn what_is_not_smooth_remains_and_is_no_noise() {
         assert!((0.85..1.25).contains(&(remains / expected)), "{query}: {remains}");
         let error = value(&found.after, "error_rms", None).value.unwrap();
         assert!(error > remains, "{error} {remains}");
+    }
+}
+
+/// A given nugget of a third of the true one: regions that are left out refute it, and predictions are wider by about what is missing.
+#[test]
+fn a_covariance_that_the_readings_refute_widens_predictions() {
+    let mut scenario = Scenario { passes: 1, ..scenario(81) };
+    scenario.tracker.noise_um = 3.0;
+    let points = scenario.simulate().points();
+    let given = |nugget: f64| {
+        let kriging =
+            format!("variogram = \"matern-5/2\", sill_um = 4.0, range_mm = [120, 100, 95], nugget_um = {nugget}");
+        separator(&format!("kriging = {{ {kriging} }}")).separate(&points).unwrap()
+    };
+    let (right, wrong) = (given(3.0), given(0.9));
+    let left_out = |outcome: &Outcome, of: &str| {
+        outcome.checks.iter().find(|check| check.test == Test::LeftOut && check.of == of).unwrap().clone()
+    };
+    for name in ["dx", "dy", "dz"] {
+        assert!(!left_out(&right, name).refutes(), "{:?}", left_out(&right, name));
+        let check = left_out(&wrong, name);
+        assert!(check.refutes() && (1.5..4.5).contains(&check.factor), "{check:?}");
+        let sill = value(&wrong, "sill", Some(name));
+        assert!(sill.refuted_by.as_ref().is_some_and(|said| said.contains("regions left out")), "{sill:?}");
+    }
+    assert!(value(&right, "sill", Some("dx")).refuted_by.is_none());
+}
+
+/// The second pass is offset along y: the pass is named, and bars the verdict until a drift explains it.
+#[test]
+fn a_pass_that_is_offset_is_named() {
+    let made = scenario(82).simulate();
+    let separator = separator("query = { grid_mm = [300, 200, 175] }");
+    let shifts = |points: &Points| -> Vec<String> {
+        let outcome = separator.separate(points).unwrap();
+        let shifts = outcome.checks.into_iter().filter(|check| check.test == Test::Shift && check.refutes());
+        shifts.map(|check| check.finding).collect()
+    };
+    assert_eq!(shifts(&made.points()), Vec::<String>::new());
+    let mut points = made.points();
+    change(&mut points, "dy_um", |(row, value)| *value += if made.repeat[row] > 1.5 { 1.6 } else { 0.0 });
+    let found = shifts(&points);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].starts_with("dy: pass 2 differs from pass 1 by"), "{found:?}");
+}
+
+/// Repeats that scatter unlike the stated uncertainty, to either side.
+#[test]
+fn a_stated_noise_that_repeats_refute_is_said() {
+    let points = scenario(83).simulate().points();
+    for (std_um, refuted) in [(0.85, false), (2.5, true), (0.3, true)] {
+        let outcome = separator(&format!("query = {{ grid_mm = [300, 200, 175] }}\nstd_um = {std_um}"))
+            .separate(&points)
+            .unwrap();
+        let found = outcome.checks.iter().any(|check| check.test == Test::Alike && check.refutes());
+        assert_eq!(found, refuted, "{std_um}: {:?}", outcome.checks);
     }
 }

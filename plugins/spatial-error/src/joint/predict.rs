@@ -73,7 +73,8 @@ impl<'a> Predictor<'a> {
                 .collect();
         };
         let count = known.cloud.len();
-        let same = if query.nugget_counts && nugget > 0.0 { at_measured(self.places, query.places) } else { Vec::new() };
+        let same =
+            if query.nugget_counts && nugget > 0.0 { at_measured(self.places, query.places) } else { Vec::new() };
         let alpha = faer::ColRef::from_slice(&known.alpha);
         let mut block = Mat::<f64>::zeros(count, BLOCK);
         let mut white = Mat::<f64>::zeros(count, BLOCK);
