@@ -167,6 +167,17 @@ impl Check {
         self
     }
 
+    /// Of one of so many parts that are tested alike: what chance makes of all of them is no finding.
+    #[must_use]
+    pub fn among(mut self, parts: usize) -> Self {
+        self.p = (self.p * parts.max(1) as f64).min(1.0);
+        if self.p >= FINDING {
+            self.finding.clear();
+            self.did = if self.factor > 1.0 { Action::Widened } else { Action::Nothing };
+        }
+        self
+    }
+
     /// The same of one of several parts: "station s1, order 3".
     #[must_use]
     pub fn within(mut self, part: &str) -> Self {
@@ -244,6 +255,7 @@ mod tests {
         assert_eq!((placed.of.as_str(), placed.finding.as_str()), ("station s1, radius", "station s1: p 0.0001"));
         assert_eq!(of(0.02).widening(1.4).did, Action::Widened);
         assert!(!of(1e-4).named().refutes());
+        assert_eq!((of(1e-4).among(10).did, of(1e-4).widening(2.0).among(60).did), (Action::Verdict, Action::Widened));
         assert_eq!([chance(0.0), chance(2.3e-5), chance(0.0123)], ["p < 1e-99", "p 2e-5", "p 0.012"]);
     }
 }

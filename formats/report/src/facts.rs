@@ -35,7 +35,7 @@ pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (Stri
 /// What the residual and the warnings give, where nothing is to be decided.
 fn without_limits(summary: &Summary) -> (String, &'static str) {
     let known = summary.stations.iter().filter(|station| station.chi2_per_dof.is_some()).count();
-    let misfits = summary.stations.iter().filter(|station| station.is_misfit(known)).count();
+    let misfits = summary.misfits().count();
     let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();
     let warned = match warnings {
         0 => String::new(),
@@ -46,8 +46,9 @@ fn without_limits(summary: &Summary) -> (String, &'static str) {
         (0, 0) => (String::new(), "open"),
         (0, _) => (" The residual agrees with the measured noise.".into(), "open"),
         (count, all) => {
-            let found =
-                format!(" At {count} of {all} stations the residual exceeds the noise; the declared rig may be wrong.");
+            let found = format!(
+                " At {count} of {all} stations the residual is not what noise leaves; the declared rig may be wrong."
+            );
             (found, "bad")
         }
     };

@@ -16,10 +16,10 @@ use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
     height_grid::HeightGrid,
     stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
-    summary::{LostOrders, NamedValue, PartSummary, StationSummary, Summary, SurfaceSummary},
+    summary::{LostOrders, NamedValue, PartSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
-use runout_consistency::Check;
+use runout_consistency::{Check, Test};
 use runout_error::{Error, Result};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
@@ -238,10 +238,14 @@ impl ResultWriter {
         let left_out = self.station_tables.remark();
         self.summary.notes.extend(left_out.clone());
         self.summary.warnings.extend(left_out);
+        // Those of whole residuals are said of all stations together.
+        let of_turns = !self.summary.stations.is_empty();
         let findings = self.summary.consistency.iter().filter(|check| !check.finding.is_empty());
+        let findings = findings.filter(|check| !(of_turns && check.test == Test::Residual));
         let findings: Vec<String> = findings.map(|check| check.finding.clone()).collect();
         self.summary.warnings.extend(findings);
-        self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
+        let misfit = misfit(&self.summary, self.interrupted);
+        self.summary.warnings.extend(misfit);
         self.summary.warnings.extend(inflated(&self.summary.stations));
         let mut placed = self.summary.placed_values();
         placed.extend(self.evaluated.placed());
@@ -373,8 +377,8 @@ fn begun(pipeline: &Pipeline) -> Summary {
 }
 
 /// What a rig that is not as declared looks like: a residual far above what is expected from noise.
-fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
-    let beyond = stations.iter().filter(|station| station.is_misfit(stations.len()));
+fn misfit(summary: &Summary, interrupted: bool) -> Option<String> {
+    let beyond = summary.misfits().filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > 1.0));
     let count = beyond.clone().count();
     let worst =
         beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;
@@ -386,8 +390,8 @@ fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
     Some(format!(
         "at {count} of {} stations the readings contradict each other: χ² per degree of freedom is up to {chi2:.decimals$} ({}, {dof} degrees of \
          freedom), where noise makes 1, and the fit leaves {left:.4} µm rms; something is not as the rig declares it{bridged}, and the \
-         stated uncertainties, which come from the noise alone, do not cover it. `runout diagnose` looks for the cause",
-        stations.len(),
+         stated uncertainties are widened by as much. `runout diagnose` looks for the cause",
+        summary.stations.len(),
         worst.station,
     ))
 }
