@@ -9,8 +9,8 @@ use super::{
     fit::{INDEPENDENT, Refit, refit},
     found::Found,
     judgement::{
-        BIC_LIMIT, OVERLAP, P_LIMIT, above_chance, at_the_floor, disturbed, independent, is, mixed, no_gain, overlap,
-        raises_held_out, unit, weak,
+        BIC_LIMIT, OVERLAP, P_LIMIT, above_chance, at_the_floor, disturbed, independent, is, mixed, no_gain,
+        noise_only, overlap, raises_held_out, unit, weak,
     },
     report::{added, blind, inconsistent, level, moved, verdict},
 };
@@ -110,7 +110,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     let current = tracing.refit_found(model.whole(), &found)?;
     let (current, others) = tracing.combinations(model.whole(), current, SAME_BIC);
     let consistency = current.fit.consistency();
-    let left = at_the_floor(current.fit.remainder());
+    let left = noise_only(current.fit.remainder(), &consistency);
     let verdict = verdict(current.fit.remainder(), &consistency, tracing.found.is_empty());
     tracing.settle(&current);
     let applied = current.settings.clone();

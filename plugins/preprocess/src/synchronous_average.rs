@@ -13,6 +13,7 @@ mod bridge;
 mod encoder;
 mod kernel;
 mod level;
+mod low_orders;
 mod marks;
 mod mean;
 mod outliers;
@@ -347,6 +348,7 @@ impl Averager for SynchronousAverage {
             scatter_beside: outcome.scatter_beside,
             near_tones: outcome.near_tones,
             levels: outcome.levels,
+            course: outcome.course,
             split: outcome.split,
             spread: outcome.spread,
             turns: count,

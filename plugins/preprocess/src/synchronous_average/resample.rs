@@ -4,6 +4,7 @@ use std::{collections::VecDeque, f64::consts::TAU};
 
 use runout_core::{
     Complex64,
+    consistency::turns::Course,
     measurement::{Block, Capture, Defect},
     near_tone::{NearTone, near_tones},
     numerics::{fourier::max_order, lanes::fused},
@@ -39,6 +40,7 @@ pub(super) struct Outcome {
     pub scatter_beside: Option<Vec<Complex64>>,
     pub near_tones: Vec<NearTone>,
     pub levels: TurnLevels,
+    pub course: Course,
     pub split: Option<Split>,
     pub spread: Option<Spread>,
     pub used: usize,
@@ -174,6 +176,7 @@ impl<'a> Resampling<'a> {
             scatter_beside: self.means.scatter_beside(),
             used: self.means.whole.turns(),
             levels: self.means.levels(),
+            course: self.means.low_orders().course(),
             split: self.means.split(neighbours.as_ref()),
             spread: self.means.spread(),
             used_samples: self.used_samples,
