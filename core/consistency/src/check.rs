@@ -185,7 +185,8 @@ impl Check {
     /// The same of one of several parts, as a station.
     #[must_use]
     pub fn within(mut self, part: &str) -> Self {
-        part.clone_into(&mut self.part);
+        // A setup at a station is "setup/station".
+        self.part = if self.part.is_empty() { part.to_owned() } else { format!("{}/{part}", self.part) };
         if !self.finding.is_empty() {
             self.finding = format!("{part}: {}", self.finding);
         }
