@@ -76,8 +76,8 @@ fn words(table: &TurnTable, spectrum: &Spectrum, order: usize) -> String {
         (last - first).norm()
     };
     let channel = (0..table.channels).max_by(|a, b| changed(a).total_cmp(&changed(b))).unwrap_or(0);
-    let [first, last] = ends(channel).map(|value| value.norm());
-    let most = spectrum.course(order, channel, rows).map(|value| value.norm()).fold(0.0, f64::max);
+    let [first, last] = ends(channel).map(Complex64::norm);
+    let most = spectrum.course(order, channel, rows).map(Complex64::norm).fold(0.0, f64::max);
     if (last - first).abs() > 0.5 * changed(&channel) {
         let how = if last < first { "fades" } else { "grows" };
         format!("order {order} {how} from {first:.3} to {last:.3} µm during the recording")
