@@ -25,11 +25,8 @@ max_order = 12
 x_rms_um = 0.5
 y_rms_um = 0.5
 
-[asynchronous]
-rms_um = 0.1
-
 [noise]
-rms_um = 0.02
+rms_um = 0.05
 "#;
 
 /// A campaign, with its pipeline on a rig whose first sensor has the wrong sign, or as it is.
@@ -75,7 +72,7 @@ fn a_station_s_warning_is_at_the_top_with_its_name() {
 
 #[test]
 fn a_diagnosis_repeats_what_the_run_warns_of() {
-    for folder in [recorded(&[], true), recorded(&["asynchronous.rms_um=0.02", "noise.rms_um=0.3"], false)] {
+    for folder in [recorded(&[], true), recorded(&["noise.rms_um=0.3"], false)] {
         let ran = json(&folder, &["run", "pipeline.toml"]);
         let diagnosis = json(&folder, &["diagnose", "pipeline.toml"]);
         let all = texts(&diagnosis, "warnings");

@@ -6,7 +6,7 @@ use runout_core::{
     rig::Rig,
     summary::{Decision, Summary},
     surface::Surface,
-    table::number::{ranges, significant},
+    table::number::{ranges, rounded_place, significant},
 };
 
 use crate::limits;
@@ -84,7 +84,8 @@ pub(crate) fn list(summary: &Summary, rig: Option<&Rig>, surface: Option<&Surfac
     let turns = [captures().map(|one| one.turns_used).sum::<usize>(), captures().map(|one| one.turns_recorded).sum()];
     let speeds: Vec<f64> = captures().filter_map(|capture| capture.speed_rpm).collect();
     let speed = (!speeds.is_empty()).then(|| speeds.iter().sum::<f64>() / speeds.len() as f64);
-    let places = summary.stations.iter().flat_map(|station| &station.sections).map(|section| section.z_mm);
+    let places =
+        summary.stations.iter().flat_map(|station| &station.sections).map(|section| rounded_place(section.z_mm));
     let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
     let lost = &summary.lost_orders;
     let has_orders = rig.is_some() || !lost.form.is_empty() || !lost.motion.is_empty();

@@ -142,9 +142,9 @@ fn diagnose_turns(
     }
     let surface = writer.build_surface(radius_mm)?;
     writer.note(turns.notes());
-    let mut remarks: Vec<String> = recording.remarks().into_iter().chain(turns.warnings(line.rig)).collect();
+    let remarks = recording.remarks().into_iter().chain(turns.warnings(line.rig)).collect();
     if pipeline.evaluate.has(Group::ErrorMotion) && !diagnosis.added.is_empty() {
-        remarks.push(UNCORRECTED_SPREAD.into());
+        writer.note(vec![UNCORRECTED_SPREAD.into()]);
     }
     writer.diagnosed(diagnosis, as_declared.warnings(line.rig));
     let mut finished = writer.finish(inputs, remarks, surface.as_ref())?;
