@@ -60,12 +60,11 @@ impl<'a, F: Fit> Keyed<'a, F> {
         let tested: Vec<Vec<f64>> = columns.iter().map(|column| self.fit.tested(column)).collect();
         let squares = |columns: &[Vec<f64>]| columns.iter().map(|column| dot(column, column)).sum::<f64>();
         let is_shown = squares(&tested) * self.fit.averaged() > SHOWN * squares(columns);
-        let keys = match self.fit.blocks_of_entries().filter(|_| !is_shown) {
-            Some(blocks) => self.by_entries(&blocks, columns, candidates),
-            None => {
-                let own = orthonormal(tested, &self.fixed, INDEPENDENT);
-                keys(&own, candidates, &self.residual, &self.fixed, self.structure(), self.models.as_ref())
-            }
+        let keys = if let Some(blocks) = self.fit.blocks_of_entries().filter(|_| !is_shown) {
+            self.by_entries(&blocks, columns, candidates)
+        } else {
+            let own = orthonormal(tested, &self.fixed, INDEPENDENT);
+            keys(&own, candidates, &self.residual, &self.fixed, self.structure(), self.models.as_ref())
         };
         match self.fit.among_family(effect) {
             Some(p) => keys.beside_family(p),

@@ -31,7 +31,7 @@ struct Cell {
 /// Means of a map.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cells {
-    cells: Vec<Cell>,
+    filled: Vec<Cell>,
     /// The mean that each point is in; beyond the end where it is in none.
     of: Vec<usize>,
     first: i32,
@@ -70,23 +70,23 @@ impl Cells {
             cells.push(Cell { y_mm: cell.y_mm / cell.points, angle: cell.angle / cell.points, ..cell });
         }
         of.iter_mut().for_each(|index| *index = place[*index]);
-        Self { cells, of, first, passes, bins }
+        Self { filled: cells, of, first, passes, bins }
     }
 
     /// Points of a mean.
     pub(crate) fn averaged(&self) -> f64 {
-        self.cells.iter().map(|cell| cell.points).sum::<f64>() / self.cells.len().max(1) as f64
+        self.filled.iter().map(|cell| cell.points).sum::<f64>() / self.filled.len().max(1) as f64
     }
 
     /// Means of values at the points.
     pub(crate) fn means(&self, values: &[f64]) -> Vec<f64> {
-        let mut sums = vec![0.0; self.cells.len()];
+        let mut sums = vec![0.0; self.filled.len()];
         for (index, value) in self.of.iter().zip(values) {
             if let Some(sum) = sums.get_mut(*index) {
                 *sum += value;
             }
         }
-        sums.iter().zip(&self.cells).map(|(sum, cell)| sum / cell.points).collect()
+        sums.iter().zip(&self.filled).map(|(sum, cell)| sum / cell.points).collect()
     }
 
     /// The group of passes that a pass is in.
@@ -105,11 +105,11 @@ impl Cells {
     /// What is declared of the means.
     pub(crate) fn structure(&self) -> Structure {
         let numbered = |count: usize| (1..=count).map(|number| format!("pass {number}")).collect::<Vec<String>>();
-        let passes: Vec<usize> = self.cells.iter().map(|cell| cell.pass).collect();
-        let groups = self.cells.iter().map(|cell| self.group(cell.pass)).collect();
-        let halves = self.cells.iter().map(|cell| usize::from(2 * cell.bin >= self.bins)).collect();
+        let passes: Vec<usize> = self.filled.iter().map(|cell| cell.pass).collect();
+        let groups = self.filled.iter().map(|cell| self.group(cell.pass)).collect();
+        let halves = self.filled.iter().map(|cell| usize::from(2 * cell.bin >= self.bins)).collect();
         Structure::default()
-            .along("y", passes.clone(), self.cells.iter().map(|cell| cell.y_mm).collect())
+            .along("y", passes.clone(), self.filled.iter().map(|cell| cell.y_mm).collect())
             .divided(self.groups_name(), Kind::Blocks, groups, numbered(self.groups()))
             .divided("passes", Kind::Alike, passes, numbered(self.passes))
             .divided(
@@ -122,7 +122,7 @@ impl Cells {
 
     /// The group of passes of each point, for effects that change no mean of a pass.
     pub(crate) fn groups_of_points(&self) -> Partition {
-        let group = |index: &usize| self.cells.get(*index).map_or(usize::MAX, |cell| self.group(cell.pass));
+        let group = |index: &usize| self.filled.get(*index).map_or(usize::MAX, |cell| self.group(cell.pass));
         Partition {
             name: self.groups_name().into(),
             level: self.of.iter().map(group).collect(),
@@ -146,9 +146,9 @@ impl Cells {
                 let lever = if tilts { cell.y_mm } else { 1.0 };
                 Complex64::from_polar(lever * mean, -ratio * (TAU * pass + cell.angle))
             };
-            self.cells.iter().zip(means).map(term).sum::<Complex64>().norm_sqr()
+            self.filled.iter().zip(means).map(term).sum::<Complex64>().norm_sqr()
         };
-        let offsets = (0..(below + above) as usize + 1).map(|index| index as f64 - below);
+        let offsets = (0..=(below + above) as usize).map(|index| index as f64 - below);
         (offsets.map(at).collect(), below as usize)
     }
 }

@@ -71,7 +71,7 @@ pub(crate) fn most_likely(
     let mut best = Vec::new();
     for field in 0..data.observed.len() {
         let start = start.map(|(families, parameters)| (families[field], part(parameters, field)));
-        let all = each_family(&alone(data, field), &prior.of(field), families, criterion, start);
+        let all = each_family(&alone(data, field), &prior.of(field), families, criterion, start.as_ref());
         let likelihood = |index: &usize| all[*index].ln_likelihood;
         best.push((0..all.len()).max_by(|one, other| likelihood(one).total_cmp(&likelihood(other)))?);
         guesses.push(all);
@@ -116,7 +116,7 @@ fn each_family(
     prior: &Prior,
     families: &[Family],
     criterion: Criterion,
-    start: Option<(Family, DVector<f64>)>,
+    start: Option<&(Family, DVector<f64>)>,
 ) -> Vec<Guess> {
     let mut all: Vec<Guess> = Vec::new();
     let moved = |from: &DVector<f64>, by: f64| {
@@ -126,10 +126,10 @@ fn each_family(
         };
         DVector::from_fn(from.len(), |index, _| shift(index, from[index]))
     };
-    let first = start.as_ref().map(|(family, _)| *family);
+    let first = start.map(|(family, _)| *family);
     for family in first.iter().chain(families.iter().filter(|family| first != Some(**family))) {
         let best = all.iter().max_by(|one, other| one.ln_likelihood.total_cmp(&other.ln_likelihood));
-        let starts = match (best, &start) {
+        let starts = match (best, start) {
             (Some(best), _) => vec![moved(&best.parameters, (reach(best.family) / reach(*family)).ln())],
             (None, Some((known, from))) => vec![moved(from, (reach(*known) / reach(*family)).ln())],
             (None, None) => vec![prior.centre.clone(), moved(&prior.centre, 0.9)],

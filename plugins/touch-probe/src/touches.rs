@@ -61,7 +61,9 @@ impl Touches {
         let mut remarks = Vec::new();
         let places = places(&column, &missing, &mut remarks)?;
         let count = places.len();
-        if let Some(row) = places.iter().position(|[x, y]| !(x.hypot(*y) > 0.0)) {
+        if let Some(row) =
+            places.iter().position(|[x, y]| x.hypot(*y).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater))
+        {
             let problem = format!(
                 "row {}, of setup `{}`, reads 0 mm from the nominal centre: it is no touch",
                 row + 1,

@@ -20,7 +20,7 @@ pub static ROWS: &[Kind] = &[
         |chance| circles(chance, 5, seated),
         &["differ", "disagree", "depend"],
     ),
-    straightness("independent errors", |chance| traces(chance, |c, n| independent(c, n))),
+    straightness("independent errors", |chance| traces(chance, independent)),
     straightness_troubled(
         "errors that are a random walk",
         |chance| traces(chance, random_walk),
@@ -175,7 +175,7 @@ fn traces(chance: &mut Chance, errors: Errors) -> String {
         for (place, error) in errors(chance, count).into_iter().enumerate() {
             let along = place as f64 / count as f64;
             let reading = at(&part, along) + sign * at(&slide, along) + 0.05 * error;
-            line(&mut text, format_args!("{trace},{setup},{},{reading:.6}", place));
+            line(&mut text, format_args!("{trace},{setup},{place},{reading:.6}"));
         }
     }
     text

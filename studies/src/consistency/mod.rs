@@ -3,7 +3,7 @@
 
 mod campaigns;
 
-use std::path::Path;
+use std::{fmt::Write as _, path::Path};
 
 use runout_core::{
     Error, Result,
@@ -128,8 +128,10 @@ pub fn table(rows: &[(&Kind, Row)]) -> String {
         let holds =
             if stated == 0 { "-".into() } else { format!("{:.1} % of {stated}", 100.0 * held as f64 / stated as f64) };
         let median = row.std.get(row.std.len() / 2).map_or_else(|| "-".into(), |std| format!("{std:.3}"));
-        text += &format!(
-            "| {} | {} | {} | {} | {named} | {} | {} | {holds} | {median} |\n",
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {} | {named} | {} | {} | {holds} | {median} |",
             kind.domain,
             kind.trouble,
             row.campaigns,

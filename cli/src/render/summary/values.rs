@@ -127,7 +127,8 @@ mod tests {
             (vec![near], Decision::Conforms, "conforms"),
             (Vec::new(), Decision::Undecided, "undecided: no value"),
         ] {
-            let summary = LimitSummary { limit: limit.clone(), decision, values };
+            let document = serde_json::json!({ "limit": limit, "decision": decision, "values": values });
+            let summary: LimitSummary = serde_json::from_value(document).unwrap();
             let deciding = deciding(&summary);
             assert!(deciding.is_none_or(|value| value.decision == decision));
             assert_eq!(decided(&summary, deciding), said);

@@ -46,7 +46,7 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
     };
     let dof = effective(&|order| order.dof as f64);
     // Known no better than the residual, and to some percent at best: weights follow a part of the noise.
-    let below = effective(&|_| freedom).min(dof).min(MOST_FREEDOM).max(LEAST_FREEDOM);
+    let below = effective(&|_| freedom).min(dof).clamp(LEAST_FREEDOM, MOST_FREEDOM);
     let pooled = linear::residual(residual.chi2_per_dof, dof, below);
     let above = if pooled.refutes() && residual.chi2_per_dof > 1.0 { residual.chi2_per_dof } else { 1.0 };
     factors.fill(above);
