@@ -40,6 +40,7 @@ pub mod rows;
 pub mod structure;
 #[cfg(test)]
 mod testing;
+pub mod turns;
 
 pub use check::{Action, Check, Test, findings, refuted_by};
 pub use linear::{Judgement, LinearFit, judge};

@@ -12,8 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use runout_closed_loop::diagnosis::{self, Correction};
-use runout_consistency::Check;
-use runout_numerics::statistics::f_tail;
+use runout_consistency::{Check, Test};
 use runout_standards::Value;
 use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
 
@@ -162,22 +161,23 @@ pub struct StationSummary {
     pub warnings: Vec<String>,
 }
 
-impl StationSummary {
-    /// Whether the residual is above the noise by more than chance, at one of so many stations: an F test of χ² per degree of freedom, in
-    /// which the noise is taken as known no better than the residual, from as many degrees of freedom.
-    #[must_use]
-    pub fn is_misfit(&self, stations: usize) -> bool {
-        let (Some(chi2), Some(dof)) = (self.chi2_per_dof, self.residual_dof) else { return false };
-        let dof = dof as f64;
-        f_tail(chi2, dof, dof.max(LEAST_FREEDOM)) * (stations as f64) < MISFIT_CHANCE
+impl Summary {
+    /// Stations whose residual is not what the noise of their readings lets expect: those of a finding in `consistency`.
+    pub fn misfits(&self) -> impl Iterator<Item = &StationSummary> + Clone {
+        misfits(&self.stations, &self.consistency)
     }
 }
 
-/// Chance of the residuals of all stations of a sound rig below which a run warns.
-const MISFIT_CHANCE: f64 = 1e-5;
-/// Degrees of freedom from which noise is known, at least, however few the residual has: asynchronous motion of low frequency makes the
-/// noise at one order scatter as if it came from so few.
-const LEAST_FREEDOM: f64 = 8.0;
+/// Stations whose residual, as a whole or at an order, is refuted by one of these tests.
+pub(crate) fn misfits<'a>(
+    stations: &'a [StationSummary],
+    checks: &'a [Check],
+) -> impl Iterator<Item = &'a StationSummary> + Clone {
+    let of_residual = |check: &&Check| check.refutes() && matches!(check.test, Test::Residual | Test::Alike);
+    let refuted =
+        move |station: &&StationSummary| checks.iter().filter(of_residual).any(|check| check.part == station.station);
+    stations.iter().filter(refuted)
+}
 
 /// What became of one capture's turns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -39,6 +39,9 @@ pub(crate) fn points(
     let mut traces = [None, None];
     for column in wanted {
         let Some(place) = file.place(column.name) else { continue };
+        if column.optional && rows.iter().all(|row| file.is_empty(place, *row)) {
+            continue;
+        }
         match column.kind {
             PointKind::Number => {
                 let values = rows.iter().map(|row| file.number(place, *row)).collect::<Result<_>>()?;
@@ -180,6 +183,13 @@ impl Raw {
                 let problem = format!("trace {name} has ended above; the points of a trace follow one another");
                 self.refuse(id, row, &problem)
             }
+        }
+    }
+
+    fn is_empty(&self, place: usize, row: usize) -> bool {
+        match &self.table.columns[place] {
+            RawColumn::Texts(texts) => texts[row].is_empty(),
+            RawColumn::Numbers(numbers) => numbers[row].is_nan(),
         }
     }
 

@@ -25,7 +25,7 @@ pub(crate) fn section(summary: &Summary) -> Markup {
                         table {
                             thead {
                                 tr {
-                                    th { "test" } th { "of" } th.number { "statistic" } th.number { "degrees of freedom" }
+                                    th { "test" } th { "where" } th { "of" } th.number { "statistic" } th.number { "degrees of freedom" }
                                     th.number { "p" } th.number { "factor on ±" } th { "done" } th { "found" }
                                 }
                             }
@@ -33,6 +33,7 @@ pub(crate) fn section(summary: &Summary) -> Markup {
                                 @for check in checks.iter().take(MOST) {
                                     tr {
                                         td { (check.test.name()) }
+                                        td { bdi { (crate::one_line(&check.part)) } }
                                         td { bdi { (crate::one_line(&check.of)) } }
                                         td.number { (significant(check.statistic, 3)) }
                                         td.number { (freedom(check)) }

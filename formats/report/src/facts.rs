@@ -40,7 +40,7 @@ fn without_limits(summary: &Summary) -> (String, &'static str) {
         return (format!("The data refute {count} of {values} values, marked by !: {reason}."), "bad");
     }
     let known = summary.stations.iter().filter(|station| station.chi2_per_dof.is_some()).count();
-    let misfits = summary.stations.iter().filter(|station| station.is_misfit(known)).count();
+    let misfits = summary.misfits().count();
     let warnings = summary.findings().count();
     let warned = match warnings {
         0 => String::new(),
@@ -51,8 +51,9 @@ fn without_limits(summary: &Summary) -> (String, &'static str) {
         (0, 0) => (String::new(), "open"),
         (0, _) => (" The residual agrees with the measured noise.".into(), "open"),
         (count, all) => {
-            let found =
-                format!(" At {count} of {all} stations the residual exceeds the noise; the declared rig may be wrong.");
+            let found = format!(
+                " At {count} of {all} stations the residual is not what noise leaves; the declared rig may be wrong."
+            );
             (found, "bad")
         }
     };

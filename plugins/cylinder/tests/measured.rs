@@ -42,7 +42,7 @@ fn separator(max_order: usize, hold_out: &[&str]) -> LeastSquaresCylinder {
         used: None,
         hold_out: hold_out.iter().map(|name| (*name).to_owned()).collect(),
         max_order,
-        outlier_mad: 5.0,
+        outlier_mad: Some(5.0),
         outlier_order: 50,
         max_lobes: 8,
     };
@@ -297,7 +297,7 @@ fn points_that_do_not_determine_a_cylinder_are_refused() {
         used: Some(vec!["generatrix".into()]),
         hold_out: Vec::new(),
         max_order: 10,
-        outlier_mad: 5.0,
+        outlier_mad: Some(5.0),
         outlier_order: 50,
         max_lobes: 8,
     };

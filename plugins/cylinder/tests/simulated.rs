@@ -61,7 +61,7 @@ fn separator(radius_mm: f64, max_order: usize) -> LeastSquaresCylinder {
         used: None,
         hold_out: Vec::new(),
         max_order,
-        outlier_mad: 5.0,
+        outlier_mad: None,
         outlier_order: 50,
         max_lobes: 8,
     };

@@ -117,7 +117,8 @@ fn diagnose_turns(
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let complete = |separation, profiles, evaluate| {
-            let evaluation = Evaluation { evaluate, radius_mm, rig: Some(line.rig) };
+            let evaluation =
+                Evaluation { evaluate, radius_mm, rig: Some(line.rig), stations: recording.stations().len() };
             complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone(), evaluation)
         };
         let declared = complete(before, Vec::new(), &looked_at);

@@ -75,7 +75,7 @@ impl PointResult<'_> {
         let mut surface = None;
         if let Some(Form { sections, radius_mm }) = evaluables.into_iter().find_map(Evaluable::into_form) {
             observer.begin(sections.len());
-            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None };
+            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None, stations: 1 };
             for separation in sections {
                 // As many angles as the surface has, or a multiple of them that the highest order fits on.
                 let angles = pipeline.surface.angles;

@@ -10,7 +10,7 @@ use super::{
     evaluate::{Evaluate, Evaluated, Group, add_areal, add_generatrices, decide, part_summary},
     station_summary::summarise,
     tables::{StationTables, consistency_rows, correction_rows, named_value_rows},
-    warnings::{Warnings, findings, of_stations},
+    warnings::{Warnings, findings, of_checks, of_stations},
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
@@ -19,7 +19,7 @@ use crate::{
     summary::{LostOrders, NamedValue, PartSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
-use runout_consistency::{self as consistency, Check};
+use runout_consistency::Check;
 use runout_error::{Error, Result};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::station::StationResult;
@@ -233,9 +233,9 @@ impl ResultWriter {
         let mut warnings = std::mem::take(&mut self.warnings);
         warnings.note(self.station_tables.remark());
         warnings.warn(self.diagnosis.iter_mut().flat_map(|diagnosis| std::mem::take(&mut diagnosis.warnings)));
-        warnings.warn(consistency::findings(&self.summary.consistency));
+        warnings.warn(of_checks(&self.summary.consistency, self.summary.stations.is_empty()));
         warnings.warn(remarks);
-        warnings.warn(of_stations(&self.summary.stations, self.interrupted));
+        warnings.warn(of_stations(&self.summary.stations, &self.summary.consistency, self.interrupted));
         warnings.of_run(std::mem::take(&mut self.of_run));
         let [all, notes] = warnings.into_parts();
         if let Some(diagnosis) = &mut self.diagnosis {

@@ -8,7 +8,7 @@ use super::{
     outdated, point_run,
     read_ahead::write_behind,
     record_reader::{RecordReader, separate},
-    result::{Evaluation, complete},
+    result::{Evaluation, complete, mark},
     result_writer::{CompleteFiles, Finished, ResultWriter},
     warnings::TurnsOfAll,
 };
@@ -114,7 +114,12 @@ fn run_turns(
         projections: projections(pipeline, separator, rig),
         alone,
     };
-    let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
+    let evaluation = Evaluation {
+        evaluate: &pipeline.evaluate,
+        radius_mm: rig.part_radius_mm,
+        rig: Some(rig),
+        stations: recording.stations().len(),
+    };
     let work = |index, station: Station| {
         let separation = separate(separator, &station, rig)?;
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
@@ -153,7 +158,8 @@ pub(super) fn projections(pipeline: &Pipeline, separator: &dyn StationSeparator,
 
 /// A station with its error motion values.
 pub(super) fn with_motion_values(result: StationResult, centres: &[Centre], radius_mm: f64) -> StationResult {
-    let motion_values = error_motion_values(&result, centres, radius_mm);
+    let mut motion_values = error_motion_values(&result, centres, radius_mm);
+    mark(motion_values.iter_mut(), &result.separation);
     StationResult { motion_values, ..result }
 }
 

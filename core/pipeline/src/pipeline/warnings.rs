@@ -7,7 +7,8 @@ use super::{
     steadiness::{Steadiness, inflated},
     undeclared::Undeclared,
 };
-use crate::summary::{StationSummary, Summary};
+use crate::summary::{StationSummary, Summary, misfits};
+use runout_consistency::{self as consistency, Check, Test};
 use runout_turning::{
     mains::{self, Sampled},
     profile::Profile,
@@ -93,6 +94,7 @@ impl TurnsOfAll {
 #[derive(Debug, Default)]
 pub(super) struct DeclaredStations {
     stations: Vec<StationSummary>,
+    checks: Vec<Check>,
     interrupted: bool,
     turns: TurnsOfAll,
 }
@@ -102,13 +104,16 @@ impl DeclaredStations {
     pub(super) fn take(&mut self, result: &StationResult, rig: &Rig) {
         self.interrupted |= result.separation.sections.iter().any(|section| !section.gaps.is_empty());
         self.stations.push(summarise(result, Some(rig)));
+        let checks = &result.separation.residual.checks;
+        self.checks.extend(checks.iter().map(|check| check.clone().within(&result.station)));
         self.turns.take(result, rig);
     }
 
     /// What a run warns of.
     pub(super) fn warnings(self, rig: &Rig) -> Vec<String> {
         let of_turns = self.turns.warnings(rig).into_iter();
-        of_turns.chain(of_stations(&self.stations, self.interrupted)).collect()
+        let of_checks = of_checks(&self.checks, false).into_iter();
+        of_turns.chain(of_checks).chain(of_stations(&self.stations, &self.checks, self.interrupted)).collect()
     }
 }
 
@@ -122,9 +127,15 @@ pub(super) fn of_station<'a>(station: &'a str, warnings: &'a [String]) -> impl I
 }
 
 /// What the fit at each station and the stations' own warnings say.
-pub(super) fn of_stations(stations: &[StationSummary], interrupted: bool) -> Vec<String> {
+pub(super) fn of_stations(stations: &[StationSummary], checks: &[Check], interrupted: bool) -> Vec<String> {
     let each = stations.iter().flat_map(|one| of_station(&one.station, &one.warnings));
-    misfit(stations, interrupted).into_iter().chain(inflated(stations)).chain(each).collect()
+    misfit(stations, checks, interrupted).into_iter().chain(inflated(stations)).chain(each).collect()
+}
+
+/// What the tests of the data found. Those of whole residuals are said of all stations together.
+pub(super) fn of_checks(checks: &[Check], of_points: bool) -> Vec<String> {
+    let said: Vec<Check> = checks.iter().filter(|check| of_points || check.test != Test::Residual).cloned().collect();
+    consistency::findings(&said)
 }
 
 /// The warnings of a summary that are no notes.
@@ -134,8 +145,8 @@ pub(super) fn findings(summary: Summary) -> Vec<String> {
 }
 
 /// What a rig that is not as declared looks like: a residual far above what is expected from noise.
-fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
-    let beyond = stations.iter().filter(|station| station.is_misfit(stations.len()));
+fn misfit(stations: &[StationSummary], checks: &[Check], interrupted: bool) -> Option<String> {
+    let beyond = misfits(stations, checks).filter(|station| station.chi2_per_dof.is_some_and(|chi2| chi2 > 1.0));
     let count = beyond.clone().count();
     let worst =
         beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;
@@ -147,7 +158,7 @@ fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
     Some(format!(
         "at {count} of {} stations the readings contradict each other: χ² per degree of freedom is up to {chi2:.decimals$} ({}, {dof} degrees of \
          freedom), where noise makes 1, and the fit leaves {left:.4} µm rms; something is not as the rig declares it{bridged}, and the \
-         stated uncertainties, which come from the noise alone, do not cover it. The closed loop (`runout diagnose`) looks for the cause",
+         stated uncertainties are widened by as much. The closed loop (`runout diagnose`) looks for the cause",
         stations.len(),
         worst.station,
     ))

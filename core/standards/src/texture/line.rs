@@ -29,7 +29,7 @@ impl<'a> Line<'a> {
         let found = stretches(&measured_mm, GAP_OF_SECTION * section_mm);
         let stretches = match &found[..] {
             // Without gaps, what is missing at the ends is missing.
-            [] | [_] => vec![0..z_mm.len().min(profile_um.len())],
+            [] | [_] => std::iter::once(0..z_mm.len().min(profile_um.len())).collect(),
             _ => found.into_iter().map(|points| there[points.start]..there[points.end - 1] + 1).collect(),
         };
         Self { z_mm, stretches, least_mm: section_mm + 2.0 * half_cut_off_mm(settings) }

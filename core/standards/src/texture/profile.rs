@@ -39,7 +39,7 @@ impl<'a> Profile<'a> {
     pub(super) fn closed(positions_mm: &'a [f64], heights_um: Vec<f64>, turn_mm: f64) -> Self {
         let (count, cells) = (heights_um.len(), vec![1.0; heights_um.len()]);
         let positions_mm = Cow::Borrowed(positions_mm);
-        let (turn_mm, stretches, even) = (Some(turn_mm), vec![0..count], true);
+        let (turn_mm, stretches, even) = (Some(turn_mm), std::iter::once(0..count).collect(), true);
         Self { positions_mm, heights_um, turn_mm, stretches, cells, even }.about_mean()
     }
 

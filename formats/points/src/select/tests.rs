@@ -71,6 +71,14 @@ fn a_column_of_flags_may_be_there() {
 }
 
 #[test]
+fn an_optional_column_that_is_empty_is_absent() {
+    let points = |rows: &str| from(&format!("ball,dx_mm,time_s\n{rows}"), "", &LABELLED);
+    assert!(points("P1,1,\nP2,2, \n").unwrap().column("time_s").is_err());
+    let message = points("P1,1,5\nP2,2,\n").unwrap_err().to_string();
+    assert!(message.contains("line 3, column 3 (time_s): it is empty"), "{message}");
+}
+
+#[test]
 fn rows_are_selected_and_columns_renamed() {
     let text = "ball;ΔX;a_deg;dx_mm;note\nP1;0,01;0;7;x\nP1;0,02;90;8;\nP2;0,03;0;9;y\n";
     let keys = "columns = { \"ΔX\" = \"dx_mm\" }\nwhere = { a_deg = 0 }";

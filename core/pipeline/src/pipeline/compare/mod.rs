@@ -167,8 +167,12 @@ impl<'a> Comparing<'a> {
         let scatter = Scatter::of(station);
         let separators = std::iter::once(self.reference).chain(self.methods.iter().map(|method| &*method.separator));
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
-        let evaluation =
-            Evaluation { evaluate: &Evaluate::ront(), radius_mm: self.rig.part_radius_mm, rig: Some(self.rig) };
+        let evaluation = Evaluation {
+            evaluate: &Evaluate::ront(),
+            radius_mm: self.rig.part_radius_mm,
+            rig: Some(self.rig),
+            stations: 1,
+        };
         let mut results = Vec::new();
         let mut estimates = Vec::new();
         let mut warnings: Vec<String> =
