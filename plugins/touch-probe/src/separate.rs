@@ -113,6 +113,10 @@ impl PointSeparator for TouchProbe {
         of_ring.then_some(EvaluableKind::ClosedProfiles).into_iter().collect()
     }
 
+    fn is_one_section(&self) -> bool {
+        true
+    }
+
     fn notes(&self) -> Vec<String> {
         let config = &self.0;
         let all: Vec<usize> = (0..config.setups.len()).collect();
