@@ -1,7 +1,7 @@
 //! The tests of measured circles on their own points.
 
 use runout_core::{
-    consistency::{Check, Judgement, Kind, LinearFit, Structure, judge, rows},
+    consistency::{Check, Kind, Structure, rows},
     numerics::least_squares::Basis,
 };
 
@@ -11,57 +11,34 @@ use crate::{
     scan::Scan,
 };
 
-/// What is declared of circles of these names: their errors may depend on each other along the angle, circles are independent, have the
-/// same noise and may be offset.
+/// What is declared of circles of these names: they are independent, have the same noise and may be offset.
+///
+/// No order along the angle: a covariance that is fitted to what a radius leaves takes several lobes for correlated errors, and refuses
+/// them all. Circles are independent whatever errors do along them, and have to agree.
 pub(crate) fn structure(scans: &[Scan], names: &[String]) -> Structure {
-    let circle: Vec<usize> = scans.iter().enumerate().flat_map(|(circle, scan)| vec![circle; scan.len()]).collect();
-    let angle: Vec<f64> = scans.iter().flat_map(|scan| scan.angle_rad.iter().copied()).collect();
-    let rows =
-        circle.iter().zip(&angle).map(|(circle, angle)| format!("{} at {:.1}°", names[*circle], angle.to_degrees()));
-    let structure = Structure::default().naming(rows.collect()).along("the angle", circle.clone(), angle);
+    let of_circle = |(circle, scan): (usize, &Scan)| {
+        let name = &names[circle];
+        scan.angle_rad.iter().map(|angle| format!("{name} at {:.1}°", angle.to_degrees())).collect::<Vec<String>>()
+    };
+    let structure = Structure::default().naming(scans.iter().enumerate().flat_map(of_circle).collect());
     if scans.len() < 2 {
         return structure;
     }
-    let named = |structure: Structure, kind: Kind| structure.divided("circles", kind, circle.clone(), names.to_vec());
-    [Kind::Blocks, Kind::Alike, Kind::Shift].into_iter().fold(structure, named)
+    let circle: Vec<usize> = scans.iter().enumerate().flat_map(|(circle, scan)| vec![circle; scan.len()]).collect();
+    let divided = |structure: Structure, kind: Kind| structure.divided("circles", kind, circle.clone(), names.to_vec());
+    [Kind::Blocks, Kind::Alike, Kind::Shift].into_iter().fold(structure, divided)
 }
 
 impl Harmonics {
-    /// The tests of a circle about them; their variance is widened by what they find. Points that are not like the others are named, and
-    /// the others tested without them.
-    pub(crate) fn judge(&mut self, scan: &Scan, name: &str) -> Vec<Check> {
-        let declared = structure(std::slice::from_ref(scan), &[name.to_owned()]);
-        let all = Basis::of(self.columns(scan));
+    /// Names points of a circle that are not like the others about them.
+    pub(crate) fn unlike(&self, scan: &Scan, name: &str) -> Option<Check> {
+        let basis = Basis::of(self.columns(scan));
         let mut left = scan.deviation_um.clone();
-        all.remove_from(&mut left);
+        basis.remove_from(&mut left);
         if rms(left.iter().copied()) < ROUNDING_UM {
-            return Vec::new();
+            return None;
         }
-        let unlike = rows::unlike(&left, all.columns());
-        let named = unlike.as_ref().map_or(&[][..], |unlike| &unlike.rows);
-        let used: Vec<usize> = (0..scan.len()).filter(|point| !named.contains(point)).collect();
-        let kept: Vec<bool> = (0..scan.len()).map(|point| !named.contains(&point)).collect();
-        let others = scan.keep(&kept);
-        let basis = if named.is_empty() { all } else { Basis::of(self.columns(&others)) };
-        let mut residual = others.deviation_um.clone();
-        basis.remove_from(&mut residual);
-        let names: Vec<String> = (0..basis.rank()).map(|column| format!("order {}", column.div_ceil(2))).collect();
-        let weights = basis.weights();
-        let fit = LinearFit {
-            residual: &residual,
-            basis: basis.columns(),
-            names: &names,
-            weights: &weights,
-            noise: None,
-            unit: "µm",
-        };
-        let Judgement { mut checks, factors } = judge(fit, &declared.sorted(&used));
-        checks.extend(unlike.filter(|unlike| !unlike.rows.is_empty()).map(|unlike| unlike.check(&declared, "µm")));
-        for (order, variance) in self.variance.iter_mut().enumerate() {
-            let of_order =
-                [(2 * order).saturating_sub(1), 2 * order].map(|column| factors.get(column).copied().unwrap_or(1.0));
-            *variance *= of_order.into_iter().fold(1.0, f64::max).powi(2);
-        }
-        checks
+        let declared = structure(std::slice::from_ref(scan), &[name.to_owned()]);
+        Some(rows::unlike(&left, basis.columns())?.check(&declared, "µm"))
     }
 }

@@ -206,10 +206,10 @@ impl LeastSquaresCylinder {
             let [low, high] = placed.z_range_mm();
             (level_variance, height_mm) = (along.level_variance, high - low);
         }
-        let mut fit = Harmonics::fit(&placed, self.0.max_order, None).map_err(unfit)?;
+        let fit = Harmonics::fit(&placed, self.0.max_order, None).map_err(unfit)?;
         let order = fit.max_order();
         let named = format!("{} {}", circle.kind, circle.id);
-        let checks = fit.judge(&placed, &named);
+        let checks = fit.unlike(&placed, &named).into_iter().collect();
         circle.warnings.extend(fit.limit.iter().map(|limit| format!("{named}: {limit}")));
         for [from, to] in unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)) {
             let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");

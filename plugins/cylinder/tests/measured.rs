@@ -188,7 +188,7 @@ fn the_run_says_what_it_left_out_and_how_well_it_predicts() {
     let Some(path) = measured() else { return };
     let summary = run_pipeline(&format!(
         "load = {{ plugin = 'points', path = '{}' }}\n\
-         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056 }}",
+         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056, outlier_mad = 5.0 }}",
         path.display()
     ))
     .unwrap();
@@ -321,7 +321,7 @@ fn the_loop_finds_what_a_radius_lacks() {
     let Some(path) = measured() else { return };
     let found = diagnosed(&format!(
         "load = {{ plugin = 'points', path = '{}' }}\n\
-         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056 }}",
+         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056, outlier_mad = 5.0 }}",
         path.display()
     ));
     for added in &found.added {

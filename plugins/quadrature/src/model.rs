@@ -50,7 +50,7 @@ fn default_max_order() -> usize {
     8
 }
 
-/// Sectors of the phase, and stretches of time, whose errors are independent of each other.
+/// Stretches of time whose errors are independent of each other; without times every eighth sample along the phase.
 const PARTS: usize = 8;
 /// Blocks and orders beyond these say nothing more.
 const MOST_BLOCKS: usize = 1_000;
@@ -146,23 +146,17 @@ impl LinearModel for Quadrature {
         let of_rows = |of_samples: Vec<usize>| of_samples.into_iter().cycle().take(rows).collect::<Vec<usize>>();
         let numbered =
             |what: &str, count: usize| (1..=count).map(|number| format!("{what} {number}")).collect::<Vec<_>>();
-        let parts = PARTS.min(self.0.blocks);
-        let mut structure = Structure::default()
-            .divided(
-                "sectors of the phase",
-                Kind::Blocks,
-                of_rows(blocks(samples.angles(), parts)),
-                numbered("sector", parts),
-            )
+        // Blocks run over the whole phase: an effect that is not found yet is the same in all of them.
+        let (name, part, of) = match points.column("time_s") {
+            Ok(time) => ("stretches of time", "stretch", in_equal_parts(time, PARTS)),
+            Err(_) => {
+                let order = blocks(samples.angles(), count);
+                ("interleaved eighths of the samples", "eighth", order.into_iter().map(|place| place % PARTS).collect())
+            }
+        };
+        let structure = Structure::default()
+            .divided(name, Kind::Blocks, of_rows(of), numbered(part, PARTS))
             .naming((0..rows).map(|row| format!("sample {}", row % count)).collect());
-        if let Ok(time) = points.column("time_s") {
-            structure = structure.divided(
-                "stretches of time",
-                Kind::Blocks,
-                of_rows(in_equal_parts(time, parts)),
-                numbered("stretch", parts),
-            );
-        }
         let observations = Observations {
             group: of_rows(blocks(samples.angles(), self.0.blocks)),
             values,
