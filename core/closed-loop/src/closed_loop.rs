@@ -15,7 +15,7 @@ use super::{
     keyed::Keyed,
     report::{added, blind, inconsistent, level, moved, verdict},
 };
-use runout_consistency::{Kind, Partition};
+use runout_consistency::{Check, Kind, Partition, Test};
 use runout_error::Result;
 use runout_numerics::least_squares::{dot, orthonormal};
 
@@ -118,7 +118,10 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     if !left {
         unexplained.extend(after.unexplained());
     }
-    unexplained.extend(consistency.iter().filter(|check| check.bars_verdict()).map(inconsistent));
+    // A residual is said by where it comes from, where that shows.
+    let placed = !unexplained.is_empty();
+    let said = |check: &&Check| check.bars_verdict() && !(placed && check.test == Test::Residual);
+    unexplained.extend(consistency.iter().filter(said).map(inconsistent));
     let warnings = tracing.ended_by_limits();
     let diagnosis = Diagnosis {
         verdict,

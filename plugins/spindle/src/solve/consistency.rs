@@ -70,7 +70,12 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
     // Of those that are as they should be, the least likely one is enough.
     single.sort_by(|a, b| a.p.total_cmp(&b.p));
     let said = single.iter().filter(|check| !check.finding.is_empty()).count();
-    single.truncate(said.max(1));
+    // What all orders have is no finding of each.
+    let pooled_above = above > 1.0;
+    single.truncate(if pooled_above { 1 } else { said.max(1) });
+    if pooled_above {
+        single = single.into_iter().map(Check::named).collect();
+    }
     let largest = factors.iter().copied().fold(1.0, f64::max).sqrt();
     let pooled = pooled.widening(if above > 1.0 { largest } else { 1.0 });
     residual.checks = std::iter::once(pooled).chain(single).map(above_refutes).collect();
