@@ -74,8 +74,7 @@ fn main() -> ExitCode {
             axial(campaigns, seed)
         }
         ["consistency", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [100, 1]).is_some() => {
-            let [campaigns, seed] = sizes(rest, [100, 1]).unwrap_or_default();
-            consistency_of_domains(campaigns, seed)
+            consistency_of_domains(sizes(rest, [100, 1]).unwrap_or_default())
         }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
@@ -94,9 +93,8 @@ fn main() -> ExitCode {
         ["blind-campaign", ref rest @ ..] if (1..=3).contains(&rest.len()) && sizes(rest, [0, 1]).is_some() => {
             layout(rest.get(2)).and_then(|only| blind_campaign(sizes(rest, [0, 1]).unwrap_or_default(), only))
         }
-        ["monte-carlo"] => monte_carlo(1000),
-        ["monte-carlo", campaigns] if campaigns.parse::<u64>().is_ok() => {
-            monte_carlo(campaigns.parse().unwrap_or_default())
+        ["monte-carlo", ref rest @ ..] if rest.len() <= 1 && sizes(rest, [1000, 0]).is_some() => {
+            monte_carlo(sizes(rest, [1000, 0]).unwrap_or_default()[0])
         }
         ["diagnose-scaling"] => scaling::rows().map(|rows| println!("{}", scaling::table(&rows))),
         ["compare-results", a, b] => compare_results(a, b, 1e-12),
@@ -149,7 +147,7 @@ fn main() -> ExitCode {
 }
 
 /// Takes `--domain NAME` out of the words; nothing where there is none, or where it is the spindle, which has a benchmark of its own.
-fn consistency_of_domains(campaigns: u64, seed: u64) -> Result<()> {
+fn consistency_of_domains([campaigns, seed]: [u64; 2]) -> Result<()> {
     let mut rows = Vec::new();
     for kind in consistency::ROWS {
         eprintln!("{}, {}", kind.domain, kind.trouble);

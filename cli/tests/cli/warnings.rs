@@ -79,7 +79,8 @@ fn a_diagnosis_repeats_what_the_run_warns_of() {
         for warning in texts(&ran, "warnings") {
             assert!(all.iter().any(|text| text.contains(&warning)), "{warning}\n{all:#?}");
         }
-        assert_eq!(texts(&ran, "notes"), texts(&diagnosis, "notes"));
+        let notes = texts(&diagnosis, "notes");
+        assert!(texts(&ran, "notes").iter().all(|note| notes.contains(note)), "{notes:#?}");
         let written = fs::read_to_string(folder.path().join("out/diagnosed/diagnosis.json")).unwrap();
         let written: Value = serde_json::from_str(&written).unwrap();
         assert_eq!(written["warnings"], diagnosis["warnings"]);

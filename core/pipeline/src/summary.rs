@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use runout_closed_loop::diagnosis::{self, Correction};
-use runout_consistency::{Check, Test};
+use runout_consistency::{Check, Test, refuted_by};
 use runout_standards::Value;
 use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
 
@@ -69,6 +69,13 @@ impl Summary {
         let of_part = self.part.iter().flat_map(|part| &part.values);
         all.extend(of_part.map(|value| PlacedValue { station: None, section: None, z_mm: None, value }));
         all
+    }
+
+    /// Marks the values of the whole part, where the data of one of its stations refute what is said of them.
+    pub(crate) fn refute_part(&mut self) {
+        let Some(by) = refuted_by(&self.consistency) else { return };
+        let values = self.part.iter_mut().flat_map(|part| &mut part.values);
+        values.for_each(|value| value.refuted_by = Some(by.clone()));
     }
 
     /// What refutes values of this result, each reason once with the number of values, and how many values there are.

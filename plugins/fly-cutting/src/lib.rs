@@ -6,7 +6,6 @@
 //! surface by interference of all passes of the tool.
 
 mod aliases;
-mod cells;
 mod config;
 mod diagnose;
 mod effects;

@@ -147,12 +147,11 @@ impl LinearModel for Quadrature {
         let numbered =
             |what: &str, count: usize| (1..=count).map(|number| format!("{what} {number}")).collect::<Vec<_>>();
         // Blocks run over the whole phase: an effect that is not found yet is the same in all of them.
-        let (name, part, of) = match points.column("time_s") {
-            Ok(time) => ("stretches of time", "stretch", in_equal_parts(time, PARTS)),
-            Err(_) => {
-                let order = blocks(samples.angles(), count);
-                ("interleaved eighths of the samples", "eighth", order.into_iter().map(|place| place % PARTS).collect())
-            }
+        let (name, part, of) = if let Ok(time) = points.column("time_s") {
+            ("stretches of time", "stretch", in_equal_parts(time, PARTS))
+        } else {
+            let order = blocks(samples.angles(), count);
+            ("interleaved eighths of the samples", "eighth", order.into_iter().map(|place| place % PARTS).collect())
         };
         let structure = Structure::default()
             .divided(name, Kind::Blocks, of_rows(of), numbered(part, PARTS))

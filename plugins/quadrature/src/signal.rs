@@ -136,7 +136,7 @@ impl Signal {
                 }
                 trial
             };
-            let better = (0..HALVINGS).map(|halving| trial(0.5_f64.powi(halving as i32))).find_map(|trial| {
+            let better = (0..HALVINGS).map(|halving| trial((-(halving as f64)).exp2())).find_map(|trial| {
                 let found = left(&trial);
                 (found.0 < squares).then_some((trial, found))
             });

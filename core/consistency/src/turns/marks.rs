@@ -82,6 +82,8 @@ fn turns_against_the_mark(table: &TurnTable) -> Found {
     let [before, after] = [0.0, by_rad].map(|by_rad| coherence(by_rad, channel));
     let falls_apart = before < COHERENT[1] && after > (0.5 + 0.5 * before).max(0.5);
     let is_turning = falls_apart || (before < COHERENT[0] && 1.0 - before > 5.0 * (1.0 - after));
+    // A part that turns against the mark turns order n by n times as much: where one is steadier than order 1, this is an asynchronous line.
+    let is_turning = is_turning && !(2..=table.orders).any(|order| 1.0 - steady(table, order) < 0.5 * (1.0 - before));
     let by_turn = by_rad / table.together.max(1) as f64;
     let words = is_turning.then(|| turning(by_turn, "order 1 turns"));
     let mut found = Found::new("order 1 against the mark", before, words);
@@ -89,6 +91,14 @@ fn turns_against_the_mark(table: &TurnTable) -> Found {
         found.phase_std_rad = by_rad.abs() * ((rows * rows - 1) as f64 / 12.0).sqrt();
     }
     found
+}
+
+/// Coherence of an order with the mark, of all channels together.
+fn steady(table: &TurnTable, order: usize) -> f64 {
+    let channels = || 0..table.channels;
+    let kept: f64 = channels().map(|channel| mean(table.series(order, channel)).norm_sqr()).sum();
+    let all: f64 = channels().flat_map(|channel| table.series(order, channel)).map(|value| value.norm_sqr()).sum();
+    if all > 0.0 { (kept * table.rows() as f64 / all).sqrt() } else { 0.0 }
 }
 
 /// Orders that are no multiples of 2, or of 3, are empty, and an eccentricity stands at order 2, or 3.

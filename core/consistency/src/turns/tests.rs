@@ -214,5 +214,5 @@ fn a_creeping_level_is_taken_out() {
     let steady = table.without_creep();
     let first = |table: &TurnTable| (mean(table.series(2, 0).take(5)) - mean(table.series(2, 0).skip(55))).norm();
     assert!(first(&steady) < 0.3 * first(&table), "{} {}", first(&steady), first(&table));
-    assert!(findings(&table).is_empty());
+    assert!(findings(&table).is_empty(), "{:?}", findings(&table));
 }

@@ -59,8 +59,7 @@ impl PointResult<'_> {
     ) -> Result<Finished> {
         let Outcome { convention, tables, values, checks, evaluables, lost_orders, mut remarks, notes } = self.outcome;
         check_declared(&evaluables, &pipeline.route.evaluables())?;
-        let mut evaluated = Evaluated::of(&evaluables, &pipeline.evaluate)?;
-        evaluated.refute(refuted_by(&checks).as_deref());
+        let evaluated = Evaluated::of(&evaluables, &pipeline.evaluate, refuted_by(&checks).as_deref())?;
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
         if let Some((diagnosis, of_run)) = self.diagnosis {

@@ -255,6 +255,7 @@ impl ResultWriter {
         for file in &self.named_files {
             self.summary.provenance.inputs.push(Input::of(file)?);
         }
+        self.summary.refute_part();
         let mut placed = self.summary.placed_values();
         placed.extend(self.evaluated.placed());
         let (limits, unmatched) = decide(self.evaluate.limits(), &placed);

@@ -3,6 +3,7 @@
 //! E_n = |a − b| / (2·√(u_a² + u_b²)) (ISO 13528:2022, 9.7, with expanded uncertainties of k = 2). The methods share readings: the
 //! difference scatters less than independent results would, and scatter alone keeps E_n below 1 all the more.
 
+use runout_consistency::refuted_by;
 use runout_error::fault::Fault;
 use std::{collections::BTreeSet, path::PathBuf};
 
@@ -108,7 +109,8 @@ impl<'a> ComparingPoints<'a> {
         spare_inputs(&outputs, std::slice::from_ref(&points.input))?;
         let separate = |separator: &dyn PointSeparator| {
             let mut outcome = separator.separate(&points)?;
-            let evaluated = Evaluated::of(&outcome.evaluables, &pipeline.evaluate)?;
+            let evaluated =
+                Evaluated::of(&outcome.evaluables, &pipeline.evaluate, refuted_by(&outcome.checks).as_deref())?;
             outcome.values = evaluated.named().chain(outcome.values).collect();
             Ok::<Outcome, Error>(outcome)
         };

@@ -32,7 +32,7 @@ fn texture_of_an_open_profile_is_that_of_its_stretches() {
         let profile = OpenProfile { of: "part".into(), deviation_um: deviation_um.collect(), z_mm, errors: Ok(errors) };
         let mut evaluate = evaluate(text).unwrap();
         evaluate.keep_given(&[EvaluableKind::OpenProfile]);
-        Evaluated::of(&[Evaluable::OpenProfile(profile)], &evaluate).unwrap()
+        Evaluated::of(&[Evaluable::OpenProfile(profile)], &evaluate, None).unwrap()
     };
     let values = |found: &Evaluated| found.values.iter().map(|(_, value)| value.clone()).collect::<Vec<_>>();
     let text = "values = ['texture']\nlambda_c_mm = 7.5\n[texture]\nprofiles = ['R', 'P']";
@@ -73,7 +73,7 @@ fn part(stations: &[StationResult], step_mm: Option<f64>, text: &str) -> PartSum
     stations.iter().for_each(|station| builder.add(station));
     let (surface, uncertain) = builder.build(RADIUS_MM).unwrap();
     let (mut part, evaluate) = (PartSummary::default(), evaluate(text).unwrap());
-    add_areal(&mut part, &surface, &uncertain, 2, &evaluate).unwrap();
+    add_areal(&mut part, &surface, &uncertain, 2, &evaluate, None).unwrap();
     add_generatrices(&mut part, &uncertain, RADIUS_MM, false, &evaluate);
     part
 }
