@@ -73,7 +73,7 @@ fn part(stations: &[StationResult], step_mm: Option<f64>, text: &str) -> PartSum
     stations.iter().for_each(|station| builder.add(station));
     let (surface, uncertain) = builder.build(RADIUS_MM).unwrap();
     let (mut part, evaluate) = (PartSummary::default(), evaluate(text).unwrap());
-    add_areal(&mut part, &surface, &uncertain, 2, &evaluate, None).unwrap();
+    add_areal(&mut part, &surface, &uncertain, 2, &evaluate).unwrap();
     add_generatrices(&mut part, &uncertain, RADIUS_MM, false, &evaluate);
     part
 }
