@@ -274,7 +274,8 @@ impl<M: Model> Tracing<'_, M> {
             let (effect, trial, evidence) = trials.remove(0);
             let columns = independent(current.fit.signature(effect), &basis);
             let keys = keyed.keys(effect, &columns, count);
-            let evidence = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
+            // Each key has its own limit; the chance that is stated is the largest.
+            let stated = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
             let by_keys = keys.refused.is_some();
             match self.doubt(effect, [&before, &trial.fit], &evidence).or(keys.refused) {
                 // What correlated errors or blocks refuse says nothing of the others.
@@ -283,7 +284,7 @@ impl<M: Model> Tracing<'_, M> {
                     self.refuse(effect, reason);
                     return None;
                 }
-                None => believed = Some((effect, trial, evidence)),
+                None => believed = Some((effect, trial, stated)),
             }
         }
         let (effect, trial, evidence) = believed?;
