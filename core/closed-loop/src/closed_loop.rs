@@ -1,4 +1,6 @@
 //! Find, trace, add, report: until only noise is left, or the evidence supports no further effect.
+//!
+//! Long because the search, its doubts and the end of the loop are one algorithm.
 
 use std::collections::BTreeMap;
 

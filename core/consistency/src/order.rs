@@ -4,6 +4,8 @@
 //! whose limits are independent errors and a random walk. 72 shares s and lengths ℓ, and independent errors, are weighed by their restricted
 //! likelihood (Patterson, Thompson, Biometrika 58 (1971) 545), independent errors with even odds before. Whitening is a scalar
 //! Kalman filter, of n steps a column.
+//!
+//! Long because the models, their likelihood and the filter that whitens for them read as one derivation.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use runout_numerics::{

@@ -1,4 +1,6 @@
 //! CSV files as programs write them, and as they should not be.
+//!
+//! Long because each test is one file of another program.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::{fmt::Write as _, fs, io::Write as _, path::Path};

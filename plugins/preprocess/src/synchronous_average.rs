@@ -312,7 +312,7 @@ impl Averager for SynchronousAverage {
             // What the recording cannot hold is not found to be 0: it is not there.
             let (mut orders, channels) = (orders_held(turn) + 1, capture.channels());
             if let Some(passed) = outcome.passed.take() {
-                passed::undo(&mut outcome, &passed, channels);
+                resample::undo(&mut outcome, &passed, channels);
                 orders = orders.min(passed::held(&passed));
                 outcome.passed = Some(passed);
             }

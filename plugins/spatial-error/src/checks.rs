@@ -15,8 +15,8 @@ use runout_core::{
 use crate::{
     campaign::{COMPONENTS, Campaign},
     noise::{Noise, of_repeats},
-    outcome::residual_um,
     projections::Projections,
+    residual::residual_um,
     rough::Rough,
     solve::Solution,
 };

@@ -1,4 +1,6 @@
 //! The spatial error as a model for the closed loop.
+//!
+//! Long because the loop and what it says of each step belong together.
 
 use runout_core::{
     Error, Result,

@@ -3,14 +3,17 @@
 //! Each component is first estimated by itself in every family, beside the columns of the trend that act on it: how smooth one component
 //! is says nothing of another. All are then estimated together with the trend that they share, each in its most likely family.
 
+use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::{
     correlation::Family,
     joint::{Data, Within},
     likelihood::{Criterion, Estimate, PARAMETERS, Prior, estimate},
-    solve::basis,
 };
+
+/// Share of a column outside the span of those before it, below which it is none of its own.
+pub(crate) const INDEPENDENT: f64 = 1e-6;
 
 /// Parameters of a family's most likely covariance of one component.
 #[derive(Debug, Clone)]
@@ -155,4 +158,24 @@ fn reach(family: Family) -> f64 {
         Family::Matern32 => 0.97,
         Family::Matern52 => 1.05,
     }
+}
+
+/// Columns that are not in the span of those before them, and an orthonormal basis of all.
+#[must_use]
+pub(crate) fn basis(design: &Mat<f64>) -> (Vec<usize>, Vec<DVector<f64>>) {
+    let (mut kept, mut basis): (Vec<usize>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
+    for column in 0..design.ncols() {
+        let mut own = DVector::from_fn(design.nrows(), |row, _| design[(row, column)]);
+        let whole = own.norm();
+        for known in basis.iter().chain(&basis) {
+            let share = known.dot(&own);
+            own.axpy(-share, known, 1.0);
+        }
+        let size = own.norm();
+        if size > INDEPENDENT * whole && size > 0.0 {
+            basis.push(own / size);
+            kept.push(column);
+        }
+    }
+    (kept, basis)
 }

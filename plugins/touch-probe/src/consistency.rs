@@ -9,8 +9,7 @@ use runout_core::{
 
 use crate::{
     config::TouchProbeConfig,
-    design::{Fitted, Noise, Weights},
-    diagnose::name,
+    design::{Fitted, Noise, Weights, name},
     touches::Touches,
     waves::angles,
 };

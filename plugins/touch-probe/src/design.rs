@@ -218,3 +218,14 @@ impl Fitted {
         places.iter().all(|place| !self.solved.lost[*place])
     }
 }
+pub(crate) fn name(config: &TouchProbeConfig, parameter: &Parameter) -> String {
+    let part = |part: &Part| if *part == Part::Cosine { "cosine" } else { "sine" };
+    match parameter {
+        Parameter::Mean => "mean pre-travel".into(),
+        Parameter::Centre { setup, axis } => format!("centre {} of {}", ["x", "y"][*axis], config.setups[*setup].id),
+        Parameter::Lobing { order, part: of, shared: false } => format!("lobing {order} {}", part(of)),
+        Parameter::Lobing { order, part: of, shared: true } => format!("lobing and ring form {order} {}", part(of)),
+        Parameter::Form { order, part: of } => format!("ring form {order} {}", part(of)),
+        Parameter::Effect { effect } => format!("effect {effect}"),
+    }
+}

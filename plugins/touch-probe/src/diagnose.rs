@@ -17,7 +17,7 @@ use runout_core::{
 use crate::{
     config::TouchProbeConfig,
     consistency::structure,
-    design::{Content, Design, Noise, Parameter},
+    design::{Content, Design, Noise, Parameter, name},
     effects::{Missing, highest},
     second_order::SecondOrder,
     separate::{Prepared, TouchProbe},
@@ -300,18 +300,6 @@ fn independent(columns: Vec<Vec<f64>>) -> Vec<Option<Vec<f64>>> {
         })
     });
     kept.collect()
-}
-
-pub(crate) fn name(config: &TouchProbeConfig, parameter: &Parameter) -> String {
-    let part = |part: &Part| if *part == Part::Cosine { "cosine" } else { "sine" };
-    match parameter {
-        Parameter::Mean => "mean pre-travel".into(),
-        Parameter::Centre { setup, axis } => format!("centre {} of {}", ["x", "y"][*axis], config.setups[*setup].id),
-        Parameter::Lobing { order, part: of, shared: false } => format!("lobing {order} {}", part(of)),
-        Parameter::Lobing { order, part: of, shared: true } => format!("lobing and ring form {order} {}", part(of)),
-        Parameter::Form { order, part: of } => format!("ring form {order} {}", part(of)),
-        Parameter::Effect { effect } => format!("effect {effect}"),
-    }
 }
 
 /// What the final fit holds: effects that were added, of a confounded set all members, so that what depends on the choice has a

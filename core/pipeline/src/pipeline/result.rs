@@ -1,9 +1,6 @@
 //! Values of one station, and its error where the truth is known.
 
-use super::{
-    evaluate::{Evaluate, missing_circles, section_values},
-    station_summary::setup_id,
-};
+use super::evaluate::{Evaluate, missing_circles, section_values};
 use runout_consistency::refuted_by;
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::Value;
@@ -69,8 +66,8 @@ fn judge_among(result: &mut StationResult, Evaluation { rig, stations, .. }: Eva
         *check = check.clone().among(stations);
     }
     for profile in &result.profiles {
-        let setup = setup_id(profile, rig);
-        checks.extend(profile.course.checks.iter().map(|check| check.clone().within(&setup)));
+        let setup = rig.and_then(|rig| rig.setups.get(profile.setup)).map_or("", |setup| setup.id.as_str());
+        checks.extend(profile.course.checks.iter().map(|check| check.clone().within(setup)));
     }
 }
 

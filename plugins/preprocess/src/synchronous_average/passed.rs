@@ -8,10 +8,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{Complex64, profile::Split};
 
-use super::{
-    kernel::{Kernel, STRETCHES},
-    resample::Outcome,
-};
+use super::kernel::{Kernel, STRETCHES};
 
 /// Of orders of which less than this passes, an average holds nothing: dividing would make noise of them. Where positions lie anywhere between
 /// samples, 48 % pass at Nyquist.
@@ -51,23 +48,8 @@ pub(super) fn held(passed: &[Complex64]) -> usize {
     passed.iter().position(|passed| passed.norm() < LEAST_PASSED).unwrap_or(passed.len())
 }
 
-/// Gives an average, and everything about it order by order, what did not pass.
-pub(super) fn undo(outcome: &mut Outcome, passed: &[Complex64], channels: usize) {
-    harmonics(&mut outcome.mean, passed, channels);
-    for matrices in [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten() {
-        squares(matrices, passed, channels);
-    }
-    for tone in &mut outcome.near_tones {
-        if let Some(passed) = passed.get(tone.order) {
-            tone.leak.iter_mut().for_each(|leak| *leak /= passed);
-        }
-    }
-    if let Some(split) = &mut outcome.split {
-        undo_split(split, passed, channels);
-    }
-}
-
-fn undo_split(split: &mut Split, passed: &[Complex64], channels: usize) {
+/// The same of the parts of a split.
+pub(super) fn undo_split(split: &mut Split, passed: &[Complex64], channels: usize) {
     let parts = [&mut split.fit.neighbours, &mut split.held_out.neighbours, &mut split.neighbours];
     for coefficients in parts.into_iter().flatten().flat_map(|neighbours| &mut neighbours.coefficients) {
         harmonics(coefficients, passed, channels);
@@ -84,14 +66,14 @@ fn undo_split(split: &mut Split, passed: &[Complex64], channels: usize) {
 }
 
 /// `[order][channel]`.
-fn harmonics(values: &mut [Complex64], passed: &[Complex64], channels: usize) {
+pub(super) fn harmonics(values: &mut [Complex64], passed: &[Complex64], channels: usize) {
     for (values, passed) in values.chunks_mut(channels.max(1)).zip(passed) {
         values.iter_mut().for_each(|value| *value /= passed);
     }
 }
 
 /// `[order][channel][channel]`.
-fn squares(values: &mut [Complex64], passed: &[Complex64], channels: usize) {
+pub(super) fn squares(values: &mut [Complex64], passed: &[Complex64], channels: usize) {
     for (values, passed) in values.chunks_mut((channels * channels).max(1)).zip(passed) {
         values.iter_mut().for_each(|value| *value /= passed.norm_sqr());
     }

@@ -21,7 +21,7 @@ use super::{
     mean::Analysis,
     orders_held,
     outliers::{Outliers, PendingTurn, Verdict},
-    passed::Fractions,
+    passed::{self, Fractions},
     size::Size,
     split::Means,
     spread::Motion,
@@ -313,4 +313,20 @@ fn is_smooth(mut number: usize) -> bool {
         }
     }
     number == 1
+}
+
+/// Gives an average, and everything about it order by order, what did not pass.
+pub(super) fn undo(outcome: &mut Outcome, passed: &[Complex64], channels: usize) {
+    passed::harmonics(&mut outcome.mean, passed, channels);
+    for matrices in [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten() {
+        passed::squares(matrices, passed, channels);
+    }
+    for tone in &mut outcome.near_tones {
+        if let Some(passed) = passed.get(tone.order) {
+            tone.leak.iter_mut().for_each(|leak| *leak /= passed);
+        }
+    }
+    if let Some(split) = &mut outcome.split {
+        passed::undo_split(split, passed, channels);
+    }
 }

@@ -1,4 +1,6 @@
 //! A spindle model fitted with effects applied.
+//!
+//! Long because what the loop asks of a fit is one trait.
 
 use std::sync::Arc;
 

@@ -7,11 +7,10 @@ use runout_core::{
 };
 
 use super::{
-    algebra::{Blocks, leftover},
+    algebra::{Blocks, leftover, pooled},
     operators::Operators,
     propagation::Propagation,
     readings::Readings,
-    residual::pooled,
 };
 
 /// Takes out of a residual's χ² what angles of the setups explain which are as well known as the readings say: the angles δ of

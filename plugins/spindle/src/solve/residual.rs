@@ -83,13 +83,6 @@ pub(crate) fn judged_residual(
     (residual, factors)
 }
 
-/// χ² per degree of freedom of all orders together; NaN where none is known.
-pub(super) fn pooled(orders: &[OrderResidual]) -> f64 {
-    let [squares, expected] =
-        orders.iter().fold([0.0; 2], |[squares, expected], order| [squares + order.squares, expected + order.expected]);
-    squares / expected
-}
-
 /// What the solution leaves of each of the linear readings `[order][reading]`, at the orders that are redundant.
 pub(crate) fn by_reading(operators: &Operators, readings: &Readings, linear: &[Complex64]) -> Vec<ReadingResidual> {
     let count = readings.count;
