@@ -5,26 +5,20 @@
 //! name moves a chain of rigid bodies.
 
 mod campaign;
-mod checks;
 mod compensate;
 mod conclusion;
 mod config;
 mod correlation;
 mod diagnose;
 mod effects;
-mod families;
 mod joint;
 mod level;
 mod likelihood;
-mod measured;
 mod neighbours;
 mod noise;
 mod outcome;
-mod projections;
 mod query;
 mod remarks;
-mod residual;
-mod rough;
 mod separate;
 pub mod simulate;
 mod solution;
@@ -34,7 +28,6 @@ mod suspects;
 mod terms;
 mod trace;
 mod trend;
-mod values;
 mod variogram;
 
 use runout_core::pipeline::{Plugin, Registry};
