@@ -167,6 +167,17 @@ impl Check {
         self
     }
 
+    /// The same as one of `count` that are tested together: its chance is that of any of them.
+    #[must_use]
+    pub fn among(mut self, count: usize) -> Self {
+        self.p = (self.p * count as f64).min(1.0);
+        if self.p >= FINDING {
+            self.finding.clear();
+            self.did = if self.factor > 1.0 { Action::Widened } else { Action::Nothing };
+        }
+        self
+    }
+
     /// The same of one of several parts: "station s1, order 3".
     #[must_use]
     pub fn within(mut self, part: &str) -> Self {
@@ -244,6 +255,8 @@ mod tests {
         assert_eq!((placed.of.as_str(), placed.finding.as_str()), ("station s1, radius", "station s1: p 0.0001"));
         assert_eq!(of(0.02).widening(1.4).did, Action::Widened);
         assert!(!of(1e-4).named().refutes());
+        assert!(of(1e-3).among(4).refutes() && !of(2e-3).among(4).refutes());
+        assert!(of(2e-3).among(4).finding.is_empty());
         assert_eq!([chance(0.0), chance(2.3e-5), chance(0.0123)], ["p < 1e-99", "p 2e-5", "p 0.012"]);
     }
 }

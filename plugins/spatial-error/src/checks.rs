@@ -14,11 +14,12 @@ use runout_core::{
 
 use crate::{
     campaign::{COMPONENTS, Campaign},
+    config::Kriging,
     noise::{Noise, of_repeats},
     outcome::residual_um,
     projections::Projections,
     rough::Rough,
-    solve::Solution,
+    solve::{Solution, families},
 };
 
 /// Halvings of the places: 8 regions.
@@ -34,9 +35,9 @@ const FEWEST_READINGS: usize = 6;
 
 /// All tests of a fit.
 #[must_use]
-pub(crate) fn checks(campaign: &Campaign, solution: &Solution) -> Vec<Check> {
+pub(crate) fn checks(campaign: &Campaign, solution: &Solution, kriging: &Kriging) -> Vec<Check> {
     let mut all = campaign.checks.clone();
-    all.extend(Rough::of(campaign, solution).iter().map(Rough::check));
+    all.extend(Rough::of(campaign, solution, &families(kriging)).iter().map(Rough::check));
     all.extend(of_stated_noise(campaign));
     all.extend(left_out(&regions_left_out(campaign, solution)));
     let residual = residual_um(campaign, solution);
@@ -133,7 +134,7 @@ fn of_repeated(campaign: &Campaign, residual: &[[f64; 3]], axis: usize) -> Vec<C
     let fit = LinearFit { residual: &left, basis: basis.columns(), names: &[], weights: &[], noise: None, unit: "µm" };
     let checks = judge(fit, &structure).checks.into_iter();
     // Which of two readings of a place is the bad one is not known.
-    checks.filter(|check| check.test != Test::Rows).map(|check| check.within(COMPONENTS[axis])).collect()
+    checks.filter(|check| check.test != Test::Rows).map(|check| check.among(campaign.measured.len()).within(COMPONENTS[axis])).collect()
 }
 
 fn structure(campaign: &Campaign, members: &[&Vec<usize>], rows: &[usize]) -> Structure {

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::{
     correlation::Family,
-    joint::{Data, Within},
-    likelihood::{Criterion, Estimate, PARAMETERS, Prior, estimate},
+    joint::{Covariance, Data, Within},
+    likelihood::{Criterion, Estimate, PARAMETERS, Prior, covariances, estimate},
     solve::basis,
 };
 
@@ -29,6 +29,11 @@ pub(crate) struct Guess {
 const UNLIKELY: f64 = 4.0;
 
 impl Guess {
+    /// The covariance.
+    pub(crate) fn field(&self) -> Option<Covariance> {
+        covariances(&[self.family], &self.parameters).first().copied()
+    }
+
     /// ln of likelihood and prior times the volume of parameters that are as likely.
     fn ln_evidence(&self) -> f64 {
         let sizes = SymmetricEigen::new(self.covariance.clone()).eigenvalues;
@@ -86,6 +91,27 @@ pub(crate) fn most_likely(
         all[best].covariance = estimate.covariance.view((first, first), (PARAMETERS, PARAMETERS)).into_owned();
     }
     Some(Likely { families, estimate, guesses })
+}
+
+/// 2ΔlnL of a field's most likely covariance in any family against the most likely one with a nugget of `nugget_um` that is smooth.
+#[must_use]
+pub(crate) fn gain_of_nugget(
+    data: &Data,
+    prior: &Prior,
+    field: usize,
+    families: &[Family],
+    nugget_um: f64,
+    smooth: &dyn Fn(&Covariance) -> bool,
+) -> f64 {
+    let (data, free) = (alone(data, field), prior.of(field));
+    let mut fixed = free.clone();
+    (fixed.centre[PARAMETERS - 1], fixed.precision[PARAMETERS - 1]) = (nugget_um.ln(), f64::INFINITY);
+    let best = |prior: &Prior, wanted: &dyn Fn(&Covariance) -> bool| {
+        let all = each_family(&data, prior, families, Criterion::Restricted, None);
+        let wanted = all.into_iter().filter(|guess| guess.field().is_some_and(|covariance| wanted(&covariance)));
+        wanted.map(|guess| guess.ln_likelihood).fold(f64::NEG_INFINITY, f64::max)
+    };
+    2.0 * (best(&free, &|_| true) - best(&fixed, smooth))
 }
 
 fn part(parameters: &DVector<f64>, field: usize) -> DVector<f64> {

@@ -89,7 +89,7 @@ impl Conclusion<'_> {
     /// When the query cannot be read.
     pub(crate) fn outcome(&self) -> Result<Outcome> {
         let places = self.separator.query.places(self.campaign)?;
-        let checks = checks(self.campaign, self.solution);
+        let checks = checks(self.campaign, self.solution, &self.separator.config.kriging);
         let queries = self.queries(&places, factors(&checks));
         let left_out = self.solution.left_out();
         let tables = vec![

@@ -112,9 +112,7 @@ impl Solution {
         let most = all.iter().map(Vec::len).max().unwrap_or(0);
         let of_rank = |rank: usize| {
             let fields = self.covariances.iter().zip(&all).map(|(best, guesses)| {
-                let other = guesses.get(rank).and_then(|(guess, weight)| {
-                    Some((*covariances(&[guess.family], &guess.parameters).first()?, *weight))
-                });
+                let other = guesses.get(rank).and_then(|(guess, weight)| Some((guess.field()?, *weight)));
                 other.unwrap_or((*best, 0.0))
             });
             let (covariances, weights): (Vec<_>, Vec<_>) = fields.unzip();
