@@ -79,7 +79,7 @@ impl Export for Page {
                 let _ = writeln!(text, "| {} | {} | {} |", column.name, column.unit, column.about);
             }
         }
-        for warning in result.summary.all_warnings() {
+        for warning in &result.summary.warnings {
             let _ = write!(text, "\nWarning: {warning}\n");
         }
         std::fs::write(self.file.path(), text).map_err(|error| self.file.caused(error))?;

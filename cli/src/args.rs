@@ -7,8 +7,8 @@ use clap_complete::Shell;
 
 /// Separates the form of a turning part from the error motion of its spindle.
 ///
-/// Exit status: 0 done; 1 the data or the work failed, or `run --fail-on-limit` or `run --fail-on-warning` found a reason; 2 the
-/// command line or the configuration is wrong.
+/// Exit status: 0 done; 1 the data or the work failed, or `--fail-on-limit` or `--fail-on-warning` found a reason; 2 the command line
+/// or the configuration is wrong.
 #[derive(Debug, Parser)]
 #[command(name = "runout", version, arg_required_else_help = true)]
 pub(crate) struct CommandLine {
@@ -80,8 +80,15 @@ pub(crate) struct RunArgs {
     /// written all the same. Without any [[limit]] that is a mistake (exit status 2).
     #[arg(long)]
     pub fail_on_limit: bool,
-    /// End with exit status 1 where the run warns of something in the data. Files and the summary are written all the same;
-    /// notes that `check` gives without the data do not count.
+    #[command(flatten)]
+    pub warnings: WarningArgs,
+}
+
+/// Whether warnings fail.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct WarningArgs {
+    /// End with exit status 1 where there is a warning of something in the data, of a single station too. Files and the report are
+    /// written all the same; notes do not count.
     #[arg(long)]
     pub fail_on_warning: bool,
 }
@@ -101,6 +108,8 @@ pub(crate) struct BatchArgs {
     /// Recordings worked on at a time, each by one thread; as many as there are processors without it.
     #[arg(long, value_name = "N", value_parser = threads)]
     pub jobs: Option<NonZeroUsize>,
+    #[command(flatten)]
+    pub warnings: WarningArgs,
     /// Folders of a recording's path that belong to its name, for files of the same name in different folders.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub name_folders: usize,
@@ -120,6 +129,8 @@ pub(crate) struct DiagnoseArgs {
     /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can replace it.
     #[arg(long, value_name = "RIG.toml")]
     pub write: Option<PathBuf>,
+    #[command(flatten)]
+    pub warnings: WarningArgs,
 }
 
 /// `runout compare`.
@@ -140,6 +151,8 @@ pub(crate) struct CompareArgs {
     /// Stations worked on at a time; as many as there are processors without it.
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    pub warnings: WarningArgs,
 }
 
 /// `runout simulate`.

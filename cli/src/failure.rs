@@ -104,14 +104,13 @@ impl Failure {
             Self::Configuration(ConfigError::File(error)) | Self::Work(error) => {
                 let message = error.to_string();
                 // Most messages hold the text of their source already.
-                let mut lines = vec![message.clone()];
-                lines.extend(error.causes().into_iter().filter(|cause| !message.contains(cause.as_str())));
-                plain(&lines.join("\n  cause: "), error.advice())
+                let causes = error.causes().into_iter().filter(|cause| !message.contains(cause.as_str()));
+                let causes = causes.map(|cause| format!("  cause: {}\n", render::one_line(&cause)));
+                headed(&message, &causes.collect::<String>(), error.advice())
             }
             Self::Limit(open) => plain(&format!("not proven to be kept: {}", open.join("; ")), None),
             Self::Warnings(count) => {
-                let s = if *count == 1 { "" } else { "s" };
-                plain(&format!("{count} warning{s}, and --fail-on-warning"), None)
+                plain(&format!("{}, and --fail-on-warning", render::count(*count, "warning")), None)
             }
             Self::Recordings(failed) => plain(&format!("{} failed", render::count(*failed, "recording")), None),
             Self::Output(error) => plain(&format!("cannot write to stdout: {error}"), None),
@@ -166,6 +165,11 @@ pub(crate) fn to_value(result: &impl Serialize) -> Result<Value, Failure> {
 }
 
 fn plain(message: &str, help: Option<&str>) -> String {
-    let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
-    render::printable(&format!("error: {message}\n{help}")).into_owned()
+    headed(message, "", help)
+}
+
+/// A message, further lines, and what to do.
+fn headed(message: &str, further: &str, help: Option<&str>) -> String {
+    let help = help.map(|help| format!("  help: {}\n", render::one_line(help))).unwrap_or_default();
+    format!("error: {}\n{further}{help}", render::one_line(message))
 }

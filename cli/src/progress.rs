@@ -5,7 +5,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use runout_core::pipeline::run::Observer;
 
-use crate::render::printable;
+use crate::render::one_line;
 
 /// A bar that fills as things get done.
 pub(crate) struct Progress {
@@ -43,7 +43,7 @@ impl Progress {
 
     /// One more thing is done.
     pub(crate) fn advance(&self, done: &str) {
-        self.bar.set_message(printable(done).into_owned());
+        self.bar.set_message(one_line(done).into_owned());
         self.bar.inc(1);
     }
 }

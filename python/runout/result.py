@@ -109,8 +109,7 @@ class Result(_Outcome):
     @property
     def warnings(self) -> list[str]:
         """Warnings of the run and of its stations."""
-        own = [str(text) for text in self.summary["warnings"]]
-        return own + [f"{at['station']}: {text}" for at in self.summary["stations"] for text in at["warnings"]]
+        return [str(text) for text in self.summary["warnings"]]
 
     @property
     def lost_orders(self) -> dict[str, list[int]]:

@@ -130,11 +130,12 @@ class LeastSquaresCylinder:
     further. Default: 50."""
 
     outlier_mad: Union[float, None] = None
-    """Points further than this many median absolute deviations from the fit of their circle are left out, and counted. Default:
-    5.0."""
+    """Leaves out points further than this many median absolute deviations from the fit of their circle, and counts them. Without
+    it every point stays, and those that are not like the others are named."""
 
     outlier_order: Union[int, None] = None
-    """Highest order of the fit that points are compared with to leave out outliers, whatever `max_order` is. Default: 50."""
+    """Highest order of the fit that points are compared with where `outlier_mad` leaves some out, whatever `max_order` is.
+    Default: 50."""
 
     radius_mm: float
     """Nominal radius that the deviations are measured from, in mm."""

@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 /// Chance: the same seed and index give the same numbers.
 pub struct Chance {
@@ -30,6 +31,11 @@ impl Chance {
     /// A number between two, all as likely.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.random.random_range(low..high)
+    }
+
+    /// A number of a normal distribution with the standard deviation 1.
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.random)
     }
 
     /// Every decade as likely.

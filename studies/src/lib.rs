@@ -5,6 +5,7 @@ pub mod axial;
 pub mod blind;
 pub mod campaign;
 pub mod chance;
+pub mod consistency;
 pub mod coverage;
 pub mod each;
 pub mod eccentricity;

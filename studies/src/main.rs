@@ -8,7 +8,7 @@ use runout_core::{Error, Result, atomic_file};
 use runout_studies::{
     averaging, axial,
     blind::{self, domains, draw::Layout, points::Domain},
-    coverage, eccentricity, flat,
+    consistency, coverage, eccentricity, flat,
     minimum_zone_cylinder::{self, Wall},
     monte_carlo, points_pictures, results, rotor, scaling, spatial, straightness, surface as unrolled,
     values::{self, Spectrum},
@@ -18,6 +18,7 @@ use runout_studies::{
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
        runout-studies axial [CAMPAIGNS [SEED]]   the same of axial error motion, from a seed on
+       runout-studies consistency [CAMPAIGNS [SEED]]   what the tests of the data say of sound and of troubled campaigns
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
        runout-studies value-coverage [CAMPAIGNS [SEED [LAYOUT]]]   the same of every value of the standards, two rigs and two
                                              spectra, from a seed on; LAYOUT is four or six
@@ -72,6 +73,9 @@ fn main() -> ExitCode {
             let [campaigns, seed] = sizes(rest, [200, 0]).unwrap_or_default();
             axial(campaigns, seed)
         }
+        ["consistency", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [100, 1]).is_some() => {
+            consistency_of_domains(sizes(rest, [100, 1]).unwrap_or_default())
+        }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
         ["value-coverage", ref rest @ ..] if rest.len() <= 3 && sizes(rest, [300, 0]).is_some() => {
@@ -89,9 +93,8 @@ fn main() -> ExitCode {
         ["blind-campaign", ref rest @ ..] if (1..=3).contains(&rest.len()) && sizes(rest, [0, 1]).is_some() => {
             layout(rest.get(2)).and_then(|only| blind_campaign(sizes(rest, [0, 1]).unwrap_or_default(), only))
         }
-        ["monte-carlo"] => monte_carlo(1000),
-        ["monte-carlo", campaigns] if campaigns.parse::<u64>().is_ok() => {
-            monte_carlo(campaigns.parse().unwrap_or_default())
+        ["monte-carlo", ref rest @ ..] if rest.len() <= 1 && sizes(rest, [1000, 0]).is_some() => {
+            monte_carlo(sizes(rest, [1000, 0]).unwrap_or_default()[0])
         }
         ["diagnose-scaling"] => scaling::rows().map(|rows| println!("{}", scaling::table(&rows))),
         ["compare-results", a, b] => compare_results(a, b, 1e-12),
@@ -144,6 +147,16 @@ fn main() -> ExitCode {
 }
 
 /// Takes `--domain NAME` out of the words; nothing where there is none, or where it is the spindle, which has a benchmark of its own.
+fn consistency_of_domains([campaigns, seed]: [u64; 2]) -> Result<()> {
+    let mut rows = Vec::new();
+    for kind in consistency::ROWS {
+        eprintln!("{}, {}", kind.domain, kind.trouble);
+        rows.push((kind, consistency::row(kind, campaigns, seed)?));
+    }
+    println!("{}", consistency::table(&rows));
+    Ok(())
+}
+
 fn domain(words: &mut Vec<&str>) -> Result<Option<&'static Domain>> {
     let Some(place) = words.iter().position(|word| *word == "--domain") else { return Ok(None) };
     let name = words.get(place + 1).copied().unwrap_or_default();

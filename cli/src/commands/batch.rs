@@ -12,7 +12,7 @@ use runout_core::{
 };
 use runout_parquet::DataSet;
 
-use super::print;
+use super::{fail_on, print};
 use crate::{args::BatchArgs, failure::Failure, progress::Progress, render};
 
 /// Runs a pipeline on every recording that is not up to date, and says how the values of all of them run.
@@ -33,7 +33,12 @@ pub(crate) fn execute(args: &BatchArgs, json: bool, registry: &Registry) -> Resu
     let report = batch.run(&recordings, jobs, &progress)?;
     drop(progress);
     print(&report, json, render::batch::text)?;
-    if report.failed.is_empty() { Ok(()) } else { Err(Failure::Recordings(report.failed.len())) }
+    if !report.failed.is_empty() {
+        return Err(Failure::Recordings(report.failed.len()));
+    }
+    // What is of another configuration is one warning.
+    let outdated = usize::from(!report.other_configuration.is_empty());
+    fail_on(report.warning_count + outdated, args.warnings)
 }
 
 /// Refuses recordings that lie in the data set: its own tables would be read as recordings.

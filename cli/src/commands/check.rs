@@ -8,7 +8,7 @@ use runout_core::{
         document::{Document, Sources},
     },
     rig::Rig,
-    stage::{EvaluableKind, Planned, PointSeparator, Source, speeds_and_turns, speeds_of},
+    stage::{EvaluableKind, Planned, PointSeparator, Source, captures_sampled, speeds_of},
 };
 use toml::{Spanned, de::DeValue};
 
@@ -42,7 +42,7 @@ pub(crate) fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCat
         Ok(Source::Points(points)) => notes.extend(points.remarks.iter().cloned()),
         Ok(Source::Turns(recording)) => {
             let setups = pipeline.rig.as_ref().map_or(0, |rig| rig.setups.len());
-            notes.extend(mains::whole_orders(&speeds_and_turns(&**recording, setups)));
+            notes.extend(mains::whole_orders(&captures_sampled(&**recording, setups)));
         }
         Err(error) => notes.push(format!("the data are not there yet, or cannot be used: {error}")),
     }

@@ -14,7 +14,7 @@ use runout_core::{
 };
 use runout_parquet::{ComparisonTable, comparison_figures, comparison_rows};
 
-use super::{pipeline, print, report::OverviewReport};
+use super::{fail_on, pipeline, print, report::OverviewReport};
 use crate::{args::CompareArgs, failure::Failure, progress::Progress, render};
 
 /// Compares separators and says how they differ.
@@ -52,7 +52,8 @@ pub(crate) fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> st
     comparison.stations = stations;
     output.finish(&comparison)?;
     write_report(report, &comparison)?;
-    print(&comparison, json, render::compare::text)
+    print(&comparison, json, render::compare::text)?;
+    fail_on(comparison.warnings.len(), args.warnings)
 }
 
 /// The same of measured points, which are in memory as a whole.
@@ -77,7 +78,8 @@ fn points(
     let comparison = comparing.run(outputs(args))?;
     output.finish(&comparison)?;
     write_report(report, &comparison)?;
-    print(&comparison, json, render::compare::text)
+    print(&comparison, json, render::compare::text)?;
+    fail_on(comparison.warnings.len(), args.warnings)
 }
 
 /// The files that are to be written.

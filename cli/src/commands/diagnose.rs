@@ -7,13 +7,14 @@ use runout_core::{
     pipeline::{Pipeline, Registry, diagnose, document::Sources},
 };
 
-use super::{pipeline, print};
+use super::{fail_on, pipeline, print};
 use crate::{args::DiagnoseArgs, failure::Failure, progress::Progress, render};
 
 /// Runs the closed loop on a pipeline and says what the declared model lacks.
 ///
 /// # Errors
-/// When the configuration is wrong, or the data or a file fails. Whatever the verdict, a diagnosis is no failure.
+/// When the configuration is wrong, or the data or a file fails; where it was asked for, also when a warning was given. Whatever the
+/// verdict, a diagnosis is no failure.
 pub(crate) fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, mut pipeline) = pipeline(&args.pipeline, registry)?;
     if let Some(memory_gb) = args.memory {
@@ -30,7 +31,8 @@ pub(crate) fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> R
     let progress = Progress::new("stations");
     let diagnosis = diagnose::diagnose(&pipeline, args.threads, &progress)?;
     drop(progress);
-    print(&diagnosis, json, render::diagnosis::text)
+    print(&diagnosis, json, render::diagnosis::text)?;
+    fail_on(diagnosis.findings().count(), args.warnings)
 }
 
 /// Refuses a file for the corrected rig that is no TOML or is something else, and a pipeline without a rig.

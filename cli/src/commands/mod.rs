@@ -17,7 +17,7 @@ use runout_core::pipeline::{INCLUDE_KEY, Pipeline, Registry, document::Sources};
 use serde::Serialize;
 
 use crate::{
-    args::{Command, PipelineArgs},
+    args::{Command, PipelineArgs, WarningArgs},
     failure::Failure,
     render,
 };
@@ -48,6 +48,11 @@ fn pipeline(args: &PipelineArgs, registry: &Registry) -> Result<(Sources, Pipeli
     let sources = Sources::read(&args.pipeline, &args.overrides.set, INCLUDE_KEY)?;
     let pipeline = Pipeline::from_sources(&sources, registry)?;
     Ok((sources, pipeline))
+}
+
+/// Fails where there are warnings, if that was asked for.
+fn fail_on(warnings: usize, args: WarningArgs) -> Result<(), Failure> {
+    if args.fail_on_warning && warnings > 0 { Err(Failure::Warnings(warnings)) } else { Ok(()) }
 }
 
 /// Prints a result: as one JSON document, or as text.

@@ -5,7 +5,7 @@ use runout_core::{
     summary::Decision,
 };
 
-use super::{pipeline, print};
+use super::{fail_on, pipeline, print};
 use crate::{args::RunArgs, failure::Failure, progress::Progress, render};
 
 /// Runs a pipeline and says what came out.
@@ -30,6 +30,5 @@ pub(crate) fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result
     if !open.is_empty() {
         return Err(Failure::Limit(open));
     }
-    let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();
-    if args.fail_on_warning && warnings > 0 { Err(Failure::Warnings(warnings)) } else { Ok(()) }
+    fail_on(summary.findings().count(), args.warnings)
 }

@@ -18,7 +18,12 @@ use runout_hdf5::{SampleFormat, Scale, WriteOptions, write_height_map, write_mea
 use serde::Serialize;
 
 use super::print;
-use crate::{args::SimulateArgs, failure::Failure, progress::Progress, render::count};
+use crate::{
+    args::SimulateArgs,
+    failure::Failure,
+    progress::Progress,
+    render::{count, one_line},
+};
 
 /// What was made. What is hidden in it stays hidden.
 #[derive(Debug, Serialize)]
@@ -177,5 +182,5 @@ fn text(report: &Report) -> String {
         (effects, Made::Points { .. }) => format!("  {} in it\n", count(effects, "effect")),
     };
     let written = format!("{} ({:.1} MB)", report.output.display(), report.bytes as f64 / 1e6);
-    format!("{}\n  {size}\n{effects}  written: {written}\n", report.title)
+    format!("{}\n  {size}\n{effects}  written: {written}\n", one_line(&report.title))
 }

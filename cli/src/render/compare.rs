@@ -6,7 +6,7 @@ use runout_core::pipeline::compare::{Comparison, Difference, MethodValue, Quanti
 
 use super::{
     count,
-    number::{lacking, ranges, significant, spread},
+    number::{lacking, place, ranges, rounded_place, significant, spread},
     page::Page,
     table::Table,
 };
@@ -48,7 +48,7 @@ pub(crate) fn page(comparison: &Comparison) -> Page {
     let refused: Vec<String> =
         comparison.refused.iter().map(|refusal| format!("{}: {}", refusal.method, refusal.reason)).collect();
     page.bullets("Refused", &refused);
-    page.bullets("Warnings and notes", &notes(comparison));
+    page.warnings(&notes(comparison));
     page
 }
 
@@ -201,7 +201,6 @@ fn notes(comparison: &Comparison) -> Vec<String> {
         notes.extend(own.map(|note| format!("{}: {note}", method.method)));
     }
     notes.extend(plane(comparison));
-    notes.extend(comparison.stations.iter().flat_map(|station| station.warnings.iter().cloned()));
     notes
 }
 
@@ -211,14 +210,11 @@ fn plane(comparison: &Comparison) -> Option<String> {
     let planes = motions.filter(|quantity| quantity.quantity == "x" || quantity.quantity == "y");
     let places = planes.flat_map(|quantity| quantity.values.iter().filter_map(|value| value.z_mm));
     let [low, _, high] = spread(places)?;
-    let place = if high > low {
-        format!("{} to {} mm, station by station", significant(low, 5), significant(high, 5))
-    } else {
-        format!("{} mm", significant(low, 5))
-    };
-    (high != 0.0).then(|| {
+    let [first, last] = [low, high].map(place);
+    let at = if last == first { format!("{last} mm") } else { format!("{first} to {last} mm, station by station") };
+    (rounded_place(high) != 0.0).then(|| {
         format!(
-            "x and y are the axis's displacement at z = {place}: tilt, which moves it to z = 0, is not observable by every method"
+            "x and y are the axis's displacement at z = {at}: tilt, which moves it to z = 0, is not observable by every method"
         )
     })
 }

@@ -39,7 +39,7 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
         }
     }
     page.bullets("Put into the rig", &changes(&diagnosis.added));
-    page.bullets("Warnings and notes", &diagnosis.warnings);
+    page.warnings(&diagnosis.warnings);
     let outputs: Vec<String> = diagnosis.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
     page.into_text()

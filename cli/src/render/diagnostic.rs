@@ -7,7 +7,7 @@ use runout_core::fault::Diagnostic;
 
 use textwrap::WordSplitter;
 
-use super::{fancy_stderr, printable};
+use super::{fancy_stderr, one_line};
 
 /// Columns of a report that no terminal bounds.
 const PLAIN_WIDTH: usize = 100;
@@ -51,7 +51,8 @@ fn can_be_drawn(diagnostic: &Diagnostic) -> bool {
     let line = source_text.get(..span.start).map_or(0, |before| before.matches('\n').count());
     let lines = source_text.get(span.clone()).map_or(0, |inside| inside.matches('\n').count());
     let near = source_text.lines().skip(line.saturating_sub(AROUND)).take(2 * AROUND + 1 + lines);
-    let harmless = |text: &str| matches!(printable(text), Cow::Borrowed(_));
+    // Tabs indent lines of a file.
+    let harmless = |text: &str| matches!(one_line(&text.replace('\t', " ")), Cow::Borrowed(_));
     near.into_iter().all(|line| line.len() <= LONGEST_LINE && harmless(line))
         && harmless(message)
         && harmless(source_name)
@@ -64,9 +65,9 @@ fn plain(diagnostic: &Diagnostic) -> String {
     let (line, column) = diagnostic.line_and_column();
     let rest = source_text.get(span.start..).unwrap_or_default().lines().next().unwrap_or_default();
     let excerpt: String = rest.chars().take(EXCERPT).collect();
-    let help = help.as_ref().map(|help| format!("  help: {help}\n")).unwrap_or_default();
-    let text = format!("error: {message}\n  at {source_name}:{line}:{column}: {excerpt}\n{help}");
-    printable(&text).into_owned()
+    let help = help.as_ref().map(|help| format!("  help: {}\n", one_line(help))).unwrap_or_default();
+    let [message, source_name, excerpt] = [message, source_name, &excerpt].map(|text| one_line(text));
+    format!("error: {message}\n  at {source_name}:{line}:{column}: {excerpt}\n{help}")
 }
 
 /// The core's diagnostic as miette knows it.

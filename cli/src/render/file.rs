@@ -3,7 +3,11 @@
 use runout_csv::TextReport;
 use runout_hdf5::{FileReport, StationReport};
 
-use super::{number::significant, page::Page, table::Table};
+use super::{
+    number::{place, significant},
+    page::Page,
+    table::Table,
+};
 use crate::reports::inspect::{Report, TableReport};
 
 /// The text of a report.
@@ -53,7 +57,7 @@ fn captures(stations: &[StationReport]) -> Table {
                 capture.channels.join(" "),
                 capture.phase.to_owned(),
                 capture.sample_type.to_owned(),
-                significant(station.z_mm, 5),
+                place(station.z_mm),
                 capture.turns.to_string(),
                 capture.samples.to_string(),
                 known(capture.sample_rate_hz),

@@ -25,8 +25,13 @@ use serde::Serialize;
 
 /// Whether a character may change what a terminal shows of others: control characters, and marks that turn the direction of text.
 fn is_harmful(character: char) -> bool {
-    (character.is_control() && !matches!(character, '\n' | '\t'))
-        || matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    breaks_line(character) && !matches!(character, '\n' | '\t')
+}
+
+/// The same, and what ends a line.
+fn breaks_line(character: char) -> bool {
+    character.is_control()
+        || matches!(character, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// A unit as the field writes it: "µm/m" of `um/m`.
@@ -38,20 +43,31 @@ pub(crate) fn unit(id: &str) -> String {
     id.split_inclusive(['/', '(', ' ', '·']).map(of_part).collect()
 }
 
-/// A text as a terminal may show it, whatever file it comes from: control characters as `\u{1b}`.
+/// A text of several lines as a terminal may show it: control characters as `\u{1b}`.
 #[must_use]
 pub(crate) fn printable(text: &str) -> Cow<'_, str> {
-    if !text.contains(is_harmful) {
+    escaped(text, is_harmful)
+}
+
+/// A line as a terminal may show it, whatever names of a file are in it: line breaks as `\n`.
+#[must_use]
+pub(crate) fn one_line(text: &str) -> Cow<'_, str> {
+    escaped(text, breaks_line)
+}
+
+fn escaped(text: &str, which: fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(which) {
         return Cow::Borrowed(text);
     }
-    let escaped = |shown: String, character: char| {
-        if is_harmful(character) {
-            shown + &character.escape_unicode().to_string()
+    let shown = text.chars().fold(String::new(), |mut shown, character| {
+        if which(character) {
+            shown.extend(character.escape_default());
         } else {
-            shown + character.encode_utf8(&mut [0; 4])
+            shown.push(character);
         }
-    };
-    Cow::Owned(text.chars().fold(String::new(), escaped))
+        shown
+    });
+    Cow::Owned(shown)
 }
 
 /// Writes to stdout. Whoever closed it early (`| head`) has seen enough: that is no failure.
@@ -108,7 +124,14 @@ pub(crate) fn count(number: usize, thing: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::unit;
+    use super::{one_line, printable, unit};
+
+    #[test]
+    fn a_name_from_a_file_is_no_line_of_its_own() {
+        assert_eq!(one_line("a\nb\tc\u{1b}\u{2028}d"), "a\\nb\\tc\\u{1b}\\u{2028}d");
+        assert_eq!(printable("a\nb\tc\u{1b}"), "a\nb\tc\\u{1b}");
+        assert_eq!(one_line("süd 50 µm"), "süd 50 µm");
+    }
 
     #[test]
     fn units_are_shown_as_the_field_writes_them() {

@@ -7,7 +7,10 @@ use runout_core::{
     stage::{Overview, Part, Section},
 };
 
-use super::table::Table;
+use super::{one_line, table::Table};
+
+/// Places that a warning names on the page; all of them are in the files.
+const FEW_PLACES: usize = 8;
 
 /// Lines, sections and tables in the order added.
 #[derive(Debug, Default)]
@@ -67,6 +70,25 @@ impl Page {
         }
     }
 
+    /// Adds warnings and notes. Those that differ in the place before their first colon only become one, with the places.
+    pub(crate) fn warnings(&mut self, texts: &[String]) {
+        let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+        for text in texts {
+            let (place, said) = text.split_once(": ").unwrap_or(("", text));
+            match groups.iter_mut().find(|(known, _)| *known == said) {
+                Some((_, places)) => places.push(place),
+                None => groups.push((said, vec![place])),
+            }
+        }
+        let lines = groups.into_iter().map(|(said, places)| {
+            let more = places.len().saturating_sub(FEW_PLACES);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let shown = places[..places.len().min(FEW_PLACES)].join(", ");
+            if shown.is_empty() { said.to_owned() } else { format!("{shown}{more}: {said}") }
+        });
+        self.bullets("Warnings and notes", &lines.collect::<Vec<_>>());
+    }
+
     /// The text for a terminal.
     #[must_use]
     pub(crate) fn into_text(self) -> String {
@@ -74,9 +96,9 @@ impl Page {
         for block in self.blocks {
             // A string takes whatever is written to it.
             let _ = match block {
-                Block::Line(line) => writeln!(text, "{line}"),
-                Block::Heading(heading) => writeln!(text, "\n{heading}"),
-                Block::Bullet(line) => writeln!(text, "  - {line}"),
+                Block::Line(line) => writeln!(text, "{}", one_line(&line)),
+                Block::Heading(heading) => writeln!(text, "\n{}", one_line(&heading)),
+                Block::Bullet(line) => writeln!(text, "  - {}", one_line(&line)),
                 Block::Table(table) => write!(text, "{}", table.text()),
             };
         }
@@ -124,6 +146,24 @@ mod tests {
         page.bullets("Warnings", &["a".into(), "b".into(), "a".into()]);
         page.bullets("Nothing", &[]);
         assert_eq!(page.into_text(), "\nWarnings\n  - a (2 times)\n  - b\n");
+    }
+
+    #[test]
+    fn one_warning_of_many_stations_is_shown_once() {
+        let mut page = Page::default();
+        let mut texts: Vec<String> = (0..11).map(|number| format!("s{number}: few turns: 3")).collect();
+        texts.insert(1, "no truth".into());
+        page.warnings(&texts);
+        let shown = "s0, s1, s2, s3, s4, s5, s6, s7 and 3 more: few turns: 3";
+        assert_eq!(page.into_text(), format!("\nWarnings and notes\n  - {shown}\n  - no truth\n"));
+    }
+
+    #[test]
+    fn a_name_with_a_line_break_stays_on_its_line() {
+        let mut page = Page::default();
+        page.line("station a\nb");
+        page.bullets("Notes", &["a\nb: few turns".into()]);
+        assert_eq!(page.into_text(), "station a\\nb\n\nNotes\n  - a\\nb: few turns\n");
     }
 
     #[test]

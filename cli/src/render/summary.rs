@@ -12,7 +12,7 @@ use runout_core::{
 
 use super::{
     count,
-    number::{lacking, ranges, significant, spread, with_std},
+    number::{lacking, place, ranges, rounded_place, significant, spread, with_std},
     page::Page,
     table::Table,
     unit,
@@ -30,6 +30,7 @@ pub(crate) fn text(summary: &Summary) -> String {
     let stations = &summary.stations;
     let mut page = Page::default();
     page.line(&summary.title);
+    refuted(&mut page, summary);
     if stations.is_empty() {
         named::section(&mut page, &summary.values);
         values::limits(&mut page, summary);
@@ -46,12 +47,34 @@ pub(crate) fn text(summary: &Summary) -> String {
         surface(&mut page, summary);
         named::section(&mut page, &summary.values);
     }
-    let mut warnings = summary.warnings.clone();
-    warnings.extend(stations.iter().flat_map(|station| station.warnings.iter().cloned()));
-    page.bullets("Warnings and notes", &warnings);
+    page.warnings(&summary.warnings);
     let outputs: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
     page.bullets("Written", &outputs);
     page.into_text()
+}
+
+/// Behind a number that its own data refute.
+const REFUTED: &str = " !";
+
+/// Says first which values their own data refute, and by what.
+fn refuted(page: &mut Page, summary: &Summary) {
+    let (reasons, values) = summary.refuted();
+    let count: usize = reasons.iter().map(|(_, count)| count).sum();
+    if count == 0 {
+        return;
+    }
+    page.line(format_args!("The data refute {count} of {values} values, marked by{REFUTED}"));
+    for (reason, _) in reasons.iter().take(FEW_STATIONS) {
+        page.line(format_args!("  {reason}"));
+    }
+    if reasons.len() > FEW_STATIONS {
+        page.line(format_args!("  and {} more reasons: every one is listed with --json", reasons.len() - FEW_STATIONS));
+    }
+}
+
+/// The mark of a number that its own data refute.
+fn mark(refuted_by: Option<&String>) -> &'static str {
+    if refuted_by.is_some() { REFUTED } else { "" }
 }
 
 /// Form, motion and what the fit leaves.
@@ -176,14 +199,15 @@ fn std_of(value: &Value) -> Option<f64> {
 
 /// A value with its standard uncertainty, or with its 95 % interval where this does not hold the value: noise adds to ranges.
 fn with_uncertainty(value: &Value) -> String {
-    let Some(known) = &value.uncertainty else { return significant(value.value, 4) };
+    let mark = mark(value.refuted_by.as_ref());
+    let Some(known) = &value.uncertainty else { return significant(value.value, 4) + mark };
     let [low, high] = known.interval_95;
     if (low..=high).contains(&value.value) {
-        return with_std(value.value, Some(known.std));
+        return with_std(value.value, Some(known.std)) + mark;
     }
     // As many decimals as the uncertainty has.
     let number = |number: f64| with_std(number, Some(known.std)).split(' ').next().unwrap_or_default().to_owned();
-    format!("{} (95 %: {} to {})", number(value.value), number(low), number(high))
+    format!("{} (95 %: {} to {}){mark}", number(value.value), number(low), number(high))
 }
 
 fn form_heading(stations: &[StationSummary]) -> String {
@@ -204,7 +228,7 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
         let mut row = vec![
             name.to_owned(),
             section.section.clone(),
-            significant(section.z_mm, 5),
+            place(section.z_mm),
             with_std(section.form_rms_um, section.form_std_um),
         ];
         let lost = lost_in(section);
@@ -253,7 +277,7 @@ fn form_gathered(stations: &[StationSummary]) -> Table {
                 table.row(row);
             }
         };
-        gather("z mm".into(), 5, &|section| Some(section.z_mm));
+        gather("z mm".into(), 5, &|section| Some(rounded_place(section.z_mm)));
         // All sections of a rig lose the same orders, or nearly so.
         let mut lost: Vec<usize> = of.iter().flat_map(|section| lost_in(section)).copied().collect();
         lost.sort_unstable();
@@ -263,7 +287,9 @@ fn form_gathered(stations: &[StationSummary]) -> Table {
         gather("rms ± µm".into(), 2, &|section| section.form_std_um);
         for first in first_values(stations) {
             let (symbol, unit) = (&first.symbol, unit(&first.unit));
-            gather(format!("{}{lost}", label(first)), 4, &|section| Some(value_of(section, symbol)?.value));
+            let refuted = of.iter().find_map(|section| value_of(section, symbol)?.refuted_by.as_ref());
+            let name = format!("{}{lost}{}", label(first), mark(refuted));
+            gather(name, 4, &|section| Some(value_of(section, symbol)?.value));
             gather(format!("{symbol} ± {unit}"), 2, &|section| std_of(value_of(section, symbol)?));
         }
         gather("true error µm".into(), 2, &|section| section.truth_form_rms_error_um);
@@ -340,7 +366,7 @@ fn lost_orders(page: &mut Page, summary: &Summary) {
 
 fn surface(page: &mut Page, summary: &Summary) {
     let Some(surface) = &summary.surface else { return };
-    let [from, to] = surface.z_mm.map(|z_mm| significant(z_mm, 5));
+    let [from, to] = surface.z_mm.map(place);
     page.heading("Surface");
     page.line(format_args!("  {} angles × {} rings, z {from} to {to} mm", surface.angles, surface.rings));
     page.line(format_args!("  between sections: {}", surface.interpolation));
@@ -350,7 +376,7 @@ fn surface(page: &mut Page, summary: &Summary) {
     for meeting in meetings.iter().take(FEW_STATIONS) {
         table.row([
             meeting.sections.join(" and "),
-            significant(meeting.z_mm, 5),
+            place(meeting.z_mm),
             significant(meeting.rms_um, 3),
             known(meeting.expected_rms_um, 3),
             significant(meeting.max_um, 3),

@@ -2,14 +2,14 @@
 
 use runout_core::stage::Part;
 
-use super::printable;
+use super::one_line;
 
 /// Characters of a cell, at most: a name from a file may have any length.
 const LONGEST: usize = 400;
 
 /// A cell as a terminal may show it.
 fn cut(cell: &str) -> String {
-    let mut shown = printable(cell).into_owned();
+    let mut shown = one_line(cell).into_owned();
     if let Some((end, _)) = shown.char_indices().nth(LONGEST) {
         shown.truncate(end);
         shown.push('…');

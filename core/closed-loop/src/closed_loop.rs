@@ -1,4 +1,6 @@
 //! Find, trace, add, report: until only noise is left, or the evidence supports no further effect.
+//!
+//! Long because the search, its doubts and the end of the loop are one algorithm.
 
 use std::collections::BTreeMap;
 
@@ -9,12 +11,13 @@ use super::{
     fit::{INDEPENDENT, Refit, refit},
     found::Found,
     judgement::{
-        BIC_LIMIT, OVERLAP, P_LIMIT, above_chance, at_the_floor, disturbed, independent, is, mixed, no_gain, overlap,
-        raises_held_out, unit, weak,
+        BIC_LIMIT, OVERLAP, P_LIMIT, above_chance, at_the_floor, disturbed, independent, is, mixed, no_gain,
+        noise_only, overlap, raises_held_out, unit, weak,
     },
+    keyed::Keyed,
     report::{added, blind, inconsistent, level, moved, verdict},
 };
-use runout_consistency::{Kind, Partition, keys::keys, order::OrderModels};
+use runout_consistency::{Check, Kind, Partition, Test};
 use runout_error::Result;
 use runout_numerics::least_squares::{dot, orthonormal};
 
@@ -24,6 +27,8 @@ const SAME_BIC: f64 = 10.0;
 pub(super) const SAME: f64 = 1e-9;
 /// Candidates of which a joint refit is tried, and the least share of the best linear gain that they must promise.
 const SHORTLIST: (usize, f64) = (6, 0.2);
+/// Candidates that explain most beside correlated errors, which join that list.
+const BESIDE_CORRELATED: usize = 4;
 /// Effects of single parts on that list at most.
 const PARTS_LISTED: usize = 2;
 /// How a loop is to be run.
@@ -106,7 +111,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     let current = tracing.refit_found(model.whole(), &found)?;
     let (current, others) = tracing.combinations(model.whole(), current, SAME_BIC);
     let consistency = current.fit.consistency();
-    let left = at_the_floor(current.fit.remainder());
+    let left = noise_only(current.fit.remainder(), &consistency);
     let verdict = verdict(current.fit.remainder(), &consistency, tracing.found.is_empty());
     tracing.settle(&current);
     let applied = current.settings.clone();
@@ -115,7 +120,10 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     if !left {
         unexplained.extend(after.unexplained());
     }
-    unexplained.extend(consistency.iter().filter(|check| check.bars_verdict()).map(inconsistent));
+    // A residual is said by where it comes from, where that shows.
+    let placed = !unexplained.is_empty();
+    let said = |check: &&Check| check.bars_verdict() && !(placed && check.test == Test::Residual);
+    unexplained.extend(consistency.iter().filter(said).map(inconsistent));
     let warnings = tracing.ended_by_limits();
     let diagnosis = Diagnosis {
         verdict,
@@ -131,6 +139,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
         lost_orders: None,
         truth: None,
         warnings,
+        notes: Vec::new(),
         outputs: Vec::new(),
     };
     Ok(Closed { diagnosis, before, after, settings: applied })
@@ -230,7 +239,14 @@ impl<M: Model> Tracing<'_, M> {
             part_places -= usize::from(listed && parts.contains(effect));
             listed
         });
-        for (effect, gain) in ranked.into_iter().take(SHORTLIST.0).filter(|(_, gain)| *gain >= promising) {
+        let keyed = Keyed::of(&current.fit, &basis);
+        let beside = keyed.explained(&ranked);
+        let listed = |rank: usize, effect: usize, gain: f64| {
+            let explains = || beside.iter().take(BESIDE_CORRELATED).any(|(other, _)| *other == effect);
+            rank < SHORTLIST.0 && gain >= promising || explains()
+        };
+        let ranked = ranked.into_iter().enumerate().filter(|(rank, (effect, gain))| listed(*rank, *effect, *gain));
+        for (effect, gain) in ranked.map(|(_, one)| one) {
             let parameters = self.model.effects()[effect].parameters.len();
             let evidence = |after: f64| {
                 self.evidence(effect, before.chi2(), after, &before, before.dof.saturating_sub(parameters), count)
@@ -252,36 +268,29 @@ impl<M: Model> Tracing<'_, M> {
         // Of those that are equal up to rounding, the one that the model names first.
         let place = |bic: f64| if bic - best <= SAME * best.abs() { best } else { bic };
         trials.sort_by(|a, b| place(a.2.delta_bic).total_cmp(&place(b.2.delta_bic)).then(a.0.cmp(&b.0)));
-        let mut trials = trials.into_iter();
-        let (effect, trial, evidence) = trials.next()?;
-        let after = trial.fit.clone();
-        let columns = independent(current.fit.signature(effect), &basis);
-        let lowered = before.chi2() - trial.chi2;
-        let parts = before.structure.of_kind(Kind::Blocks).map(Partition::count).max().unwrap_or(1);
-        let each = -lowered / parts.max(1) as f64;
-        let fixed_columns: Vec<Vec<f64>> = current.fit.declared_columns().iter().chain(&basis).cloned().collect();
-        let models = (before.structure.order.as_ref())
-            .and_then(|order| OrderModels::of(order, &before.residual, &fixed_columns));
-        let keys = keys(&columns, count, &before.residual, &fixed_columns, &before.structure, models.as_ref());
-        let evidence = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
-        let reason = if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
-            Some(weak(&evidence))
-        } else if parts > 1 && !above_chance(&before) && before.noise_is_known() && each > BIC_LIMIT {
-            // Noise may be all that is left, and in each part it is not known better because there are more parts.
-            Some(format!(
-                "it would explain too little of each of {parts} parts of the data: Δχ² {each:.1}, above {BIC_LIMIT}"
-            ))
-        } else if lowered <= before.disturbed_chi2 {
-            Some(disturbed(lowered, before.disturbed_chi2))
-        } else if raises_held_out(&before, &after, self.model.is_seen_besides(effect)) {
-            Some(no_gain(&before, &after))
-        } else {
-            keys.refused
-        };
-        if let Some(reason) = reason {
-            self.refuse(effect, reason);
-            return None;
+        // Beside correlated errors, the one that explains most beside them.
+        let beside = |effect: usize| beside.iter().find(|(other, _)| *other == effect).map_or(0.0, |(_, gain)| *gain);
+        trials.sort_by(|a, b| beside(b.0).total_cmp(&beside(a.0)));
+        let mut believed = None;
+        while believed.is_none() && !trials.is_empty() {
+            let (effect, trial, evidence) = trials.remove(0);
+            let columns = independent(current.fit.signature(effect), &basis);
+            let keys = keyed.keys(effect, &columns, count);
+            // Each key has its own limit; the chance that is stated is the largest.
+            let stated = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
+            let by_keys = keys.refused.is_some();
+            match self.doubt(effect, [&before, &trial.fit], &evidence).or(keys.refused) {
+                // What correlated errors or blocks refuse says nothing of the others.
+                Some(reason) if by_keys => self.refuse(effect, reason),
+                Some(reason) => {
+                    self.refuse(effect, reason);
+                    return None;
+                }
+                None => believed = Some((effect, trial, stated)),
+            }
         }
+        let (effect, trial, evidence) = believed?;
+        let (after, chosen) = (trial.fit.clone(), evidence.delta_bic);
         let named = &self.model.effects()[effect];
         self.refused.retain(|refused| !is(refused, named));
         let unit = unit(&after);
@@ -290,10 +299,10 @@ impl<M: Model> Tracing<'_, M> {
         let std = (first..first + count).map(|index| (trial.covariance[index][index] * unit).sqrt()).collect();
         let values = trial.settings.last().map(|setting| setting.values.clone()).unwrap_or_default();
         // BIC counts in units of what each trial leaves; the best one's unit is common to all.
-        let alike = trials.filter(|(_, other, evidence)| {
+        let alike = trials.into_iter().filter(|(_, other, evidence)| {
             let difference = (other.chi2 - trial.chi2) / unit.max(f64::MIN_POSITIVE);
             difference < SAME_BIC
-                && evidence.delta_bic - best < SAME_BIC.max(0.02 * best.abs())
+                && evidence.delta_bic - chosen < SAME_BIC.max(0.02 * chosen.abs())
                 && overlap(&before.residual, [&after.residual, &other.fit.residual]) > OVERLAP
         });
         let mut members = vec![effect];
@@ -303,6 +312,29 @@ impl<M: Model> Tracing<'_, M> {
             alone.push(refit.settings.last().map(|setting| setting.values.clone()).unwrap_or_default());
         }
         Some(Found { members, alone, values, std, evidence, before, after })
+    }
+
+    /// Why an effect is not believed, by what is left without and with it.
+    fn doubt(&self, effect: usize, [before, after]: [&Remainder; 2], evidence: &Evidence) -> Option<String> {
+        let lowered = before.chi2() - after.chi2();
+        // Where errors may depend on each other along an order, keys say what blocks do.
+        let blocks = before.structure.of_kind(Kind::Blocks).filter(|_| before.structure.order.is_none());
+        let parts = blocks.map(Partition::count).max().unwrap_or(1);
+        let each = -lowered / parts.max(1) as f64;
+        if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
+            Some(weak(evidence))
+        } else if parts > 1 && !above_chance(before) && before.noise_is_known() && each > BIC_LIMIT {
+            // Noise may be all that is left, and in each part it is not known better because there are more parts.
+            Some(format!(
+                "it would explain too little of each of {parts} parts of the data: Δχ² {each:.1}, above {BIC_LIMIT}"
+            ))
+        } else if lowered <= before.disturbed_chi2 {
+            Some(disturbed(lowered, before.disturbed_chi2))
+        } else if raises_held_out(before, after, self.model.is_seen_besides(effect)) {
+            Some(no_gain(before, after))
+        } else {
+            None
+        }
     }
 
     /// Evidence for an effect, of χ² without and with it, by what is known of the noise.
@@ -363,7 +395,9 @@ impl<M: Model> Tracing<'_, M> {
         for (found, setting) in self.found.iter_mut().zip(&last.settings[self.settings.known.len()..]) {
             found.values.clone_from(&setting.values);
             let places = position..position + setting.values.len();
-            found.std = places.map(|place| (last.covariance[place][place] * unit).sqrt()).collect();
+            let tested = last.fit.tested_std(setting.effect).into_iter().map(Some).chain(std::iter::repeat(None));
+            let by_size = places.map(|place| (last.covariance[place][place] * unit).sqrt());
+            found.std = by_size.zip(tested).map(|(std, tested)| tested.map_or(std, |tested| std.max(tested))).collect();
             position += setting.values.len();
         }
     }

@@ -37,14 +37,22 @@ pub struct Diagnosis {
     /// Beside the truth, where the data carry it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<Truth>,
-    /// What the user should know.
+    /// What the user should know: all that a run of the same pipeline warns of among it.
     pub warnings: Vec<String>,
+    /// Those of `warnings` that say nothing wrong.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Files written: the results of the final model, and this document.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<PathBuf>,
 }
 
 impl Diagnosis {
+    /// The warnings that are no notes: `--fail-on-warning` counts them.
+    pub fn findings(&self) -> impl Iterator<Item = &String> {
+        self.warnings.iter().filter(|warning| !self.notes.contains(warning))
+    }
+
     /// The verdict in one sentence, and the confounded sets that the data do not decide.
     #[must_use]
     pub fn headline(&self) -> String {

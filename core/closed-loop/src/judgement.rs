@@ -8,6 +8,7 @@ use super::{
     fit::{INDEPENDENT, Refit},
     found::Found,
 };
+use runout_consistency::{Check, Test};
 use runout_numerics::least_squares::{dot, norm, orthonormal};
 
 /// Chance of noise doing as much, corrected for the number of candidates, below which an effect is believed.
@@ -84,7 +85,13 @@ pub(super) fn chance(remainder: &Remainder) -> f64 {
     1.0 + 3.0 * (2.0 / remainder.dof.max(1) as f64).sqrt()
 }
 
-/// Whether noise may be all that is left.
+/// Whether noise may be all that is left in the end: by the tests of the residual where the domain has them, or else by its size.
+pub(super) fn noise_only(remainder: &Remainder, consistency: &[Check]) -> bool {
+    let tested = consistency.iter().any(|check| check.test == Test::Residual);
+    (tested || at_the_floor(remainder)) && !consistency.iter().any(Check::bars_verdict)
+}
+
+/// Whether noise may be all that is left, while effects are looked for.
 pub(super) fn at_the_floor(remainder: &Remainder) -> bool {
     !remainder.noise_is_known() || remainder.chi2_per_dof() <= FLOOR_CHI2.max(chance(remainder))
 }

@@ -44,16 +44,18 @@ pub mod fit;
 pub mod foresight;
 mod found;
 mod judgement;
+mod keyed;
 pub mod linear_terms;
 mod mistakes;
 mod parts;
 mod report;
 mod taken_back;
+pub mod tested;
 
 use std::sync::Arc;
 
 use self::diagnosis::{Estimated, Unexplained};
-use runout_consistency::{Check, Structure};
+use runout_consistency::{Check, Partition, Structure};
 use runout_error::Result;
 
 /// A declared model of a measurement, and what it could lack.
@@ -140,11 +142,32 @@ pub trait Fit {
     /// already taken out of it.
     fn signature(&self, effect: usize) -> Vec<Vec<f64>>;
 
-    /// The orthonormal columns of what is declared, in the coordinates of the residual; nothing where these leave it out.
+    /// A vector of the residual's coordinates in those of the readings that [`Remainder::structure`] is of, where these are others:
+    /// contrasts between traces, means over neighbours. It is linear.
+    fn tested(&self, vector: &[f64]) -> Vec<f64> {
+        vector.to_vec()
+    }
+    /// Entries of the residual that each of these readings is a mean of.
+    fn averaged(&self) -> f64 {
+        1.0
+    }
+    /// The orthonormal columns of what is declared, in the coordinates of [`tested`](Self::tested); nothing where these leave it out.
     fn declared_columns(&self) -> &[Vec<f64>] {
         &[]
     }
-
+    /// Independent blocks of the residual's own entries, for effects that [`tested`](Self::tested) does not show.
+    fn blocks_of_entries(&self) -> Option<Partition> {
+        None
+    }
+    /// Chance of an effect's gain among those of the other members of its family ([`runout_consistency::keys::among_family`]): what it
+    /// explains elsewhere in the spectrum.
+    fn among_family(&self, _effect: usize) -> Option<f64> {
+        None
+    }
+    /// Standard uncertainties of a fitted effect's parameters where the tests make them larger than the size of the residual does.
+    fn tested_std(&self, _effect: usize) -> Vec<f64> {
+        Vec::new()
+    }
     /// The tests of the fit on its own data, beside those of single effects.
     fn consistency(&self) -> Vec<Check> {
         Vec::new()

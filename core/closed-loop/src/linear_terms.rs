@@ -21,6 +21,8 @@ pub struct Observations {
     pub unit: String,
     /// Standard uncertainty of each, where it is known from elsewhere.
     pub std: Option<f64>,
+    /// Degrees of freedom that it is known from; nothing where it is stated.
+    pub std_dof: Option<f64>,
     /// The group of each point (an index into `groups`): groups are left out of the fit one after the other and predicted.
     pub group: Vec<usize>,
     /// The groups' names.

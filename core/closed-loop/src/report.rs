@@ -4,7 +4,7 @@ use super::{
     Effect, Fit, Model, Remainder, Setting,
     diagnosis::{Added, BiasPerUnit, Blind, Estimated, Level, Moved, Step, Unexplained, Verdict},
     found::Found,
-    judgement::at_the_floor,
+    judgement::noise_only,
 };
 use runout_consistency::Check;
 use runout_numerics::least_squares::norm;
@@ -19,7 +19,7 @@ pub(super) fn known(value: f64) -> Option<f64> {
 /// What is left in the end, in one word. Without a noise level known from elsewhere, or without a residual, nothing says that noise
 /// only is left; and noise only is not left where a test of the data says so.
 pub(super) fn verdict(left: &Remainder, consistency: &[Check], nothing_added: bool) -> Verdict {
-    let consistent = at_the_floor(left) && !consistency.iter().any(Check::bars_verdict);
+    let consistent = noise_only(left, consistency);
     match (left.noise_is_known() && left.dof > 0, consistent, nothing_added) {
         (true, false, _) => Verdict::Unexplained,
         (true, true, true) => Verdict::AtNoiseFloor,

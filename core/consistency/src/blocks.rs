@@ -210,7 +210,7 @@ mod tests {
                 below[0] += usize::from(whole.p < 0.05);
                 below[1] += usize::from(whole.p < 0.005);
             }
-            let shares = below.map(|below| below as f64 / trials as f64);
+            let shares = below.map(|below| below as f64 / f64::from(trials));
             assert!((0.02..0.07).contains(&shares[0]) && shares[1] < 0.009, "{count} blocks: {shares:?}");
         }
     }

@@ -28,6 +28,9 @@ pub fn widening(blocks: usize) -> f64 {
 pub struct Check {
     /// Which test.
     pub test: Test,
+    /// The part of the data that it is of, as a station; empty for the whole.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub part: String,
     /// What was tested: a value, an effect, an order, a block, a channel.
     pub of: String,
     /// The test's statistic: a ratio of variances, or χ² per degree of freedom, where nothing else is said.
@@ -126,8 +129,9 @@ impl Check {
     pub fn new(test: Test, of: impl Into<String>, statistic: f64, dof: &[f64], p: f64) -> Self {
         Self {
             test,
+            part: String::new(),
             of: of.into(),
-            statistic,
+            statistic: if statistic.is_finite() { statistic } else { f64::MAX },
             dof: dof.iter().copied().filter(|dof| dof.is_finite()).collect(),
             p: p.min(1.0),
             factor: 1.0,
@@ -167,10 +171,10 @@ impl Check {
         self
     }
 
-    /// The same as one of `count` that are tested together: its chance is that of any of them.
+    /// Of one of so many parts that are tested alike: what chance makes of all of them is no finding.
     #[must_use]
-    pub fn among(mut self, count: usize) -> Self {
-        self.p = (self.p * count as f64).min(1.0);
+    pub fn among(mut self, parts: usize) -> Self {
+        self.p = (self.p * parts.max(1) as f64).min(1.0);
         if self.p >= FINDING {
             self.finding.clear();
             self.did = if self.factor > 1.0 { Action::Widened } else { Action::Nothing };
@@ -178,10 +182,11 @@ impl Check {
         self
     }
 
-    /// The same of one of several parts: "station s1, order 3".
+    /// The same of one of several parts, as a station.
     #[must_use]
     pub fn within(mut self, part: &str) -> Self {
-        self.of = if self.of.is_empty() { part.to_owned() } else { format!("{part}, {}", self.of) };
+        // A setup at a station is "setup/station".
+        self.part = if self.part.is_empty() { part.to_owned() } else { format!("{}/{part}", self.part) };
         if !self.finding.is_empty() {
             self.finding = format!("{part}: {}", self.finding);
         }
@@ -219,6 +224,25 @@ pub fn refuted_by(checks: &[Check]) -> Option<String> {
 /// Findings in one sentence at most.
 const MOST_SAID: usize = 3;
 
+/// All findings in words, the least likely first; of many of one test, the first ones and how many more there are.
+#[must_use]
+pub fn findings(checks: &[Check]) -> Vec<String> {
+    let mut found: Vec<&Check> = checks.iter().filter(|check| !check.finding.is_empty()).collect();
+    found.sort_by(|a, b| a.test.cmp(&b.test).then(a.p.total_cmp(&b.p)));
+    let of_test = |same: &[&Check]| -> Vec<String> {
+        let mut said: Vec<String> = same.iter().take(MOST_SAID).map(|check| check.finding.clone()).collect();
+        if same.len() > MOST_SAID {
+            let more = same.len() - MOST_SAID;
+            said.push(format!(
+                "{more} more findings of the test {}: the table consistency has all",
+                same[0].test.name()
+            ));
+        }
+        said
+    };
+    found.chunk_by(|a, b| a.test == b.test).flat_map(of_test).collect()
+}
+
 /// A chance in words: "p 0.003", "p < 1e-99".
 #[must_use]
 pub fn chance(p: f64) -> String {
@@ -252,11 +276,11 @@ mod tests {
         let many = [0.001, 1e-9, 0.002, 0.003, 0.1].map(of);
         assert_eq!(refuted_by(&many).as_deref(), Some("p 0.000000001; p 0.001; p 0.002; and 1 more"));
         let placed = of(1e-4).within("station s1");
-        assert_eq!((placed.of.as_str(), placed.finding.as_str()), ("station s1, radius", "station s1: p 0.0001"));
+        assert_eq!((placed.part.as_str(), placed.finding.as_str()), ("station s1", "station s1: p 0.0001"));
+        assert_eq!(findings(&many).len(), 4);
         assert_eq!(of(0.02).widening(1.4).did, Action::Widened);
         assert!(!of(1e-4).named().refutes());
-        assert!(of(1e-3).among(4).refutes() && !of(2e-3).among(4).refutes());
-        assert!(of(2e-3).among(4).finding.is_empty());
+        assert_eq!((of(1e-4).among(10).did, of(1e-4).widening(2.0).among(60).did), (Action::Verdict, Action::Widened));
         assert_eq!([chance(0.0), chance(2.3e-5), chance(0.0123)], ["p < 1e-99", "p 2e-5", "p 0.012"]);
     }
 }

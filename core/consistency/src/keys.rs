@@ -3,7 +3,7 @@
 use crate::{
     blocks::agreement,
     order::OrderModels,
-    structure::{Kind, Structure},
+    structure::{Kind, Partition, Structure},
 };
 use runout_numerics::{least_squares::dot, statistics::f_tail};
 
@@ -36,6 +36,27 @@ impl Keys {
     }
 }
 
+impl Keys {
+    /// With what blocks say of an effect: the chance of their agreement on it, nothing where they cannot tell.
+    #[must_use]
+    pub fn beside_blocks(mut self, blocks: &Partition, agreed: Option<f64>, candidates: usize) -> Self {
+        let limit = AGREED[usize::from(candidates > MANY)];
+        if let Some(p) = agreed {
+            self.add(p, limit, || {
+                format!("{} {} do not agree on it: p {p:.3}, above {limit}", blocks.count(), blocks.name)
+            });
+        }
+        self
+    }
+
+    /// With the chance of its gain among those of its family.
+    #[must_use]
+    pub fn beside_family(mut self, p: f64) -> Self {
+        self.add(p, BELIEVED, || format!("neighbours in the spectrum explain as much: p {p:.3}, above {BELIEVED}"));
+        self
+    }
+}
+
 /// The keys of an effect whose orthonormal columns, outside `basis` and what is found already, are `columns`, among `candidates`.
 #[must_use]
 pub fn keys(
@@ -62,17 +83,14 @@ pub fn keys(
             ));
         }
     }
-    let limit = AGREED[usize::from(candidates > MANY)];
     for partition in structure.of_kind(Kind::Blocks) {
-        match agreement(columns, basis, residual, &partition.members()) {
-            Some((p, _, _)) => keys.add(p, limit, || {
-                format!("{} {} do not agree on it: p {p:.3}, above {limit}", partition.count(), partition.name)
-            }),
-            None if correlated.is_some() => keys.add(1.0, limit, || {
+        let agreed = agreement(columns, basis, residual, &partition.members()).map(|(p, ..)| p);
+        if agreed.is_none() && correlated.is_some() {
+            keys.add(1.0, 0.0, || {
                 format!("{} {} cannot check it, and errors depend on each other", partition.count(), partition.name)
-            }),
-            None => {}
+            });
         }
+        keys = keys.beside_blocks(partition, agreed, candidates);
     }
     keys
 }

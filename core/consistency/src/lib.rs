@@ -40,7 +40,8 @@ pub mod rows;
 pub mod structure;
 #[cfg(test)]
 mod testing;
+pub mod turns;
 
-pub use check::{Action, Check, Test, refuted_by};
+pub use check::{Action, Check, Test, findings, refuted_by};
 pub use linear::{Judgement, LinearFit, judge};
 pub use structure::{Kind, Order, Partition, Structure};

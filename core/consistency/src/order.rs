@@ -4,8 +4,10 @@
 //! whose limits are independent errors and a random walk. 72 shares s and lengths ℓ, and independent errors, are weighed by their restricted
 //! likelihood (Patterson, Thompson, Biometrika 58 (1971) 545), independent errors with even odds before. Whitening is a scalar
 //! Kalman filter, of n steps a column.
+//!
+//! Long because the models, their likelihood and the filter that whitens for them read as one derivation.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use runout_numerics::{
     least_squares::{Basis, dot},
     statistics::{chi2_tail, f_tail, median},
@@ -25,6 +27,8 @@ const CORRELATED: f64 = 9.2;
 const NEGLIGIBLE: f64 = 1e-4;
 /// Readings of a series at most; more are averaged with their neighbours.
 const MOST_READINGS: usize = 200;
+/// Share of the variance that changes of a whole series leave beside them.
+const UNNOTICED: f64 = 0.02;
 
 /// The models of a fit's errors along an order, with their weights.
 #[derive(Debug, Clone)]
@@ -64,6 +68,8 @@ struct Weighed {
 pub struct Correlated {
     blocks: Vec<(Vec<usize>, DMatrix<f64>)>,
     freedom: f64,
+    /// Variance of the share that is independent from reading to reading.
+    pub independent: f64,
     /// Correlation length of the likeliest model, in median steps, and its share of the variance.
     pub length: f64,
     /// Share of the variance that is correlated in the likeliest model.
@@ -75,12 +81,7 @@ impl OrderModels {
     #[must_use]
     pub fn of(order: &Order, residual: &[f64], basis: &[Vec<f64>]) -> Option<Self> {
         let (averaged, mut series) = condensed(order, residual.len());
-        let mean = |values: &[f64]| -> Vec<f64> {
-            let of = |readings: &Vec<usize>| {
-                readings.iter().map(|reading| values[*reading]).sum::<f64>() / readings.len() as f64
-            };
-            averaged.iter().map(of).collect()
-        };
+        let mean = |values: &[f64]| mean_of(&averaged, values);
         let step = median(series.iter().flat_map(|one| one.steps.iter().skip(1)).copied().filter(|step| *step > 0.0));
         if !step.is_finite() {
             return None;
@@ -149,13 +150,7 @@ impl OrderModels {
     /// with the effect in the fit. `columns` are the effect's, `[parameter][reading]`.
     #[must_use]
     pub fn evidence(&self, columns: &[Vec<f64>]) -> Option<(f64, f64)> {
-        let mean = |values: &Vec<f64>| -> Vec<f64> {
-            let of = |readings: &Vec<usize>| {
-                readings.iter().map(|reading| values[*reading]).sum::<f64>() / readings.len() as f64
-            };
-            self.averaged.iter().map(of).collect()
-        };
-        let columns: Vec<Vec<f64>> = columns.iter().map(mean).collect();
+        let columns: Vec<Vec<f64>> = columns.iter().map(|column| mean_of(&self.averaged, column)).collect();
         let mut with = self.clone();
         with.weigh(&columns);
         let (mut p, mut bic) = (0.0, 0.0);
@@ -173,6 +168,16 @@ impl OrderModels {
             bic += model.weight * (parameters * (left.len() as f64).ln() - gain);
         }
         Some((p, bic))
+    }
+
+    /// χ² that columns explain beside the errors of the likeliest model; they are as in [`evidence`](Self::evidence).
+    #[must_use]
+    pub fn explained(&self, columns: &[Vec<f64>]) -> f64 {
+        let Some(model) = self.models.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)) else { return 0.0 };
+        let columns: Vec<Vec<f64>> = columns.iter().map(|column| mean_of(&self.averaged, column)).collect();
+        let (_, without, _) = self.whitened(model.share, model.length, &[]);
+        let (_, left, _) = self.whitened(model.share, model.length, &columns);
+        (dot(&without, &without) - dot(&left, &left)).max(0.0) / model.variance.max(f64::MIN_POSITIVE)
     }
 
     /// The covariance of the readings' errors, averaged over the models.
@@ -207,6 +212,7 @@ impl OrderModels {
         let correlated = self.models.iter().skip(1);
         let likeliest = correlated.max_by(|a, b| a.weight.total_cmp(&b.weight));
         Correlated {
+            independent: used.iter().map(|model| model.weight * model.variance * (1.0 - model.share)).sum(),
             blocks,
             freedom: trace * trace / squares.max(f64::MIN_POSITIVE),
             length: likeliest.map_or(0.0, |model| model.length),
@@ -260,6 +266,39 @@ impl Correlated {
         self.freedom
     }
 
+    /// What the correlated errors of one series are made of once a fit has taken `columns` (orthonormal, of its averaged readings) out of
+    /// them: changes of the whole series, each with a factor of its own of variance 1, the largest first, and the variance that is left
+    /// beside them at each reading. Changes that hold less than 2 % of the variance together are left out, and those beyond `most`.
+    #[must_use]
+    pub fn principal(&self, series: usize, columns: &[Vec<f64>], most: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
+        let Some((_, block)) = self.blocks.get(series) else { return (Vec::new(), Vec::new()) };
+        let count = block.nrows();
+        let mut covariance = block - DMatrix::identity(count, count) * self.independent;
+        for column in columns {
+            let column = DVector::from_column_slice(column);
+            let along = &covariance * &column;
+            let own = column.dot(&along);
+            covariance +=
+                &column * column.transpose() * own - &along * column.transpose() - &column * along.transpose();
+        }
+        let mut left: Vec<f64> = covariance.diagonal().iter().map(|variance| variance.max(0.0)).collect();
+        let all: f64 = left.iter().sum();
+        let eigen = SymmetricEigen::new(covariance);
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let mut changes = Vec::new();
+        for place in order.into_iter().take(most) {
+            if left.iter().sum::<f64>() < UNNOTICED * all {
+                break;
+            }
+            let size = eigen.eigenvalues[place].max(0.0).sqrt();
+            let change: Vec<f64> = eigen.eigenvectors.column(place).iter().map(|entry| size * entry).collect();
+            left.iter_mut().zip(&change).for_each(|(left, change)| *left = (*left - change * change).max(0.0));
+            changes.push(change);
+        }
+        (changes, left)
+    }
+
     pub(crate) fn times(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut product = DMatrix::zeros(columns.nrows(), columns.ncols());
         for (readings, block) in &self.blocks {
@@ -271,6 +310,13 @@ impl Correlated {
         }
         product
     }
+}
+
+/// Means of values over the readings of each averaged one.
+fn mean_of(averaged: &[Vec<usize>], values: &[f64]) -> Vec<f64> {
+    let of =
+        |readings: &Vec<usize>| readings.iter().map(|reading| values[*reading]).sum::<f64>() / readings.len() as f64;
+    averaged.iter().map(of).collect()
 }
 
 /// The Kalman filter of one model: gains and standard deviations of the innovations, which are the same for every column.

@@ -120,6 +120,13 @@ fn weighted(columns: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64
 }
 
 impl Rows {
+    /// The same of readings in another unit, of which `unit` are one of these.
+    #[must_use]
+    pub fn scaled(&self, unit: f64) -> Self {
+        let off_by = self.off_by.iter().map(|off| unit * off).collect();
+        Self { off_by, std: self.std.map(|std| unit * std), ..self.clone() }
+    }
+
     /// The test in words: which rows, how far off, and what they do to the noise.
     #[must_use]
     pub fn check(&self, structure: &Structure, unit: &str) -> Check {

@@ -12,6 +12,7 @@ pub mod least_squares;
 pub mod moderated;
 pub mod side_by_side;
 pub mod statistics;
+pub mod stretches;
 pub mod threads;
 
 pub use num_complex::Complex64;

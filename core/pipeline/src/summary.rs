@@ -12,8 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use runout_closed_loop::diagnosis::{self, Correction};
-use runout_consistency::Check;
-use runout_numerics::statistics::f_tail;
+use runout_consistency::{Check, Test, refuted_by};
 use runout_standards::Value;
 use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
 
@@ -46,7 +45,7 @@ pub struct Summary {
     pub consistency: Vec<Check>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
-    /// What the user should know.
+    /// What the user should know: of the whole, then of each station, behind the station's name.
     pub warnings: Vec<String>,
     /// Those of `warnings` that say nothing wrong: what the layout cannot separate, what the result is made of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -72,12 +71,32 @@ impl Summary {
         all
     }
 
-    /// The run's warnings, then each station's behind its name.
-    pub fn all_warnings(&self) -> impl Iterator<Item = String> + '_ {
-        let of_station = |station: &'_ StationSummary| -> Vec<String> {
-            station.warnings.iter().map(|warning| format!("{}: {warning}", station.station)).collect()
-        };
-        self.warnings.iter().cloned().chain(self.stations.iter().flat_map(of_station))
+    /// Marks the values of the whole part, where the data of one of its stations refute what is said of them.
+    pub(crate) fn refute_part(&mut self) {
+        let Some(by) = refuted_by(&self.consistency) else { return };
+        let values = self.part.iter_mut().flat_map(|part| &mut part.values);
+        values.for_each(|value| value.refuted_by = Some(by.clone()));
+    }
+
+    /// What refutes values of this result, each reason once with the number of values, and how many values there are.
+    #[must_use]
+    pub fn refuted(&self) -> (Vec<(&str, usize)>, usize) {
+        let placed = self.placed_values();
+        let all = placed.iter().map(|placed| placed.value.refuted_by.as_deref());
+        let all: Vec<Option<&str>> = all.chain(self.values.iter().map(|value| value.refuted_by.as_deref())).collect();
+        let mut reasons: Vec<(&str, usize)> = Vec::new();
+        for reason in all.iter().flatten() {
+            match reasons.iter_mut().find(|(known, _)| known == reason) {
+                Some((_, count)) => *count += 1,
+                None => reasons.push((reason, 1)),
+            }
+        }
+        (reasons, all.len())
+    }
+
+    /// The warnings that are no notes: `--fail-on-warning` counts them.
+    pub fn findings(&self) -> impl Iterator<Item = &String> {
+        self.warnings.iter().filter(|warning| !self.notes.contains(warning))
     }
 }
 
@@ -145,26 +164,27 @@ pub struct StationSummary {
     pub residual_orders: Option<[usize; 2]>,
     /// True error of the motions, where the recording carries the truth.
     pub truth: Option<MotionTruth>,
-    /// What the user should know of this station.
+    /// What the user should know of this station; it is in the warnings of the whole too.
     pub warnings: Vec<String>,
 }
 
-impl StationSummary {
-    /// Whether the residual is above the noise by more than chance, at one of so many stations: an F test of χ² per degree of freedom, in
-    /// which the noise is taken as known no better than the residual, from as many degrees of freedom.
-    #[must_use]
-    pub fn is_misfit(&self, stations: usize) -> bool {
-        let (Some(chi2), Some(dof)) = (self.chi2_per_dof, self.residual_dof) else { return false };
-        let dof = dof as f64;
-        f_tail(chi2, dof, dof.max(LEAST_FREEDOM)) * (stations as f64) < MISFIT_CHANCE
+impl Summary {
+    /// Stations whose residual is not what the noise of their readings lets expect: those of a finding in `consistency`.
+    pub fn misfits(&self) -> impl Iterator<Item = &StationSummary> + Clone {
+        misfits(&self.stations, &self.consistency)
     }
 }
 
-/// Chance of the residuals of all stations of a sound rig below which a run warns.
-const MISFIT_CHANCE: f64 = 1e-5;
-/// Degrees of freedom from which noise is known, at least, however few the residual has: asynchronous motion of low frequency makes the
-/// noise at one order scatter as if it came from so few.
-const LEAST_FREEDOM: f64 = 8.0;
+/// Stations whose residual, as a whole or at an order, is refuted by one of these tests.
+pub(crate) fn misfits<'a>(
+    stations: &'a [StationSummary],
+    checks: &'a [Check],
+) -> impl Iterator<Item = &'a StationSummary> + Clone {
+    let of_residual = |check: &&Check| check.refutes() && matches!(check.test, Test::Residual | Test::Alike);
+    let refuted =
+        move |station: &&StationSummary| checks.iter().filter(of_residual).any(|check| check.part == station.station);
+    stations.iter().filter(refuted)
+}
 
 /// What became of one capture's turns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

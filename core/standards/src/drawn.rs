@@ -181,6 +181,20 @@ impl Drawn {
     }
 }
 
+/// How much errors are of what a value is taken from, as their mean square over its variance.
+#[must_use]
+pub fn share_in_words(share: f64) -> String {
+    let of = "the variance of what it is taken from";
+    if share.is_nan() {
+        return format!("{of} is 0, or errors are not known everywhere");
+    }
+    if share > 1.0 {
+        format!("errors are more than {of}")
+    } else {
+        format!("errors are {:.2} % of {of}", 100.0 * share)
+    }
+}
+
 /// What errors do to a value of a form without its noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moments {
@@ -206,10 +220,7 @@ impl Moments {
     pub fn uncertainty(&self, value: f64, sensitivity: Sensitivity) -> Result<Uncertainty, String> {
         let Self { about, shift, std, share, draws, lowest } = *self;
         if share.is_nan() || share > sensitivity.largest_share() {
-            let percent = 100.0 * share;
-            return Err(format!(
-                "errors are {percent:.2} % of the variance of what it is taken from; no interval holds 95 % then"
-            ));
+            return Err(share_in_words(share) + "; no interval holds 95 % then");
         }
         let rounding = 1e-12 * about.abs();
         if shift.abs() > sensitivity.largest_shift() * std + rounding {

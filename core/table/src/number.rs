@@ -19,7 +19,7 @@ pub fn significant(value: f64, digits: usize) -> String {
 #[must_use]
 pub fn with_std(value: f64, std: Option<f64>) -> String {
     match std {
-        Some(std) if std.is_finite() && std > 0.0 => {
+        Some(std) if std.is_finite() && std > ROUNDING => {
             let decimals = usize::try_from(1 - std.log10().floor() as i32).unwrap_or(0);
             if decimals > MOST_DECIMALS {
                 format!("{} ± {std:.0e}", significant(value, 6))
@@ -33,6 +33,22 @@ pub fn with_std(value: f64, std: Option<f64>) -> String {
 
 /// A picometre and less means nothing for form in µm: such uncertainties are rounding.
 const MOST_DECIMALS: usize = 6;
+/// A standard uncertainty that is rounding of arithmetic in any unit that is used: µm, mm, µrad, degrees.
+pub const ROUNDING: f64 = 1e-15;
+/// Half a nanometre, in mm: places that are nearer to 0 are 0 but for rounding.
+const NO_PLACE_MM: f64 = 5e-7;
+
+/// A place, in mm, that is 0 but for rounding as 0.
+#[must_use]
+pub fn rounded_place(z_mm: f64) -> f64 {
+    if z_mm.abs() < NO_PLACE_MM { 0.0 } else { z_mm }
+}
+
+/// A place, in mm, in words.
+#[must_use]
+pub fn place(z_mm: f64) -> String {
+    significant(rounded_place(z_mm), 5)
+}
 
 /// Ranges that are listed of irregular numbers: more hide what is beside them.
 const MOST_RANGES: usize = 16;
@@ -97,7 +113,7 @@ pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::{lacking, ranges, significant, spread, with_std};
+    use super::{lacking, place, ranges, significant, spread, with_std};
 
     #[test]
     fn orders_become_ranges() {
@@ -130,13 +146,16 @@ mod tests {
         assert_eq!(significant(1234.56, 2), "1235");
         assert_eq!(significant(3.21e-16, 2), "3.2e-16");
         assert_eq!(significant(f64::NAN, 2), "-");
+        assert_eq!([-4.422e-9, 1e-6, -120.5].map(place), ["0.0000", "1.0000e-6", "-120.50"]);
     }
 
     #[test]
     fn digits_follow_the_uncertainty() {
         assert_eq!(with_std(4.012_34, Some(0.0034)), "4.0123 ± 0.0034");
         assert_eq!(with_std(412.34, Some(25.0)), "412 ± 25");
-        assert_eq!(with_std(4.012_34, Some(3e-17)), "4.01234 ± 3e-17");
+        assert_eq!(with_std(4.012_34, Some(3e-12)), "4.01234 ± 3e-12");
+        assert_eq!(with_std(4.012_34, Some(3e-17)), "4.0123");
+        assert_eq!(with_std(0.0, Some(4e-76)), "0.0000");
         assert_eq!(with_std(4.012_34, None), "4.0123");
     }
 

@@ -4,6 +4,8 @@
 //!   filters stay finite, and marked as [`DefectKind::NotFinite`](crate::measurement::DefectKind::NotFinite); so is one beyond [`FARTHEST_UM`], as
 //!   [`DefectKind::OutOfReach`](crate::measurement::DefectKind::OutOfReach).
 //! - Integer data is clipped where at least [`LIMIT_RUN`] samples in a row stand at the converter's limit.
+//! - Integer data has wrapped round where a step between two samples is [`WRAPPED_SHARE`] of the converter's range or more: a counter or a
+//!   conversion without saturation has passed its limit and goes on from the other one.
 //! - Other data gives no limit. There, a run of equal samples at the channel's extreme so far is clipped if it is at least
 //!   [`FLAT_RUN`] samples and [`FLAT_RUN_TURN`] of a turn long *and* the signal came to it steeply. A quantised signal
 //!   also stands still at its crest, but it rounds off towards it: the crest of a parabola that stays within one step
@@ -20,9 +22,11 @@
 //!   it is handed on, and [reported](Inspection::reporting).
 
 mod channel;
+mod rule;
 mod spikes;
 
-use channel::{Channel, Look, Rule};
+use channel::{Channel, Look};
+use rule::Rule;
 pub use spikes::Spike;
 
 use crate::measurement::{Block, Capture, SampleStream};
@@ -33,6 +37,9 @@ use runout_numerics::lanes::in_lanes;
 pub const FARTHEST_UM: f64 = 1e6;
 /// Shortest run at the converter's limit that is clipping; a single sample may just touch it.
 pub const LIMIT_RUN: u64 = 2;
+/// Step between two samples, as a share of the converter's range, from which on a channel has wrapped round. A reading that moves by less
+/// than a quarter of the range from sample to sample makes such a step where it wraps round, and nowhere else.
+pub const WRAPPED_SHARE: f64 = 0.75;
 /// Shortest flat run, in samples.
 pub const FLAT_RUN: f64 = 8.0;
 /// Shortest flat run, in turns.

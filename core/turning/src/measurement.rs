@@ -255,6 +255,8 @@ pub enum DefectKind {
     OutOfReach,
     /// At the converter's limit, or flat at the channel's extreme.
     Clipped,
+    /// Behind a step of nearly the converter's range: the reading has passed one limit and goes on from the other.
+    WrappedRound,
     /// Exactly equal for a good part of a turn, anywhere.
     Stuck,
 }
@@ -265,6 +267,7 @@ impl std::fmt::Display for DefectKind {
             Self::NotFinite => "not a number",
             Self::OutOfReach => "farther than 1 m",
             Self::Clipped => "clipped",
+            Self::WrappedRound => "wrapped round (a step of nearly the converter's range)",
             Self::Stuck => "stuck at one value",
         })
     }

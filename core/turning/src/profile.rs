@@ -8,6 +8,7 @@ use crate::{
     neighbours::Neighbours,
     spread::Spread,
 };
+use runout_consistency::turns::Course;
 use runout_numerics::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -40,6 +41,8 @@ pub struct Profile {
     pub near_tones: Vec<NearTone>,
     /// Mean level of each turn used.
     pub levels: TurnLevels,
+    /// What the low orders of its turns say of their course.
+    pub course: Course,
     /// The same turns in parts, where asked for.
     pub split: Option<Split>,
     /// How far the turns lie apart, where asked for and there are two.

@@ -103,10 +103,16 @@ pub fn coefficients(profile: &Profile, channel: usize) -> Vec<Complex64> {
     profile.mean.iter().skip(channel).step_by(profile.channels().max(1)).copied().collect()
 }
 
-/// Variances E|δ|² of the same; `None` where the turns' scatter is not known.
+/// Variances E|δ|² of the same, with the course of the turns; `None` where the turns' scatter is not known.
 #[must_use]
 pub fn variances(profile: &Profile, channel: usize) -> Option<Vec<f64>> {
-    profile.covariance.as_ref().map(|all| diagonal(all, profile.channels(), channel))
+    let mut variances = profile.covariance.as_ref().map(|all| diagonal(all, profile.channels(), channel))?;
+    for (order, variance) in variances.iter_mut().enumerate().skip(1) {
+        // What changes from turn to turn is no noise.
+        let course = profile.course.covariance(order, profile.order(order));
+        *variance += course.map_or(0.0, |matrix| matrix[channel * (profile.channels() + 1)].re);
+    }
+    Some(variances)
 }
 
 /// One channel's variances of matrices `[order][channel][channel]`.

@@ -17,10 +17,34 @@ pub struct Residual {
     /// Lowest and highest order at which a reading is redundant; `None` where the fit is not one of single orders, and where
     /// none is.
     pub orders: Option<[usize; 2]>,
+    /// What is left at each redundant order, beside what noise leaves; none where the fit is not one of single orders, and where the
+    /// noise is not known.
+    pub by_order: Vec<OrderResidual>,
     /// What is left of each reading at the redundant orders; none where the fit is not one of single orders.
     pub by_reading: Vec<ReadingResidual>,
     /// The tests of the readings on themselves.
     pub checks: Vec<Check>,
+}
+
+/// What a fit leaves at one order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderResidual {
+    /// The order.
+    pub order: usize,
+    /// Weighted sum of squares, in the weights' units.
+    pub squares: f64,
+    /// Its value expected from the covariance of the averages.
+    pub expected: f64,
+    /// Real degrees of freedom.
+    pub dof: usize,
+}
+
+impl OrderResidual {
+    /// χ² per degree of freedom.
+    #[must_use]
+    pub fn chi2_per_dof(&self) -> f64 {
+        self.squares / self.expected
+    }
 }
 
 /// What a fit leaves of one averaged reading.

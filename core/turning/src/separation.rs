@@ -2,7 +2,7 @@
 
 mod quantity;
 
-pub use crate::residual::{ReadingResidual, Residual};
+pub use crate::residual::{OrderResidual, ReadingResidual, Residual};
 use crate::{azimuth::Azimuth, smoothing::orders_beside};
 pub use quantity::{ALONG_COLUMN, MotionColumn, Quantity, motion_columns};
 use runout_numerics::Complex64;

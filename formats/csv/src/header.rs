@@ -172,8 +172,14 @@ impl Header {
         let marked = cell.starts_with(b"#");
         let help = if marked && column == 0 {
             "comments are understood above the header only"
+        } else if cell.trim_ascii().is_empty() {
+            "only readings may be missing: each row needs a number in this column"
         } else if !marked && cell.iter().any(u8::is_ascii_digit) {
-            "numbers are written as 1.5, 1,5 or 1.5e-3: without units, and without marks between thousands"
+            if decimal == b',' {
+                "the numbers of this file have a decimal comma, as in 1,5 or 1,5e-3: without units, and without marks between thousands"
+            } else {
+                "the numbers of this file have a decimal point, as in 1.5 or 1.5e-3: without units, and without marks between thousands"
+            }
         } else if self.sensors.contains(&column) {
             "take out rows of units; where a reading is missing, leave its cell empty or write NaN"
         } else {

@@ -1,4 +1,6 @@
 //! CSV files as programs write them, and as they should not be.
+//!
+//! Long because each test is one file of another program.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::{fmt::Write as _, fs, io::Write as _, path::Path};
@@ -203,6 +205,14 @@ fn mistakes_are_reported_with_their_place() {
     expect(&refusal("# x\nindex,S1,Fühler\n0,1,2µm\n"), &["line 3, column 3 (`Fühler`)", "found `2µm`"]);
     expect(&refusal("index;S1;Fühler\n0;1,5;2\n0;1.5;2\n"), &["line 3, column 2", "decimal comma", "found `1.5`"]);
     expect(&refusal("index;S1;Fühler\n0;1.5;2\n0;1,5;2\n"), &["line 3, column 2", "found `1,5`"]);
+    for (text, mark, refused) in [
+        ("index;S1;Fühler\n0;1,5;2\n0;1.5;2\n", "decimal comma, as in 1,5", "1.5"),
+        ("index;S1;Fühler\n0;1.5;2\n0;1,5;2\n", "decimal point, as in 1.5", "1,5"),
+    ] {
+        let error = read(text).map(|_| ()).unwrap_err();
+        expect(error.advice().unwrap(), &[mark]);
+        assert!(!error.advice().unwrap().contains(refused), "{:?}", error.advice());
+    }
     expect(&refusal("index,S1,Fühler\n0,1,2\n\n0,1,2\n"), &["line 3", "blank line"]);
     expect(&refusal(b"\xff\xfei\0n\0d\0"), &["UTF-16"]);
     expect(&refusal(vec![b'7'; 3 << 20]), &["line 1", "line end"]);
@@ -232,6 +242,7 @@ fn mistakes_are_reported_with_their_place() {
             let error = read(format!("S1,Fühler,{column}\n0,1,0\n0,1,{cell}\n")).map(|_| ()).unwrap_err();
             expect(&error.to_string(), &["line 3, column 3"]);
             expect(error.advice().unwrap(), &["only readings may be missing"]);
+            assert_eq!(error.advice().unwrap().contains("rows of units"), !cell.is_empty(), "{cell}");
         }
     }
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! Figures: the exporter `figures`, which draws the figures that a result's tables declare, as SVG and PNG.
 //!
 //! Its path is a folder that receives one file a figure and format, named by the figure's id (`form.svg`, `form.png`), and
-//! `surface.svg`, `surface.png` where the result has a surface. A figure has one panel a station, of at most `panels` stations.
+//! `surface.svg`, `surface.png` where the result has a surface (`form-surface` where a table has a figure `surface`). A figure has one panel a station, of at most `panels` stations.
 //! [`fragment`] draws the same figures for a page of HTML.
 
 mod draw;
@@ -101,8 +101,13 @@ struct Figures {
     panels: usize,
 }
 
-/// Id of the figure of the surface.
-const SURFACE: &str = "surface";
+/// Id of the figure of the surface, and its id where a table declares a figure of that one.
+const SURFACE: [&str; 2] = ["surface", "form-surface"];
+
+fn surface_id(tables: &[TableSpec]) -> &'static str {
+    let declared = tables.iter().flat_map(|table| &table.figures).any(|figure| figure.id == SURFACE[0]);
+    SURFACE[usize::from(declared)]
+}
 
 impl Figures {
     fn files(&self, id: &str) -> Vec<(PathBuf, Format)> {
@@ -136,7 +141,7 @@ impl Exporter for Figures {
 
     fn outputs(&self, tables: &[TableSpec]) -> Vec<PathBuf> {
         let ids = tables.iter().flat_map(|table| &table.figures).map(|figure| figure.id.as_str());
-        ids.chain([SURFACE]).flat_map(|id| self.files(id)).map(|(path, _)| path).collect()
+        ids.chain([surface_id(tables)]).flat_map(|id| self.files(id)).map(|(path, _)| path).collect()
     }
 
     fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
@@ -150,7 +155,7 @@ impl Exporter for Figures {
                 figures.push(Panels::new(table, figure, self.panels)?);
             }
         }
-        Ok(Box::new(Drawing { place: self.clone(), figures }))
+        Ok(Box::new(Drawing { place: self.clone(), figures, surface: surface_id(&result.tables) }))
     }
 }
 
@@ -158,6 +163,8 @@ impl Exporter for Figures {
 struct Drawing {
     place: Figures,
     figures: Vec<Panels>,
+    /// Id of the figure of the surface.
+    surface: &'static str,
 }
 
 impl Export for Drawing {
@@ -175,8 +182,8 @@ impl Export for Drawing {
             }
         }
         match result.surface {
-            Some(surface) => complete.extend(self.place.write(SURFACE, &draw::surface(surface))?),
-            None => self.place.remove_outdated(SURFACE)?,
+            Some(surface) => complete.extend(self.place.write(self.surface, &draw::surface(surface))?),
+            None => self.place.remove_outdated(self.surface)?,
         }
         Ok(complete)
     }

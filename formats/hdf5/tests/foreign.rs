@@ -110,3 +110,15 @@ fn measurements_of_h5py_are_read() {
         assert_eq!(extra.contains("temperature"), name == "plain", "{extra}");
     }
 }
+
+/// Few stations have their links in the group's header, many in a heap.
+#[test]
+fn files_with_names_beyond_ascii_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    if !python("write_umlaut.py", &[folder.path()]) {
+        return;
+    }
+    for (name, stations) in [("umlaut-few.h5", 3), ("umlaut-many.h5", 12)] {
+        other_programs::umlauts_are_read(&folder.path().join(name), stations);
+    }
+}

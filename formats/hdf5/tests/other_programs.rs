@@ -1,4 +1,5 @@
-//! Files as MATLAB and LabVIEW write them. `foreign/write_other_programs.py` made those in `data`.
+//! Files as MATLAB and LabVIEW write them. `foreign/write_other_programs.py` made those in `data`, and
+//! `foreign/write_umlaut.py` the one with names beyond ASCII.
 
 use std::{
     fs,
@@ -156,4 +157,21 @@ fn errors_have_no_path_of_the_machine_that_compiled() {
     for part in ["/home", "/root", "/usr", "/build", "/lib/", "plugin"] {
         assert!(!without.contains(part), "{part}: {text}");
     }
+}
+
+/// Names in UTF-8 make the library convert groups of the old format, which leaves bytes behind that belong to nothing.
+pub(crate) fn umlauts_are_read(path: &Path, stations: usize) {
+    let recording = load(path, &rig()).unwrap();
+    assert_eq!(recording.remarks(), [] as [String; 0], "{}", path.display());
+    assert_eq!(recording.stations().len(), stations);
+    for (station, key) in recording.stations().iter().enumerate() {
+        assert!(!key.name.is_ascii(), "{}", key.name);
+        assert_eq!(read(&*recording, station, 1).unwrap().capture.samples, 150, "{}", key.name);
+    }
+    assert_eq!(inspect(path).unwrap().stations.len(), stations);
+}
+
+#[test]
+fn names_beyond_ascii_are_no_damage() {
+    umlauts_are_read(&data("umlaut-few"), 3);
 }

@@ -83,7 +83,7 @@ pub(crate) fn summary() -> Summary {
             truth: None,
             warnings: vec!["left out 3 points".into()],
         }],
-        warnings: vec!["order 1 of the form is lost".into()],
+        warnings: vec!["order 1 of the form is lost".into(), "s1: left out 3 points".into()],
         effects: vec![Correction {
             effect: "reversal-angle".into(),
             targets: vec!["b".into()],

@@ -6,8 +6,7 @@ use serde_json::json;
 /// Keys and values for a table's metadata; lists are JSON.
 pub(crate) fn entries(table: &TableSpec, result: &Completed) -> Vec<(String, String)> {
     let summary = result.summary;
-    let warnings: Vec<String> = summary.all_warnings().collect();
-    let mut entries = of_program(&summary.title, &summary.provenance, &result.about.convention, &warnings);
+    let mut entries = of_program(&summary.title, &summary.provenance, &result.about.convention, &summary.warnings);
     entries.push(named("about", table.about.clone()));
     entries.push(named("effects", json!(summary.effects).to_string()));
     entries.extend(result.about.notes.iter().map(|(key, value)| named(key, value.clone())));

@@ -44,10 +44,13 @@ impl ComparisonTable {
     /// # Errors
     /// When the file system refuses the rest.
     pub fn close(self, comparison: &Comparison) -> Result<PendingFile> {
-        let stations = comparison.stations.iter().flat_map(|station| station.warnings.iter());
-        let warnings: Vec<String> = comparison.warnings.iter().chain(stations).cloned().collect();
         let convention = format!("{CONVENTION} Differences are those from the method {}.", comparison.reference);
-        self.file.close(&about::of_program(&comparison.title, &comparison.provenance, &convention, &warnings))
+        self.file.close(&about::of_program(
+            &comparison.title,
+            &comparison.provenance,
+            &convention,
+            &comparison.warnings,
+        ))
     }
 }
 

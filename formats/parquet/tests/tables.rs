@@ -269,6 +269,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         weakened_above_upr: None,
         absent_above_upr: None,
         no_uncertainty: None,
+        refuted_by: None,
         filter: "Gaussian 50 UPR".into(),
         reference: "MZCI".into(),
         coverage: 0.75,

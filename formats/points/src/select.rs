@@ -11,6 +11,10 @@ use runout_core::{
 
 use crate::{Cell, PointsConfig, RawColumn, RawTable};
 
+/// What marks a number may have.
+const MARKS: &str = "numbers have a decimal point, or a decimal comma where columns are separated by semicolon or tab, and no marks \
+    between thousands";
+
 /// Cells are equal to a selected number within this share of it, or this much below 1: half the last digit of most exports.
 const SAME: f64 = 1e-6;
 /// Two names as near as this (Jaro-Winkler) are one with a slip of the pen.
@@ -210,7 +214,12 @@ impl Raw {
         let parsed = if self.table.decimal_comma { text.replace(',', ".").parse() } else { text.parse() };
         match parsed {
             Ok(number) if f64::is_finite(number) => Ok(number),
-            _ => Err(self.refuse(place, row, &format!("expected a finite number, found `{text}`"))),
+            _ if text.is_empty() => Err(self.refuse(place, row, "expected a finite number, found an empty cell")),
+            _ => {
+                let error = self.refuse(place, row, &format!("expected a finite number, found `{text}`"));
+                let marks = text.contains(',') && text.bytes().any(|byte| byte.is_ascii_digit());
+                Err(if marks { error.help(MARKS) } else { error })
+            }
         }
     }
 

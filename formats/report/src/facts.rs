@@ -6,7 +6,7 @@ use runout_core::{
     rig::Rig,
     summary::{Decision, Summary},
     surface::Surface,
-    table::number::{ranges, significant},
+    table::number::{ranges, rounded_place, significant},
 };
 
 use crate::limits;
@@ -34,9 +34,14 @@ pub(crate) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> (Stri
 
 /// What the residual and the warnings give, where nothing is to be decided.
 fn without_limits(summary: &Summary) -> (String, &'static str) {
+    let (refuted, values) = summary.refuted();
+    if let Some((reason, _)) = refuted.first() {
+        let count: usize = refuted.iter().map(|(_, count)| count).sum();
+        return (format!("The data refute {count} of {values} values, marked by !: {reason}."), "bad");
+    }
     let known = summary.stations.iter().filter(|station| station.chi2_per_dof.is_some()).count();
-    let misfits = summary.stations.iter().filter(|station| station.is_misfit(known)).count();
-    let warnings = summary.all_warnings().filter(|warning| !summary.notes.contains(warning)).count();
+    let misfits = summary.misfits().count();
+    let warnings = summary.findings().count();
     let warned = match warnings {
         0 => String::new(),
         1 => " One warning is below.".into(),
@@ -46,8 +51,9 @@ fn without_limits(summary: &Summary) -> (String, &'static str) {
         (0, 0) => (String::new(), "open"),
         (0, _) => (" The residual agrees with the measured noise.".into(), "open"),
         (count, all) => {
-            let found =
-                format!(" At {count} of {all} stations the residual exceeds the noise; the declared rig may be wrong.");
+            let found = format!(
+                " At {count} of {all} stations the residual is not what noise leaves; the declared rig may be wrong."
+            );
             (found, "bad")
         }
     };
@@ -78,7 +84,8 @@ pub(crate) fn list(summary: &Summary, rig: Option<&Rig>, surface: Option<&Surfac
     let turns = [captures().map(|one| one.turns_used).sum::<usize>(), captures().map(|one| one.turns_recorded).sum()];
     let speeds: Vec<f64> = captures().filter_map(|capture| capture.speed_rpm).collect();
     let speed = (!speeds.is_empty()).then(|| speeds.iter().sum::<f64>() / speeds.len() as f64);
-    let places = summary.stations.iter().flat_map(|station| &station.sections).map(|section| section.z_mm);
+    let places =
+        summary.stations.iter().flat_map(|station| &station.sections).map(|section| rounded_place(section.z_mm));
     let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
     let lost = &summary.lost_orders;
     let has_orders = rig.is_some() || !lost.form.is_empty() || !lost.motion.is_empty();

@@ -10,6 +10,7 @@
 //! ```
 
 mod closed_loop;
+mod consistency;
 mod data;
 mod facts;
 mod limits;

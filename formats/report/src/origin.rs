@@ -42,20 +42,13 @@ pub(crate) fn turns(summary: &Summary) -> Markup {
 
 /// What the user should know.
 pub(crate) fn warnings(summary: &Summary) -> Markup {
-    let (mut warnings, mut notes): (Vec<String>, Vec<String>) =
-        summary.all_warnings().partition(|warning| !summary.notes.contains(warning));
-    // Each is said once.
-    [&mut warnings, &mut notes].into_iter().for_each(|all| {
-        let mut known = std::collections::HashSet::new();
-        all.retain(|text| known.insert(text.clone()));
-    });
     html! {
-        @if !warnings.is_empty() || !notes.is_empty() {
+        @if !summary.warnings.is_empty() {
             section #warnings {
                 h2 { "Warnings and notes" }
                 ul {
-                    @for warning in &warnings { li.warning { bdi { (warning) } } }
-                    @for note in &notes { li { bdi { (note) } } }
+                    @for warning in summary.findings() { li.warning { bdi { (warning) } } }
+                    @for note in &summary.notes { li { bdi { (note) } } }
                 }
             }
         }

@@ -6,7 +6,7 @@ use runout_core::{Error, Result, stage::Completed, table::panels::Panels};
 use sha2::{Digest, Sha256};
 
 use crate::{
-    closed_loop,
+    closed_loop, consistency,
     data::{self, Data, FigureData},
     facts, limits, origin, overview, rig,
     values::Columns,
@@ -59,6 +59,7 @@ pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Resul
         @if let Some(diagnosis) = diagnosis { (closed_loop::section(diagnosis)) }
         @if let Some(overview) = overview { (overview::sections(overview)) }
         @if values.count() > 0 { (table(values.count())) }
+        (consistency::section(summary))
         (origin::turns(summary))
         (origin::warnings(summary))
         (origin::provenance(summary, about))

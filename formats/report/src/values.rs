@@ -108,27 +108,43 @@ fn rows(summary: &Summary) -> Vec<Row> {
         Row {
             place: one_line(&place),
             symbol: value.symbol.clone(),
-            shown: with_std(value.value, std),
+            shown: with_std(value.value, std) + mark(value.refuted_by.as_ref()),
             value: finite(value.value),
             std,
             unit: symbol(&value.unit),
             interval: uncertainty.map_or_else(String::new, |known| interval((known.interval_95, known.std))),
             refers: [value.reference.as_str(), value.filter.as_str()].join(", "),
-            about: format!("{}; {} to {} UPR{lacks}", value.source, value.band_upr[0], value.band_upr[1]),
+            about: format!(
+                "{}; {} to {} UPR{lacks}{}",
+                value.source,
+                value.band_upr[0],
+                value.band_upr[1],
+                reason(value.refuted_by.as_ref())
+            ),
         }
     });
     let named = summary.values.iter().map(|value| Row {
         place: value.of.as_deref().map(one_line).unwrap_or_default(),
         symbol: value.symbol.clone(),
-        shown: value.value.map_or_else(|| "not observable".into(), |number| with_std(number, value.std)),
+        shown: value.value.map_or_else(|| "not observable".into(), |number| with_std(number, value.std))
+            + mark(value.refuted_by.as_ref()),
         value: value.value.and_then(finite),
         std: value.std,
         unit: symbol(&value.unit),
         interval: value.interval_95.zip(value.std).map_or_else(String::new, interval),
         refers: [&value.reference, &value.filter].into_iter().flatten().cloned().collect::<Vec<_>>().join(", "),
-        about: value.about.clone(),
+        about: format!("{}{}", value.about, reason(value.refuted_by.as_ref())),
     });
     of_form.chain(named).collect()
+}
+
+/// The mark of a number that its own data refute.
+fn mark(refuted_by: Option<&String>) -> &'static str {
+    if refuted_by.is_some() { " !" } else { "" }
+}
+
+fn reason(refuted_by: Option<&String>) -> String {
+    refuted_by.map_or_else(String::new, |by| format!("; ! its own data refute it: {}", one_line(by)))
 }
 
 fn finite(number: f64) -> Option<f64> {

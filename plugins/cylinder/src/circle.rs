@@ -47,7 +47,8 @@ impl Harmonics {
     ///
     /// The variance is the residual's, raised by its correlation along the trace. Errors that vary more slowly than
     /// the highest order (drift, thermal growth, the machine's own geometry) are inside the harmonics, where nothing
-    /// separates them from form: they are not in the variance.
+    /// separates them from form: they are not in the variance. A covariance fitted to the residual would have to be carried to lower
+    /// orders than it has, and calls the part's own high orders noise.
     ///
     /// # Errors
     /// When the points carry no order of roundness, in words.
@@ -95,6 +96,12 @@ impl Harmonics {
             residual_rms_um: rms(residual.iter().copied()),
             dof,
         })
+    }
+
+    /// Their columns at the points of a scan, without slopes along z.
+    pub(crate) fn columns(&self, scan: &Scan) -> Vec<Vec<f64>> {
+        let column = |column: usize| scan.angle_rad.iter().map(|angle| basis(*angle, column)).collect();
+        (0..2 * self.coefficients.len() - 1).map(column).collect()
     }
 
     /// The highest order.

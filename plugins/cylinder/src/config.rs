@@ -20,10 +20,11 @@ pub struct LeastSquaresCylinderConfig {
     /// further.
     #[serde(default = "default_max_order")]
     pub max_order: usize,
-    /// Points further than this many median absolute deviations from the fit of their circle are left out, and counted.
-    #[serde(default = "default_outlier_mad")]
-    pub outlier_mad: f64,
-    /// Highest order of the fit that points are compared with to leave out outliers, whatever `max_order` is.
+    /// Leaves out points further than this many median absolute deviations from the fit of their circle, and counts them. Without it
+    /// every point stays, and those that are not like the others are named.
+    #[serde(default)]
+    pub outlier_mad: Option<f64>,
+    /// Highest order of the fit that points are compared with where `outlier_mad` leaves some out, whatever `max_order` is.
     #[serde(default = "default_outlier_order")]
     pub outlier_order: usize,
     /// Highest order of lobes that `diagnose` may add.
@@ -33,10 +34,6 @@ pub struct LeastSquaresCylinderConfig {
 
 fn default_max_order() -> usize {
     50
-}
-
-fn default_outlier_mad() -> f64 {
-    5.0
 }
 
 fn default_outlier_order() -> usize {
@@ -64,9 +61,10 @@ impl LeastSquaresCylinderConfig {
         within("max_order", "an order", self.max_order, 2..=HIGHEST_ORDER)?;
         within("outlier_order", "an order", self.outlier_order, 2..=HIGHEST_ORDER)?;
         within("max_lobes", "an order", self.max_lobes, 2..=HIGHEST_LOBES)?;
-        if !(self.outlier_mad.is_finite() && self.outlier_mad >= 1.0) {
-            let message = format!("expected at least 1 (half of the points lie nearer), found {}", self.outlier_mad);
-            return Err(Fault::at("outlier_mad", message).help("a large number keeps every point"));
+        if let Some(outlier_mad) = self.outlier_mad.filter(|deviations| !(deviations.is_finite() && *deviations >= 1.0))
+        {
+            let message = format!("expected at least 1 (half of the points lie nearer), found {outlier_mad}");
+            return Err(Fault::at("outlier_mad", message).help("without the key every point is kept"));
         }
         Ok(())
     }

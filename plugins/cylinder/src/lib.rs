@@ -5,6 +5,7 @@
 
 mod circle;
 mod config;
+mod consistency;
 mod generatrix;
 mod model;
 mod predict;

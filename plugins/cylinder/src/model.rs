@@ -21,8 +21,8 @@ use runout_core::{
 };
 
 use crate::{
+    consistency::structure,
     generatrix::open_profiles,
-    robust::correlation_factor,
     scan::Scan,
     separate::{Circle, LeastSquaresCylinder},
     shape::Cylinder,
@@ -140,7 +140,11 @@ impl<'a> Basis<'a> {
             return (only.angle_rad.iter().map(arc).collect(), names.collect());
         }
         let group = self.placed.iter().enumerate().flat_map(|(group, scan)| vec![group; scan.len()]).collect();
-        (group, self.circles.iter().map(|circle| format!("{} {}", circle.kind, circle.id)).collect())
+        (group, self.names())
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.circles.iter().map(|circle| format!("{} {}", circle.kind, circle.id)).collect()
     }
 }
 
@@ -168,6 +172,7 @@ impl LinearModel for LeastSquaresCylinder {
             std: None,
             group,
             groups,
+            structure: structure(&basis.placed, &basis.names()),
             ..Observations::default()
         };
         let column = vec![1.0; observations.values.len()];
@@ -184,10 +189,9 @@ impl LinearModel for LeastSquaresCylinder {
 
     fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let basis = Basis::of(self, points)?;
-        let raised = correlation_factor(&fit.remainder().residual);
         let circles = basis.circles.iter().zip(&basis.placed);
         let mut sections: Vec<Separation> =
-            circles.map(|(circle, placed)| self.shape(circle, placed, &basis, fit, raised)).collect();
+            circles.map(|(circle, placed)| self.shape(circle, placed, &basis, fit)).collect();
         let place = |section: &Separation| section.sections.first().map_or(f64::NAN, |at| at.z_mm);
         sections.sort_by(|a, b| place(a).total_cmp(&place(b)));
         let offset_um = fit.declared().first().copied().unwrap_or(f64::NAN);
@@ -196,18 +200,17 @@ impl LinearModel for LeastSquaresCylinder {
             count => format!("each of {count} circles is held out once and predicted from the others"),
         };
         let mut remarks = vec![
-            format!(
-                "{left_out}; outliers beyond {} MAD are left out before, circle by circle: {} of {} points",
-                self.outlier_mad(),
-                basis.circles.iter().map(|circle| circle.measured - circle.scan.len()).sum::<usize>(),
-                basis.circles.iter().map(|circle| circle.measured).sum::<usize>()
-            ),
-            "the noise is not known from elsewhere, and points of one circle are not independent: evidence and \
-             standard uncertainties of the effects are too optimistic, and the circles left out decide"
-                .into(),
+            left_out,
             "form of the exports is that of the effects found (taper, barrel, lobes), not of each circle on its own"
                 .into(),
         ];
+        if let Some(outlier_mad) = self.outlier_mad() {
+            remarks.push(format!(
+                "outliers beyond {outlier_mad} MAD are left out before, circle by circle: {} of {} points",
+                basis.circles.iter().map(|circle| circle.measured - circle.scan.len()).sum::<usize>(),
+                basis.circles.iter().map(|circle| circle.measured).sum::<usize>()
+            ));
+        }
         if !basis.cylinder.tilted {
             remarks.push("the circles are at one height: tilt, taper and barrel are not observable".into());
         }
@@ -220,7 +223,7 @@ impl LinearModel for LeastSquaresCylinder {
 
 impl LeastSquaresCylinder {
     /// Form of one circle by the effects found: what changes the size is its level, lobes are its harmonics.
-    fn shape(&self, circle: &Circle, placed: &Scan, basis: &Basis, fit: &LinearFit, raised: f64) -> Separation {
+    fn shape(&self, circle: &Circle, placed: &Scan, basis: &Basis, fit: &LinearFit) -> Separation {
         let at = circle.section(placed, self.max_lobes(), &basis.cylinder);
         let arm = arm_mm(&basis.cylinder, at.z_mm);
         let orders = self.max_lobes() + 1;
@@ -231,13 +234,13 @@ impl LeastSquaresCylinder {
                 // a cos nα + b sin nα = Re (a − ib) e^{inα}.
                 (Some(order), FORM, [a, b]) => {
                     estimate[order] += Complex64::new(*a, -b);
-                    variance[order] += raised * variances.iter().sum::<f64>();
+                    variance[order] += variances.iter().sum::<f64>();
                 }
                 (None, SIZE, _) => {
                     for ((part, value), unit) in found.parts.iter().zip(values).zip(&variances) {
                         let here = part(0.0, arm);
                         estimate[0] += here * value;
-                        variance[0] += raised * here * here * unit;
+                        variance[0] += here * here * unit;
                     }
                 }
                 _ => {}

@@ -12,7 +12,7 @@ pub(crate) struct Fence {
 }
 
 /// Rounding of decimal files and of the fit stays below a picometre, in µm: data without noise has no outliers.
-const ROUNDING_UM: f64 = 1e-6;
+pub(crate) const ROUNDING_UM: f64 = 1e-6;
 
 impl Fence {
     /// For values in µm.

@@ -52,8 +52,8 @@ impl LeastSquaresCylinderConfig {
 
 /// Removes the least-squares cylinder and gives the form of each circle by harmonics.
 ///
-/// 1. Harmonics 0 to `outlier_order` are fitted to each circle on its own, on its actual angles; points too far from them
-///    are left out.
+/// 1. With `outlier_mad`, harmonics 0 to `outlier_order` are fitted to each circle on its own, on its actual angles; points too far
+///    from them are left out. Without it every point stays.
 /// 2. The cylinder (radius, offset and slope of the axis) is fitted to all points kept (LSCY of ISO 12180-1), and each
 ///    point becomes angle, height and distance about its axis, exactly. At one height the slope is not observable: then
 ///    radius and centre are fitted (LSCI of ISO 12181-1).
@@ -65,6 +65,9 @@ impl LeastSquaresCylinderConfig {
 /// removed before the harmonics of the turn are fitted.
 #[derive(Debug, Clone)]
 pub struct LeastSquaresCylinder(LeastSquaresCylinderConfig);
+
+/// Median absolute deviations from which points of traces that were not used are counted apart, where nothing else is asked for.
+const FAR_OFF_MAD: f64 = 5.0;
 
 /// The columns that the separator takes.
 pub const COLUMNS: [PointColumn; 5] = [
@@ -156,7 +159,7 @@ impl LeastSquaresCylinder {
             let scans: Vec<Scan> = scans.iter().map(|scan| cylinder.place(scan)).collect();
             let ends = surface.z_mm.first().copied().zip(surface.z_mm.last().copied());
             let sample = |angle, z| surface.sample(angle, cylinder.at_end(z, ends));
-            let prediction = Prediction::of(&scans, sample, self.0.outlier_mad);
+            let prediction = Prediction::of(&scans, sample, self.0.outlier_mad.unwrap_or(FAR_OFF_MAD));
             let traces = traces.iter().map(|trace| trace.id.clone()).collect();
             Ok(Prediction { kind: kind.to_owned(), traces, ..prediction })
         };
@@ -175,7 +178,7 @@ impl LeastSquaresCylinder {
         kinds
     }
 
-    pub(crate) fn outlier_mad(&self) -> f64 {
+    pub(crate) fn outlier_mad(&self) -> Option<f64> {
         self.0.outlier_mad
     }
 
@@ -206,6 +209,7 @@ impl LeastSquaresCylinder {
         let fit = Harmonics::fit(&placed, self.0.max_order, None).map_err(unfit)?;
         let order = fit.max_order();
         let named = format!("{} {}", circle.kind, circle.id);
+        let checks = fit.unlike(&placed, &named).into_iter().collect();
         circle.warnings.extend(fit.limit.iter().map(|limit| format!("{named}: {limit}")));
         for [from, to] in unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)) {
             let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");
@@ -239,6 +243,7 @@ impl LeastSquaresCylinder {
                 expected_rms_um: f64::NAN,
                 chi2_per_dof: f64::NAN,
                 dof: fit.dof,
+                checks,
                 ..Residual::default()
             },
             warnings: circle.warnings,

@@ -42,7 +42,7 @@ fn separator(max_order: usize, hold_out: &[&str]) -> LeastSquaresCylinder {
         used: None,
         hold_out: hold_out.iter().map(|name| (*name).to_owned()).collect(),
         max_order,
-        outlier_mad: 5.0,
+        outlier_mad: Some(5.0),
         outlier_order: 50,
         max_lobes: 8,
     };
@@ -188,7 +188,7 @@ fn the_run_says_what_it_left_out_and_how_well_it_predicts() {
     let Some(path) = measured() else { return };
     let summary = run_pipeline(&format!(
         "load = {{ plugin = 'points', path = '{}' }}\n\
-         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056 }}",
+         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056, outlier_mad = 5.0 }}",
         path.display()
     ))
     .unwrap();
@@ -297,7 +297,7 @@ fn points_that_do_not_determine_a_cylinder_are_refused() {
         used: Some(vec!["generatrix".into()]),
         hold_out: Vec::new(),
         max_order: 10,
-        outlier_mad: 5.0,
+        outlier_mad: Some(5.0),
         outlier_order: 50,
         max_lobes: 8,
     };
@@ -321,7 +321,7 @@ fn the_loop_finds_what_a_radius_lacks() {
     let Some(path) = measured() else { return };
     let found = diagnosed(&format!(
         "load = {{ plugin = 'points', path = '{}' }}\n\
-         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056 }}",
+         separate = {{ plugin = 'least-squares-cylinder', radius_mm = 15.056, outlier_mad = 5.0 }}",
         path.display()
     ));
     for added in &found.added {

@@ -61,7 +61,7 @@ fn separator(radius_mm: f64, max_order: usize) -> LeastSquaresCylinder {
         used: None,
         hold_out: Vec::new(),
         max_order,
-        outlier_mad: 5.0,
+        outlier_mad: Some(5.0),
         outlier_order: 50,
         max_lobes: 8,
     };
@@ -249,7 +249,10 @@ fn the_highest_order_of_the_form_steers_neither_outliers_nor_candidates() {
     let added = |separate: &str| -> Vec<String> {
         diagnosed(&points, separate).added.into_iter().map(|added| added.effect).collect()
     };
-    assert_eq!(added("radius_mm = 12.0, max_order = 4"), added("radius_mm = 12.0, max_order = 60"));
+    assert_eq!(
+        added("radius_mm = 12.0, outlier_mad = 5.0, max_order = 4"),
+        added("radius_mm = 12.0, outlier_mad = 5.0, max_order = 60")
+    );
 }
 
 #[test]

@@ -13,9 +13,11 @@ mod bridge;
 mod encoder;
 mod kernel;
 mod level;
+mod low_orders;
 mod marks;
 mod mean;
 mod outliers;
+mod passed;
 mod resample;
 mod scatter;
 mod size;
@@ -26,7 +28,7 @@ mod turns;
 mod window;
 
 use runout_core::{
-    Error, ErrorKind, Result,
+    Complex64, Error, ErrorKind, Result,
     fault::Fault,
     measurement::{Block, Capture, Response, SampleStream},
     near_tone::NearTone,
@@ -150,7 +152,7 @@ impl SynchronousAverage {
         Ok(())
     }
 
-    fn warnings(&self, capture: &Capture, speed_rpm: Option<f64>, exact: bool) -> Vec<String> {
+    fn warnings(&self, capture: &Capture, speed_rpm: Option<f64>, passed: Option<&[Complex64]>) -> Vec<String> {
         let mut warnings = Vec::new();
         if let (Some(measured), Some(stated)) = (speed_rpm, capture.stated_speed_rpm) {
             let tolerance_percent = self.config.speed_tolerance_percent;
@@ -176,38 +178,27 @@ impl SynchronousAverage {
                 angles
             ));
         }
-        if self.is_weakened(capture, turn, exact) {
+        if let Some(passed) = passed.and_then(|passed| passed[..passed::held(passed)].last()) {
             warnings.push(format!(
-                "{}: {turn:.0} samples a turn carry orders to {} through the resampling in angle; those above are weakened",
+                "{}: {turn:.0} samples a turn carry orders to {} through the resampling in angle; those above are divided by what passes, \
+                 {:.0} % of the highest one, and their noise with them",
                 capture.object,
-                (PASS_BAND * 0.5 * turn) as usize
+                (PASS_BAND * 0.5 * turn) as usize,
+                100.0 * passed.norm()
             ));
         }
         warnings
     }
 
-    /// Whether the resampling weakens orders that are to be kept, of turns of so many samples, and nothing before it has.
-    fn is_weakened(&self, capture: &Capture, turn: f64, exact: bool) -> bool {
+    /// Whether interpolation between samples weakens orders that are to be kept, and nothing before it has.
+    fn is_weakened(&self, capture: &Capture) -> bool {
+        let Some(turn) = capture.median_turn_samples() else { return false };
         let filtered = |rate_hz: f64| {
             let band_hz = PASS_BAND * 0.5 * rate_hz;
             capture.responses.iter().any(|response| response.half_power_hz <= band_hz)
         };
         let highest = self.max_order().min(orders_held(turn));
-        !exact && highest > (PASS_BAND * 0.5 * turn) as usize && !capture.sample_rate_hz.is_some_and(filtered)
-    }
-
-    /// What the resampling does to them.
-    fn resampling_response(&self, capture: &Capture, exact: bool) -> Option<Response> {
-        let (turn, rate_hz) = (capture.median_turn_samples()?, capture.sample_rate_hz?);
-        self.is_weakened(capture, turn, exact).then(|| {
-            let half_power_hz = KERNEL_HALF_POWER * 0.5 * rate_hz;
-            Response {
-                description: format!("resampling in angle, −3 dB at about {} Hz", significant(half_power_hz, 3)),
-                half_power_hz,
-                order: KERNEL_ORDER,
-                sample_rate_hz: f64::INFINITY,
-            }
-        })
+        highest > (PASS_BAND * 0.5 * turn) as usize && !capture.sample_rate_hz.is_some_and(filtered)
     }
 }
 
@@ -242,11 +233,6 @@ fn near_synchronous(tones: &[NearTone], turns: usize, object: &str) -> Option<St
         size(largest),
     ))
 }
-
-/// Share of the recording's Nyquist frequency at which the kernel of the resampling passes half of the power, and the order of the low-pass that
-/// falls about as it does.
-const KERNEL_HALF_POWER: f64 = 0.9;
-const KERNEL_ORDER: usize = 8;
 
 /// Highest order that turns of this many samples hold, below Nyquist as for whole numbers of samples.
 fn orders_held(turn_samples: f64) -> usize {
@@ -318,13 +304,18 @@ impl Averager for SynchronousAverage {
         let of_angle = angle_unit.check(&capture.object)?;
         let mut outcome = resampling.finish();
         count.used = outcome.used;
-        count.rejected.extend(outcome.rejected);
+        count.rejected.append(&mut outcome.rejected);
         count.rejected.sort_by_key(|turn| turn.turn);
         self.enough(&capture, &count, count.used)?;
 
         if let Some(turn) = capture.median_turn_samples() {
             // What the recording cannot hold is not found to be 0: it is not there.
-            let (orders, channels) = (orders_held(turn) + 1, capture.channels());
+            let (mut orders, channels) = (orders_held(turn) + 1, capture.channels());
+            if let Some(passed) = outcome.passed.take() {
+                resample::undo(&mut outcome, &passed, channels);
+                orders = orders.min(passed::held(&passed));
+                outcome.passed = Some(passed);
+            }
             outcome.mean.truncate(orders * channels);
             for matrices in
                 [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten()
@@ -338,11 +329,10 @@ impl Averager for SynchronousAverage {
         let most_angles = capture.median_turn_samples().map_or(usize::MAX, most_angles);
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
-        let mut warnings = self.warnings(&capture, speed_rpm, outcome.exact);
+        let mut warnings = self.warnings(&capture, speed_rpm, outcome.passed.as_deref());
         warnings.extend(of_angle);
         warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
-        capture.responses.extend(self.resampling_response(&capture, outcome.exact));
         if let Some(speed_rpm) = speed_rpm {
             in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
         }
@@ -358,6 +348,7 @@ impl Averager for SynchronousAverage {
             scatter_beside: outcome.scatter_beside,
             near_tones: outcome.near_tones,
             levels: outcome.levels,
+            course: outcome.course,
             split: outcome.split,
             spread: outcome.spread,
             turns: count,

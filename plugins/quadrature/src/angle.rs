@@ -18,10 +18,14 @@ const DIFFERENCE_OVER_SUM: f64 = 19.0 / 4.0;
 /// What is done to the angle.
 pub(crate) struct Correction {
     signal: Signal,
-    /// Variance of the angle by the components, in rad².
-    variance: f64,
-    /// Of one reading, in rad.
-    noise_rad: f64,
+    /// Variance of the angle by components that are not decided, in rad².
+    undecided_variance: f64,
+    /// Variance of a reading across the turning vector by those that are, in counts².
+    decided_variance: f64,
+    /// Standard deviation of a reading, in counts.
+    noise: f64,
+    /// Of each sample: the corrected angle, and its change by one count, in rad.
+    angles: Vec<[f64; 2]>,
     /// Orders that two components may have, and the amplitude of the angle error that either would have, in rad.
     undecided: Vec<(Component, f64)>,
 }
@@ -52,15 +56,20 @@ impl Correction {
             })
         });
         let found: Vec<Found> = found.collect();
-        let noise_rad = fit.remainder().rms / radius;
-        let mut correction =
-            Self { signal: Signal { radius, components: Vec::new() }, variance: 0.0, noise_rad, undecided: Vec::new() };
+        let mut correction = Self {
+            signal: Signal { radius, components: Vec::new() },
+            undecided_variance: 0.0,
+            decided_variance: 0.0,
+            noise: fit.remainder().rms,
+            angles: Vec::new(),
+            undecided: Vec::new(),
+        };
         if samples.true_rad.is_some() {
             for Found { component, waves, variance } in &found {
                 correction.signal.components.push((*component, component.of_radius(*waves)));
-                correction.variance += 0.5 * variance.iter().sum::<f64>() / radius.powi(2);
+                correction.decided_variance += 0.5 * variance.iter().sum::<f64>();
             }
-            return Ok(correction);
+            return Ok(correction.applied(samples));
         }
         let open = |component: Component| fit.considers(&component.id());
         let (mut known, mut decided, mut beside) = (Vec::new(), Vec::new(), Vec::new());
@@ -75,25 +84,32 @@ impl Correction {
                 beside.extend(free().next().map(|found| found.component));
                 let usual = 2.0 * (backward.usual().powi(2) + forward.usual().powi(2));
                 let difference = usual.max(DIFFERENCE_OVER_SUM * (sum / radius).norm_sqr());
-                correction.variance += 0.5 * difference;
+                correction.undecided_variance += 0.5 * difference;
                 if sum.norm() > 0.0 {
                     correction.undecided.push((backward, sum.norm() / radius));
                 }
             } else {
                 decided.extend(free().map(|found| found.component));
                 let variance: f64 = free().flat_map(|found| found.variance).sum();
-                correction.variance += 0.5 * variance / radius.powi(2);
+                correction.decided_variance += 0.5 * variance;
             }
         }
         if !(decided.is_empty() && known.is_empty()) {
             correction.signal = Signal::fit(&samples.phase_rad, &samples.radius, &known, &decided, &beside)?;
         }
-        Ok(correction)
+        Ok(correction.applied(samples))
     }
 
-    /// Standard uncertainty of a corrected angle, in rad.
-    fn std_rad(&self) -> f64 {
-        (self.variance + self.noise_rad.powi(2)).sqrt()
+    fn applied(mut self, samples: &Samples) -> Self {
+        let readings = samples.phase_rad.iter().zip(&samples.radius);
+        self.angles = readings.map(|(phase, radius)| self.signal.angle_rad(*phase, *radius)).collect();
+        self
+    }
+
+    /// Standard uncertainty of a corrected angle, in rad, by its change with one count.
+    fn std_rad(&self, by_count: f64) -> f64 {
+        let counts = self.decided_variance + self.noise * self.noise;
+        (self.undecided_variance + counts * by_count * by_count).sqrt()
     }
 
     /// What the user should know.
@@ -115,12 +131,16 @@ impl Correction {
         if self.undecided.is_empty() && self.signal.components.is_empty() {
             remarks.push("nothing that was found is decided: the angle is not corrected".into());
         }
+        let count = self.angles.len().max(1) as f64;
+        let mean_square =
+            |of: &dyn Fn(f64) -> f64| self.angles.iter().map(|[_, by]| of(*by).powi(2)).sum::<f64>() / count;
+        let by_count = mean_square(&|by| by).sqrt();
         remarks.push(format!(
             "standard uncertainty of one corrected angle: {:.4}°, of which {:.4}° is the noise of the reading and {:.4}° is \
              what the fit does not decide",
-            self.std_rad().to_degrees(),
-            self.noise_rad.to_degrees(),
-            self.variance.sqrt().to_degrees()
+            mean_square(&|by| self.std_rad(by)).sqrt().to_degrees(),
+            (self.noise * by_count).to_degrees(),
+            (self.undecided_variance + self.decided_variance * by_count * by_count).sqrt().to_degrees()
         ));
         remarks
     }
@@ -130,8 +150,7 @@ impl Correction {
     /// # Errors
     /// Never in practice: the columns are of one length.
     pub(crate) fn rows(&self, points: &Points, samples: &Samples) -> Result<TableRows> {
-        let corrected = samples.phase_rad.iter().zip(&samples.radius).map(|(phase, radius)| {
-            let angle = self.signal.angle_rad(*phase, *radius);
+        let corrected = samples.phase_rad.iter().zip(&self.angles).map(|(phase, [angle, _])| {
             // The same turn as the phase has.
             let ahead = (angle - phase + PI).rem_euclid(2.0 * PI) - PI;
             (phase + ahead).to_degrees()
@@ -144,7 +163,7 @@ impl Correction {
             numbers_or_null((0..count).map(|row| time.map(|time| time[row]))),
             numbers(samples.phase_rad.iter().map(|phase| phase.to_degrees())),
             numbers(corrected),
-            numbers(std::iter::repeat_n(self.std_rad().to_degrees(), count)),
+            numbers(self.angles.iter().map(|[_, by_count]| self.std_rad(*by_count).to_degrees())),
         ])?;
         Ok(TableRows { table: table.name, rows })
     }

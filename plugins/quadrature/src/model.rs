@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::{Kind, Structure},
     fault::{Fault, within},
     model::{
         Effect, Fit,
@@ -49,6 +50,8 @@ fn default_max_order() -> usize {
     8
 }
 
+/// Stretches of time whose errors are independent of each other; without times every eighth sample along the phase.
+const PARTS: usize = 8;
 /// Blocks and orders beyond these say nothing more.
 const MOST_BLOCKS: usize = 1_000;
 const HIGHEST_ORDER: usize = 50;
@@ -126,28 +129,45 @@ impl LinearModel for Quadrature {
             let error = Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData);
             return Err(error.help("ask for fewer `blocks`"));
         }
-        let (values, radius, gain_and_angle) = samples.linearised(self.0.max_order)?;
+        let linearised = samples.linearised(self.0.max_order)?;
+        let radius = linearised.radius;
         let terms = Component::all(self.0.max_order).into_iter().map(|component| {
-            let waves = [0, 1].map(|wave| samples.column(component, wave));
-            let columns = component.slopes(radius, gain_and_angle).map(|[cosine, sine]| {
-                waves[0].iter().zip(&waves[1]).map(|(first, second)| cosine * first + sine * second).collect()
+            let waves = [0, 1].map(|wave| linearised.column(component, wave));
+            let columns = component.slopes(radius, linearised.gain_and_angle).map(|[cosine, sine]| {
+                waves[0].iter().zip(waves[1]).map(|(first, second)| cosine * first + sine * second).collect()
             });
             let rank = usize::from(component.order() > 2);
             Term { effect: component.effect(radius), columns: columns.into(), rank }
         });
-        let group = blocks(samples.angles(), self.0.blocks);
+        let terms: Vec<Term> = terms.collect();
+        let (values, declared) = (linearised.values, linearised.declared);
         let rows = values.len();
+        // Both parts of a sample with a reference are of one block.
+        let of_rows = |of_samples: Vec<usize>| of_samples.into_iter().cycle().take(rows).collect::<Vec<usize>>();
+        let numbered =
+            |what: &str, count: usize| (1..=count).map(|number| format!("{what} {number}")).collect::<Vec<_>>();
+        // Blocks run over the whole phase: an effect that is not found yet is the same in all of them.
+        let (name, part, of) = if let Ok(time) = points.column("time_s") {
+            ("stretches of time", "stretch", in_equal_parts(time, PARTS))
+        } else {
+            let order = blocks(samples.angles(), count);
+            ("interleaved eighths of the samples", "eighth", order.into_iter().map(|place| place % PARTS).collect())
+        };
+        let structure = Structure::default()
+            .divided(name, Kind::Blocks, of_rows(of), numbered(part, PARTS))
+            .naming((0..rows).map(|row| format!("sample {}", row % count)).collect());
         let observations = Observations {
-            group: group.into_iter().cycle().take(rows).collect(),
+            group: of_rows(blocks(samples.angles(), self.0.blocks)),
             values,
             unit: UNIT.into(),
             std: None,
-            groups: (1..=self.0.blocks).map(|block| format!("block {block}")).collect(),
-            ..Observations::default()
+            std_dof: None,
+            groups: numbered("block", self.0.blocks),
+            structure,
         };
         let highest = self.0.max_order;
         let limit = format!("`separate.max_order` is {highest}");
-        let model = LinearTerms::new(observations, samples.declared(), terms.collect())?;
+        let model = LinearTerms::new(observations, declared, terms)?;
         let model = Component::of_order(highest)
             .into_iter()
             .fold(model, |model, component| model.ending_at(component.id(), limit.clone()));
@@ -166,10 +186,8 @@ impl LinearModel for Quadrature {
             count / self.0.blocks,
             count.div_ceil(self.0.blocks)
         );
-        let evidence = "the noise is not known from elsewhere and samples count as independent: evidence and standard \
-            uncertainties flatter, and the blocks left out decide";
         let correction = Correction::of(&samples, self.0.max_order, fit)?;
-        let mut remarks = vec![blocks, evidence.to_owned()];
+        let mut remarks = vec![blocks];
         remarks.extend(correction.remarks());
         let values = fit.values().into_iter().map(|found| {
             NamedValue::new(&found.value, found.number, found.std, &found.unit, "declared part of the signal")
@@ -184,13 +202,18 @@ impl LinearModel for Quadrature {
     }
 }
 
-/// The block of each sample: equal counts, in the order of the phase.
+/// The block of each sample: equal counts, in the order of the phase within its turn.
 fn blocks(phase: &[f64], count: usize) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..phase.len()).collect();
-    order.sort_by(|a, b| phase[*a].rem_euclid(TAU).total_cmp(&phase[*b].rem_euclid(TAU)));
-    let mut group = vec![0; phase.len()];
+    in_equal_parts(&phase.iter().map(|phase| phase.rem_euclid(TAU)).collect::<Vec<f64>>(), count)
+}
+
+/// The part of each sample: equal counts, in the order of a value.
+fn in_equal_parts(by: &[f64], count: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..by.len()).collect();
+    order.sort_by(|a, b| by[*a].total_cmp(&by[*b]));
+    let mut part = vec![0; by.len()];
     for (position, sample) in order.into_iter().enumerate() {
-        group[sample] = position * count / phase.len();
+        part[sample] = position * count / by.len();
     }
-    group
+    part
 }

@@ -4,7 +4,7 @@ use runout_core::{Complex64, Error, Result, model::linear_terms::Declared, point
 
 use crate::{
     components::{Component, UNIT},
-    signal::{Signal, least_squares},
+    signal::{Place, Signal, least_squares},
 };
 
 /// A reference that does not follow the phase within this, in rad, is none of it.
@@ -53,8 +53,8 @@ impl Samples {
         self.true_rad.as_deref().unwrap_or(&self.phase_rad)
     }
 
-    /// The radius; with a reference both parts of z e^{−iθ}, the one along the circle behind the other.
-    pub(crate) fn values(&self) -> Vec<f64> {
+    /// Both parts of z e^{−iθ}, the one along the circle behind the other; the radius without a reference.
+    fn values(&self) -> Vec<f64> {
         let Some(angles) = &self.true_rad else { return self.radius.clone() };
         let z = self.radius.iter().zip(&self.phase_rad).zip(angles);
         let turned: Vec<Complex64> =
@@ -62,67 +62,91 @@ impl Samples {
         turned.iter().map(|z| z.re).chain(turned.iter().map(|z| z.im)).collect()
     }
 
-    /// What is always fitted: the radius, and with a reference the zero of the angle.
-    pub(crate) fn declared(&self) -> Vec<Declared> {
-        let count = self.phase_rad.len();
-        let rows = if self.true_rad.is_some() { 2 * count } else { count };
-        let part = |name: &str, of: std::ops::Range<usize>| {
-            let column = (0..rows).map(|row| if of.contains(&row) { 1.0 } else { 0.0 }).collect();
-            Declared { name: name.into(), unit: UNIT.into(), column }
-        };
-        let mut declared = vec![part("radius", 0..count)];
-        if rows > count {
-            declared.push(part("zero of the angle", count..rows));
-        }
-        declared
-    }
-
-    /// The values of a linear model, exact where it is fitted; radius, and parameters of gain ratio and quadrature angle, there.
+    /// A linear model of the samples, exact where it is fitted.
     ///
-    /// What the radius over the phase has beyond first order is taken out of it, as if all components were backward ones: of
-    /// components that the radius alone does not decide, it is not known better.
-    pub(crate) fn linearised(&self, max_order: usize) -> Result<(Vec<f64>, f64, [f64; 2])> {
-        let mut values = self.values();
+    /// Without a reference what the curve has beyond first order is taken out, as if all components were backward ones: of
+    /// components that the radius alone does not decide, it is not known better, and both of one order have the same columns.
+    pub(crate) fn linearised(&self, max_order: usize) -> Result<Linearised> {
         let gain = Component::of_order(2)[0];
-        let (radius, waves) = if self.true_rad.is_some() {
+        let (mut linearised, waves) = if let Some(angles) = &self.true_rad {
+            let across = |component: Component, wave: usize| {
+                let [across, along] = [Component::across, Component::along]
+                    .map(|of| angles.iter().map(move |angle| of(component, *angle)[wave]));
+                across.chain(along).collect::<Vec<f64>>()
+            };
+            let count = angles.len();
+            let part = |name: &str, from: usize| {
+                let column = (0..2 * count).map(|row| f64::from(u8::from((from..from + count).contains(&row))));
+                Declared { name: name.into(), unit: UNIT.into(), column: column.collect() }
+            };
+            let declared = vec![part("radius", 0), part("zero of the angle", count)];
             let all = Component::all(max_order);
-            let waves = all.iter().flat_map(|component| [0, 1].map(|wave| self.column(*component, wave)));
+            let columns: Vec<[Vec<f64>; 2]> =
+                all.iter().map(|component| [0, 1].map(|wave| across(*component, wave))).collect();
+            let waves = columns.iter().flatten().cloned();
             let waves = waves.map(|column| Declared { name: "component".into(), unit: UNIT.into(), column });
-            let found = least_squares(values.clone(), self.declared().into_iter().chain(waves).collect())?;
-            let place = self.declared().len() + 2 * all.iter().position(|component| *component == gain).unwrap_or(0);
-            (found[0], [found[place], found[place + 1]])
+            let values = self.values();
+            let found = least_squares(values.clone(), declared.iter().cloned().chain(waves).collect())?;
+            let place = declared.len() + 2 * all.iter().position(|component| *component == gain).unwrap_or(0);
+            let made =
+                Linearised { values, radius: found[0], gain_and_angle: [0.0; 2], declared, columns, shared: false };
+            (made, [found[place], found[place + 1]])
         } else {
             let backward: Vec<Component> = (1..=max_order).map(|order| Component::of_order(order)[0]).collect();
-            let signal = Signal::fit(&self.phase_rad, &self.radius, &[], &backward, &[])?;
-            if !signal.is_usable() {
-                return Ok((values, self.mean_radius(), [0.0; 2]));
+            let found = Signal::fit(&self.phase_rad, &self.radius, &[], &backward, &[])?;
+            let signal =
+                if found.is_usable() { found } else { Signal { radius: self.mean_radius(), components: Vec::new() } };
+            let places = signal.places(&self.phase_rad, &self.radius);
+            let column = |of: &dyn Fn(&Place) -> f64| places.iter().map(of).collect::<Vec<f64>>();
+            let columns: Vec<[Vec<f64>; 2]> = (backward.iter())
+                .map(|component| [0, 1].map(|wave| column(&|place| place.column(*component, wave))))
+                .collect();
+            let round = column(&Place::of_radius);
+            let mut values = column(&|place| place.distance);
+            values.iter_mut().zip(&round).for_each(|(value, round)| *value += signal.radius * round);
+            for (component, p) in &signal.components {
+                let [cosine, sine] = &columns[component.order() - 1];
+                let both = values.iter_mut().zip(cosine).zip(sine);
+                both.for_each(|((value, cosine), sine)| *value += p.re * cosine + p.im * sine);
             }
-            for (value, phase) in values.iter_mut().zip(&self.phase_rad) {
-                let first_order = signal.components.iter().map(|(component, p)| {
-                    let [cosine, sine] = component.across(*phase);
-                    p.re * cosine + p.im * sine
-                });
-                *value += signal.radius + first_order.sum::<f64>() - signal.radius_at_phase(*phase);
-            }
-            let p =
-                signal.components.iter().find(|(component, _)| *component == gain).map_or(Complex64::ZERO, |(_, p)| *p);
-            (signal.radius, [p.re, p.im])
+            let p = signal.components.iter().find(|(component, _)| *component == gain);
+            let waves = p.map_or([0.0; 2], |(_, p)| [p.re, p.im]);
+            let declared = vec![Declared { name: "radius".into(), unit: UNIT.into(), column: round }];
+            let made =
+                Linearised { values, radius: signal.radius, gain_and_angle: [0.0; 2], declared, columns, shared: true };
+            (made, waves)
         };
-        let parameters = gain.parameters(radius, waves);
-        let slopes = gain.slopes(radius, parameters);
-        let beyond: [f64; 2] =
-            [0, 1].map(|wave| parameters[0] * slopes[0][wave] + parameters[1] * slopes[1][wave] - waves[wave]);
-        for (wave, share) in beyond.into_iter().enumerate() {
-            let column = self.column(gain, wave);
-            values.iter_mut().zip(column).for_each(|(value, entry)| *value += share * entry);
+        linearised.gain_and_angle = gain.parameters(linearised.radius, waves);
+        let slopes = gain.slopes(linearised.radius, linearised.gain_and_angle);
+        for (wave, share) in waves.into_iter().enumerate() {
+            let parameters = linearised.gain_and_angle;
+            let beyond = parameters[0] * slopes[0][wave] + parameters[1] * slopes[1][wave] - share;
+            let column = linearised.column(gain, wave).to_vec();
+            linearised.values.iter_mut().zip(column).for_each(|(value, entry)| *value += beyond * entry);
         }
-        Ok((values, radius, parameters))
+        Ok(linearised)
     }
+}
 
+/// Samples as a linear model has them.
+pub(crate) struct Linearised {
+    /// Distances of the readings across the curve that is fitted; with a reference both parts of z e^{−iθ}.
+    pub values: Vec<f64>,
+    /// Radius, and gain ratio less 1 and angle error, about which it is linear.
+    pub radius: f64,
+    pub gain_and_angle: [f64; 2],
+    /// What is always fitted: the radius, and with a reference the zero of the angle.
+    pub declared: Vec<Declared>,
+    /// Cosine and sine of each component, or of each order where both of one order share them.
+    columns: Vec<[Vec<f64>; 2]>,
+    shared: bool,
+}
+
+impl Linearised {
     /// What the cosine or the sine of a component in the radius adds to the values.
-    pub(crate) fn column(&self, component: Component, wave: usize) -> Vec<f64> {
-        let across = self.angles().iter().map(|angle| component.across(*angle)[wave]);
-        let along = self.true_rad.iter().flatten().map(|angle| component.along(*angle)[wave]);
-        across.chain(along).collect()
+    pub(crate) fn column(&self, component: Component, wave: usize) -> &[f64] {
+        let order = component.order() - 1;
+        let place = if self.shared { order } else { 2 * order + usize::from(component.is_forward()) };
+        &self.columns[place][wave]
     }
 }

@@ -238,6 +238,46 @@ fn signals_that_are_known_to_be_sines_are_corrected_exactly() {
     assert!(far[1] > 60 && far[0] * 100 <= far[1] * 12, "{far:?}");
 }
 
+/// Ellipses far from a circle: offsets up to 0.7 of the radius, gain ratios of 0.4 to 1.6, quadrature angles up to 40°.
+#[test]
+fn strong_ellipses_are_corrected_exactly() {
+    let sines = ["quadrature-offset", "quadrature-gain-and-angle"];
+    let mut random = Random(6);
+    let (mut far, mut all) = (0, 0);
+    for (x, y, gain, degrees) in [
+        (0.5, 0.0, 1.0, 0.0_f64),
+        (0.3, -0.6, 1.0, 0.0),
+        (0.0, 0.0, 0.4, 0.0),
+        (0.05, 0.1, 1.6, 0.0),
+        (0.0, 0.0, 1.0, 40.0),
+        (0.2, 0.25, 0.7, -25.0),
+    ] {
+        let mut channels = perfect();
+        channels[0].offset = 500.0 * x;
+        channels[1].offset = 500.0 * y;
+        channels[1].harmonics[0] = (500.0 * gain, degrees.to_radians() - 0.5 * PI);
+        let recording = recorded(&channels, 1.0, false, &mut random);
+        let (found, [before, after, stated]) = corrected(&recording, Some(&sines));
+        println!("{x} {y} {gain} {degrees}°: {before:.5} → {after:.5} ± {stated:.5} rad, {:?}", found.after);
+        assert!(after < 0.2_f64.to_radians() * 1.5 && after < 1.15 * stated && stated < 1.15 * after, "{found:?}");
+        // What is left is the noise of the signals.
+        assert!((found.after.residual_rms_um - 1.0).abs() < 0.06, "{:?}", found.after);
+        let truths = [
+            ("cosine", 500.0 * x),
+            ("sine", 500.0 * y),
+            ("gain_ratio_less_1", gain - 1.0),
+            ("angle_error", degrees.to_radians()),
+        ];
+        for parameter in found.added.iter().flat_map(|added| &added.parameters) {
+            let truth = truths.iter().find(|(name, _)| *name == parameter.name).unwrap().1;
+            println!("  {} {} ± {:?}, truth {truth}", parameter.name, parameter.value, parameter.std);
+            all += 1;
+            far += usize::from((parameter.value - truth).abs() > 2.5 * parameter.std.unwrap());
+        }
+    }
+    assert!(all > 14 && far <= 2, "{far} of {all}");
+}
+
 #[test]
 fn a_reference_that_does_not_follow_is_refused() {
     let file = tempfile::NamedTempFile::new().unwrap();

@@ -17,6 +17,8 @@ pub struct Crossing {
 
 /// Relative accuracy of a crossing of a damped rotor.
 const ACCURACY: f64 = 1e-9;
+/// Crossings closer than this are at one speed, relative.
+const SAME: f64 = 10.0 * ACCURACY;
 /// A difference that is this many times as large as the accuracy, with the speed known to the accuracy, is a jump.
 const JUMP: f64 = 100.0;
 /// Steps of a search; bisection alone needs 30.
@@ -48,11 +50,8 @@ impl<'a> Search<'a> {
         }
         let roots =
             self.roots(ratio, count, &undamped.iter().map(|(speed, _)| *speed).collect::<Vec<_>>(), ACCURACY)?;
-        roots
-            .into_iter()
-            .map(|(speed, number)| self.at(speed, number))
-            .collect::<Result<Vec<_>>>()
-            .map(|found| found.into_iter().flatten().collect())
+        let same = |a: &(f64, usize), b: &(f64, usize)| b.0 - a.0 <= SAME * b.0;
+        roots.chunk_by(same).map(|roots| self.at(roots)).collect::<Result<Vec<_>>>().map(|found| found.concat())
     }
 
     /// The same as speeds alone, with a relative accuracy of one in a thousand.
@@ -119,12 +118,16 @@ impl<'a> Search<'a> {
         Ok(None)
     }
 
-    /// The mode of a frequency by its number among all.
-    fn at(&self, speed: f64, number: usize) -> Result<Option<Crossing>> {
+    /// The modes of roots at one speed, by the numbers of their frequencies among all.
+    ///
+    /// They are of one eigenvalue problem: where two frequencies are equal but for rounding (one mode grows and the other decays as fast), which
+    /// of them comes first changes with the speed by chance.
+    fn at(&self, roots: &[(f64, usize)]) -> Result<Vec<Crossing>> {
+        let speed = roots.iter().map(|(speed, _)| speed).sum::<f64>() / roots.len() as f64;
         let modes = self.modal.at(speed)?;
         let still = self.modal.size().saturating_sub(modes.len());
-        let mode = number.checked_sub(still).and_then(|index| modes.into_iter().nth(index));
-        Ok(mode.map(|mode| Crossing { speed, mode }))
+        let mode = |number: usize| Some(Crossing { speed, mode: modes.get(number.checked_sub(still)?)?.clone() });
+        Ok(roots.iter().filter_map(|(_, number)| mode(*number)).collect())
     }
 
     fn frequencies(&mut self, speed: f64) -> Result<&Vec<f64>> {

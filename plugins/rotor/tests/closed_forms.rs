@@ -170,6 +170,34 @@ fn cross_coupling_makes_whirl_grow() {
     assert_eq!(whirl(&growing.shape, &all.nodes), Whirl::Forward);
 }
 
+/// Cross-coupled bearings make one mode of each pair grow and the other decay, at one frequency: a critical speed of each, forward and
+/// backward. Gyroscopic moments are next to none.
+#[test]
+fn critical_speeds_of_an_unstable_pair_are_forward_and_backward() {
+    for (cross, length_mm, elements) in [(1e5, 300, 2), (3e4, 500, 4), (4e5, 700, 3), (2.5e5, 450, 5), (7e3, 640, 6)] {
+        let bearing = |z_mm: i32, k: f64| {
+            format!(
+                "{{ z_mm = {z_mm}, kxx_n_per_m = {k}, kyy_n_per_m = {k}, kxy_n_per_m = {cross}, kyx_n_per_m = -{cross} }}"
+            )
+        };
+        let parts = format!(
+            r#"segments = [{{ length_mm = {length_mm}, outer_mm = 12, material = "steel", elements = {elements} }}]
+            bearings = [{}, {}]"#,
+            bearing(0, 1e6),
+            bearing(length_mm, 2e6)
+        );
+        let all = equations(&parts);
+        let found = Search::new(&modal(&parts)).crossings(1.0, 4).unwrap();
+        assert_eq!(found.len(), 4);
+        for pair in found.chunks(2) {
+            let whirls = [&pair[0], &pair[1]].map(|crossing| whirl(&crossing.mode.shape, &all.nodes));
+            assert!(whirls.contains(&Whirl::Forward) && whirls.contains(&Whirl::Backward), "{cross} {whirls:?}");
+            let damping = [&pair[0], &pair[1]].map(|crossing| crossing.mode.damping_ratio());
+            assert!(damping[0] * damping[1] < 0.0, "{cross} {damping:?}");
+        }
+    }
+}
+
 /// √(re + i·im) with both parts positive.
 fn root(re: f64, im: f64) -> (f64, f64) {
     let size = re.hypot(im);

@@ -10,6 +10,7 @@ use runout_core::{
     points::{PointColumn, PointKind::Number, Points},
 };
 
+pub(crate) use crate::measured::COMPONENTS;
 use crate::{
     joint::{Data, Observed, Within},
     measured::Measured,
@@ -17,9 +18,6 @@ use crate::{
     span::Span,
     terms::{Term, Volume},
 };
-
-/// Components of the error.
-pub(crate) const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
 
 /// Commands that differ by less than this, in mm, are one place.
 const SAME_MM: f64 = 1e-6;

@@ -16,8 +16,8 @@ use crate::{
     campaign::{COMPONENTS, Campaign},
     config::Kriging,
     noise::{Noise, of_repeats},
-    outcome::residual_um,
     projections::Projections,
+    residual::residual_um,
     rough::Rough,
     solve::{Solution, families},
 };

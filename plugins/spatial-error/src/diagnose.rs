@@ -1,4 +1,6 @@
 //! The spatial error as a model for the closed loop.
+//!
+//! Long because the loop and what it says of each step belong together.
 
 use runout_core::{
     Error, Result,
@@ -159,6 +161,7 @@ impl PointModel for SpatialError {
             lost_orders: None,
             truth: None,
             warnings: Vec::new(),
+            notes: Vec::new(),
             outputs: Vec::new(),
         };
         diagnosis.warnings.append(&mut outcome.remarks);

@@ -3,14 +3,17 @@
 //! Each component is first estimated by itself in every family, beside the columns of the trend that act on it: how smooth one component
 //! is says nothing of another. All are then estimated together with the trend that they share, each in its most likely family.
 
+use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::{
     correlation::Family,
     joint::{Covariance, Data, Within},
     likelihood::{Criterion, Estimate, PARAMETERS, Prior, covariances, estimate},
-    solve::basis,
 };
+
+/// Share of a column outside the span of those before it, below which it is none of its own.
+pub(crate) const INDEPENDENT: f64 = 1e-6;
 
 /// Parameters of a family's most likely covariance of one component.
 #[derive(Debug, Clone)]
@@ -76,7 +79,7 @@ pub(crate) fn most_likely(
     let mut best = Vec::new();
     for field in 0..data.observed.len() {
         let start = start.map(|(families, parameters)| (families[field], part(parameters, field)));
-        let all = each_family(&alone(data, field), &prior.of(field), families, criterion, start);
+        let all = each_family(&alone(data, field), &prior.of(field), families, criterion, start.as_ref());
         let likelihood = |index: &usize| all[*index].ln_likelihood;
         best.push((0..all.len()).max_by(|one, other| likelihood(one).total_cmp(&likelihood(other)))?);
         guesses.push(all);
@@ -142,7 +145,7 @@ fn each_family(
     prior: &Prior,
     families: &[Family],
     criterion: Criterion,
-    start: Option<(Family, DVector<f64>)>,
+    start: Option<&(Family, DVector<f64>)>,
 ) -> Vec<Guess> {
     let mut all: Vec<Guess> = Vec::new();
     let moved = |from: &DVector<f64>, by: f64| {
@@ -152,10 +155,10 @@ fn each_family(
         };
         DVector::from_fn(from.len(), |index, _| shift(index, from[index]))
     };
-    let first = start.as_ref().map(|(family, _)| *family);
+    let first = start.map(|(family, _)| *family);
     for family in first.iter().chain(families.iter().filter(|family| first != Some(**family))) {
         let best = all.iter().max_by(|one, other| one.ln_likelihood.total_cmp(&other.ln_likelihood));
-        let starts = match (best, &start) {
+        let starts = match (best, start) {
             (Some(best), _) => vec![moved(&best.parameters, (reach(best.family) / reach(*family)).ln())],
             (None, Some((known, from))) => vec![moved(from, (reach(*known) / reach(*family)).ln())],
             (None, None) => vec![prior.centre.clone(), moved(&prior.centre, 0.9)],
@@ -181,4 +184,24 @@ fn reach(family: Family) -> f64 {
         Family::Matern32 => 0.97,
         Family::Matern52 => 1.05,
     }
+}
+
+/// Columns that are not in the span of those before them, and an orthonormal basis of all.
+#[must_use]
+pub(crate) fn basis(design: &Mat<f64>) -> (Vec<usize>, Vec<DVector<f64>>) {
+    let (mut kept, mut basis): (Vec<usize>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
+    for column in 0..design.ncols() {
+        let mut own = DVector::from_fn(design.nrows(), |row, _| design[(row, column)]);
+        let whole = own.norm();
+        for known in basis.iter().chain(&basis) {
+            let share = known.dot(&own);
+            own.axpy(-share, known, 1.0);
+        }
+        let size = own.norm();
+        if size > INDEPENDENT * whole && size > 0.0 {
+            basis.push(own / size);
+            kept.push(column);
+        }
+    }
+    (kept, basis)
 }

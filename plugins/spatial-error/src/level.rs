@@ -2,7 +2,7 @@
 
 use runout_core::model::diagnosis::Level;
 
-use crate::{campaign::Campaign, noise::Noise, outcome::residual_um, projections::Projections, solve::Solution};
+use crate::{campaign::Campaign, noise::Noise, projections::Projections, residual::residual_um, solve::Solution};
 
 /// How far a fit is from its readings.
 pub(crate) fn level(campaign: &Campaign, solution: &Solution) -> Level {

@@ -23,6 +23,7 @@ mod outcome;
 mod projections;
 mod query;
 mod remarks;
+mod residual;
 mod rough;
 mod separate;
 pub mod simulate;

@@ -10,8 +10,8 @@ use runout_core::{
     points::Points,
 };
 
-use crate::campaign::COMPONENTS;
-
+/// Components of the error.
+pub(crate) const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
 /// Share of the largest residual beside a plane below which a component is not measured.
 const CONSTANT: f64 = 1e-3;
 /// Share of a coordinate outside the span of the others below which it varies with them.

@@ -48,6 +48,12 @@ pub(crate) fn notes(conclusion: &Conclusion, queries: &[At]) -> Vec<String> {
     let mut all = vec![of_field(campaign, solution)];
     all.extend(campaign.notes.iter().cloned());
     all.extend(of_noise(campaign));
+    if campaign.place_of.len() == campaign.places_mm.len() {
+        all.push(
+            "each place was read once: a drift in time is confounded with the errors of the axis that moves slowest"
+                .into(),
+        );
+    }
     all.extend(of_numbers(campaign, solution));
     let extrapolated = queries.iter().filter(|query| query.extrapolated).count();
     if extrapolated > 0 {
@@ -136,7 +142,11 @@ fn of_noise(campaign: &Campaign) -> Option<String> {
                 each.collect::<Vec<_>>().join(", ")
             ))
         }
-        Noise::Unknown => Some("the noise is not known: it is in the nugget, which predictions do not include".into()),
+        Noise::Unknown => Some(
+            "the noise is not known, without repeats, `std_um` or a column `std_um`: noise and what varies from place to place are one, \
+             the nugget, which predictions do not include"
+                .into(),
+        ),
         Noise::Column(_) | Noise::Stated(_) => None,
     }
 }

@@ -57,12 +57,8 @@ impl PointSeparator for SpatialError {
 
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![
-            "with one pass, a drift in time is confounded with the errors of the axis that moves slowest".to_owned(),
             "the error of the machine is known but for a displacement and a rotation, which are those of the tracker too".to_owned(),
         ];
-        if self.config.std_um.is_none() {
-            notes.push("without repeats, `std_um` or a column `std_um`, noise and what varies from place to place are one: the nugget".into());
-        }
         if self.config.tool_mm.iter().all(|length| length.abs() < 1e-12) {
             let [.., last] = self.config.chain_axes();
             let (axis, before) = (["X", "Y", "Z"][last], ["X", "Y", "Z"][self.config.chain_axes()[1]]);

@@ -10,7 +10,7 @@ use crate::{
     campaign::Campaign,
     config::{Kriging, SpatialErrorConfig},
     correlation::Family,
-    families::{Guess, Likely, most_likely},
+    families::{Guess, INDEPENDENT, Likely, basis, most_likely},
     joint::{Covariance, Data, Joint},
     likelihood::{Criterion, Estimate, PARAMETERS, Prior},
     neighbours::Neighbours,
@@ -26,8 +26,6 @@ const CLUSTER: usize = 50;
 const TREND_FROM: usize = 1500;
 /// Distinct places that an estimated covariance needs at least.
 const FEWEST: usize = 10;
-/// Share of a column outside the span of those before it, below which it is none of its own.
-const INDEPENDENT: f64 = 1e-6;
 
 /// Covariances and trend.
 #[derive(Debug, Clone)]
@@ -119,26 +117,6 @@ fn left_of_trend(values: &[f64], design: &Mat<f64>) -> f64 {
         left.axpy(-share, &known, 1.0);
     }
     left.norm_squared()
-}
-
-/// Columns that are not in the span of those before them, and an orthonormal basis of all.
-#[must_use]
-pub(crate) fn basis(design: &Mat<f64>) -> (Vec<usize>, Vec<DVector<f64>>) {
-    let (mut kept, mut basis): (Vec<usize>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
-    for column in 0..design.ncols() {
-        let mut own = DVector::from_fn(design.nrows(), |row, _| design[(row, column)]);
-        let whole = own.norm();
-        for known in basis.iter().chain(&basis) {
-            let share = known.dot(&own);
-            own.axpy(-share, known, 1.0);
-        }
-        let size = own.norm();
-        if size > INDEPENDENT * whole && size > 0.0 {
-            basis.push(own / size);
-            kept.push(column);
-        }
-    }
-    (kept, basis)
 }
 
 /// Families that may be taken.

@@ -60,7 +60,7 @@ pub(crate) struct Design {
     /// Of the slide's.
     slide: Vec<(Local, f64)>,
     /// Lines of the traces and splines of the slide, `[column][reading]`, without those in the span of others.
-    dense: Vec<Vec<f64>>,
+    pub dense: Vec<Vec<f64>>,
     /// Which of the slide's splines each column is; nothing for lines.
     dense_slide: Vec<Option<usize>>,
     /// What the part's splines leave of them.
@@ -173,6 +173,33 @@ impl Design {
     fn less_splines(&self, column: &[f64], coefficients: &[f64]) -> Vec<f64> {
         let rows = column.iter().zip(&self.local);
         rows.map(|(value, (local, factor))| value - factor * local.of(coefficients)).collect()
+    }
+
+    /// What each trace has of the deviations that are free at each place, `[deviation][trace]`.
+    pub(crate) fn free(&self) -> Vec<Vec<f64>> {
+        let each = self.alterations.iter().zip(&self.data.setups);
+        let seen = each.map(|(one, setup)| ((1.0 + one.gain) * one.cosine(), *setup));
+        if self.readings.slide.is_some() {
+            return vec![seen.map(|(seen, _)| seen).collect()];
+        }
+        let of = |own: usize| seen.clone().map(|(seen, setup)| if setup == own { seen } else { 0.0 }).collect();
+        vec![of(0), of(1)]
+    }
+
+    /// The share of the readings' degrees of freedom that splines leave to each setup's.
+    pub(crate) fn left_by_splines(&self) -> [f64; 2] {
+        let own = |setup: usize| self.readings.of.iter().filter(|(trace, _)| self.data.setups[*trace] == setup).count();
+        let share = |splines: usize, readings: usize| 1.0 - splines as f64 / readings.max(1) as f64;
+        if self.readings.slide.is_some() {
+            return [share(self.readings.splines, self.readings.of.len()); 2];
+        }
+        [0, 1].map(|setup| share(self.readings.part.splines(), own(setup)).max(0.0))
+    }
+
+    /// The lines of the traces among the columns beside the splines.
+    pub(crate) fn lines(&self) -> Vec<Vec<f64>> {
+        let all = self.dense.iter().zip(&self.dense_slide);
+        all.filter(|(_, slide)| slide.is_none()).map(|(column, _)| column.clone()).collect()
     }
 
     /// What everything that is fitted leaves of a column.

@@ -81,6 +81,7 @@ impl AxialReversal {
         if self.0.slide_cutoff_mm.is_none() {
             diagnosis.warnings.extend(self.likely_shift(points, &traces, fit.applied())?);
         }
+        after.checks.clone_from(&diagnosis.consistency);
         diagnosis.moved = moved(&before, &after);
         // The remarks are part of the diagnosis now.
         after.warnings.clear();
@@ -159,7 +160,7 @@ impl AxialReversal {
     /// Straightness with effects applied.
     fn with(&self, points: &Points, traces: &Traces, data: &Data, applied: &[Setting]) -> Result<Straightness> {
         let (traces, cosine) = self.taken_out(traces, data, applied, [0.0; 2]);
-        Ok(self.straightness(points, &traces, cosine, None)?.0)
+        Ok(self.straightness(points, &traces, cosine, None, None)?.0)
     }
 
     /// The weighted mean of equivalent fits, with what is not known of their effects in the standard uncertainties, and
@@ -193,8 +194,9 @@ impl AxialReversal {
         let mut results = Vec::with_capacity(each.len());
         for one in &each {
             let mut displaced = Vec::with_capacity(one.displaced.len());
+            let errors = one.fit.trace_errors();
             for (share, (traces, cosine)) in &one.displaced {
-                displaced.push((*share, self.straightness(points, traces, *cosine, on)?.0));
+                displaced.push((*share, self.straightness(points, traces, *cosine, on, errors.as_ref())?.0));
             }
             let Some(mut result) = mean(&displaced, mean_square) else { continue };
             said.push(self.widen(&mut result, data, one));
@@ -272,8 +274,8 @@ impl AxialReversal {
         ))
     }
 
-    /// What traces say of shifts against each other, for a run that does not look for them.
-    pub(crate) fn contradictions(&self, points: &Points, traces: &Traces) -> Result<Vec<String>> {
+    /// What traces say of shifts against each other, for a run that does not look for them, and the fit without any.
+    pub(crate) fn contradictions(&self, points: &Points, traces: &Traces) -> Result<(Vec<String>, TracesFit)> {
         let model = self.traces_model(points, traces, self.0.slide_cutoff_mm, &[])?;
         let settings =
             Settings { effects: Some(vec![REGISTRATION.into()]), max_added: traces.all.len(), ..Settings::default() };
@@ -297,7 +299,7 @@ impl AxialReversal {
         if self.0.slide_cutoff_mm.is_none() {
             said.extend(self.likely_shift(points, traces, closed.after.applied())?);
         }
-        Ok(said)
+        Ok((said, closed.before))
     }
 
     /// A shift between the setups, where nothing bounds the slide: it is not observable, but likely where it takes away most of
@@ -320,7 +322,7 @@ impl AxialReversal {
         let bounded = AxialReversal(crate::AxialReversalConfig { slide_cutoff_mm: Some(cutoff_mm), ..self.0.clone() });
         let short = |all: &[Alteration]| -> Result<f64> {
             let all = Traces { all: corrected(model.data(), &traces.all, all), setups: traces.setups.clone() };
-            Ok(bounded.straightness(points, &all, 1.0, None)?.1.beyond_smooth_um)
+            Ok(bounded.straightness(points, &all, 1.0, None, None)?.1.beyond_smooth_um)
         };
         let [without, with] =
             [self.altered(free.data(), applied), bounded.altered(model.data(), closed.after.applied())];

@@ -32,8 +32,8 @@ pub(crate) struct Split {
     pub variance: Vec<f64>,
     /// Correlation of a trace's errors over 0, 1, … positions.
     pub correlation: Vec<f64>,
-    /// Standard uncertainties of part and slide from it.
-    pub std_um: [Vec<f64>; 2],
+    /// Variances of part and slide for independent errors of variance 1 in each trace.
+    pub shares: [Vec<f64>; 2],
     /// Root mean square difference of the setups' half difference from the slide that is declared possible; NaN where
     /// nothing is declared.
     pub beyond_smooth_um: f64,
@@ -141,8 +141,8 @@ impl Grid {
         let share = |[n1, n2]: [f64; 2]| (c * c / n1 + 1.0 / n2) / (1.0 + c).powi(2);
         let squares: f64 = beyond.iter().zip(&counts).map(|(beyond, counts)| beyond * beyond / share(*counts)).sum();
         let variance = self.variance(&aligned, &means, &counts, squares / freedom);
-        let std = |of: &dyn Fn([f64; 2], f64) -> f64| -> Vec<f64> {
-            positions.clone().map(|at| (variance[at] * of(counts[at], leverage[at])).sqrt()).collect()
+        let shares = |of: &dyn Fn([f64; 2], f64) -> f64| -> Vec<f64> {
+            positions.clone().map(|at| of(counts[at], leverage[at])).collect()
         };
         let of_slide = |counts: [f64; 2], leverage: f64| leverage * share(counts);
         let of_part = |[n1, n2]: [f64; 2], leverage: f64| {
@@ -155,7 +155,7 @@ impl Grid {
         };
         let rms = (beyond.iter().map(|value| value * value).sum::<f64>() / beyond.len().max(1) as f64).sqrt();
         Split {
-            std_um: [std(&of_part), std(&of_slide)],
+            shares: [shares(&of_part), shares(&of_slide)],
             part_um,
             slide_um,
             correlation: self.correlation(&aligned, &means),

@@ -4,12 +4,14 @@
 //! turned by 180° about its axis and the probe looks at the same line of it from the opposite side. The separator `axial-reversal`
 //! takes traces of both setups and separates part and slide.
 
+mod contrasts;
 mod data;
 mod design;
 mod diagnose;
 mod effects;
 mod grid;
 mod interpolate;
+mod judged;
 mod mixture;
 mod model;
 mod moves;

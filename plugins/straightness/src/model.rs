@@ -6,16 +6,17 @@
 //! slide, one spline for each setup, say the same: then a setup without repeats has nothing that contradicts it, and is
 //! left out. With the bound, part and slide have splines of their own.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Error, ErrorKind, Result,
-    consistency::Structure,
-    model::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained},
+    consistency::Check,
+    model::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, tested::Tested},
     numerics::least_squares::Basis,
 };
 
 use crate::{
+    contrasts::Contrasts,
     data::Data,
     design::Design,
     effects::{Alteration, Candidate, Content, Kind, USUAL_TIME_CONSTANT, alterations},
@@ -24,8 +25,6 @@ use crate::{
 
 /// Blocks of z of which every second one is a half of the data.
 const BLOCKS: f64 = 16.0;
-/// Stretches of z that have to agree on an effect.
-const STRETCHES: usize = 8;
 /// Shifts that are tried on each side.
 const MOST_SHIFTS: f64 = 40.0;
 
@@ -76,11 +75,10 @@ impl Model for TracesModel {
         let (count, dof) = (left.len(), left.len().saturating_sub(design.rank));
         let scale = data.std_um.unwrap_or(1.0);
         let squares: f64 = left.iter().map(|value| value * value).sum();
-        let stretch = count.div_ceil(STRETCHES).max(1);
-        let stretches: Vec<usize> = (0..count).step_by(stretch).map(|start| stretch.min(count - start)).collect();
+        let contrasts = Contrasts::of(&design);
         let remainder = Remainder {
             residual: left.iter().map(|value| value / scale).collect(),
-            structure: Arc::new(Structure::default().in_stretches("z-blocks", &stretches)),
+            structure: Arc::new(contrasts.structure()),
             dof,
             rms: (squares / count.max(1) as f64).sqrt(),
             noise_floor: data.std_um.map_or(f64::NAN, |std| std * (dof as f64 / count.max(1) as f64).sqrt()),
@@ -92,6 +90,9 @@ impl Model for TracesModel {
         };
         let mut fit = TracesFit {
             design,
+            contrasts,
+            declared: OnceLock::new(),
+            judged: OnceLock::new(),
             contents,
             applied: applied.to_vec(),
             remainder,
@@ -136,11 +137,16 @@ impl Model for TracesModel {
 
 /// A fit of the traces.
 pub(crate) struct TracesFit {
-    design: Design,
+    pub design: Design,
+    /// What the tests are made on.
+    pub contrasts: Contrasts,
+    /// Orthonormal columns of what is declared, in contrasts.
+    declared: OnceLock<Basis>,
+    pub judged: OnceLock<Tested>,
     /// Part and slide at each reading.
     contents: Vec<Content>,
-    applied: Vec<Setting>,
-    remainder: Remainder,
+    pub applied: Vec<Setting>,
+    pub remainder: Remainder,
     /// Effects and the covariance of their parameters.
     uncertain: Vec<(Vec<usize>, Vec<Vec<f64>>)>,
     /// Weights of this fit and of the others that explain the data as well.
@@ -266,6 +272,27 @@ impl Fit for TracesFit {
         let mut columns = self.signature_um(effect);
         columns.iter_mut().flatten().for_each(|entry| *entry *= scale);
         columns
+    }
+
+    fn tested(&self, vector: &[f64]) -> Vec<f64> {
+        self.contrasts.made(vector)
+    }
+
+    fn averaged(&self) -> f64 {
+        self.contrasts.averaged
+    }
+
+    fn declared_columns(&self) -> &[Vec<f64>] {
+        let made = || Basis::of(self.design.dense.iter().map(|column| self.contrasts.made(column)).collect());
+        self.declared.get_or_init(made).columns()
+    }
+
+    fn consistency(&self) -> Vec<Check> {
+        self.judged().checks.clone()
+    }
+
+    fn tested_std(&self, effect: usize) -> Vec<f64> {
+        self.judged().std(effect)
     }
 
     fn bias(&self, effect: usize) -> Vec<Bias> {

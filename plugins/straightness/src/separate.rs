@@ -3,6 +3,7 @@
 use runout_core::{
     Error, ErrorKind, Result,
     fault::{Fault, known_names},
+    model::Fit as _,
     pipeline::{Context, StageConfig},
     points::{
         PointColumn,
@@ -16,12 +17,13 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
+    contrasts::TraceErrors,
     grid::{Split, smooth},
     moves::{grid, rows},
     positions::{coarsest_mm, common_range, positions},
     straightness::{self, LIMIT, Straightness},
     trace::AxialTrace,
-    value_std::{ProfileErrors, correlation_of},
+    value_std::ProfileErrors,
 };
 
 /// `[separate] plugin = "axial-reversal"`.
@@ -124,7 +126,8 @@ impl AxialReversalConfig {
 /// 3. With the mean m of each setup, part = (m₁ + m₂)/2 and slide = (m₁ − m₂)/2. With a bound on the slide's waves, the slide
 ///    is the least-squares spline of that, and the part is what the traces have without it.
 /// 4. With k₁ and k₂ traces, the scatter s² about the setups' means, pooled at each position over k₁ + k₂ − 2 degrees
-///    of freedom, gives both the variance s²(1/k₁ + 1/k₂)/4.
+///    of freedom, gives both the variance s²(1/k₁ + 1/k₂)/4. Where errors of a trace depend on each other along z
+///    ([`runout_core::consistency::order`], on contrasts between the traces), their covariance over all z takes its place.
 #[derive(Debug, Clone)]
 pub struct AxialReversal(pub(crate) AxialReversalConfig);
 
@@ -199,8 +202,13 @@ impl AxialReversal {
     /// When the traces do not hold what the method needs.
     pub fn separated(&self, points: &Points) -> Result<Straightness> {
         let traces = self.traces(points)?;
-        let mut result = self.straightness(points, &traces, 1.0, None)?.0;
-        result.warnings.extend(self.contradictions(points, &traces)?);
+        let mut result = self.straightness(points, &traces, 1.0, None, None)?.0;
+        let (said, fit) = self.contradictions(points, &traces)?;
+        if let Some(errors) = fit.trace_errors() {
+            result = self.straightness(points, &traces, 1.0, None, Some(&errors))?.0;
+        }
+        result.checks = fit.consistency();
+        result.warnings.extend(said);
         finite(points, &result)?;
         Ok(result)
     }
@@ -233,6 +241,7 @@ impl AxialReversal {
         traces: &Traces,
         cosine: f64,
         on: Option<&[f64]>,
+        correlated: Option<&TraceErrors>,
     ) -> Result<(Straightness, Split)> {
         let all: Vec<&AxialTrace> = traces.all.iter().collect();
         let range = common_range(&points.input, &all)?;
@@ -264,14 +273,11 @@ impl AxialReversal {
                 1e3 * repeatability_um
             ));
         }
-        let [part_std_um, slide_std_um] = split.std_um.clone();
-        let of_slide = grid.smooth.as_ref().map(|smooth| correlation_of(smooth, grid.z_mm.len()));
-        let correlations = [split.correlation.clone(), of_slide.unwrap_or_else(|| split.correlation.clone())];
-        let errors = [0, 1].map(|which| ProfileErrors {
-            noise_um: split.std_um[which].clone(),
-            correlation: correlations[which].clone(),
-            common_um: Vec::new(),
-        });
+        let errors = match correlated {
+            Some(errors) => grid.correlated(&split, errors),
+            None => grid.scattered(&split, (counts[0] + counts[1] - 2) as f64),
+        };
+        let [part_std_um, slide_std_um] = errors.each_ref().map(ProfileErrors::std_um);
         let result = Straightness {
             errors,
             z_mm: grid.z_mm.clone(),
@@ -281,6 +287,7 @@ impl AxialReversal {
             slide_std_um,
             repeatability_um: if counts == [1, 1] { f64::NAN } else { repeatability_um },
             degrees_of_freedom: counts[0] + counts[1] - 2,
+            checks: Vec::new(),
             warnings,
         };
         Ok((result, split))

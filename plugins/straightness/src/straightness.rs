@@ -2,6 +2,7 @@
 
 use runout_core::{
     Result,
+    consistency::Check,
     stage::{Evaluable, OpenProfile, Outcome},
     standards::open_errors::OpenErrors,
     summary::NamedValue,
@@ -40,6 +41,8 @@ pub struct Straightness {
     pub repeatability_um: f64,
     /// Degrees of freedom behind each position's standard uncertainty.
     pub degrees_of_freedom: usize,
+    /// The tests of the traces on themselves.
+    pub checks: Vec<Check>,
     /// What the errors of part and slide are made of.
     pub(crate) errors: [ProfileErrors; 2],
     /// What the user should know.
@@ -88,8 +91,8 @@ impl Straightness {
         let tables = vec![TableRows { rows: table.rows(columns.into())?, table: table.name }];
         let values = self.values();
         let evaluables = self.evaluables().into();
-        let remarks = self.warnings;
-        Ok(Outcome { convention: CONVENTION.into(), tables, values, evaluables, remarks, ..Outcome::default() })
+        let Self { checks, warnings: remarks, .. } = self;
+        Ok(Outcome { convention: CONVENTION.into(), tables, values, checks, evaluables, remarks, ..Outcome::default() })
     }
 
     /// Both profiles with their errors, for the standards' values.
@@ -99,7 +102,7 @@ impl Straightness {
             if errors.noise_um.iter().all(|std| std.is_finite()) {
                 Ok(OpenErrors {
                     std_um: errors.noise_um.clone(),
-                    freedom: self.degrees_of_freedom as f64,
+                    freedom: errors.freedom,
                     correlation: errors.correlation.clone(),
                     common_um: errors.common_um.clone(),
                 })

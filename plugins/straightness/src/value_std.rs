@@ -2,7 +2,10 @@
 
 use runout_core::numerics::least_squares::Basis;
 
-use crate::grid::Grid;
+use crate::{
+    contrasts::TraceErrors,
+    grid::{Grid, Split},
+};
 
 /// Correlations along the profile below this are none.
 const NONE: f64 = 0.1;
@@ -14,6 +17,8 @@ pub(crate) struct ProfileErrors {
     pub noise_um: Vec<f64>,
     /// Correlation of that over 0, 1, … positions.
     pub correlation: Vec<f64>,
+    /// Degrees of freedom behind the standard deviation at one position; 0 where it holds them.
+    pub freedom: f64,
     /// Changes of the whole profile, in µm, each with a factor of its own that has the standard deviation 1.
     pub common_um: Vec<Vec<f64>>,
 }
@@ -30,6 +35,12 @@ impl ProfileErrors {
         let common: f64 = self.common_um.iter().map(|change| along(change).powi(2)).sum();
         // A covariance that is cut off is none by right: alternating weights may make it too small.
         ((own + beside).max(NONE * own) + common).sqrt()
+    }
+
+    /// Standard uncertainty at each position.
+    pub(crate) fn std_um(&self) -> Vec<f64> {
+        let common = |at: usize| self.common_um.iter().map(|change| change[at] * change[at]).sum::<f64>();
+        self.noise_um.iter().enumerate().map(|(at, noise)| (noise * noise + common(at)).sqrt()).collect()
     }
 
     /// Adds what parameters of effects change, which are known with a covariance.
@@ -64,6 +75,7 @@ impl ProfileErrors {
         Self {
             noise_um: select(&self.noise_um),
             correlation: self.correlation.clone(),
+            freedom: self.freedom,
             common_um: self.common_um.iter().map(select).collect(),
         }
     }
@@ -83,6 +95,45 @@ pub(crate) fn correlation_of(smooth: &Basis, positions: usize) -> Vec<f64> {
 }
 
 impl Grid {
+    /// Errors of part and slide of the scatter about the setups' means, as it is at each position.
+    pub(crate) fn scattered(&self, split: &Split, freedom: f64) -> [ProfileErrors; 2] {
+        let of_slide = self.smooth.as_ref().map(|smooth| correlation_of(smooth, self.z_mm.len()));
+        let correlations = [split.correlation.clone(), of_slide.unwrap_or_else(|| split.correlation.clone())];
+        let (mut shares, mut correlations) = (split.shares.iter(), correlations.into_iter());
+        [0, 1].map(|_| {
+            let noise = split.variance.iter().zip(shares.next().into_iter().flatten());
+            ProfileErrors {
+                noise_um: noise.map(|(variance, share)| (variance * share).sqrt()).collect(),
+                correlation: correlations.next().unwrap_or_default(),
+                freedom,
+                common_um: Vec::new(),
+            }
+        })
+    }
+
+    /// Errors of part and slide where those of each trace depend on each other along z.
+    pub(crate) fn correlated(&self, split: &Split, errors: &TraceErrors) -> [ProfileErrors; 2] {
+        let left = errors.at(&errors.left_um2, &self.z_mm);
+        let mut both = split.shares.each_ref().map(|shares| {
+            let noise = left.iter().zip(shares).map(|(left, share)| ((left + errors.independent_um2) * share).sqrt());
+            ProfileErrors { noise_um: noise.collect(), correlation: vec![1.0], ..ProfileErrors::default() }
+        });
+        for change in &errors.changes_um {
+            let change = errors.at(change, &self.z_mm);
+            for setup in [0, 1] {
+                let count = self.setups.iter().filter(|own| **own == setup).count() as f64;
+                let of = |own: &usize| {
+                    let share = if *own == setup { count.sqrt().recip() } else { 0.0 };
+                    change.iter().map(|entry| share * entry).collect()
+                };
+                let moved = self.split(&self.setups.iter().map(of).collect::<Vec<Vec<f64>>>());
+                both[0].common_um.push(moved.part_um);
+                both[1].common_um.push(moved.slide_um);
+            }
+        }
+        both
+    }
+
     /// Correlation along the profile of what traces differ by from their setup's mean, over 0, 1, … positions, as far as there is one.
     pub(crate) fn correlation(&self, aligned: &[Vec<f64>], means: &[[f64; 2]]) -> Vec<f64> {
         let positions = means.len();
@@ -105,7 +156,7 @@ mod tests {
 
     #[test]
     fn independent_errors_average_out_and_common_ones_do_not() {
-        let mut errors = ProfileErrors { noise_um: vec![0.1; 100], correlation: vec![1.0], common_um: Vec::new() };
+        let mut errors = ProfileErrors { noise_um: vec![0.1; 100], correlation: vec![1.0], ..ProfileErrors::default() };
         let mean = vec![0.01; 100];
         assert!((errors.of(&mean) - 0.01).abs() < 1e-12);
         errors.correlation = vec![1.0, 0.5];

@@ -3,11 +3,13 @@
 //! reading − ring radius = mean + centring of the setup + Σ L_n e^{in(θ − probe)} + Σ F_n e^{in(θ − ring)}, real parts, n ≥ 2.
 
 use nalgebra::DMatrix;
-use runout_core::numerics::least_squares::{LeastNorm, SINGULAR, least_norm};
+use runout_core::{
+    consistency::rows::Rows,
+    numerics::least_squares::{LeastNorm, SINGULAR, least_norm},
+};
 
 use crate::{
     config::TouchProbeConfig,
-    correlation,
     effects::Missing,
     touches::{Touch, Touches},
     waves::{Part, angles, wave},
@@ -51,16 +53,13 @@ impl Content {
 pub(crate) struct Design {
     pub parameters: Vec<Parameter>,
     pub columns: Vec<Vec<f64>>,
-    /// Time of each touch.
-    time: Vec<f64>,
 }
 
 impl Design {
     /// The model of touches.
     pub(crate) fn new(config: &TouchProbeConfig, touches: &Touches, missing: &[Missing], content: &Content) -> Self {
         let Touches { all, setups, .. } = touches;
-        let mut design =
-            Self { parameters: Vec::new(), columns: Vec::new(), time: all.iter().map(|touch| touch.time).collect() };
+        let mut design = Self { parameters: Vec::new(), columns: Vec::new() };
         design.add(Parameter::Mean, all.iter().map(|_| 1.0).collect());
         for setup in setups.iter().copied() {
             for (axis, part) in [Part::Cosine, Part::Sine].into_iter().enumerate() {
@@ -147,8 +146,8 @@ pub(crate) struct Fitted {
     pub chi2_per_dof: f64,
     /// What is left of each touch, in µm.
     pub residual_um: Vec<f64>,
-    /// Correlation of touches that follow one another, where it is more than chance.
-    pub correlation: Option<f64>,
+    /// Touches that are not like the others.
+    pub unlike: Option<Rows>,
 }
 
 /// Standard deviation of each touch in µm, and where it is known from.
@@ -168,40 +167,42 @@ impl Weights {
 impl Design {
     /// Fits some touches (indices; all of them in order where they are all) to readings in µm.
     pub(crate) fn fit(&self, readings_um: &[f64], weights: &Weights, used: &[usize]) -> Fitted {
-        let weigh =
-            |column: &Vec<f64>| used.iter().map(|row| column[*row] / weights.std_um[*row]).collect::<Vec<f64>>();
-        let columns: Vec<Vec<f64>> = self.columns.iter().map(weigh).collect();
+        let columns = weighted(&self.columns, weights, used);
         let values: Vec<f64> = used.iter().map(|row| readings_um[*row] / weights.std_um[*row]).collect();
-        let mut solved = least_norm(&columns, &values, SINGULAR);
+        let solved = least_norm(&columns, &values, SINGULAR);
         let chi2: f64 = solved.residual.iter().map(|value| value * value).sum();
         let level = if solved.dof > 0 { chi2 / solved.dof as f64 } else { f64::NAN };
-        let variance = match weights.noise {
-            Noise::Residual => level,
-            // With no degree of freedom left, the stated noise is all that is known.
-            _ if solved.dof == 0 => 1.0,
-            _ => level.max(1.0),
-        };
-        let correlation = if solved.dof > 0 { self.correlate(&columns, &mut solved, used) } else { None };
         let residual_um = solved.residual.iter().zip(used).map(|(value, row)| value * weights.std_um[*row]).collect();
-        let chi2_per_dof = if weights.noise == Noise::Residual { f64::NAN } else { level };
-        Fitted { design: self.clone(), solved, variance, chi2_per_dof, residual_um, correlation }
+        let (design, unlike) = (self.clone(), None);
+        let mut fitted = Fitted { design, solved, variance: 1.0, chi2_per_dof: f64::NAN, residual_um, unlike };
+        fitted.level(weights, level);
+        fitted
     }
 }
 
-impl Design {
-    /// The correlation of the noise, and its part of the covariance.
-    fn correlate(&self, columns: &[Vec<f64>], solved: &mut LeastNorm, used: &[usize]) -> Option<f64> {
-        let mut order: Vec<usize> = (0..used.len()).collect();
-        order.sort_by(|one, other| self.time[used[*one]].total_cmp(&self.time[used[*other]]));
-        let matrix = DMatrix::from_fn(order.len(), columns.len(), |row, column| columns[column][order[row]]);
-        let residual: Vec<f64> = order.iter().map(|row| solved.residual[*row]).collect();
-        let found = correlation::of(&matrix, &solved.covariance, &residual, solved.dof)?;
-        solved.covariance = found.covariance;
-        Some(found.lag_one)
-    }
+/// Columns of some touches in units of their standard deviation.
+fn weighted(columns: &[Vec<f64>], weights: &Weights, used: &[usize]) -> Vec<Vec<f64>> {
+    let weigh = |column: &Vec<f64>| used.iter().map(|row| column[*row] / weights.std_um[*row]).collect();
+    columns.iter().map(weigh).collect()
 }
 
 impl Fitted {
+    /// The design's columns of some touches, in units of their standard deviation.
+    pub(crate) fn weighted(&self, weights: &Weights, used: &[usize]) -> Vec<Vec<f64>> {
+        weighted(&self.design.columns, weights, used)
+    }
+
+    /// Takes the variance from what is left per degree of freedom, in units of the noise where that is known.
+    pub(crate) fn level(&mut self, weights: &Weights, level: f64) {
+        self.variance = match weights.noise {
+            Noise::Residual => level,
+            // With no degree of freedom left, the stated noise is all that is known.
+            _ if self.solved.dof == 0 => 1.0,
+            _ => level.max(1.0),
+        };
+        self.chi2_per_dof = if weights.noise == Noise::Residual { f64::NAN } else { level };
+    }
+
     /// Covariance of parameters, in their units.
     pub(crate) fn covariance(&self, one: usize, other: usize) -> f64 {
         self.variance * self.solved.covariance[(one, other)]
@@ -215,5 +216,16 @@ impl Fitted {
     /// Whether the parameters are observable with the touches.
     pub(crate) fn is_observable(&self, places: &[usize]) -> bool {
         places.iter().all(|place| !self.solved.lost[*place])
+    }
+}
+pub(crate) fn name(config: &TouchProbeConfig, parameter: &Parameter) -> String {
+    let part = |part: &Part| if *part == Part::Cosine { "cosine" } else { "sine" };
+    match parameter {
+        Parameter::Mean => "mean pre-travel".into(),
+        Parameter::Centre { setup, axis } => format!("centre {} of {}", ["x", "y"][*axis], config.setups[*setup].id),
+        Parameter::Lobing { order, part: of, shared: false } => format!("lobing {order} {}", part(of)),
+        Parameter::Lobing { order, part: of, shared: true } => format!("lobing and ring form {order} {}", part(of)),
+        Parameter::Form { order, part: of } => format!("ring form {order} {}", part(of)),
+        Parameter::Effect { effect } => format!("effect {effect}"),
     }
 }

@@ -2,6 +2,7 @@
 
 use runout_core::{
     Error, Result,
+    consistency::Check,
     model::{
         Effect, Fit, Setting,
         closed_loop::{self, Closed, Settings},
@@ -15,7 +16,8 @@ use runout_core::{
 
 use crate::{
     config::TouchProbeConfig,
-    design::{Content, Design, Noise, Parameter},
+    consistency::structure,
+    design::{Content, Design, Noise, Parameter, name},
     effects::{Missing, highest},
     second_order::SecondOrder,
     separate::{Prepared, TouchProbe},
@@ -29,8 +31,6 @@ const MOST_ORDERS: usize = 5;
 const MOST_ADDED: usize = 9;
 /// Share of a column outside the span of those before it, below which it is none of its own.
 const INDEPENDENT: f64 = 1e-7;
-/// Standard deviations of χ² per degree of freedom that are more than chance.
-const CHANCE: f64 = 4.0;
 /// Amplitude of an order against what the second order makes of it, below which it is not believed: the latter is known to its
 /// size only.
 const SECOND_ORDER: f64 = 3.0;
@@ -126,9 +126,13 @@ impl TouchProbe {
             values: weigh(prepared.readings_um()),
             unit: "um".into(),
             std: (weights.noise != Noise::Residual).then_some(scale),
+            std_dof: match weights.noise {
+                Noise::Repeats(dof) => Some(dof as f64),
+                _ => None,
+            },
             group,
             groups,
-            ..Observations::default()
+            structure: structure(&self.0, touches),
         };
         let object = points.input.display().to_string();
         let model = LinearTerms::new(observations, declared.collect(), terms.collect())
@@ -183,8 +187,10 @@ impl TouchProbe {
         let (_, mut after) = self.fitted_outcome(prepared, missing, &content(missing, &diagnosis), &readings)?;
         diagnosis.moved = moved(&declared, &after);
         self.of_mean(&mut diagnosis, &after);
-        if let Noise::Repeats(dof) = prepared.weights.noise {
-            more_than_repeats(&mut diagnosis, &fit, dof);
+        diagnosis.consistency.clone_from(&after.checks);
+        if diagnosis.consistency.iter().any(Check::bars_verdict) && diagnosis.verdict != Verdict::Unexplained {
+            diagnosis.verdict = Verdict::Unexplained;
+            diagnosis.unexplained.extend(fit.unexplained());
         }
         let [before, left] = [&before, &fit].map(|fit| in_order(terms, prepared, fit));
         if !diagnosis.unexplained.is_empty() {
@@ -274,20 +280,6 @@ impl TouchProbe {
     }
 }
 
-/// Repeats determine the noise well: more than chance makes of it is unexplained, also below the limit for noise that is only stated.
-fn more_than_repeats(diagnosis: &mut Diagnosis, fit: &LinearFit, noise_dof: usize) {
-    let left = fit.remainder();
-    let std = (2.0 / left.dof.max(1) as f64 + 2.0 / noise_dof.max(1) as f64).sqrt();
-    if left.chi2_per_dof() > 1.0 + CHANCE * std && diagnosis.verdict != Verdict::Unexplained {
-        diagnosis.verdict = Verdict::Unexplained;
-        diagnosis.unexplained.extend(fit.unexplained());
-    }
-    // Passes that are far worse than the others make the scatter of repeats: it is then no noise.
-    if !diagnosis.unexplained.is_empty() {
-        diagnosis.verdict = Verdict::Unexplained;
-    }
-}
-
 /// The columns that are not in the span of those before them.
 fn independent(columns: Vec<Vec<f64>>) -> Vec<Option<Vec<f64>>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
@@ -308,18 +300,6 @@ fn independent(columns: Vec<Vec<f64>>) -> Vec<Option<Vec<f64>>> {
         })
     });
     kept.collect()
-}
-
-fn name(config: &TouchProbeConfig, parameter: &Parameter) -> String {
-    let part = |part: &Part| if *part == Part::Cosine { "cosine" } else { "sine" };
-    match parameter {
-        Parameter::Mean => "mean pre-travel".into(),
-        Parameter::Centre { setup, axis } => format!("centre {} of {}", ["x", "y"][*axis], config.setups[*setup].id),
-        Parameter::Lobing { order, part: of, shared: false } => format!("lobing {order} {}", part(of)),
-        Parameter::Lobing { order, part: of, shared: true } => format!("lobing and ring form {order} {}", part(of)),
-        Parameter::Form { order, part: of } => format!("ring form {order} {}", part(of)),
-        Parameter::Effect { effect } => format!("effect {effect}"),
-    }
 }
 
 /// What the final fit holds: effects that were added, of a confounded set all members, so that what depends on the choice has a

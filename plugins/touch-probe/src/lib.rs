@@ -6,7 +6,7 @@
 //! of a probe on three seats.
 
 mod config;
-mod correlation;
+mod consistency;
 mod design;
 mod diagnose;
 mod effects;

@@ -12,10 +12,10 @@ const DRIFT_DEGREE: i32 = 3;
 /// Degrees of freedom from which on repeats determine the noise.
 const FEWEST: usize = 8;
 
-/// The standard deviation of each touch.
-pub(crate) fn weights(touches: &mut Touches) -> Weights {
+/// The standard deviation of each touch; touches that are not like the others are left out of it.
+pub(crate) fn weights(touches: &mut Touches, unlike: &[usize]) -> Weights {
     let stated: Option<Vec<f64>> = touches.all.iter().map(|touch| touch.std_um).collect();
-    let repeated = repeatability(touches);
+    let repeated = repeatability(touches, unlike);
     if let Some(std_um) = stated {
         let weights = Weights { std_um, noise: Noise::Stated };
         if let Some((found, dof)) = repeated {
@@ -45,11 +45,11 @@ pub(crate) fn weights(touches: &mut Touches) -> Weights {
 
 /// Scatter of touches of one direction in one setup, after a drift of radius and centre that is common to all; with its degrees
 /// of freedom.
-fn repeatability(touches: &Touches) -> Option<(f64, usize)> {
+fn repeatability(touches: &Touches, unlike: &[usize]) -> Option<(f64, usize)> {
     let all = &touches.all;
     let groups = 1 + all.iter().map(|touch| touch.direction).max()?;
     let mut members = vec![Vec::new(); groups];
-    for (row, touch) in all.iter().enumerate() {
+    for (row, touch) in all.iter().enumerate().filter(|(row, _)| !unlike.contains(row)) {
         members[touch.direction].push(row);
     }
     members.retain(|rows| rows.len() > 1);

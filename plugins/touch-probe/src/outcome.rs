@@ -316,24 +316,8 @@ impl Found<'_> {
         if self.fit.solved.dof == 0 {
             remarks.push("as many parameters as touches: nothing is left for a residual".into());
         }
-        if let Some(correlation) = self.fit.correlation {
-            remarks.push(format!(
-                "touches that follow one another are correlated by {correlation:.2}: noise that varies slowly, a drift, or an order above \
-                 those declared. The stated uncertainties include a correlation of this size that decays with the touches between; evidence \
-                 of effects that vary slowly does not"
-            ));
-        }
         if self.weights.noise != Noise::Residual {
             remarks.extend(far_below_noise(self.fit.chi2_per_dof, self.fit.solved.dof));
-        }
-        let dof = self.fit.solved.dof.max(1) as f64;
-        if self.fit.chi2_per_dof > 1.0 + 4.0 * (2.0 / dof).sqrt() {
-            remarks.push(format!(
-                "the residual is {:.1} times the noise (χ² per degree of freedom {:.2}): uncertainties are widened by as much, and \
-                 `diagnose` looks for the cause",
-                self.fit.chi2_per_dof.sqrt(),
-                self.fit.chi2_per_dof
-            ));
         }
         let centres = self.touches.setups.iter().map(|setup| {
             let [x, y] = self.touches.centre_um[*setup];

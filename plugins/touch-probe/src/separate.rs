@@ -2,6 +2,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::refuted_by,
     fault::Fault,
     model::diagnosis::LostOrders,
     pipeline::{Context, StageConfig},
@@ -112,6 +113,10 @@ impl PointSeparator for TouchProbe {
         of_ring.then_some(EvaluableKind::ClosedProfiles).into_iter().collect()
     }
 
+    fn is_one_section(&self) -> bool {
+        true
+    }
+
     fn notes(&self) -> Vec<String> {
         let config = &self.0;
         let all: Vec<usize> = (0..config.setups.len()).collect();
@@ -193,7 +198,8 @@ impl TouchProbe {
     /// Touches with angles and readings from the centres of the rings.
     pub(crate) fn prepare(&self, points: &Points) -> Result<Prepared> {
         let mut touches = Touches::new(points, &self.0)?;
-        let mut weights = weights(&mut touches);
+        let mut weights = weights(&mut touches, &[]);
+        let mut unlike = Vec::new();
         for pass in 0..RECENTRED {
             let prepared = Prepared { touches: touches.clone(), weights: weights.clone() };
             let fit = self.fit(&prepared, &[], &Content::declared(), &prepared.readings_um());
@@ -209,10 +215,11 @@ impl TouchProbe {
                 })
             });
             touches.recentre(&moved.collect::<Vec<_>>());
+            unlike = fit.unlike.map_or_else(Vec::new, |unlike| unlike.rows);
         }
         // Repeats scatter by what a displaced centre leaves of the directions' differences.
         let remarks = touches.remarks.len();
-        weights.clone_from(&crate::noise::weights(&mut touches));
+        weights.clone_from(&crate::noise::weights(&mut touches, &unlike));
         touches.remarks.truncate(remarks);
         Ok(Prepared { touches, weights })
     }
@@ -225,7 +232,10 @@ impl TouchProbe {
         readings_um: &[f64],
     ) -> Fitted {
         let all: Vec<usize> = (0..readings_um.len()).collect();
-        Design::new(&self.0, &prepared.touches, missing, content).fit(readings_um, &prepared.weights, &all)
+        let design = Design::new(&self.0, &prepared.touches, missing, content);
+        let mut fit = design.fit(readings_um, &prepared.weights, &all);
+        fit.set_apart(&prepared.weights, &all);
+        fit
     }
 
     fn has_enough(&self, points: &Points, prepared: &Prepared, fit: &Fitted) -> Result<()> {
@@ -257,10 +267,14 @@ impl TouchProbe {
         content: &Content,
         readings_um: &[f64],
     ) -> Result<(Fitted, Outcome)> {
-        let fit = self.fit(prepared, missing, content, readings_um);
+        let mut fit = self.fit(prepared, missing, content, readings_um);
         let Prepared { touches, weights } = prepared;
+        let checks = fit.judge(&self.0, touches, weights);
         let ranges = ranges(&self.0, touches, missing, content, readings_um, weights);
-        let outcome = Found { config: &self.0, touches, fit: &fit, weights, ranges }.outcome()?;
+        let mut outcome = Found { config: &self.0, touches, fit: &fit, weights, ranges }.outcome()?;
+        let refuted = refuted_by(&checks);
+        outcome.values = outcome.values.into_iter().map(|value| value.refuted_by(refuted.clone())).collect();
+        outcome.checks = checks;
         Ok((fit, outcome))
     }
 }

@@ -61,6 +61,16 @@ impl Touches {
         let mut remarks = Vec::new();
         let places = places(&column, &missing, &mut remarks)?;
         let count = places.len();
+        if let Some(row) =
+            places.iter().position(|[x, y]| x.hypot(*y).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater))
+        {
+            let problem = format!(
+                "row {}, of setup `{}`, reads 0 mm from the nominal centre: it is no touch",
+                row + 1,
+                labels[row]
+            );
+            return Err(Error::new("read", object(), problem).help("take out the rows of touches that were not made"));
+        }
         let setups = labels.iter().map(|label| {
             config.setups.iter().position(|setup| setup.id == *label).ok_or_else(|| {
                 let known = known_names(label, config.setups.iter().map(|setup| setup.id.as_str()));

@@ -107,7 +107,9 @@ fn correlated_touches_are_remarked_and_widen() {
                 *radius += 1e-3 * noise_um;
             }
             let outcome = config(&scenario, 15, None).separate(&points).unwrap();
-            warned[kind] += usize::from(outcome.remarks.iter().any(|remark| remark.contains("are correlated by")));
+            warned[kind] += usize::from(
+                outcome.checks.iter().any(|check| check.finding.contains("depend on each other along time")),
+            );
             let mean = outcome.values.iter().find(|value| value.symbol == "pretravel_mean").unwrap();
             squares[kind] += ((mean.value.unwrap() - truth) / mean.std.unwrap()).powi(2);
         }

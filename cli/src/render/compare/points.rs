@@ -24,10 +24,7 @@ pub(crate) fn page(mut page: Page, comparison: &Comparison) -> Page {
     let refused: Vec<String> =
         comparison.refused.iter().map(|refusal| format!("{}: {}", refusal.method, refusal.reason)).collect();
     page.bullets("Refused", &refused);
-    let notes = comparison.methods.iter().flat_map(|method| {
-        method.notes.iter().map(|note| format!("{}: {note}", method.method)).collect::<Vec<String>>()
-    });
-    page.bullets("Warnings and notes", &notes.collect::<Vec<String>>());
+    page.warnings(&super::notes(comparison));
     page
 }
 

@@ -44,6 +44,7 @@ fn at_the_floor() -> Diagnosis {
         lost_orders: Some(LostOrders::of([("form", vec![]), ("motion", vec![1])])),
         truth: None,
         warnings: vec![],
+        notes: vec![],
         outputs: vec![],
     }
 }
@@ -115,6 +116,7 @@ fn diagnosed() -> Diagnosis {
         }],
         truth: Some(Truth { form_rms_error_um: step(0.0937, 0.0081) }),
         warnings: vec!["the speed is 3 % off the stated one".into()],
+        notes: vec![],
         outputs: vec!["out/diagnosed/form.parquet".into(), "out/diagnosed/diagnosis.json".into()],
         ..at_the_floor()
     }

@@ -4,7 +4,7 @@ use runout_core::{standards::Value, summary::StationSummary};
 
 use super::{unit, with_uncertainty};
 use crate::render::{
-    number::{lacking, significant, spread},
+    number::{lacking, place, significant, spread},
     page::Page,
     table::Table,
 };
@@ -43,9 +43,9 @@ pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
     let places: Vec<f64> = stations.iter().filter_map(|station| station.motion_z_mm).collect();
     let at = match spread(places) {
         Some([low, _, high]) if low < high => {
-            format!(", radial at z {} to {} mm", significant(low, 5), significant(high, 5))
+            format!(", radial at z {} to {} mm", place(low), place(high))
         }
-        Some([low, ..]) => format!(", radial at z = {} mm", significant(low, 5)),
+        Some([low, ..]) => format!(", radial at z = {} mm", place(low)),
         None => String::new(),
     };
     page.headed_table(format_args!("Error motion of the axis about {about}{at}, peak to valley and rms{of}"), &table);

@@ -2,7 +2,7 @@
 
 use runout_core::summary::NamedValue;
 
-use super::{described, unit};
+use super::{described, mark, unit};
 use crate::render::{
     number::{significant, with_std},
     page::Page,
@@ -87,9 +87,10 @@ fn name(value: &NamedValue) -> String {
 }
 
 fn number(value: &NamedValue) -> String {
-    match (value.value, value.std) {
+    let number = match (value.value, value.std) {
         (Some(value), Some(std)) => with_std(value, Some(std)),
         (Some(value), None) => significant(value, DIGITS),
         (None, _) => "not known".into(),
-    }
+    };
+    number + mark(value.refuted_by.as_ref())
 }

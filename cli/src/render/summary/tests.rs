@@ -34,6 +34,7 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
         weakened_above_upr: None,
         absent_above_upr: None,
         no_uncertainty: None,
+        refuted_by: None,
         filter: "none".into(),
         reference: "LSCI".into(),
         coverage: 1.0,
@@ -64,6 +65,7 @@ fn motion_values(size: f64) -> Vec<Value> {
         weakened_above_upr: None,
         absent_above_upr: None,
         no_uncertainty: None,
+        refuted_by: None,
         filter: "none".into(),
         reference: reference.into(),
         coverage: 1.0,
@@ -127,6 +129,7 @@ fn summary(stations: usize) -> Summary {
             meetings: vec![meeting],
         }),
         outputs: vec!["out/form.parquet".into()],
+        warnings: (0..stations).map(|index| format!("s{index:02}: the speed is 3 % off the stated one")).collect(),
         ..Summary::default()
     }
 }

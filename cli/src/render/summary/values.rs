@@ -24,11 +24,11 @@ pub(crate) fn part(page: &mut Page, summary: &Summary) {
     page.headed_table("The whole part", &table);
 }
 
-/// What was found of each limit, by its worst value.
+/// What was found of each limit, by the worst of the values that decide it.
 pub(crate) fn limits(page: &mut Page, summary: &Summary) {
     let mut table = Table::new(1, ["limit", "values", "proven", "the worst", "95 % interval", "decision"]);
     for limit in &summary.limits {
-        let worst = worst(limit);
+        let worst = deciding(limit);
         let proven = limit.values.iter().filter(|value| value.decision == Decision::Conforms).count();
         let interval = worst.and_then(|value| value.interval_95);
         table.row([
@@ -67,15 +67,17 @@ fn decided(limit: &LimitSummary, worst: Option<&LimitValue>) -> String {
     }
 }
 
-/// The value nearest to a limit, or farthest beyond it.
-fn worst(limit: &LimitSummary) -> Option<&LimitValue> {
+/// Of the values that the decision follows from, the one nearest to a limit, or farthest beyond it: of an undecided limit a value that is
+/// undecided itself, so that its reason is that of the decision.
+fn deciding(limit: &LimitSummary) -> Option<&LimitValue> {
     let room = |value: &LimitValue| {
         let [from, to] = value.interval_95.unwrap_or([value.value; 2]);
         let above = limit.limit.lower.map_or(f64::INFINITY, |lower| from - lower);
         let below = limit.limit.upper.map_or(f64::INFINITY, |upper| upper - to);
         above.min(below)
     };
-    limit.values.iter().min_by(|a, b| room(a).total_cmp(&room(b)))
+    let decide = limit.values.iter().filter(|value| value.decision == limit.decision);
+    decide.min_by(|a, b| room(a).total_cmp(&room(b)))
 }
 
 /// "s31, section a, MZCI, 5.31".
@@ -85,4 +87,51 @@ fn place(value: &LimitValue) -> String {
     let words =
         [value.station.clone(), section, Some(value.reference.clone()), filter, Some(significant(value.value, 4))];
     words.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use runout_core::summary::Limit;
+
+    use super::*;
+
+    fn value(interval_95: [f64; 2], decision: Decision, missing: Option<&str>) -> LimitValue {
+        LimitValue {
+            station: None,
+            section: None,
+            reference: "MZCI".into(),
+            filter: "none".into(),
+            band_upr: [2, 63],
+            value: 0.5 * (interval_95[0] + interval_95[1]),
+            interval_95: Some(interval_95),
+            within: true,
+            decision,
+            missing: missing.map(str::to_owned),
+        }
+    }
+
+    /// The value nearest to the limit keeps it; another one is undecided, and says why.
+    #[test]
+    fn the_reason_of_a_limit_is_that_of_a_value_that_decides_it() {
+        let limit: Limit = toml::from_str("symbol = 'RONt'\nupper = 7.0\nunit = 'um'").unwrap();
+        let near = value([6.8, 6.9], Decision::Conforms, None);
+        let lacks = value([5.1, 5.2], Decision::Undecided, Some("its filter passes more than there is"));
+        let covers = value([6.9, 7.1], Decision::Undecided, None);
+        let beyond = value([7.2, 7.3], Decision::DoesNotConform, None);
+        for (values, decision, said) in [
+            (vec![near.clone(), lacks.clone()], Decision::Undecided, "undecided: its filter passes more than there is"),
+            (vec![near.clone(), lacks, covers], Decision::Undecided, "undecided: the interval holds the limit"),
+            (vec![near.clone(), beyond], Decision::DoesNotConform, "does not conform"),
+            (vec![near], Decision::Conforms, "conforms"),
+            (Vec::new(), Decision::Undecided, "undecided: no value"),
+        ] {
+            let document = serde_json::json!({ "limit": limit, "decision": decision, "values": values });
+            let summary: LimitSummary = serde_json::from_value(document).unwrap();
+            let deciding = deciding(&summary);
+            assert!(deciding.is_none_or(|value| value.decision == decision));
+            assert_eq!(decided(&summary, deciding), said);
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{Data, HeldOut, subtract};
+use super::{Data, HeldOut, Observations, subtract};
 use crate::{
     Bias, Effect, Fit, Outcome, Remainder, Setting,
     diagnosis::Unexplained,
@@ -57,20 +57,21 @@ impl LinearFit {
             let weights = self.joint.weights();
             let mut residual = self.residual();
             self.joint.remove_from(&mut residual);
+            let Observations { std, std_dof, unit, .. } = &self.data.observations;
+            let known_from = std_dof.unwrap_or(f64::INFINITY);
             let fit = consistency::LinearFit {
                 residual: &residual,
                 basis: self.joint.columns(),
                 names: &names,
                 weights: &weights,
-                noise: self.data.observations.std.map(|std| (std, f64::INFINITY)),
-                unit: &self.data.observations.unit.replace("um", "µm"),
+                noise: std.map(|std| (std, known_from)),
+                unit: &unit.replace("um", "µm"),
             };
             let mut judgement = judge(fit, &self.data.structure);
             if self.remainder.noise_is_known() {
                 let dof = self.remainder.dof as f64;
-                judgement
-                    .checks
-                    .insert(0, consistency::linear::residual(self.remainder.chi2_per_dof(), dof, f64::INFINITY));
+                let left = consistency::linear::residual(self.remainder.chi2_per_dof(), dof, known_from);
+                judgement.checks.insert(0, left);
             }
             judgement
         })

@@ -12,24 +12,24 @@ use super::{
     evaluate::Group,
     hidden_readings,
     observer::Observer,
-    point_run::PointResult,
+    point_run::{self, PointResult},
     record_reader::{RecordReader, separate},
     result::{Evaluation, complete, true_error},
     result_writer::{Finished, ResultWriter},
-    run::{projections, speeds_and_turns, with_motion_values},
-    undeclared::Undeclared,
+    run::{projections, with_motion_values},
+    warnings::{DeclaredStations, TurnsOfAll},
 };
 use crate::{
     atomic_file::PendingFile,
     points::Points,
-    stage::{PointModel, Source, Station, StationModel, StationSeparator},
+    stage::{PointModel, PointSeparator, Source, Station, StationModel, StationSeparator},
 };
 use runout_closed_loop::{
     Effect, Setting, closed_loop,
     diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
 };
 use runout_error::{Error, ErrorKind, Result};
-use runout_turning::{mains, profile::Profile, separation::Quantity};
+use runout_turning::{profile::Profile, separation::Quantity};
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form. These do not
 /// replace those of a run: they go below `diagnosed/`, or where `[diagnose] out` says.
@@ -45,7 +45,7 @@ pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &d
     match (&source, &pipeline.route) {
         (Source::Points(points), Route::Points { separator, .. }) => {
             let model = separator.model().ok_or_else(|| no_model(&pipeline.separator))?;
-            diagnose_points(pipeline, points, model, observer)
+            diagnose_points(pipeline, points, (&**separator, model), observer)
         }
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator, model: Some(model) }) => {
             let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
@@ -104,9 +104,9 @@ fn diagnose_turns(
     writer.corrected_for(corrections(&changes));
     let rig = pipeline.diagnose.write_rig.clone();
     diagnosis.warnings.extend(rig.as_ref().and_then(|path| corrected_rig::left_out(&changes, path)));
-    let profiles = stations.iter().flat_map(|station| speeds_and_turns(&station.profiles));
-    let notes = mains::whole_orders(&profiles.collect::<Vec<_>>());
-    let (mut errors, mut undeclared) = ([Vec::new(), Vec::new()], Undeclared::default());
+    let mut errors = [Vec::new(), Vec::new()];
+    // As the rig is declared, and with the effects found.
+    let (mut as_declared, mut turns) = (DeclaredStations::default(), TurnsOfAll::default());
     let (radius_mm, several) = (line.rig.part_radius_mm, stations.len() > 1);
     let looked_at = pipeline.evaluate.first_ront();
     for (index, (station, (before, after))) in
@@ -117,7 +117,8 @@ fn diagnose_turns(
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let complete = |separation, profiles, evaluate| {
-            let evaluation = Evaluation { evaluate, radius_mm, rig: Some(line.rig) };
+            let evaluation =
+                Evaluation { evaluate, radius_mm, rig: Some(line.rig), stations: recording.stations().len() };
             complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone(), evaluation)
         };
         let declared = complete(before, Vec::new(), &looked_at);
@@ -128,10 +129,10 @@ fn diagnose_turns(
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);
             errors.extend(forms.filter_map(|form| true_error(result, form)));
         }
-        undeclared.take(&result);
+        as_declared.take(&declared, line.rig);
+        turns.take(&result, line.rig);
         writer.take(&result, pipeline.rig.as_ref())?;
     }
-    diagnosis.warnings.extend(undeclared.warning());
     let rms = |errors: &Vec<f64>| {
         let squares: f64 = errors.iter().map(|error| error * error).sum();
         (!errors.is_empty()).then(|| (squares / errors.len() as f64).sqrt())
@@ -140,20 +141,17 @@ fn diagnose_turns(
         diagnosis.truth = Some(Truth { form_rms_error_um: Step { before: rms(&errors[0]), after: rms(&errors[1]) } });
     }
     let surface = writer.build_surface(radius_mm)?;
-    diagnosis.warnings.extend(line.rig.remarks());
-    let mut remarks = recording.remarks();
-    remarks.extend(diagnosis.warnings.iter().cloned());
+    writer.note(turns.notes());
+    let remarks = recording.remarks().into_iter().chain(turns.warnings(line.rig)).collect();
     if pipeline.evaluate.has(Group::ErrorMotion) && !diagnosis.added.is_empty() {
-        remarks.push(UNCORRECTED_SPREAD.into());
+        writer.note(vec![UNCORRECTED_SPREAD.into()]);
     }
-    writer.note(notes.clone());
-    diagnosis.warnings.extend(notes);
-    writer.diagnosed(&diagnosis);
+    writer.diagnosed(diagnosis, as_declared.warnings(line.rig));
     let mut finished = writer.finish(inputs, remarks, surface.as_ref())?;
     if let Some(path) = rig {
         finished.add(corrected_rig::pending(path, pipeline, &changes)?);
     }
-    commit(finished, pipeline.diagnosis_path(), diagnosis)
+    commit(finished, pipeline.diagnosis_path())
 }
 
 /// Refuses to begin what needs more memory than the pipeline allows: as many stations like the first one.
@@ -181,7 +179,7 @@ const MOST_ADDED: usize = 40;
 fn diagnose_points(
     pipeline: &Pipeline,
     points: &Points,
-    model: &dyn PointModel,
+    (separator, model): (&dyn PointSeparator, &dyn PointModel),
     observer: &dyn Observer,
 ) -> Result<Diagnosis> {
     spare_inputs(&pipeline.diagnosed_outputs(), &points.inputs())?;
@@ -195,14 +193,11 @@ fn diagnose_points(
     let known = known(&effects, &settings.known, |_| Vec::new());
     let found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
     let effects = corrections(&changes(known, &found.diagnosis));
-    let mut outcome = found.after;
-    outcome.remarks.splice(0..0, found.diagnosis.warnings.iter().cloned());
-    let mut diagnosis = found.diagnosis;
-    diagnosis.lost_orders.clone_from(&outcome.lost_orders);
-    diagnosis.warnings.extend(outcome.notes.iter().cloned());
-    let result = PointResult { outcome, remarks: None, effects, diagnosis: Some(&diagnosis) };
-    let finished = result.write(pipeline, &pipeline.diagnosed, points, observer)?;
-    commit(finished, pipeline.diagnosis_path(), diagnosis)
+    let of_run = point_run::findings(pipeline, points, separator)?;
+    let diagnosis = Diagnosis { lost_orders: found.after.lost_orders.clone(), ..found.diagnosis };
+    let diagnosis = Some((diagnosis, of_run));
+    let result = PointResult { outcome: found.after, remarks: None, effects, diagnosis };
+    commit(result.write(pipeline, &pipeline.diagnosed, points, observer)?, pipeline.diagnosis_path())
 }
 
 /// Effects that are declared as known, each with the lines that declare it in a rig.
@@ -241,7 +236,9 @@ fn corrections(changes: &[Change]) -> Vec<Correction> {
 }
 
 /// Gives the exports their names, and the diagnosis, which lists them, with them.
-fn commit(exports: Finished, path: Option<PathBuf>, mut diagnosis: Diagnosis) -> Result<Diagnosis> {
+fn commit(mut exports: Finished, path: Option<PathBuf>) -> Result<Diagnosis> {
+    let missing = || Error::new("diagnose", "the pipeline", "the result has no diagnosis");
+    let mut diagnosis = exports.diagnosis().ok_or_else(missing)?;
     diagnosis.outputs = exports.outputs();
     diagnosis.outputs.extend(path.clone());
     let written = path.map(|path| pending(path, &diagnosis)).transpose()?;

@@ -1,5 +1,6 @@
 //! TOML text with places: a file, the files that it includes and overrides, read as one document.
 
+mod meaning;
 mod table;
 
 use runout_error::fault::{Diagnostic, Fault, Place};
@@ -9,6 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub(super) use meaning::inline;
 pub use table::{Table, checked, read, read_besides, resolve, table, table_text};
 pub(super) use table::{required, tables};
 use toml::{

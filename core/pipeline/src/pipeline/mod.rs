@@ -23,6 +23,7 @@ mod steadiness;
 mod tables;
 mod turn_tables;
 mod undeclared;
+mod warnings;
 
 pub use config::{Candidate, INCLUDE_KEY, Pipeline, PlainTable, Route, choice, pipeline_schema, plain_tables};
 pub use registry::{Catalogue, Context, Plugin, Registry, StageConfig};

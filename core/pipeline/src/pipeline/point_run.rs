@@ -3,7 +3,7 @@
 use super::{
     config::{Pipeline, exports::spare_inputs},
     evaluate::Evaluated,
-    observer::Observer,
+    observer::{Observer, Silent},
     result::{Evaluation, complete},
     result_writer::{Finished, ResultWriter},
 };
@@ -25,9 +25,17 @@ pub(super) fn run(
     observer: &dyn Observer,
 ) -> Result<Finished> {
     spare_inputs(&pipeline.outputs(), &points.inputs())?;
+    declared(separator, points)?.write(pipeline, &pipeline.exporters, points, observer)
+}
+
+/// What a run of these points warns of, without its files.
+pub(super) fn findings(pipeline: &Pipeline, points: &Points, separator: &dyn PointSeparator) -> Result<Vec<String>> {
+    Ok(declared(separator, points)?.write(pipeline, &[], points, &Silent)?.into_findings())
+}
+
+fn declared<'a>(separator: &'a dyn PointSeparator, points: &Points) -> Result<PointResult<'a>> {
     let outcome = separator.separate(points)?;
-    let result = PointResult { outcome, remarks: Some(separator), effects: Vec::new(), diagnosis: None };
-    result.write(pipeline, &pipeline.exporters, points, observer)
+    Ok(PointResult { outcome, remarks: Some(separator), effects: Vec::new(), diagnosis: None })
 }
 
 /// A result of points, to be written.
@@ -37,8 +45,8 @@ pub(super) struct PointResult<'a> {
     pub remarks: Option<&'a dyn PointSeparator>,
     /// Effects that the result is corrected for.
     pub effects: Vec<Correction>,
-    /// What the closed loop found.
-    pub diagnosis: Option<&'a Diagnosis>,
+    /// What the closed loop found, and what a run warns of.
+    pub diagnosis: Option<(Diagnosis, Vec<String>)>,
 }
 
 impl PointResult<'_> {
@@ -51,12 +59,11 @@ impl PointResult<'_> {
     ) -> Result<Finished> {
         let Outcome { convention, tables, values, checks, evaluables, lost_orders, mut remarks, notes } = self.outcome;
         check_declared(&evaluables, &pipeline.route.evaluables())?;
-        let mut evaluated = Evaluated::of(&evaluables, &pipeline.evaluate)?;
-        evaluated.refute(refuted_by(&checks).as_deref());
+        let evaluated = Evaluated::of(&evaluables, &pipeline.evaluate, refuted_by(&checks).as_deref())?;
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
-        if let Some(diagnosis) = self.diagnosis {
-            writer.diagnosed(diagnosis);
+        if let Some((diagnosis, of_run)) = self.diagnosis {
+            writer.diagnosed(diagnosis, of_run);
         }
         writer.take_values(values, evaluated, convention);
         writer.take_checks(checks);
@@ -67,7 +74,7 @@ impl PointResult<'_> {
         let mut surface = None;
         if let Some(Form { sections, radius_mm }) = evaluables.into_iter().find_map(Evaluable::into_form) {
             observer.begin(sections.len());
-            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None };
+            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None, stations: 1 };
             for separation in sections {
                 // As many angles as the surface has, or a multiple of them that the highest order fits on.
                 let angles = pipeline.surface.angles;

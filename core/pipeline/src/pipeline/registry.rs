@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use toml::{Spanned, de::DeTable};
 
-use super::document::{self, Table};
+use super::document::{self, Table, inline};
 use crate::{
     effects::EffectCatalogue,
     stage::{Check, Exporter, Loader, Preprocessor, Separator, Simulator},
@@ -180,13 +180,4 @@ impl<S> Catalogue<S> {
         let plugin = self.plugins.iter().find(|plugin| plugin.name == name)?;
         Some((plugin.build)(&Spanned::new(0..0, DeTable::new()), context))
     }
-}
-
-/// The schema of a type, without references.
-pub(super) fn inline<T: JsonSchema>() -> Schema {
-    let settings = schemars::generate::SchemaSettings::default().with(|settings| {
-        settings.inline_subschemas = true;
-        settings.meta_schema = None;
-    });
-    settings.into_generator().into_root_schema_for::<T>()
 }

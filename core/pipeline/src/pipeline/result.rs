@@ -3,6 +3,7 @@
 use super::evaluate::{Evaluate, missing_circles, section_values};
 use runout_consistency::refuted_by;
 use runout_numerics::{Complex64, fourier::Fourier};
+use runout_standards::Value;
 use runout_turning::station::StationResult;
 use runout_turning::{
     measurement::StationTruth,
@@ -17,6 +18,8 @@ pub(super) struct Evaluation<'a> {
     pub evaluate: &'a Evaluate,
     pub radius_mm: f64,
     pub rig: Option<&'a Rig>,
+    /// Stations that are tested alike.
+    pub stations: usize,
 }
 
 /// Adds the standards' values to a separation.
@@ -30,7 +33,7 @@ pub(super) fn complete(
     evaluation: Evaluation,
 ) -> StationResult {
     let (values, motion_values) = (Vec::new(), Vec::new());
-    let Evaluation { evaluate, radius_mm, rig } = evaluation;
+    let Evaluation { evaluate, radius_mm, rig, .. } = evaluation;
     if let Some(rig) = rig {
         let beyond_rad = profiles.iter().map(|profile| profile.bridged_beyond_rad).fold(0.0, f64::max);
         for section in &mut separation.sections {
@@ -44,11 +47,28 @@ pub(super) fn complete(
     let missing = |section: usize| missing_circles(&result, section, evaluate, radius_mm, &result.values[section]);
     let missing: Vec<String> = sections.flat_map(missing).collect();
     result.separation.warnings.extend(missing);
-    if let Some(by) = refuted_by(&result.separation.residual.checks) {
-        let values = result.values.iter_mut().flatten().chain(&mut result.motion_values);
+    judge_among(&mut result, evaluation);
+    mark(result.values.iter_mut().flatten(), &result.separation);
+    result
+}
+
+/// Marks values that the tests of a separation refute.
+pub(super) fn mark<'a>(values: impl Iterator<Item = &'a mut Value>, separation: &Separation) {
+    if let Some(by) = refuted_by(&separation.residual.checks) {
         values.for_each(|value| value.refuted_by = Some(by.clone()));
     }
-    result
+}
+
+/// The tests of the station's readings and of the course of its turns, as one of several stations and captures.
+fn judge_among(result: &mut StationResult, Evaluation { rig, stations, .. }: Evaluation) {
+    let checks = &mut result.separation.residual.checks;
+    for check in checks.iter_mut() {
+        *check = check.clone().among(stations);
+    }
+    for profile in &result.profiles {
+        let setup = rig.and_then(|rig| rig.setups.get(profile.setup)).map_or("", |setup| setup.id.as_str());
+        checks.extend(profile.course.checks.iter().map(|check| check.clone().within(setup)));
+    }
 }
 
 /// True motion [x, y, tilt about x, about y] as a separation reports it at a place along the spindle: x + z·ε_y, y − z·ε_x;
@@ -134,7 +154,7 @@ mod tests {
             warnings: Vec::new(),
         };
         let truth = StationTruth { form_um: Vec::new(), z_um: None, motion: Some([2.0, -0.5, 2.0, 5.0].map(cosine)) };
-        let evaluation = Evaluation { evaluate: &Evaluate::nothing(), radius_mm: 30.0, rig: None };
+        let evaluation = Evaluation { evaluate: &Evaluate::nothing(), radius_mm: 30.0, rig: None, stations: 1 };
         let result = complete("s1".into(), 0.0, 32, separation, Vec::new(), Some(truth), evaluation);
         for quantity in [Quantity::X, Quantity::Y] {
             // Rounding of transforms of values near 1.

@@ -9,14 +9,14 @@ use super::{
     },
     evaluate::{Evaluate, Evaluated, Group, add_areal, add_generatrices, decide, part_summary},
     station_summary::summarise,
-    steadiness::inflated,
     tables::{StationTables, consistency_rows, correction_rows, named_value_rows},
+    warnings::{Warnings, findings, of_checks, of_stations},
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
     height_grid::HeightGrid,
     stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
-    summary::{LostOrders, NamedValue, PartSummary, StationSummary, Summary, SurfaceSummary},
+    summary::{LostOrders, NamedValue, PartSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_consistency::Check;
@@ -67,8 +67,11 @@ pub(super) struct ResultWriter {
     /// Values of open profiles and height maps, for limits.
     evaluated: Evaluated,
     summary: Summary,
+    warnings: Warnings,
     /// What the closed loop found.
     diagnosis: Option<Diagnosis>,
+    /// What a run of the same pipeline warns of, where this is another result.
+    of_run: Vec<String>,
     summary_path: Option<PathBuf>,
     /// Inputs besides what is loaded.
     named_files: Vec<PathBuf>,
@@ -119,7 +122,9 @@ impl ResultWriter {
             heights: None,
             evaluated: Evaluated::default(),
             summary: begun(pipeline),
+            warnings: noted(pipeline),
             diagnosis: None,
+            of_run: Vec::new(),
             summary_path: summary_path(exporters, &pipeline.tables),
             named_files: pipeline.named_files.clone(),
             in_data_set: pipeline.in_data_set,
@@ -200,9 +205,10 @@ impl ResultWriter {
         self.summary.effects = effects;
     }
 
-    /// Takes what the closed loop found.
-    pub(super) fn diagnosed(&mut self, diagnosis: &Diagnosis) {
-        self.diagnosis = Some(diagnosis.clone());
+    /// Takes what the closed loop found, and what a run of the same pipeline warns of.
+    pub(super) fn diagnosed(&mut self, diagnosis: Diagnosis, of_run: Vec<String>) {
+        self.diagnosis = Some(diagnosis);
+        self.of_run = of_run;
     }
 
     /// Takes heights on a plane.
@@ -212,8 +218,7 @@ impl ResultWriter {
 
     /// Takes what the user should know and that is as it should be.
     pub(super) fn note(&mut self, notes: Vec<String>) {
-        self.summary.warnings.extend(notes.iter().cloned());
-        self.summary.notes.extend(notes);
+        self.warnings.note(notes);
     }
 
     /// Takes the orders that points do not separate.
@@ -221,6 +226,22 @@ impl ResultWriter {
         if let Some(lost) = lost {
             self.summary.lost_orders = lost.into();
         }
+    }
+
+    /// Warnings and notes of the summary, and of the diagnosis where there is one: the same.
+    fn gather_warnings(&mut self, remarks: impl Iterator<Item = String>) {
+        let mut warnings = std::mem::take(&mut self.warnings);
+        warnings.note(self.station_tables.remark());
+        warnings.warn(self.diagnosis.iter_mut().flat_map(|diagnosis| std::mem::take(&mut diagnosis.warnings)));
+        warnings.warn(of_checks(&self.summary.consistency, self.summary.stations.is_empty()));
+        warnings.warn(remarks);
+        warnings.warn(of_stations(&self.summary.stations, &self.summary.consistency, self.interrupted));
+        warnings.of_run(std::mem::take(&mut self.of_run));
+        let [all, notes] = warnings.into_parts();
+        if let Some(diagnosis) = &mut self.diagnosis {
+            (diagnosis.warnings, diagnosis.notes) = (all.clone(), notes.clone());
+        }
+        (self.summary.warnings, self.summary.notes) = (all, notes);
     }
 
     /// Completes the exports.
@@ -234,20 +255,12 @@ impl ResultWriter {
         for file in &self.named_files {
             self.summary.provenance.inputs.push(Input::of(file)?);
         }
-        self.summary.warnings.extend(remarks);
-        let left_out = self.station_tables.remark();
-        self.summary.notes.extend(left_out.clone());
-        self.summary.warnings.extend(left_out);
-        let findings = self.summary.consistency.iter().filter(|check| !check.finding.is_empty());
-        let findings: Vec<String> = findings.map(|check| check.finding.clone()).collect();
-        self.summary.warnings.extend(findings);
-        self.summary.warnings.extend(misfit(&self.summary.stations, self.interrupted));
-        self.summary.warnings.extend(inflated(&self.summary.stations));
+        self.summary.refute_part();
         let mut placed = self.summary.placed_values();
         placed.extend(self.evaluated.placed());
         let (limits, unmatched) = decide(self.evaluate.limits(), &placed);
         self.summary.limits = limits;
-        self.summary.warnings.extend(unmatched);
+        self.gather_warnings(remarks.into_iter().chain(unmatched));
         let values = if self.of_form {
             self.station_tables.value_rows(&self.summary)?
         } else {
@@ -277,8 +290,8 @@ impl ResultWriter {
         for export in self.exports {
             complete.extend(export.finish(&completed)?);
         }
-        let Self { summary, summary_path, in_data_set, lock, .. } = self;
-        Ok(Finished { summary, complete, summary_path, in_data_set, lock })
+        let Self { summary, diagnosis, summary_path, in_data_set, lock, .. } = self;
+        Ok(Finished { summary, diagnosis, complete, summary_path, in_data_set, lock })
     }
 }
 
@@ -294,6 +307,7 @@ fn longest_name(rig: Option<&Rig>, stations: &[StationKey]) -> Option<usize> {
 /// Exports that are complete and wait for their names.
 pub(super) struct Finished {
     summary: Summary,
+    diagnosis: Option<Diagnosis>,
     complete: Vec<PendingFile>,
     summary_path: Option<PathBuf>,
     in_data_set: bool,
@@ -306,6 +320,16 @@ impl Finished {
     pub(super) fn outputs(&self) -> Vec<PathBuf> {
         let complete = self.complete.iter().map(PendingFile::destination);
         complete.chain(self.summary_path.as_deref()).map(Into::into).collect()
+    }
+
+    /// What it warns of, where nothing of it is wanted but that.
+    pub(super) fn into_findings(self) -> Vec<String> {
+        findings(self.summary)
+    }
+
+    /// What the closed loop found, with all warnings.
+    pub(super) fn diagnosis(&mut self) -> Option<Diagnosis> {
+        self.diagnosis.take()
     }
 
     /// Adds a file.
@@ -322,7 +346,7 @@ impl Finished {
     pub(super) fn complete(mut self, besides: Option<PendingFile>) -> Result<CompleteFiles> {
         self.complete.extend(besides);
         self.summary.outputs = self.outputs();
-        let Self { summary, complete: mut files, summary_path, in_data_set, lock } = self;
+        let Self { summary, complete: mut files, summary_path, in_data_set, lock, .. } = self;
         if let Some(path) = summary_path {
             let file = PendingFile::new(path)?;
             let text = serde_json::to_vec_pretty(&summary).map_err(|error| file.caused(error))?;
@@ -355,9 +379,6 @@ impl CompleteFiles {
 
 /// A summary of nothing yet.
 fn begun(pipeline: &Pipeline) -> Summary {
-    let notes = pipeline.assessment.as_ref().map(|found| found.notes.clone()).unwrap_or_default();
-    let of_points = pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default();
-    let notes: Vec<String> = notes.into_iter().chain(of_points).collect();
     Summary {
         title: pipeline.title.clone(),
         provenance: Provenance {
@@ -366,28 +387,14 @@ fn begun(pipeline: &Pipeline) -> Summary {
             inputs: Vec::new(),
         },
         lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
-        warnings: notes.clone(),
-        notes,
         ..Summary::default()
     }
 }
 
-/// What a rig that is not as declared looks like: a residual far above what is expected from noise.
-fn misfit(stations: &[StationSummary], interrupted: bool) -> Option<String> {
-    let beyond = stations.iter().filter(|station| station.is_misfit(stations.len()));
-    let count = beyond.clone().count();
-    let worst =
-        beyond.max_by(|a, b| a.chi2_per_dof.unwrap_or_default().total_cmp(&b.chi2_per_dof.unwrap_or_default()))?;
-    let left = worst.residual_rms_um.unwrap_or(f64::NAN);
-    let (chi2, dof) = (worst.chi2_per_dof.unwrap_or(f64::NAN), worst.residual_dof.unwrap_or(0));
-    let decimals = if chi2 < 100.0 { 2 } else { 0 };
-    let bridged =
-        if interrupted { " (or readings go astray where its interruptions are bridged: make them wider)" } else { "" };
-    Some(format!(
-        "at {count} of {} stations the readings contradict each other: χ² per degree of freedom is up to {chi2:.decimals$} ({}, {dof} degrees of \
-         freedom), where noise makes 1, and the fit leaves {left:.4} µm rms; something is not as the rig declares it{bridged}, and the \
-         stated uncertainties, which come from the noise alone, do not cover it. `runout diagnose` looks for the cause",
-        stations.len(),
-        worst.station,
-    ))
+/// What is known without the data: what the layout and the method cannot observe.
+fn noted(pipeline: &Pipeline) -> Warnings {
+    let mut warnings = Warnings::default();
+    warnings.note(pipeline.assessment.iter().flat_map(|found| found.notes.clone()));
+    warnings.note(pipeline.route.point_separator().map(PointSeparator::notes).unwrap_or_default());
+    warnings
 }

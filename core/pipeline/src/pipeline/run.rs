@@ -8,10 +8,9 @@ use super::{
     outdated, point_run,
     read_ahead::write_behind,
     record_reader::{RecordReader, separate},
-    result::{Evaluation, complete},
+    result::{Evaluation, complete, mark},
     result_writer::{CompleteFiles, Finished, ResultWriter},
-    steadiness::Steadiness,
-    undeclared::Undeclared,
+    warnings::TurnsOfAll,
 };
 pub use super::{
     observer::{Observer, Silent},
@@ -25,9 +24,7 @@ use runout_standards::Value;
 use runout_turning::station::StationResult;
 use runout_turning::{
     error_motion::{Centre, ErrorMotion, behind_low_pass, with_jitter_of_marks},
-    mains,
     measurement::Recording,
-    profile::Profile,
     rig::Rig,
     separation::Quantity,
     spread::Projection,
@@ -117,7 +114,12 @@ fn run_turns(
         projections: projections(pipeline, separator, rig),
         alone,
     };
-    let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm: rig.part_radius_mm, rig: Some(rig) };
+    let evaluation = Evaluation {
+        evaluate: &pipeline.evaluate,
+        radius_mm: rig.part_radius_mm,
+        rig: Some(rig),
+        stations: recording.stations().len(),
+    };
     let work = |index, station: Station| {
         let separation = separate(separator, &station, rig)?;
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
@@ -126,12 +128,9 @@ fn run_turns(
         let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
         Ok(with_motion_values(result, &pipeline.evaluate.centres, rig.part_radius_mm))
     };
-    let mut steadiness = Steadiness::default();
-    let (mut speeds, mut undeclared) = (Vec::new(), Undeclared::default());
+    let mut turns = TurnsOfAll::default();
     let mut take = |result: StationResult| {
-        steadiness.take(&result.station, &result.profiles, rig);
-        speeds.extend(speeds_and_turns(&result.profiles));
-        undeclared.take(&result);
+        turns.take(&result, rig);
         writer.take(&result, Some(rig))
     };
     let inputs = if alone {
@@ -139,21 +138,10 @@ fn run_turns(
     } else {
         write_behind(take, |take| line.run(threads, observer, work, take))?
     };
-    let remarks = recording
-        .remarks()
-        .into_iter()
-        .chain(rig.remarks())
-        .chain(steadiness.warnings(rig))
-        .chain(undeclared.warning())
-        .collect();
-    writer.note(mains::whole_orders(&speeds));
+    writer.note(turns.notes());
+    let remarks = recording.remarks().into_iter().chain(turns.warnings(rig)).collect();
     let surface = writer.build_surface(rig.part_radius_mm)?;
     writer.finish(inputs, remarks, surface.as_ref())
-}
-
-/// Speed, in rpm, and turns used of captures whose speed is known.
-pub(super) fn speeds_and_turns(profiles: &[Profile]) -> impl Iterator<Item = (f64, usize)> {
-    profiles.iter().filter_map(|profile| Some((profile.speed_rpm?, profile.turns.used)))
 }
 
 /// How motion follows from the readings of each setup, where error motion values are wanted.
@@ -170,7 +158,8 @@ pub(super) fn projections(pipeline: &Pipeline, separator: &dyn StationSeparator,
 
 /// A station with its error motion values.
 pub(super) fn with_motion_values(result: StationResult, centres: &[Centre], radius_mm: f64) -> StationResult {
-    let motion_values = error_motion_values(&result, centres, radius_mm);
+    let mut motion_values = error_motion_values(&result, centres, radius_mm);
+    mark(motion_values.iter_mut(), &result.separation);
     StationResult { motion_values, ..result }
 }
 

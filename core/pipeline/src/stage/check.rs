@@ -1,7 +1,10 @@
 //! Checks before a measurement: what else is known of the machine, compared with what is planned.
 
 use runout_error::Result;
-use runout_turning::measurement::{Capture, Recording};
+use runout_turning::{
+    mains::Sampled,
+    measurement::{Capture, Recording},
+};
 
 /// Compares a pipeline with knowledge of its own, for `check`. A pipeline names it in `[[check]]`; `run` does not ask it.
 pub trait Check: Send + Sync {
@@ -22,12 +25,13 @@ pub struct Planned<'a> {
 /// Speeds nearer to each other than this are one, relative.
 const SAME_SPEED: f64 = 0.005;
 
-/// Speed, in rpm, and whole turns of each capture of a recording's first station that can be opened and says its speed.
-pub fn speeds_and_turns(recording: &dyn Recording, setups: usize) -> Vec<(f64, usize)> {
+/// How each capture of a recording's first station is sampled that can be opened and says its speed.
+pub fn captures_sampled(recording: &dyn Recording, setups: usize) -> Vec<Sampled> {
     let of = |setup| {
         let stream = recording.open(0, setup).ok()?;
         let capture = stream.capture();
-        Some((speed_rpm(capture)?, capture.marks.len().saturating_sub(1)))
+        let turns = capture.marks.len().saturating_sub(1);
+        Some(Sampled { speed_rpm: speed_rpm(capture)?, turns, rate_hz: capture.sample_rate_hz })
     };
     if recording.stations().is_empty() { Vec::new() } else { (0..setups).filter_map(of).collect() }
 }

@@ -11,7 +11,7 @@ mod preprocessor;
 mod separator;
 mod simulator;
 
-pub use check::{Check, Planned, speeds_and_turns, speeds_of};
+pub use check::{Check, Planned, captures_sampled, speeds_of};
 pub use evaluable::{AxisMotion, Evaluable, EvaluableKind, Form, MotionErrors, OpenProfile, PlaneMap};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};

@@ -55,6 +55,11 @@ pub trait PointSeparator: Send + Sync {
         Vec::new()
     }
 
+    /// Whether its form is that of one section, which makes no surface.
+    fn is_one_section(&self) -> bool {
+        false
+    }
+
     /// Whether [`remarks`](Self::remarks) needs the surface.
     fn needs_surface(&self) -> bool {
         false

@@ -1,6 +1,7 @@
 //! Values with their places: those of form and motion, and those of a domain of its own.
 
 use runout_standards::Value;
+use runout_table::number::ROUNDING;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +55,7 @@ pub struct NamedValue {
 }
 
 impl NamedValue {
-    /// A number under a name, with a unit; what is not finite is null.
+    /// A number under a name, with a unit; what is not finite is null, and so is an uncertainty that is rounding of arithmetic.
     #[must_use]
     pub fn new(symbol: &str, value: f64, std: f64, unit: &str, about: &str) -> Self {
         let known = |number: f64| number.is_finite().then_some(number);
@@ -62,7 +63,7 @@ impl NamedValue {
             symbol: symbol.into(),
             of: None,
             value: known(value),
-            std: known(std),
+            std: known(std).filter(|std| *std == 0.0 || *std > ROUNDING),
             unit: unit.into(),
             about: about.into(),
             interval_95: None,

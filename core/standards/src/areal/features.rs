@@ -1,13 +1,17 @@
 //! Feature parameters (ISO 25178-2:2021, clause 5): hills and dales by watersheds, pruned after Wolf.
 
-use super::HeightMap;
+use super::{HeightMap, bridge::bridged};
 use runout_numerics::threads::both;
 
 /// Peaks or pits of which the mean is S5p or S5v.
 const FIVE: usize = 5;
+/// Share of the map's points that may be bridged, in %: beyond it, hills and dales are those of the bridges.
+const MOST_BRIDGED_PERCENT: f64 = 10.0;
+/// Share of the area that hills (dales) cut by wide holes may have, in %: beyond it, the others do not stand for all.
+const MOST_CUT_PERCENT: f64 = 25.0;
 
-/// Values of the significant hills and dales. Those that reach an open edge of the map, or a gap, are incomplete and
-/// left out.
+/// Values of the significant hills and dales. Narrow holes are bridged. Those that reach an open edge of the map are incomplete and
+/// left out; so are those that a wide hole cuts, with their area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Features {
@@ -37,20 +41,35 @@ pub struct Features {
     pub sdv_mm3: f64,
     /// Mean volume of the hills, in mm³: of a hill, what is above the highest saddle on its border.
     pub shv_mm3: f64,
+    /// Share of the map's points that were bridged, in %.
+    pub bridged_percent: f64,
+    /// Share of the map's area that is wide holes, and hills or dales (what is more) that these cut, in %.
+    pub cut_percent: f64,
 }
 
 impl Features {
     /// Of a map with mean 0; hills and dales lower than `pruning_um` are merged with a neighbour.
     pub(super) fn of(centred: &HeightMap, pruning_um: f64) -> Self {
-        let of = |sign: f64| Relief::new(centred, sign).extremes(pruning_um);
-        let (dales, hills) = both(|| of(1.0), || of(-1.0));
-        let area = centred.area_mm2();
+        let bridged = bridged(centred);
+        let bridged_percent = 100.0 * bridged.points as f64 / centred.heights_um().len() as f64;
+        if bridged_percent > MOST_BRIDGED_PERCENT {
+            return Self { bridged_percent, ..Self::NONE };
+        }
+        let map = &*bridged.map;
+        let of = |sign: f64| Relief::new(map, sign).extremes(pruning_um);
+        let ((dales, cut_dales), (hills, cut_hills)) = both(|| of(1.0), || of(-1.0));
+        let cell_mm2 = map.dx_mm() * map.dy_mm();
+        let cut_mm2 = |points: usize| cell_mm2 * (points + map.missing()) as f64;
+        let cut_percent = 100.0 * cut_mm2(cut_dales.max(cut_hills)) / map.area_mm2();
+        if cut_percent > MOST_CUT_PERCENT {
+            return Self { bridged_percent, cut_percent, ..Self::NONE };
+        }
+        let per_mm2 = |count: usize, cut: usize| count as f64 / (map.area_mm2() - cut_mm2(cut));
         let [s5v, s5p] = [&dales, &hills].map(|found| {
             let mut depths: Vec<f64> = found.iter().map(|extreme| -extreme.depth).collect();
             depths.sort_unstable_by(|a, b| b.total_cmp(a));
             mean(depths.into_iter().take(FIVE))
         });
-        let cell_mm2 = centred.dx_mm() * centred.dy_mm();
         let [sda_mm2, sha_mm2] =
             [&dales, &hills].map(|found| mean(found.iter().map(|one| one.points as f64 * cell_mm2)));
         // µm·mm² to mm³.
@@ -61,8 +80,8 @@ impl Features {
         Self {
             hills: hills.len(),
             dales: dales.len(),
-            spd_per_mm2: hills.len() as f64 / area,
-            svd_per_mm2: dales.len() as f64 / area,
+            spd_per_mm2: per_mm2(hills.len(), cut_hills),
+            svd_per_mm2: per_mm2(dales.len(), cut_dales),
             spc_per_mm,
             svc_per_mm,
             s5p,
@@ -72,7 +91,28 @@ impl Features {
             sha_mm2,
             sdv_mm3,
             shv_mm3,
+            bridged_percent,
+            cut_percent,
         }
+    }
+
+    /// Why there are none, where too much of the map is missing.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let problem = if self.bridged_percent > MOST_BRIDGED_PERCENT {
+            format!(
+                "{:.1} % of the points are missing here and there; {MOST_BRIDGED_PERCENT} % are bridged",
+                self.bridged_percent
+            )
+        } else if self.cut_percent > MOST_CUT_PERCENT {
+            format!(
+                "{:.0} % of the area are holes and what they cut; {MOST_CUT_PERCENT} % may be, so that the others stand for all",
+                self.cut_percent
+            )
+        } else {
+            return None;
+        };
+        Some(format!("no values of hills and dales (Spd … Shv): {problem}"))
     }
 
     /// Where nothing was looked for.
@@ -90,6 +130,8 @@ impl Features {
         sha_mm2: f64::NAN,
         sdv_mm3: f64::NAN,
         shv_mm3: f64::NAN,
+        bridged_percent: 0.0,
+        cut_percent: 0.0,
     };
 }
 
@@ -208,15 +250,22 @@ impl<'a> Relief<'a> {
         (labels, pits)
     }
 
-    /// Pits of the dales that are left after pruning and complete.
+    /// Whether a point of the frame stands for what is beyond the map.
+    fn is_beyond(&self, point: usize) -> bool {
+        let (row, column) = (point / self.stride, point % self.stride);
+        let beside = column == 0 || column == self.stride - 1;
+        row == 0 || row == self.map.rows() + 1 || (beside && !self.map.closed())
+    }
+
+    /// Pits of the dales that are left after pruning and complete, and the points of those that are cut by holes alone.
     ///
     /// Wolf pruning merges the shallowest dale over its lowest saddle, again and again; its neighbour there is the deeper
     /// one, or it would be the shallower dale itself. What is left is therefore what the saddles in ascending order give:
     /// where two parts first meet, the one with the higher pit ends with its depth below the saddle.
-    fn extremes(&self, pruning: f64) -> Vec<Extreme> {
+    fn extremes(&self, pruning: f64) -> (Vec<Extreme>, usize) {
         let (labels, pits) = self.basins();
         let steps = self.neighbours();
-        let mut edge = vec![false; pits.len()];
+        let [mut edge, mut cut] = [(); 2].map(|()| vec![false; pits.len()]);
         let mut saddles: Vec<(f64, u32, u32)> = Vec::new();
         for point in self.rows().flatten() {
             let (label, height) = (labels[point], self.heights[point]);
@@ -232,7 +281,8 @@ impl<'a> Relief<'a> {
                     continue;
                 }
                 if other == 0 {
-                    edge[label as usize] = true;
+                    let which = if self.is_beyond(neighbour) { &mut edge } else { &mut cut };
+                    which[label as usize] = true;
                 } else if self.heights[neighbour] <= height {
                     saddles.push((height, label, other));
                     last = other;
@@ -250,6 +300,7 @@ impl<'a> Relief<'a> {
                 && let Some((deep, shallow)) = dales.join(a, b, &depths)
             {
                 edge[deep] |= edge[shallow];
+                cut[deep] |= cut[shallow];
             }
         }
         let roots: Vec<usize> = (0..pits.len()).map(|label| dales.root(label)).collect();
@@ -267,13 +318,14 @@ impl<'a> Relief<'a> {
             held[root].0 += 1;
             held[root].1 += depth.max(0.0);
         }
-        let significant = (1..pits.len()).filter(|label| roots[*label] == *label && !edge[*label]);
-        significant
-            .map(|label| {
-                let (points, below_saddle) = held[label];
-                Extreme { depth: depths[label], curvature: self.curvature(pits[label]), points, below_saddle }
-            })
-            .collect()
+        let whole = |label: &usize| roots[*label] == *label && !edge[*label];
+        let cut_points = (1..pits.len()).filter(whole).filter(|label| cut[*label]).map(|label| held[label].0).sum();
+        let significant = (1..pits.len()).filter(whole).filter(|label| !cut[*label]);
+        let extreme = |label: usize| {
+            let (points, below_saddle) = held[label];
+            Extreme { depth: depths[label], curvature: self.curvature(pits[label]), points, below_saddle }
+        };
+        (significant.map(extreme).collect(), cut_points)
     }
 
     fn curvature(&self, point: usize) -> Option<f64> {

@@ -3,7 +3,9 @@
 //! Heights are referred to the mean of the points that were measured. Missing points are left out of every value; what
 //! that means for each family is said there.
 
+mod bridge;
 mod correlation;
+mod direction;
 mod features;
 mod form;
 mod height;

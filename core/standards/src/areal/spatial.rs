@@ -3,10 +3,8 @@
 use super::{
     HeightMap,
     correlation::{Correlation, Line, correlate},
+    direction::Directions,
 };
-
-/// Angles of the angular spectrum over half a turn: steps of 0.5°.
-pub(super) const ANGLES: usize = 360;
 
 /// Lengths and direction of the texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,8 +15,8 @@ pub struct Spatial {
     /// Texture aspect ratio: shortest over longest lag of that. NaN where the autocorrelation does not fall to s within
     /// the map in some direction.
     pub str: f64,
-    /// Texture direction: where the angular amplitude spectrum is largest, in steps of 0.5° from +x (the columns)
-    /// towards +y (the rows), 0 to 180°. It is the direction across a lay.
+    /// Texture direction: where the angular power spectrum ∫ r·|F|² dr is largest, in steps of 0.5° from +x (the columns)
+    /// towards +y (the rows), 0 to below 180°. It is the direction across a lay.
     pub std_deg: f64,
     /// Dominant wavelength: of the largest amplitude in the spectrum.
     pub ssw_mm: f64,
@@ -33,15 +31,12 @@ impl Spatial {
     pub(super) fn of(centred: &HeightMap, decay: f64) -> Self {
         let heights = centred.heights_um();
         let lengths = [centred.columns() as f64 * centred.dx_mm(), centred.rows() as f64 * centred.dy_mm()];
-        let mut angular = [0.0; ANGLES];
         let (mut strongest, mut ssw_mm) = (0.0, f64::NAN);
-        let mut sectors = Sectors::new();
         let mut look = |Line { across, along, amplitude }: Line| {
             let (fx, fy) = (across as f64 / lengths[0], along as f64 / lengths[1]);
             if across == 0 && along == 0 {
                 return;
             }
-            angular[sectors.of(fx, fy)] += if across == 0 { amplitude } else { 2.0 * amplitude };
             if amplitude > strongest {
                 (strongest, ssw_mm) = (amplitude, fx.hypot(fy).recip());
             }
@@ -55,7 +50,7 @@ impl Spatial {
             heights
         };
         let mut sums = correlate(centred, filled, &mut look);
-        let places = (0..ANGLES).max_by(|a, b| angular[*a].total_cmp(&angular[*b]).then(b.cmp(a))).unwrap_or(0);
+        let std_deg = Directions::new(centred).direction_deg(filled);
         if missing {
             let mask: Vec<f64> = heights.iter().map(|height| f64::from(u8::from(height.is_finite()))).collect();
             let mut pairs = correlate(centred, &mask, |_| ());
@@ -67,40 +62,7 @@ impl Spatial {
             }
         }
         let [sal_mm, longest_mm] = Decay::new(centred, &mut sums, !missing, decay).lengths();
-        let std_deg = if strongest > 0.0 { places as f64 * 180.0 / ANGLES as f64 } else { f64::NAN };
         Self { sal_mm, str: sal_mm / longest_mm, std_deg, ssw_mm }
-    }
-}
-
-/// Places in the angular spectrum of directions, of which the next is mostly near the last.
-pub(super) struct Sectors {
-    /// Tangents of the angles at which places begin, of a quarter turn, and infinity.
-    tangents: Vec<f64>,
-    last: usize,
-}
-
-impl Sectors {
-    pub(super) fn new() -> Self {
-        let tangents = (0..ANGLES / 2).map(|place| (place as f64 * 180.0 / ANGLES as f64).to_radians().tan());
-        Self { tangents: tangents.chain([f64::INFINITY]).collect(), last: 0 }
-    }
-
-    /// The place of the direction (fx, fy), fx from 0 on: of its angle modulo 180°.
-    pub(super) fn of(&mut self, fx: f64, fy: f64) -> usize {
-        let (place, up) = (&mut self.last, fy.abs());
-        while up >= self.tangents[*place + 1] * fx && *place + 2 < self.tangents.len() {
-            *place += 1;
-        }
-        while up < self.tangents[*place] * fx {
-            *place -= 1;
-        }
-        let near = |place: usize| (up - self.tangents[place] * fx).abs() <= 1e-9 * up;
-        // Where places meet, and along the axes.
-        if fx <= 0.0 || up <= 0.0 || near(*place) || near(*place + 1) {
-            let angle = fy.atan2(fx).to_degrees().rem_euclid(180.0);
-            return (angle * ANGLES as f64 / 180.0) as usize % ANGLES;
-        }
-        if fy > 0.0 { *place } else { ANGLES - 1 - *place }
     }
 }
 
@@ -214,25 +176,5 @@ impl<'a, R: Rows> Decay<'a, R> {
             if cubic(middle) > self.level { above = middle } else { below = middle }
         }
         0.5 * (above + below)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sectors_are_those_of_the_angle() {
-        let mut sectors = Sectors::new();
-        for across in 0..60 {
-            for along in (-80..80).filter(|along| across > 0 || *along != 0) {
-                for scale in [1.0, 0.013] {
-                    let (fx, fy) = (f64::from(across), scale * f64::from(along));
-                    let angle = fy.atan2(fx).to_degrees().rem_euclid(180.0);
-                    let expected = (angle * ANGLES as f64 / 180.0) as usize % ANGLES;
-                    assert_eq!(sectors.of(fx, fy), expected, "{fx} {fy}");
-                }
-            }
-        }
     }
 }

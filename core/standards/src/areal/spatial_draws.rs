@@ -1,12 +1,10 @@
 //! Spatial parameters of a map with errors added and taken away, many times over.
 //!
 //! The autocorrelation of z ± e is A(z, z) ± [A(z, e) + A(e, z)] + A(e, e). Where it falls to its level within few rows, only these
-//! lags are computed, ring by ring, instead of a transform of the whole map. The angular spectrum is a sum of amplitudes of many lines, each
-//! with an error of its own: sums are drawn with the mean and the variance that the errors of their lines make.
+//! lags are computed, ring by ring, instead of a transform of the whole map. The spectrum that the direction is taken from is that of the map plus or
+//! minus that of the errors. Of the dominant wavelength, errors of the lines that may be the strongest are drawn.
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
-
-use std::f64::consts::PI;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -16,7 +14,8 @@ use realfft::RealFftPlanner;
 use super::{
     HeightMap,
     correlation::{Line, correlate},
-    spatial::{ANGLES, Decay, Rows, Sectors, Spatial},
+    direction::Directions,
+    spatial::{Decay, Rows, Spatial},
 };
 use runout_numerics::{
     Complex64,
@@ -39,25 +38,21 @@ pub struct SpatialDraws<'a> {
     lags: usize,
     rows: Planes,
     lines: Vec<Seen>,
-    spectrum: Option<Spectrum>,
+    directions: Directions,
+    spectra: Vec<Complex64>,
+    strongest: Option<Strongest>,
     random: ChaCha8Rng,
 }
 
 /// A line of the map's spectrum.
 struct Seen {
     across: usize,
-    sector: u16,
     amplitude: f64,
     wavelength_mm: f64,
 }
 
-/// What errors make of the angular spectrum and of the lines that may be dominant.
-struct Spectrum {
-    /// Of each sector, the sum without errors, what they raise it by, and their standard deviation.
-    sectors: Vec<[f64; 3]>,
-    /// Amplitude, standard deviation of an error's real part, and wavelength.
-    strongest: Vec<[f64; 3]>,
-}
+/// Of the lines that may be dominant: amplitude, standard deviation of an error's real part, and wavelength.
+struct Strongest(Vec<[f64; 3]>);
 
 /// Spectra of rows, real and imaginary parts apart.
 #[derive(Default)]
@@ -153,18 +148,13 @@ impl<'a> SpatialDraws<'a> {
         }
         let columns = centred.columns();
         let lengths = [columns as f64 * centred.dx_mm(), centred.rows() as f64 * centred.dy_mm()];
-        let (mut lines, mut sectors) = (Vec::new(), Sectors::new());
+        let mut lines = Vec::new();
         let mut correlation = correlate(&centred, centred.heights_um(), |Line { across, along, amplitude }| {
             if across == 0 && along == 0 {
                 return;
             }
             let (fx, fy) = (across as f64 / lengths[0], along as f64 / lengths[1]);
-            lines.push(Seen {
-                across,
-                sector: sectors.of(fx, fy) as u16,
-                amplitude,
-                wavelength_mm: fx.hypot(fy).recip(),
-            });
+            lines.push(Seen { across, amplitude, wavelength_mm: fx.hypot(fy).recip() });
         });
         let [sal_mm, longest_mm] = Decay::new(&centred, &mut correlation, true, decay).lengths();
         let asked = (0..centred.rows()).rev().find(|lag| correlation.is_known(*lag)).unwrap_or(0);
@@ -174,28 +164,29 @@ impl<'a> SpatialDraws<'a> {
         }
         let sums = (0..lags).flat_map(|lag| correlation.row(lag).to_vec()).collect();
         let rows = Planes::of(centred.heights_um(), columns);
-        let mut angular = vec![[0.0; 3]; ANGLES];
-        for line in &lines {
-            angular[usize::from(line.sector)][0] += line.weight() * line.amplitude;
-        }
+        let directions = Directions::new(&centred);
         let strongest = lines.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
         let own = Spatial {
             sal_mm,
             str: sal_mm / longest_mm,
-            std_deg: direction_deg(angular.iter().map(|sector| sector[0])),
+            std_deg: directions.direction_deg(centred.heights_um()),
             ssw_mm: strongest.map_or(f64::NAN, |line| line.wavelength_mm),
         };
         let random = ChaCha8Rng::seed_from_u64(1);
-        Some((Self { map: centred, decay, sums, lags, rows, lines, spectrum: None, random }, own))
+        let spectra = directions.spectra(centred.heights_um());
+        let draws = Self { map: centred, decay, sums, lags, rows, lines, directions, spectra, strongest: None, random };
+        Some((draws, own))
     }
 
     /// Values of the map with errors added and taken away.
     pub fn both(&mut self, errors_um: &[f64]) -> [Spatial; 2] {
         let errors = Planes::of(errors_um, self.map.columns());
         let lengths = self.autocorrelations(&errors).map(|sums| self.lengths(sums));
-        let spectrum = self.spectrum.get_or_insert_with(|| Spectrum::of(&self.lines, &errors));
-        let directions = spectrum.draw(&mut self.random);
-        let mut both = lengths.into_iter().zip(directions).enumerate().map(|(sign, (lengths, [std_deg, ssw_mm]))| {
+        let strongest = self.strongest.get_or_insert_with(|| Strongest::of(&self.lines, &errors));
+        let dominant = strongest.draw(&mut self.random);
+        let directions = self.directions.both_deg(&self.spectra, errors_um);
+        let found = lengths.into_iter().zip(directions.into_iter().zip(dominant)).enumerate();
+        let mut both = found.map(|(sign, (lengths, (std_deg, ssw_mm)))| {
             let [sal_mm, longest_mm] = lengths.unwrap_or_else(|| {
                 // The lags that are there do not reach.
                 let sign = if sign == 0 { 1.0 } else { -1.0 };
@@ -257,14 +248,7 @@ impl<'a> SpatialDraws<'a> {
     }
 }
 
-impl Seen {
-    /// A line stands for its opposite too.
-    fn weight(&self) -> f64 {
-        if self.across == 0 { 1.0 } else { 2.0 }
-    }
-}
-
-impl Spectrum {
+impl Strongest {
     /// Of errors that are alike at all periods along the rows: the mean of |E|² over these is the sum over the rows.
     fn of(lines: &[Seen], errors: &Planes) -> Self {
         let mut squares = vec![0.0; errors.bins];
@@ -272,54 +256,31 @@ impl Spectrum {
             let [re, im] = errors.row(row);
             squares.iter_mut().zip(re.iter().zip(im)).for_each(|(sum, (re, im))| *sum += re * re + im * im);
         }
-        let mut sectors = vec![[0.0; 3]; ANGLES];
-        for line in lines {
-            let (square, power) = (squares[line.across], line.amplitude * line.amplitude);
-            // Rice's distribution: a half of the square where the line is strong, 1 − π/4 of it where there is none.
-            let own = power / (power + square).max(f64::MIN_POSITIVE);
-            let variance = square * ((1.0 - PI / 4.0) + (PI / 4.0 - 0.5) * own);
-            let mean = (power + square - variance).max(0.0).sqrt();
-            let [sum, shift, spread] = &mut sectors[usize::from(line.sector)];
-            *sum += line.weight() * line.amplitude;
-            *shift += line.weight() * (mean - line.amplitude);
-            *spread += line.weight() * line.weight() * variance;
-        }
-        for sector in &mut sectors {
-            sector[2] = sector[2].sqrt();
-        }
         let std = |line: &Seen| (0.5 * squares[line.across]).sqrt();
         let least = lines.iter().map(|line| line.amplitude - FAR * std(line)).fold(0.0, f64::max);
         let strongest = lines.iter().filter(|line| line.amplitude + FAR * std(line) > least);
-        let strongest = strongest.map(|line| [line.amplitude, std(line), line.wavelength_mm]).collect();
-        Self { sectors, strongest }
+        Self(strongest.map(|line| [line.amplitude, std(line), line.wavelength_mm]).collect())
     }
 
-    /// Direction and dominant wavelength with errors added and taken away.
-    fn draw(&self, random: &mut ChaCha8Rng) -> [[f64; 2]; 2] {
+    /// Dominant wavelength with errors added and taken away.
+    fn draw(&self, random: &mut ChaCha8Rng) -> [f64; 2] {
         let mut normal = || -> f64 { StandardNormal.sample(random) };
-        let numbers: Vec<f64> = self.sectors.iter().map(|_| normal()).collect();
-        let errors: Vec<Complex64> = self.strongest.iter().map(|_| Complex64::new(normal(), normal())).collect();
+        let errors: Vec<Complex64> = self.0.iter().map(|_| Complex64::new(normal(), normal())).collect();
         [1.0, -1.0].map(|sign| {
-            let sums = self.sectors.iter().zip(&numbers);
-            let direction = direction_deg(sums.map(|([sum, shift, std], number)| sum + shift + sign * std * number));
-            let amplitude =
-                |place: usize| (self.strongest[place][0] + sign * self.strongest[place][1] * errors[place]).norm();
-            let places = 0..self.strongest.len();
-            let dominant = places.max_by(|a, b| amplitude(*a).total_cmp(&amplitude(*b)));
-            [direction, dominant.map_or(f64::NAN, |place| self.strongest[place][2])]
+            let with_error = self.0.iter().zip(&errors);
+            let amplitudes = with_error.map(|([amplitude, std, wavelength_mm], error)| {
+                ((amplitude + sign * std * error).norm(), *wavelength_mm)
+            });
+            amplitudes.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(f64::NAN, |(_, wavelength_mm)| wavelength_mm)
         })
     }
-}
-
-/// Where an angular spectrum is largest; NaN of a flat map.
-fn direction_deg(sums: impl Iterator<Item = f64>) -> f64 {
-    let largest = sums.enumerate().reduce(|best, other| if other.1 > best.1 { other } else { best });
-    largest.filter(|(_, sum)| *sum > 0.0).map_or(f64::NAN, |(place, _)| place as f64 * 180.0 / ANGLES as f64)
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use std::f64::consts::TAU;
 
     use super::*;
 
@@ -364,33 +325,30 @@ mod tests {
         }
     }
 
-    /// Direction and dominant wavelength change as often as by whole transforms: of two lines that are nearly as strong.
+    /// Directions are those of whole transforms, and the dominant wavelength changes as often: of two lines that are nearly as strong.
     #[test]
-    fn directions_change_as_often_as_by_whole_transforms() {
+    fn directions_and_wavelengths_are_those_of_whole_transforms() {
         let mut random = ChaCha8Rng::seed_from_u64(4);
         let wave = |place: usize| {
             let (row, column) = ((place / COLUMNS) as f64 / ROWS as f64, (place % COLUMNS) as f64 / COLUMNS as f64);
-            (2.0 * PI * 5.0 * column).cos() + 0.98 * (2.0 * PI * (3.0 * column + 4.0 * row)).cos()
+            (TAU * 5.0 * column).cos() + 0.98 * (TAU * (3.0 * column + 4.0 * row)).cos()
         };
         let base =
             HeightMap::new((0..ROWS * COLUMNS).map(wave).collect::<Vec<f64>>(), COLUMNS, 0.1, 0.2, true).unwrap();
         let (mut draws, own) = SpatialDraws::new(base.clone(), 0.2).unwrap();
-        let (mut quick, mut slow) = ([0; 2], [0; 2]);
+        let (mut quick, mut slow) = (0_u32, 0_u32);
         for _ in 0..300 {
             let errors: Vec<f64> =
                 (0..ROWS * COLUMNS).map(|_| 0.5 * Distribution::<f64>::sample(&StandardNormal, &mut random)).collect();
             let heights = base.heights_um().iter().zip(&errors).map(|(height, error)| height + error);
             let expected = Spatial::of(&base.with(heights.collect()), 0.2);
             let [found, _] = draws.both(&errors);
-            for (counts, one) in [(&mut quick, found), (&mut slow, expected)] {
-                counts[0] += u32::from((one.std_deg - own.std_deg).abs() > 0.1);
-                counts[1] += u32::from((one.ssw_mm - own.ssw_mm).abs() > 1e-9);
+            assert!((found.std_deg - expected.std_deg).abs() < 1e-9);
+            for (count, one) in [(&mut quick, found), (&mut slow, expected)] {
+                *count += u32::from((one.ssw_mm - own.ssw_mm).abs() > 1e-9);
             }
         }
         // √300/2: 9 at most.
-        for which in [0, 1] {
-            assert!(quick[which].abs_diff(slow[which]) < 40, "{quick:?} {slow:?}");
-        }
-        assert!(slow[1] > 30, "{slow:?}");
+        assert!(quick.abs_diff(slow) < 40 && slow > 30, "{quick} {slow}");
     }
 }

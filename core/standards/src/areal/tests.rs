@@ -214,3 +214,74 @@ fn a_map_is_what_it_says() {
     assert!(rows(&[1.0, 3.0, 6.0]).is_err() && rows(&[1.0, 3.0, 4.0, 5.0]).is_err() && rows(&[1.0]).is_err());
     near(HeightMap::unrolled(10.0, &[0.0, 1.0], 8, &[1.0; 16]).unwrap().dx_mm(), TAU * 10.0 / 8.0, 1e-12);
 }
+
+/// Crossed waves of random direction and phase, hills of some 0.6 mm, on a plane map: with holes, hills and dales are those without.
+#[test]
+fn hills_and_dales_with_holes_are_those_without() {
+    use rand::{RngExt, SeedableRng};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(17);
+    let (rows, columns) = (170, 230);
+    let waves: Vec<[f64; 3]> = (0..60)
+        .map(|_| {
+            let (angle, frequency) = (PI * random.random::<f64>(), 1.0 + random.random::<f64>());
+            [frequency * angle.cos(), frequency * angle.sin(), TAU * random.random::<f64>()]
+        })
+        .collect();
+    let height = |point: usize| -> f64 {
+        let (x, y) = (0.05 * (point % columns) as f64, 0.05 * (point / columns) as f64);
+        waves.iter().map(|[fx, fy, phase]| (TAU * (fx * x + fy * y) + phase).sin()).sum()
+    };
+    let heights: Vec<f64> = (0..rows * columns).map(height).collect();
+    let of = |heights: &[f64]| {
+        let map = HeightMap::new(heights.to_vec(), columns, 0.05, 0.05, false).unwrap();
+        areal(&map, &Settings::default()).features
+    };
+    let numbers = |found: &Features| {
+        [
+            found.spd_per_mm2,
+            found.svd_per_mm2,
+            found.spc_per_mm,
+            found.svc_per_mm,
+            found.s5p,
+            found.s5v,
+            found.s10z,
+            found.sda_mm2,
+            found.sha_mm2,
+            found.sdv_mm3,
+            found.shv_mm3,
+        ]
+    };
+    let whole = of(&heights);
+    assert!(whole.hills > 100 && whole.problem().is_none(), "{whole:?}");
+    // Squares of holes, so many points wide, at random, over a share of the points; and how far values may be off.
+    for (wide, share, off) in
+        [(1, 0.001, 0.002), (1, 0.01, 0.004), (1, 0.08, 0.02), (2, 0.03, 0.02), (4, 0.02, 0.03), (8, 0.02, 0.12)]
+    {
+        let mut with_holes = heights.clone();
+        for _ in 0..(share * (rows * columns) as f64 / f64::from(wide * wide)) as usize {
+            let (row, column) = (random.random_range(0..rows - 8), random.random_range(0..columns - 8));
+            for hole in 0..(wide * wide) as usize {
+                with_holes[(row + hole / wide as usize) * columns + column + hole % wide as usize] = f64::NAN;
+            }
+        }
+        let found = of(&with_holes);
+        let pairs = numbers(&found).into_iter().zip(numbers(&whole));
+        let worst = pairs.map(|(found, whole)| (found / whole - 1.0).abs());
+        let worst = worst.fold(0.0, |worst: f64, off| if off <= worst { worst } else { off });
+        println!(
+            "{wide} wide, {share}: off by {worst:.4}, bridged {:.2} %, cut {:.1} %",
+            found.bridged_percent, found.cut_percent
+        );
+        assert!(worst < off, "{wide} {share}: {worst}\n{found:?}\n{whole:?}");
+    }
+    // Too much, here and there or at one place.
+    let mut scattered = heights.clone();
+    scattered.iter_mut().step_by(8).for_each(|height| *height = f64::NAN);
+    let mut torn = heights;
+    torn[60 * columns..110 * columns].fill(f64::NAN);
+    for (missing, said) in [(scattered, "12.5 % of the points"), (torn, "of the area are holes")] {
+        let found = of(&missing);
+        assert!(numbers(&found).iter().all(|value| value.is_nan()));
+        assert!(found.problem().unwrap().contains(said), "{:?}", found.problem());
+    }
+}

@@ -3,19 +3,24 @@
 //! A profile is filtered by λs and λc (Gaussian, ISO 16610-21 and -28), referred to the mean of what is left, and
 //! evaluated over its whole length: the circumference, or a generatrix without the ends at which a filter is incomplete.
 //! Ra, Rq, Rt, Rsk and Rku are of the evaluation length; Rp, Rv and Rz are means over the section lengths, as in the edition
-//! of 2021 (ISO 4287:1997 defined them, and Ra and Rq, on one sampling length). Missing points (NaN) are left out and counted.
+//! of 2021 (ISO 4287:1997 defined them, and Ra and Rq, on one sampling length). Missing points (NaN) are left out and counted. A gap of a
+//! line is no length: stretches beside it are lines of their own.
 
 #![allow(clippy::inline_always, reason = "see crate::numerics::lanes")]
 
 mod elements;
+mod line;
 mod profile;
 mod values;
+
+use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{areal::MaterialRatio, parameter::Parameter};
-use profile::{AT_AN_END, Profile};
+use line::Line;
+use profile::{AT_AN_END, Profile, Stretch};
 use runout_numerics::{
     filter::{Degree, Smoother, upr},
     lanes::{NullaryFnOnce, vectorised},
@@ -158,6 +163,16 @@ impl Kind {
         }
     }
 
+    /// The first letter of its symbols.
+    #[must_use]
+    pub fn letter(self) -> char {
+        match self {
+            Self::P => 'P',
+            Self::W => 'W',
+            Self::R => 'R',
+        }
+    }
+
     /// Symbol of the material ratio at a height.
     #[must_use]
     pub fn material_ratio_symbol(self) -> &'static str {
@@ -189,37 +204,68 @@ fn closed(form_um: &[f64], radius_mm: f64, settings: &Settings, all: bool) -> Te
     let length_mm = std::f64::consts::TAU * radius_mm;
     let spacing = length_mm / form_um.len() as f64;
     let positions: Vec<f64> = (0..form_um.len()).map(|point| point as f64 * spacing).collect();
-    let profile = Profile::new(&positions, heights, Some(length_mm));
+    let profile = Profile::closed(&positions, heights, length_mm);
     if all { profile.texture(settings) } else { profile.heights(settings) }
 }
 
 /// Texture along a line on ascending positions, such as a generatrix on a surface's rings. Spacings may differ: a point
 /// then counts as much as it stands for. Half of the longest cut-off is left out at each end where half of the line
-/// remains: there the filter has only a part of its Gaussian.
+/// remains: there the filter has only a part of its Gaussian. Of a line with [gaps](runout_numerics::stretches) longer than a tenth of a
+/// section, each stretch that has a whole section between such ends is a line of its own, and the others are left out: without any, all
+/// values are NaN.
 #[must_use]
 pub fn along(z_mm: &[f64], profile_um: &[f64], settings: &Settings) -> Texture {
-    let count = z_mm.len().min(profile_um.len());
-    let (z_mm, profile_um) = (&z_mm[..count], &profile_um[..count]);
-    let mut heights = filtered(profile_um, settings, |wavelength_mm| Smoother::open(z_mm, wavelength_mm, Degree::One));
-    let cropped_mm = end_effect_mm(z_mm, settings);
-    let (first, last) = (z_mm.first().copied().unwrap_or(0.0), z_mm.last().copied().unwrap_or(0.0));
-    let off_mm = AT_AN_END * (last - first) / count.max(1) as f64;
-    let from = z_mm.partition_point(|z| *z < first + cropped_mm - off_mm);
-    let to = z_mm.partition_point(|z| *z <= last - cropped_mm + off_mm);
-    heights.truncate(to);
-    heights.drain(..from);
-    Texture { cropped_mm, ..Profile::new(&z_mm[from..to], heights, None).texture(settings) }
+    let line = Line::new(z_mm, profile_um, settings);
+    let half_mm = half_cut_off_mm(settings);
+    let cropped_mm = if line.has_gaps() { half_mm } else { end_effect_mm(z_mm, half_mm) };
+    let stretch = |points: &Range<usize>| {
+        let positions = &z_mm[points.clone()];
+        let smoother = |wavelength_mm: f64| Smoother::open(positions, wavelength_mm, Degree::One);
+        let heights = filtered(&profile_um[points.clone()], settings, smoother);
+        let (first, last) = (positions.first().copied().unwrap_or(0.0), positions.last().copied().unwrap_or(0.0));
+        let off_mm = AT_AN_END * (last - first) / positions.len().max(1) as f64;
+        let from = positions.partition_point(|z| *z < first + cropped_mm - off_mm);
+        let to = positions.partition_point(|z| *z <= last - cropped_mm + off_mm);
+        Stretch { positions_mm: positions[from..to].to_vec(), heights_um: heights[from..to].to_vec() }
+    };
+    let found = Profile::open(line.long_enough().iter().map(stretch).collect()).texture(settings);
+    Texture { cropped_mm, ..found }
 }
 
-/// Length at each end of a line over which the filters lack more than 1 % of their Gaussian: half of the longest cut-off
-/// (ISO 16610-28). 0 without filters, and where less than half of the line would be left.
-fn end_effect_mm(z_mm: &[f64], settings: &Settings) -> f64 {
+/// What the values of a line with gaps are of; `None` of a line without.
+#[must_use]
+pub fn over_gaps(z_mm: &[f64], profile_um: &[f64], settings: &Settings) -> Option<String> {
+    let line = Line::new(z_mm, profile_um, settings);
+    if !line.has_gaps() {
+        return None;
+    }
+    let gap = |pair: &[Range<usize>]| format!("{} to {} mm", z_mm[pair[0].end - 1], z_mm[pair[1].start]);
+    let gaps: Vec<String> = line.stretches.windows(2).map(gap).collect();
+    let kept = line.long_enough();
+    let of = match kept.len() {
+        0 => "no stretch is as long as a section and the ends where the filter is incomplete: there are no values"
+            .to_owned(),
+        count => {
+            let long_mm: f64 = kept.iter().map(|points| line.length_mm(points)).sum();
+            format!("values are of {count} of {} stretches, {long_mm:.3} mm long", line.stretches.len())
+        }
+    };
+    Some(format!("nothing was measured from {}; {of}", gaps.join(", from ")))
+}
+
+/// Half of the longest cut-off.
+fn half_cut_off_mm(settings: &Settings) -> f64 {
     let longest = match settings.kind {
         Kind::P => None,
         Kind::R => settings.lambda_c_mm,
         Kind::W => settings.lambda_f_mm.or(settings.lambda_c_mm),
     };
-    let half = 0.5 * longest.or(settings.lambda_s_mm).unwrap_or(0.0);
+    0.5 * longest.or(settings.lambda_s_mm).unwrap_or(0.0)
+}
+
+/// Length at each end of a line over which the filters lack more than 1 % of their Gaussian: half of the longest cut-off
+/// (ISO 16610-28). 0 without filters, and where less than half of the line would be left.
+fn end_effect_mm(z_mm: &[f64], half: f64) -> f64 {
     let [first, .., last] = *z_mm else { return 0.0 };
     if last - first >= 4.0 * half { half } else { 0.0 }
 }

@@ -2,6 +2,8 @@
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
 
+use std::{borrow::Cow, ops::Range};
+
 use super::{Settings, Texture};
 use crate::areal::derivative;
 use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
@@ -14,59 +16,102 @@ pub(super) const AT_AN_END: f64 = 1e-3;
 
 /// A profile about its mean line.
 pub(super) struct Profile<'a> {
-    pub(super) positions_mm: &'a [f64],
+    pub(super) positions_mm: Cow<'a, [f64]>,
     /// Heights about the mean, NaN where missing.
     pub(super) heights_um: Vec<f64>,
     /// The circumference of a closed profile.
     pub(super) turn_mm: Option<f64>,
+    /// Indices of the points of each stretch that was measured.
+    stretches: Vec<Range<usize>>,
     /// Length that each point stands for.
     cells: Vec<f64>,
     even: bool,
 }
 
+/// A filtered stretch of an open profile.
+pub(super) struct Stretch {
+    pub(super) positions_mm: Vec<f64>,
+    pub(super) heights_um: Vec<f64>,
+}
+
 impl<'a> Profile<'a> {
-    pub(super) fn new(positions_mm: &'a [f64], mut heights_um: Vec<f64>, turn_mm: Option<f64>) -> Self {
-        let (cells, even) = match turn_mm {
-            // Closed profiles are on equal angles.
-            Some(_) => (vec![1.0; heights_um.len()], true),
-            None => cells(positions_mm),
-        };
-        let ([mean], length) = sums(&heights_um, &cells, |height| [height]);
-        let mean = mean / length;
-        for height in &mut heights_um {
-            *height -= mean;
-        }
-        Self { positions_mm, heights_um, turn_mm, cells, even }
+    /// A closed profile on equal angles.
+    pub(super) fn closed(positions_mm: &'a [f64], heights_um: Vec<f64>, turn_mm: f64) -> Self {
+        let (count, cells) = (heights_um.len(), vec![1.0; heights_um.len()]);
+        let positions_mm = Cow::Borrowed(positions_mm);
+        let (turn_mm, stretches, even) = (Some(turn_mm), std::iter::once(0..count).collect(), true);
+        Self { positions_mm, heights_um, turn_mm, stretches, cells, even }.about_mean()
     }
 
-    /// First position and length.
-    fn extent(&self) -> (f64, f64) {
-        match (self.turn_mm, self.positions_mm) {
+    /// An open profile of some stretches, in the order of their positions. What is between them has neither length nor height.
+    pub(super) fn open(parts: Vec<Stretch>) -> Self {
+        let (mut positions_mm, mut heights_um, mut all_cells) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut stretches, mut even) = (Vec::new(), true);
+        let step_of = |part: &Stretch| part.positions_mm.get(1).map(|second| second - part.positions_mm[0]);
+        let step_mm = parts.first().and_then(step_of);
+        for part in parts {
+            if let Some(last) = positions_mm.last().copied() {
+                // A missing point ends elements and slopes there.
+                positions_mm.push(f64::midpoint(last, part.positions_mm.first().copied().unwrap_or(last)));
+                heights_um.push(f64::NAN);
+                all_cells.push(0.0);
+            }
+            let same = step_of(&part).zip(step_mm).is_none_or(|(step, first)| (step - first).abs() <= EVEN * first);
+            let (cells, are_even) = cells(&part.positions_mm);
+            even &= same && are_even;
+            stretches.push(positions_mm.len()..positions_mm.len() + part.positions_mm.len());
+            positions_mm.extend(part.positions_mm);
+            heights_um.extend(part.heights_um);
+            all_cells.extend(cells);
+        }
+        if even {
+            all_cells.fill(1.0);
+        }
+        let positions_mm = Cow::Owned(positions_mm);
+        Self { positions_mm, heights_um, turn_mm: None, stretches, cells: all_cells, even }.about_mean()
+    }
+
+    fn about_mean(mut self) -> Self {
+        let ([mean], length) = sums(&self.heights_um, &self.cells, |height| [height]);
+        let mean = mean / length;
+        for height in &mut self.heights_um {
+            *height -= mean;
+        }
+        self
+    }
+
+    /// First position and length of each stretch.
+    fn extents(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.stretches.iter().map(|stretch| match (self.turn_mm, &self.positions_mm[stretch.clone()]) {
             (Some(turn), _) => (0.0, turn),
             (None, [first, .., last]) => (*first, last - first),
             _ => (0.0, 0.0),
-        }
+        })
     }
 
     /// The values that need neither elements nor the material ratio curve; the others are NaN.
     pub(super) fn heights(&self, settings: &Settings) -> Texture {
-        let (start, length) = self.extent();
-        let wanted = settings.section_mm.or(settings.lambda_c_mm).unwrap_or(length / 5.0);
+        let measured_mm: f64 = self.extents().map(|(_, length)| length).sum();
+        let wanted = settings.section_mm.or(settings.lambda_c_mm).unwrap_or(measured_mm / 5.0);
         // A length that is whole sections but for a little has them all.
-        let off_mm = AT_AN_END * length / self.heights_um.len().max(1) as f64;
-        let sections = (((length + off_mm) / wanted) as usize).clamp(1, self.heights_um.len().max(1));
-        let section_mm = length / sections as f64;
-        // A point at the end of a section is the next one's, also where its place is off a little.
-        let start = start - off_mm;
-        let mut extremes = Vec::with_capacity(sections);
-        let mut rest = (self.positions_mm, &self.heights_um[..]);
-        for section in 0..sections {
-            let last = section + 1 == sections;
-            let inside = |position: &f64| last || ((position - start) / section_mm) as usize <= section;
-            let (positions, heights) = rest;
-            let count = positions.partition_point(inside).min(heights.len());
-            extremes.push(vectorised(Ends(&heights[..count])));
-            rest = (&positions[count..], &heights[count..]);
+        let off_mm = AT_AN_END * measured_mm / self.heights_um.len().max(1) as f64;
+        let mut extremes = Vec::new();
+        let mut sections = 0;
+        for (stretch, (start, length)) in self.stretches.iter().zip(self.extents()) {
+            let of_stretch = (((length + off_mm) / wanted) as usize).clamp(1, stretch.len().max(1));
+            let section_mm = length / of_stretch as f64;
+            // A point at the end of a section is the next one's, also where its place is off a little.
+            let start = start - off_mm;
+            let mut rest = (&self.positions_mm[stretch.clone()], &self.heights_um[stretch.clone()]);
+            for section in 0..of_stretch {
+                let last = section + 1 == of_stretch;
+                let inside = |position: &f64| last || ((position - start) / section_mm) as usize <= section;
+                let (positions, heights) = rest;
+                let count = positions.partition_point(inside).min(heights.len());
+                extremes.push(vectorised(Ends(&heights[..count])));
+                rest = (&positions[count..], &heights[count..]);
+            }
+            sections += of_stretch;
         }
         let points = vectorised(There(&self.heights_um));
         // A section in which nothing was measured has no say.
@@ -90,9 +135,9 @@ impl<'a> Profile<'a> {
             rku: fourth / (variance * variance),
             rdq: self.gradient(),
             points,
-            missing: self.heights_um.len() - points,
+            missing: self.stretches.iter().map(Range::len).sum::<usize>() - points,
             sections,
-            section_mm,
+            section_mm: measured_mm / sections.max(1) as f64,
             rsm_mm: f64::NAN,
             rc: f64::NAN,
             rk: f64::NAN,

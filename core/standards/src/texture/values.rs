@@ -12,6 +12,9 @@ impl Profile<'_> {
     /// All values.
     pub(super) fn texture(&self, settings: &Settings) -> Texture {
         let heights = self.heights(settings);
+        if heights.points == 0 {
+            return heights;
+        }
         let lowest = [LOWEST * heights.rp, LOWEST * heights.rv];
         let elements = elements::mean(self, lowest, NARROWEST * heights.section_mm);
         let curve = MaterialRatio::of_heights(self.heights_um.iter().copied().filter(|height| height.is_finite()));

@@ -4,43 +4,11 @@ use std::ops::Range;
 
 use super::{
     FARTHEST_UM, FLAT_RUN, LIMIT_RUN, STEEP_STEPS, STUCK_STEPS,
+    rule::Rule,
     spikes::{Extents, Spike},
 };
 use crate::measurement::{Block, Defect, DefectKind};
 use runout_numerics::lanes::{Arithmetic, LaneWork, load};
-
-/// How clipping shows.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Rule {
-    /// At the converter's limits, lowest and highest of each channel.
-    Limits(Vec<[f64; 2]>),
-    /// Flat at the extreme so far; lengths in samples.
-    Flat {
-        /// Of a run that began steeply.
-        shortest: u64,
-        /// Of any run.
-        pegged: u64,
-        /// Of the approach that is looked at.
-        approach: u64,
-    },
-    /// Not at all.
-    None,
-}
-
-impl Rule {
-    /// Readings between which a channel is certainly neither clipped nor out of reach.
-    fn inside(&self, channel: usize) -> [f64; 2] {
-        match self {
-            // Readings and limits come from the same integers; the margin covers their rounding.
-            Self::Limits(limits) => {
-                let [low, high] = limits[channel];
-                let margin = 1e-9 * (high - low).abs();
-                [(low.min(high) + margin).max(-FARTHEST_UM), (low.max(high) - margin).min(FARTHEST_UM)]
-            }
-            Self::Flat { .. } | Self::None => [-FARTHEST_UM, FARTHEST_UM],
-        }
-    }
-}
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Channel {
@@ -131,6 +99,7 @@ impl Channel {
         past: &[f64],
     ) {
         let [low, high] = rule.inside(index);
+        let wrapped_step = rule.wrapped_step(index);
         for frame in frames {
             let place = block.start + frame as u64;
             let at = frame * channels + index;
@@ -169,6 +138,9 @@ impl Channel {
                 let step = (value - last).abs();
                 if step > 0.0 {
                     self.finest_step = self.finest_step.min(step);
+                }
+                if step >= wrapped_step {
+                    mark(&mut block.defects, index, DefectKind::WrappedRound, place..place + 1);
                 }
             }
             self.last = Some(value);
@@ -274,9 +246,19 @@ impl LaneWork for Look<'_> {
         let flat = matches!(self.rule, Rule::Flat { .. });
         // Fewer equal samples than these can be neither clipped nor stuck.
         let few = if flat { 1.0 } else { FLAT_RUN - 1.0 };
+        let wraps = |lane: usize| {
+            let wrapped_step = self.rule.wrapped_step(offset + lane);
+            // Only readings that lie so far apart can be a step of this size.
+            let swing = highest[lane].max(before[lane]) - lowest[lane].min(before[lane]);
+            swing >= wrapped_step && {
+                let readings = std::iter::once(&before[lane]).chain(frames.iter().skip(offset + lane).step_by(count));
+                let next = readings.clone().skip(1);
+                readings.zip(next).any(|(one, next)| (next - one).abs() >= wrapped_step)
+            }
+        };
         let quiet = (0..C).all(|lane| {
             let [low, high] = self.rule.inside(offset + lane);
-            zero[lane] == 0.0 && lowest[lane] > low && highest[lane] < high && most[lane] < few
+            zero[lane] == 0.0 && lowest[lane] > low && highest[lane] < high && most[lane] < few && !wraps(lane)
         });
         if !quiet {
             for (lane, channel) in group.iter_mut().enumerate() {

@@ -116,6 +116,31 @@ fn integers_are_clipped_at_the_converters_limit() {
     assert_eq!(defects, [defect(0, 40..43, DefectKind::Clipped)]);
 }
 
+/// Converters of 12, 16 and 32 bits without saturation: each step from one limit to the other is found, and nothing else; a converter that
+/// only comes near both limits between two samples further apart wraps nowhere.
+#[test]
+fn integers_that_wrap_round_are_found_where_they_do() {
+    for (bits, amplitude, phase) in [(12, 0.8, 0.3), (16, 1.1, 1.0), (32, 0.51, 2.0)] {
+        let codes = f64::from(bits).exp2();
+        let step = 20.0 / codes;
+        let code = |value: f64| (20.0 * value / step).round();
+        let wrap = |code: f64| (code + 0.5 * codes).rem_euclid(codes) - 0.5 * codes;
+        let limits = [-0.5 * codes * step, (0.5 * codes - 1.0) * step];
+        let codes_of = |frames| sine(frames, amplitude, phase).into_iter().map(code);
+        let wrapped: Vec<f64> = codes_of(3 * TURN).map(|code| wrap(code) * step).collect();
+        let of = |code: f64| ((code + 0.5 * codes) / codes).floor();
+        let periods: Vec<f64> = codes_of(3 * TURN).map(of).collect();
+        let expected = (1..3 * TURN).filter(|at| periods[*at].total_cmp(&periods[at - 1]).is_ne());
+        let expected: Vec<Defect> =
+            expected.map(|at| defect(0, at as u64..at as u64 + 1, DefectKind::WrappedRound)).collect();
+        assert_eq!(expected.len(), 12, "{bits}");
+        let (samples, defects) = inspect_in_blocks(std::slice::from_ref(&wrapped), Some(limits));
+        assert_eq!((samples, defects), (wrapped, expected), "{bits}");
+        let (_, defects) = inspect_in_blocks(&[sine(3 * TURN, 0.49 * codes * step, phase)], Some(limits));
+        assert_eq!(defects, [], "{bits}: nearly the whole range, in small steps");
+    }
+}
+
 #[test]
 fn a_flat_top_is_clipped_and_a_quantised_crest_is_not() {
     // The top of the sine cut at 90 %: arcsin 0.9 to π − arcsin 0.9 is 14.4 % of a turn.

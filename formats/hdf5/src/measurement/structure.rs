@@ -46,7 +46,7 @@ pub(super) struct Structures {
     pub(super) bytes: Vec<Range<u64>>,
     /// Whether the file begins with them, and not with a block of its user.
     pub(super) from_start: bool,
-    /// Whether all that lead on were followed.
+    /// Whether all that lead on were followed, and nothing else is to be in the file.
     is_whole: bool,
 }
 
@@ -64,7 +64,7 @@ struct Walk {
     found: Vec<Range<u64>>,
     seen: HashSet<(u64, Kind)>,
     ahead: Vec<(u64, Kind)>,
-    /// Whether something was met that this walk does not know.
+    /// Whether something was met that this walk does not know, or that left bytes behind.
     lost: bool,
 }
 
@@ -224,6 +224,10 @@ impl Walk {
             let body = messages.get(8..8 + length)?;
             match kind {
                 0x10 => self.ahead.push((number(body, 0)?, Kind::Continuation(number(body, 8)?))),
+                // A group of the new format, whose links are in its header, or in a heap that this walk does not know: the library makes
+                // it of a group of the old one for a name in UTF-8. What the old one leaves behind belongs to nothing.
+                0x02 => self.lost = true,
+                0x06 => self.ahead.extend(hard_link(body).map(|object| (object, Kind::Header))),
                 0x11 => self.ahead.extend([(number(body, 0)?, Kind::Tree), (number(body, 8)?, Kind::Heap)]),
                 // The layout, of the version that has been written since HDF5 1.6.3.
                 0x08 if body.starts_with(&[3, 2]) => {
@@ -287,6 +291,20 @@ impl Walk {
         self.ahead.extend(children.filter_map(|pair| Some((number(pair, WIDTH)?, Kind::Tree))));
         Some(())
     }
+}
+
+/// Where a link of a group's header leads, unless that is a name in this file or another one.
+fn hard_link(body: &[u8]) -> Option<u64> {
+    let flags = usize::from(*body.get(1)?);
+    // Its kind, its number in the order of creation and the set of its characters are there only where the flags say so.
+    let has = |flag: usize| usize::from(flags & flag != 0);
+    if has(8) == 1 && *body.get(2)? != 0 {
+        return None;
+    }
+    let at = 2 + has(8) + 8 * has(4) + has(16);
+    let width = 1 << (flags & 3);
+    let length = body.get(at..at + width)?.iter().rev().fold(0, |length, byte| (length << 8) | usize::from(*byte));
+    number(body, at.checked_add(width)?.checked_add(length)?)
 }
 
 fn chunk_key(dimensions: u8) -> usize {

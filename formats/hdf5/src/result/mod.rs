@@ -140,7 +140,7 @@ fn complete(file: &File, result: &Completed) -> hdf5_metno::Result<()> {
     if let Some(surface) = result.surface {
         put_surface(file, surface)?;
     }
-    put_texts(file, "warnings", summary.all_warnings())?;
+    put_texts(file, "warnings", summary.warnings.iter())?;
     put_texts(file, read::NOTES, summary.notes.iter())?;
     put_texts(file, "effects", summary.effects.iter().map(ToString::to_string))?;
     let group = node::create_group(file, "provenance")?;

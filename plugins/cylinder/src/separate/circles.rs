@@ -96,11 +96,16 @@ impl LeastSquaresCylinder {
         let window = all.range(turn.window.clone());
         let measured = all.range(turn.points.clone());
         let about_mm = helix.map(|_| measured.mean_z_mm());
-        let cleaned = Cleaned::of(&window, self.0.outlier_order, about_mm, self.0.outlier_mad)
-            .map_err(|problem| unfit(points, trace, &problem))?;
-        let kept_window = window.keep(&cleaned.kept);
-        let cleaned = cleaned.range(turn.points.start - turn.window.start, measured.len());
-        let scan = measured.keep(&cleaned.kept);
+        let (mut scan, mut kept_window) = (measured.clone(), window);
+        let mut outliers = None;
+        if let Some(outlier_mad) = self.0.outlier_mad {
+            let cleaned = Cleaned::of(&kept_window, self.0.outlier_order, about_mm, outlier_mad)
+                .map_err(|problem| unfit(points, trace, &problem))?;
+            kept_window = kept_window.keep(&cleaned.kept);
+            let cleaned = cleaned.range(turn.points.start - turn.window.start, measured.len());
+            scan = measured.keep(&cleaned.kept);
+            outliers = (cleaned.left_out() > 0).then(|| left_out(&cleaned, &measured, outlier_mad));
+        }
         let id = helix.map_or_else(|| trace.id.clone(), |(_, number)| format!("{}.{number}", trace.id));
         let mut warnings = Vec::new();
         if let Some((helix, 1)) = helix {
@@ -114,9 +119,7 @@ impl LeastSquaresCylinder {
                 helix.behind
             ));
         }
-        if cleaned.left_out() > 0 {
-            warnings.push(format!("{} {id}: {}", trace.kind, left_out(&cleaned, &measured, self.0.outlier_mad)));
-        }
+        warnings.extend(outliers.map(|left_out| format!("{} {id}: {left_out}", trace.kind)));
         let window = helix.map(|_| kept_window);
         Ok(Circle { id, kind: &trace.kind, measured: measured.len(), scan, window, warnings })
     }

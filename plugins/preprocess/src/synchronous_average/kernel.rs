@@ -4,7 +4,7 @@
 //! sines below half of the recording's Nyquist frequency ([`PASS_BAND`]). (Laakso, Välimäki, Karjalainen, Laine, IEEE Signal
 //! Process. Mag. 13(1), 1996: least squared integral error.) Low frequencies count for more, as form and motion are
 //! large at low orders and fade towards high ones: [`ERRORS`] says what is met. Above the pass band the interpolation
-//! weakens, halfway between two samples to nothing at Nyquist. Between two samples each weight is a parabola in each of
+//! weakens, halfway between two samples to nothing at Nyquist ([`Kernel::passed`]). Between two samples each weight is a parabola in each of
 //! [`STRETCHES`] stretches, interpolated at the zeros of a Chebyshev polynomial; at these, the weights are scaled to the sum 1.
 //!
 //! Positions about one sample apart, as those of a turn on as many angles as it has samples, share a stretch with their
@@ -38,7 +38,7 @@ const FALL: i32 = 4;
 const SINES: usize = 32;
 /// In a stretch, a parabola errs by (π·share of Nyquist/(2·STRETCHES))³/(3!·2²) of a sine: 8e-8 at the end of the pass
 /// band, 1e-9 at an eighth of Nyquist.
-const STRETCHES: usize = 64;
+pub(super) const STRETCHES: usize = 64;
 /// How far a parabola serves, in halves of its stretch: its error grows as Chebyshev's polynomial T₃, to 26 times as much.
 const SERVES: f64 = 2.0;
 /// Nearer to a sample than this, a position is as good as on it.
@@ -64,6 +64,18 @@ impl Kernel {
     pub(super) fn new() -> Self {
         let nearest = Nearest::new();
         Self { stretches: (0..STRETCHES).map(|index| parabolas(&nearest, index)).collect() }
+    }
+
+    /// What a position that is `fraction` behind a sample passes of a sine of so many rad a sample: amplitude and phase.
+    pub(super) fn passed(&self, fraction: f64, omega: f64) -> Complex64 {
+        let place = self.place(fraction);
+        let across = place.across(fraction);
+        let taps = place.stretch.iter().enumerate();
+        taps.map(|(tap, [c0, c1, c2])| {
+            let behind = tap as f64 - (REACH - 1) as f64 - fraction;
+            Complex64::cis(omega * behind) * ((c2 * across + c1) * across + c0)
+        })
+        .sum()
     }
 
     /// The stretch of a position that is `fraction` (0 to 1) behind a sample.

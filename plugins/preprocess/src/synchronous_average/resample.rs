@@ -4,6 +4,7 @@ use std::{collections::VecDeque, f64::consts::TAU};
 
 use runout_core::{
     Complex64,
+    consistency::turns::Course,
     measurement::{Block, Capture, Defect},
     near_tone::{NearTone, near_tones},
     numerics::{fourier::max_order, lanes::fused},
@@ -20,6 +21,7 @@ use super::{
     mean::Analysis,
     orders_held,
     outliers::{Outliers, PendingTurn, Verdict},
+    passed::{self, Fractions},
     size::Size,
     split::Means,
     spread::Motion,
@@ -38,6 +40,7 @@ pub(super) struct Outcome {
     pub scatter_beside: Option<Vec<Complex64>>,
     pub near_tones: Vec<NearTone>,
     pub levels: TurnLevels,
+    pub course: Course,
     pub split: Option<Split>,
     pub spread: Option<Spread>,
     pub used: usize,
@@ -48,8 +51,8 @@ pub(super) struct Outcome {
     pub bridged: Option<String>,
     /// By how much interruptions are wider at each end than the rig declares.
     pub bridged_beyond_rad: f64,
-    /// All positions lay on samples: nothing was interpolated.
-    pub exact: bool,
+    /// What passes of each order where the interpolation weakens some that are kept.
+    pub passed: Option<Vec<Complex64>>,
 }
 
 /// The resampling of one capture under way. All buffers live as long as it.
@@ -77,7 +80,8 @@ pub(super) struct Resampling<'a> {
     outliers: Option<Outliers>,
     used_samples: f64,
     rejected: Vec<RejectedTurn>,
-    exact: bool,
+    /// Where positions lie between samples, where that weakens orders that are kept.
+    fractions: Option<Fractions>,
 }
 
 impl<'a> Resampling<'a> {
@@ -115,7 +119,7 @@ impl<'a> Resampling<'a> {
             outliers: config.outlier_sigma.map(|sigma| Outliers::new(sigma, channels)),
             used_samples: 0.0,
             rejected: Vec::new(),
-            exact: true,
+            fractions: (!on_samples && average.is_weakened(capture)).then_some(Fractions::NONE),
         }
     }
 
@@ -172,13 +176,16 @@ impl<'a> Resampling<'a> {
             scatter_beside: self.means.scatter_beside(),
             used: self.means.whole.turns(),
             levels: self.means.levels(),
+            course: self.means.low_orders().course(),
             split: self.means.split(neighbours.as_ref()),
             spread: self.means.spread(),
             used_samples: self.used_samples,
             rejected: self.rejected,
             bridged_beyond_rad: if self.bridges.any() { self.beyond_rad } else { 0.0 },
             bridged: self.bridges.warning(),
-            exact: self.exact,
+            passed: self.fractions.zip(self.capture.median_turn_samples()).map(|(fractions, turn_samples)| {
+                fractions.passed(self.kernel, turn_samples, self.harmonics.len() / self.capture.channels().max(1))
+            }),
         }
     }
 
@@ -216,7 +223,9 @@ impl<'a> Resampling<'a> {
             self.rejected.push(turn.rejected(turn.number, reason));
             return;
         }
-        self.exact &= exact;
+        if let Some(fractions) = &mut self.fractions {
+            fractions.note(&self.positions);
+        }
         let looked_at = self.outliers.is_some() || self.means.looks_at_next();
         let readings = self.means.next();
         fused(Interpolation {
@@ -304,4 +313,20 @@ fn is_smooth(mut number: usize) -> bool {
         }
     }
     number == 1
+}
+
+/// Gives an average, and everything about it order by order, what did not pass.
+pub(super) fn undo(outcome: &mut Outcome, passed: &[Complex64], channels: usize) {
+    passed::harmonics(&mut outcome.mean, passed, channels);
+    for matrices in [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten() {
+        passed::squares(matrices, passed, channels);
+    }
+    for tone in &mut outcome.near_tones {
+        if let Some(passed) = passed.get(tone.order) {
+            tone.leak.iter_mut().for_each(|leak| *leak /= passed);
+        }
+    }
+    if let Some(split) = &mut outcome.split {
+        passed::undo_split(split, passed, channels);
+    }
 }

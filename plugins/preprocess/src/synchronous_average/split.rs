@@ -2,12 +2,13 @@
 
 use runout_core::{
     Complex64,
+    consistency::turns::TurnTable,
     neighbours::Neighbours,
     profile::{Part, Split, TURN_ORDERS, TurnLevels, Turns},
     spread::Spread,
 };
 
-use super::{mean::Mean, size::Size, spread::Extremes, turns::Turn};
+use super::{low_orders::LowOrders, mean::Mean, size::Size, spread::Extremes, turns::Turn};
 
 /// Turns that are summed together at most: the sums are then read and written once for all of them.
 const TOGETHER: usize = 4;
@@ -32,6 +33,7 @@ pub(super) struct Means {
     /// Equal angles of a turn.
     angles: usize,
     levels: TurnLevels,
+    low_orders: LowOrders,
 }
 
 struct Parts {
@@ -75,6 +77,7 @@ impl Means {
             stride: stride.max(1),
             angles: size.angles,
             levels: TurnLevels::default(),
+            low_orders: LowOrders::new(size, planned),
         }
     }
 
@@ -105,7 +108,9 @@ impl Means {
         let taken = self.turns();
         let readings = &self.waiting[self.pending * self.readings..][..self.readings];
         self.levels.numbers.push(turn.number);
+        let before = self.levels.levels_um.len();
         self.levels.levels_um.extend(readings.chunks_exact(self.angles).map(mean));
+        self.low_orders.take(turn.number, readings, &self.levels.levels_um[before..]);
         self.pending += 1;
         if looked_at {
             self.whole.look_at(harmonics);
@@ -150,6 +155,11 @@ impl Means {
     /// Mean levels of the turns taken.
     pub(crate) fn levels(&mut self) -> TurnLevels {
         std::mem::take(&mut self.levels)
+    }
+
+    /// Low orders of the turns taken.
+    pub(crate) fn low_orders(&mut self) -> TurnTable {
+        self.low_orders.table()
     }
 
     /// The scatter without what the covariance is taken from.

@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod by_encoder;
+mod near_nyquist;
 mod over_turns;
 
 use std::f64::consts::TAU;

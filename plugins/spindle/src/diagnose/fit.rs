@@ -1,9 +1,12 @@
 //! A spindle model fitted with effects applied.
+//!
+//! Long because what the loop asks of a fit is one trait.
 
 use std::sync::Arc;
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
+    consistency::{Check, Test, linear},
     model::{
         Bias, Fit, OpenWithinBound, Outcome, Remainder, Setting,
         diagnosis::Unexplained,
@@ -65,7 +68,8 @@ impl SpindleFit {
     /// χ² per degree of freedom as a run states it of each station, and of what single turns show beside; `None` where nothing is
     /// redundant or the noise is not known.
     ///
-    /// The loop weighs each order by its own noise floor, a run all orders by one: the two differ by some percent.
+    /// The loop looks for effects with each order weighed by its own noise floor; what is printed, and what the verdict is taken from, is
+    /// what a run states.
     pub(super) fn stated_chi2_per_dof(&self) -> Option<f64> {
         let (mut chi2, mut dof) = (0.0, 0);
         for (solved, data) in self.stations.iter().zip(&self.shared.data) {
@@ -176,7 +180,7 @@ impl SpindleFit {
     fn own_separations(&self, stations: &[Station]) -> Vec<Separation> {
         let solver = self.shared.solver(&self.layout, &self.alterations);
         let each = self.stations.iter().zip(stations).map(|(solved, station)| {
-            let propagation = solved.with_angles.as_ref().or(solved.propagation.as_ref());
+            let propagation = solved.stated.as_ref().or(solved.propagation.as_ref());
             let by_reading = by_reading(&solved.operators, &solved.corrected, &solved.linear);
             let residual = Residual { by_reading, ..solved.residual.clone() };
             solver.report(station, &solved.operators, &solved.estimate, propagation, residual)
@@ -280,6 +284,24 @@ impl Fit for SpindleFit {
         Vec::new()
     }
 
+    fn consistency(&self) -> Vec<Check> {
+        let rig = &self.shared.selection.rig;
+        let several = self.stations.len() > 1;
+        let each = self.stations.iter().zip(&self.shared.data).flat_map(|(solved, data)| {
+            let residual = solved.residual.checks.iter().map(|check| {
+                let beside = data.beside_averages(&self.alterations);
+                let tested = if check.test == Test::Residual { with_beside(check, &beside) } else { check.clone() };
+                tested.among(self.stations.len())
+            });
+            let turns = data.readings.courses.iter().zip(&rig.setups);
+            let turns =
+                turns.flat_map(|(course, setup)| course.checks.iter().map(|check| check.clone().within(&setup.id)));
+            let checks = residual.chain(turns);
+            checks.map(move |check| if several { check.within(&data.name) } else { check }).collect::<Vec<_>>()
+        });
+        each.collect()
+    }
+
     fn widen(&mut self, effects: &[usize], covariance: &[Vec<f64>]) {
         let width = self.layout.unknowns.len();
         for station in 0..self.stations.len() {
@@ -293,7 +315,7 @@ impl Fit for SpindleFit {
             let along_axis = self.layout.unknowns.contains(&Quantity::Z);
             let first: Vec<Vec<Complex64>> =
                 partials.iter().filter(|_| along_axis).map(|partial| solved.first_moved(partial)).collect();
-            for propagation in [&mut solved.propagation, &mut solved.with_angles].into_iter().flatten() {
+            for propagation in [&mut solved.propagation, &mut solved.stated].into_iter().flatten() {
                 for (of_i, row) in first.iter().zip(covariance) {
                     for (of_j, entry) in first.iter().zip(row) {
                         let products = of_i.iter().flat_map(|a| of_j.iter().map(move |b| a * b.conj() * *entry));
@@ -358,6 +380,14 @@ impl Fit for SpindleFit {
         };
         Some(format!("{more}; `runout plan` tries what helps"))
     }
+}
+
+/// The test of the residual, with what single turns show beside the averages.
+fn with_beside(check: &Check, beside: &[f64]) -> Check {
+    let [Some(dof), noise_dof] = [0, 1].map(|place| check.dof.get(place).copied()) else { return check.clone() };
+    let (count, squares) = (beside.len() as f64, beside.iter().map(|left| left * left).sum::<f64>());
+    let chi2_per_dof = (check.statistic * dof + squares) / (dof + count);
+    linear::residual(chi2_per_dof, dof + count, noise_dof.unwrap_or(f64::INFINITY)).widening(check.factor)
 }
 
 /// An order that is not observable.

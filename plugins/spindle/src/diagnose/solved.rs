@@ -13,7 +13,7 @@ use crate::{
     alterations::Alterations,
     effects::Predicted,
     layout::{FirstOrder, Layout},
-    solve::{Estimate, Operators, Propagation, Readings, Solver, apply, leftover, residual},
+    solve::{Estimate, Operators, Propagation, Readings, Solver, apply, judged_residual, leftover},
 };
 
 /// One station's solution.
@@ -22,8 +22,9 @@ pub(super) struct Solved {
     /// Effects as they act on the turns fitted.
     pub alterations: Alterations,
     pub propagation: Option<Propagation>,
-    /// The same with what is not known of the setups' angles.
-    pub with_angles: Option<Propagation>,
+    /// The same with what results are uncertain by beyond noise: angles, turns that change, and what the residual refutes. Nothing where
+    /// that is nothing, and of a part of the turns.
+    pub stated: Option<Propagation>,
     pub estimate: Estimate,
     /// Readings taken back to displacements, without their covariance.
     pub corrected: Readings,
@@ -83,30 +84,20 @@ impl Solved {
             })
             .collect();
         let propagation = Propagation::of(&corrected, &operators);
-        // The residual shows an angle that is off, as an effect; results are uncertain by it all the same.
-        let with_angles = (data.part == Part::All && corrected.has_uncertain_angles()).then(|| {
+        let (residual, factors) = judged_residual(&operators, &corrected, &linear, propagation.as_ref());
+        let is_wider = corrected.has_more_than_noise() || factors.iter().any(|factor| *factor > 1.0);
+        let mut stated = None;
+        if data.part == Part::All && is_wider {
             let mut uncertain = corrected.clone();
-            uncertain.add_angle_uncertainty();
-            Propagation::of(&uncertain, &operators)
-        });
-        let with_angles = with_angles.flatten();
-        let residual = residual(&operators, &corrected, &linear, propagation.as_ref());
+            uncertain.add_more_than_noise();
+            stated = Propagation::of(&uncertain, &operators);
+            stated.iter_mut().for_each(|stated| stated.times(&factors));
+        }
         // A loop holds several fits of all stations: what is not asked for again goes.
         operators.weights = None;
         (corrected.covariance, corrected.scatter) = (None, None);
         let alterations = altered;
-        Self {
-            operators,
-            alterations,
-            propagation,
-            with_angles,
-            estimate,
-            corrected,
-            linear,
-            whitened,
-            floor_std,
-            residual,
-        }
+        Self { operators, alterations, propagation, stated, estimate, corrected, linear, whitened, floor_std, residual }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Products of small complex matrices.
 
-use runout_core::Complex64;
+use runout_core::{Complex64, separation::OrderResidual};
 
 /// Matrix (`[row][col]`) times vector.
 pub(crate) fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
@@ -104,4 +104,10 @@ pub(crate) fn leftover(matrix: &[Complex64], operator: &[Complex64], count: usiz
         }
     }
     left
+}
+/// χ² per degree of freedom of all orders together; NaN where none is known.
+pub(super) fn pooled(orders: &[OrderResidual]) -> f64 {
+    let [squares, expected] =
+        orders.iter().fold([0.0; 2], |[squares, expected], order| [squares + order.squares, expected + order.expected]);
+    squares / expected
 }

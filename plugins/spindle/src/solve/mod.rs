@@ -2,6 +2,7 @@
 
 mod algebra;
 mod angles;
+mod consistency;
 mod estimate;
 mod joint;
 pub(crate) mod leak;
@@ -22,7 +23,7 @@ pub(crate) use operators::{Operators, OrderOperator};
 pub(crate) use projection::projection;
 pub(crate) use propagation::Propagation;
 pub(crate) use readings::{Readings, Scatter};
-pub(crate) use residual::{by_reading, residual};
+pub(crate) use residual::{by_reading, judged_residual};
 pub(crate) use second_order::{OVERSAMPLING, interpolate};
 pub(crate) use solution::Solver;
 pub(crate) use weights::{smooth_by_order, whitening};

@@ -63,6 +63,13 @@ impl Propagation {
         }
         Some(propagation)
     }
+
+    /// With the covariance of each order times a factor.
+    pub(crate) fn times(&mut self, factors: &[f64]) {
+        for (covariance, factor) in self.covariance.iter_mut().zip(factors) {
+            covariance.iter_mut().for_each(|entry| *entry *= *factor);
+        }
+    }
 }
 
 /// What eight orders need.
@@ -203,6 +210,7 @@ mod tests {
         *,
     };
     use crate::layout::System;
+    use runout_core::consistency::turns::Course;
 
     const SENSORS: usize = 3;
     const SETUPS: usize = 2;
@@ -258,6 +266,7 @@ mod tests {
             turns: vec![10; SETUPS],
             near_tones: vec![Vec::new(); SETUPS],
             angle_std_rad: vec![0.0; SETUPS],
+            courses: vec![Course::default(); SETUPS],
             places: (0..COUNT).collect(),
         };
         let scatter =

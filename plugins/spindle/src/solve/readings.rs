@@ -1,6 +1,8 @@
 //! One station's averaged readings, in the layout's order.
 
-use runout_core::{Complex64, Error, Result, near_tone::NearTone, profile::Profile, stage::Station};
+use runout_core::{
+    Complex64, Error, Result, consistency::turns::Course, near_tone::NearTone, profile::Profile, stage::Station,
+};
 
 use crate::{layout::Layout, selection::Selection};
 
@@ -28,6 +30,8 @@ pub(crate) struct Readings {
     pub near_tones: Vec<Vec<(usize, Vec<Complex64>)>>,
     /// Standard uncertainty of the spindle angle in each setup, in rad.
     pub angle_std_rad: Vec<f64>,
+    /// How the turns of each setup change, channels in the rig's order.
+    pub courses: Vec<Course>,
     /// Place of each reading among the channels of all profiles of the station.
     pub places: Vec<usize>,
 }
@@ -107,6 +111,9 @@ impl Readings {
             turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
             near_tones: ordered.iter().map(|(profile, channels)| leaks(profile, channels)).collect(),
             angle_std_rad: ordered.iter().map(|(profile, _)| profile.angle_std_rad).collect(),
+            courses: (ordered.iter())
+                .map(|(profile, channels)| profile.course.of_channels(channels, profile.channels()))
+                .collect(),
             places,
         })
     }
@@ -131,11 +138,31 @@ impl Readings {
         self.turns.len() > 1 && self.angle_std_rad.iter().any(|std_rad| *std_rad > 0.0)
     }
 
+    /// Whether results are uncertain by more than the noise of the averages: by angles, or by turns that change.
+    #[must_use]
+    pub(crate) fn has_more_than_noise(&self) -> bool {
+        self.has_uncertain_angles() || self.courses.iter().any(|course| !course.is_steady())
+    }
+
+    /// Adds to the covariance of the averages what their noise does not show: uncertain angles, and what changes from turn to turn.
+    pub(crate) fn add_more_than_noise(&mut self) {
+        self.add_angle_uncertainty();
+        let sensors = self.count / self.turns.len().max(1);
+        for (setup, (matrices, course)) in self.covariance.iter_mut().flatten().zip(&self.courses).enumerate() {
+            let means = self.mean.chunks_exact(self.count).map(|order| &order[setup * sensors..(setup + 1) * sensors]);
+            for (order, (matrix, mean)) in matrices.chunks_exact_mut(sensors * sensors).zip(means).enumerate().skip(1) {
+                if let Some(course) = course.covariance(order, mean) {
+                    matrix.iter_mut().zip(course).for_each(|(entry, course)| *entry += course);
+                }
+            }
+        }
+    }
+
     /// Adds to the covariance of the averages that of the angle which each setup's turns are counted from: at an angle that is off by
     /// δ, order n is off by −i·n·δ·u, in all channels together.
     ///
     /// Weights do not have it: it repeats in every turn, and scatter does not show it.
-    pub(crate) fn add_angle_uncertainty(&mut self) {
+    fn add_angle_uncertainty(&mut self) {
         if !self.has_uncertain_angles() {
             return;
         }

@@ -2,12 +2,13 @@
 
 use runout_core::{
     Complex64,
-    profile::{NEIGHBOURS, Profile},
     separation::{Residual, SectionAt, Separation},
     stage::Station,
 };
 
-use super::{estimate::Estimate, operators::Operators, propagation::Propagation, solution::Solver};
+use super::{
+    consistency::noise_freedom, estimate::Estimate, operators::Operators, propagation::Propagation, solution::Solver,
+};
 use crate::layout::ToReference;
 
 impl Solver<'_> {
@@ -116,16 +117,10 @@ impl Solver<'_> {
     }
 }
 
-/// Real degrees of freedom behind the covariance of one order by itself: of the neighbours that captures of so many
-/// turns have, and of both parts of each.
+/// Real degrees of freedom behind the covariance of one order of a station by itself.
 fn freedom(station: &Station, setups: &[usize]) -> usize {
     let used = station.profiles.iter().filter(|profile| setups.contains(&profile.setup));
-    let of = |profile: &Profile| match profile.turns.used {
-        0 | 1 => 0,
-        2 => 2,
-        turns => 4 * NEIGHBOURS.min((turns - 1) / 2),
-    };
-    used.map(of).sum()
+    noise_freedom(used.map(|profile| profile.turns.used))
 }
 
 /// M·C·Mᴴ for a covariance C, where `times` gives M·rows for rows of a length.

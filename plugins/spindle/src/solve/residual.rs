@@ -2,18 +2,20 @@
 
 use runout_core::{
     Complex64,
-    separation::{ReadingResidual, Residual},
+    separation::{OrderResidual, ReadingResidual, Residual},
 };
 
 use super::{
     algebra::apply,
+    angles,
+    consistency::judge,
     operators::{Operators, OrderOperator},
     propagation::Propagation,
     readings::Readings,
 };
 
 /// What the solution leaves of linear readings, `[order][reading]`, and what is expected of that from noise.
-pub(crate) fn residual(
+fn residual(
     operators: &Operators,
     readings: &Readings,
     linear: &[Complex64],
@@ -22,48 +24,63 @@ pub(crate) fn residual(
     let count = readings.count;
     let (mut squares, mut expected, mut dof) = (0.0, 0.0, 0);
     let mut orders: Option<[usize; 2]> = None;
-    // Weighted as the fit is; set against its value expected from the covariance.
-    let (mut weighted, mut weighted_expected) = (0.0, 0.0);
+    let mut by_order = Vec::new();
     for (index, (OrderOperator { operator, rank }, system)) in
         operators.orders.iter().zip(&operators.systems).enumerate()
     {
         if *rank == count {
             continue;
         }
-        dof += count - rank;
+        let freedom = 2 * (count - rank);
+        dof += freedom;
         orders = Some([orders.map_or(index + 1, |[lowest, _]| lowest), index + 1]);
         let recorded = &linear[(index + 1) * count..(index + 2) * count];
         let fitted = apply(&system.matrix, &apply(operator, recorded));
         let residual: Vec<Complex64> =
             recorded.iter().zip(fitted).map(|(recorded, fitted)| recorded - fitted).collect();
-        squares += residual.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let plain = norm_sqr(&residual);
+        squares += plain;
         let Some(propagation) = propagation else { continue };
         expected += propagation.squares[index];
-        if let Some(weights) = &operators.weights {
-            weighted += weights[index].times(&residual, 1).iter().map(Complex64::norm_sqr).sum::<f64>();
-            weighted_expected += propagation.weighted_squares[index];
-        }
+        // Weighted as the fit is; set against its value expected from the covariance.
+        let [squares, expected] = match &operators.weights {
+            Some(weights) => [norm_sqr(&weights[index].times(&residual, 1)), propagation.weighted_squares[index]],
+            None => [plain, propagation.squares[index]],
+        };
+        by_order.push(OrderResidual { order: index + 1, squares, expected, dof: freedom });
     }
     if dof == 0 {
         let nan = f64::NAN;
         return Residual { rms_um: nan, expected_rms_um: nan, chi2_per_dof: nan, orders, ..Residual::default() };
     }
+    if expected <= 0.0 {
+        by_order.clear();
+    }
     // A coefficient of size c is a wave of mean square c²/2.
     let rms = |squares: f64| (0.5 * squares / count as f64).sqrt();
-    let chi2_per_dof = match &operators.weights {
-        _ if expected <= 0.0 => f64::NAN,
-        Some(_) => weighted / weighted_expected,
-        None => squares / expected,
-    };
     Residual {
         rms_um: rms(squares),
         expected_rms_um: if propagation.is_some() { rms(expected) } else { f64::NAN },
-        chi2_per_dof,
-        dof: 2 * dof,
+        chi2_per_dof: pooled(&by_order),
+        dof,
         orders,
+        by_order,
         by_reading: Vec::new(),
         checks: Vec::new(),
     }
+}
+
+/// The same without what uncertain angles of the setups explain: what is left is held against noise and angles.
+pub(crate) fn judged_residual(
+    operators: &Operators,
+    readings: &Readings,
+    linear: &[Complex64],
+    propagation: Option<&Propagation>,
+) -> (Residual, Vec<f64>) {
+    let mut residual = residual(operators, readings, linear, propagation);
+    angles::explain(&mut residual, operators, readings, linear, propagation);
+    let factors = judge(&mut residual, &readings.turns, operators.orders.len());
+    (residual, factors)
 }
 
 /// What the solution leaves of each of the linear readings `[order][reading]`, at the orders that are redundant.
@@ -81,4 +98,8 @@ pub(crate) fn by_reading(operators: &Operators, readings: &Readings, linear: &[C
     }
     found.retain(|reading| !reading.harmonics.is_empty());
     found
+}
+
+fn norm_sqr(values: &[Complex64]) -> f64 {
+    values.iter().map(Complex64::norm_sqr).sum()
 }

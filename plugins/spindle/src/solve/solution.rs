@@ -11,14 +11,13 @@ use runout_core::{
 
 use super::{
     algebra::apply,
-    angles,
     estimate::Estimate,
     joint::Joint,
     leak,
     operators::Operators,
     propagation::Propagation,
     readings::{Readings, Scatter},
-    residual::{by_reading, residual},
+    residual::{by_reading, judged_residual},
     second_order::{COUPLED, SecondOrder},
     weights,
 };
@@ -73,15 +72,13 @@ impl Solver<'_> {
             return Err(self.unsettled(station, &readings, &estimate));
         }
         let mut propagation = Propagation::of(&readings, &operators);
-        let mut residual = residual(&operators, &readings, &linear, propagation.as_ref());
+        let (mut residual, factors) = judged_residual(&operators, &readings, &linear, propagation.as_ref());
         residual.by_reading = by_reading(&operators, &readings, &linear);
-        if readings.has_uncertain_angles() {
-            // What is left is held against noise and angles, results are uncertain by both.
-            residual.chi2_per_dof *=
-                1.0 - angles::explained_share(&operators, &readings, &linear, propagation.as_ref());
-            readings.add_angle_uncertainty();
+        if readings.has_more_than_noise() {
+            readings.add_more_than_noise();
             propagation = Propagation::of(&readings, &operators);
         }
+        propagation.iter_mut().for_each(|propagation| propagation.times(&factors));
         let mut separation = self.report(station, &operators, &estimate, propagation.as_ref(), residual);
         let carried = self.second_order.then(|| self.carried(&readings, &separation)).flatten();
         separation.warnings.extend(carried);

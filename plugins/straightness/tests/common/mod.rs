@@ -19,6 +19,8 @@ pub(crate) struct Campaign {
     pub part: Waves,
     pub slide: Waves,
     pub noise_um: f64,
+    /// Step of a random walk along each trace.
+    pub walk_um: f64,
     pub length_mm: f64,
     pub step_mm: f64,
     pub traces: Vec<Shot>,
@@ -56,7 +58,7 @@ pub(crate) fn ground(seed: u64, repeats: [usize; 2]) -> Campaign {
     let slide = vec![wave(0.15, 190.0), wave(0.06, 63.0)];
     let of = |reversed| Shot { reversed, ..Shot::default() };
     let traces = [vec![of(false); repeats[0]], vec![of(true); repeats[1]]].concat();
-    Campaign { part, slide, noise_um: 0.02, length_mm: 100.0, step_mm: 0.2, traces, seed }
+    Campaign { part, slide, noise_um: 0.02, walk_um: 0.0, length_mm: 100.0, step_mm: 0.2, traces, seed }
 }
 
 impl Campaign {
@@ -76,6 +78,7 @@ impl Campaign {
             let (offset, slope) = (random.random_range(-20.0..20.0), random.random_range(-0.05..0.05));
             let first = random.random_range(0.0..self.step_mm);
             let count = (self.length_mm / self.step_mm) as usize;
+            let mut walked = 0.0;
             let rows = (0..count).map(|row| if shot.backwards { count - 1 - row } else { row });
             for (row, at) in rows.enumerate() {
                 let z = first + self.step_mm * at as f64;
@@ -89,8 +92,11 @@ impl Campaign {
                     value(&self.part, truly) + sign * value(&self.slide, truly) - shot.bow_um * arm * arm + settling;
                 let chip = shot.chip && (60.0..64.0).contains(&z);
                 let lifted = if chip { 3.0 } else { 0.0 };
+                let error = noise.sample(&mut random);
+                walked +=
+                    if self.walk_um > 0.0 { self.walk_um / self.noise_um * noise.sample(&mut random) } else { 0.0 };
                 z_mm.push(z);
-                reading_um.push((1.0 + shot.gain) * content + lifted + offset + slope * z + noise.sample(&mut random));
+                reading_um.push((1.0 + shot.gain) * content + lifted + offset + slope * z + error + walked);
                 flag.push(f64::from(u8::from(chip)));
             }
             let kind = if shot.reversed { "reversed" } else { "initial" };

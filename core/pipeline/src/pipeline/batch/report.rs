@@ -29,6 +29,8 @@ pub struct BatchReport {
     pub failed: Vec<Failed>,
     /// Recordings of the data set with warnings.
     pub warned: usize,
+    /// Warnings of all of them together.
+    pub warning_count: usize,
     /// What the first of them warn of, in the order of this call; those of earlier calls come last.
     pub warnings: Vec<Warned>,
     /// Recordings in the data set whose results are of another configuration or version: they are in no value and no trend. Given
@@ -94,13 +96,11 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Notes are of the pipeline, and no warnings.
     pub(super) fn of(summary: &Summary) -> Self {
-        let warnings = || summary.all_warnings().filter(|warning| !summary.notes.contains(warning));
         Self {
             decisions: summary.limits.iter().map(|limit| limit.decision).collect(),
-            warnings: warnings().count(),
-            first: warnings().take(MOST_OF_ONE).collect(),
+            warnings: summary.findings().count(),
+            first: summary.findings().take(MOST_OF_ONE).cloned().collect(),
         }
     }
 }
@@ -128,6 +128,7 @@ impl BatchReport {
             earlier: 0,
             failed: Vec::new(),
             warned: 0,
+            warning_count: 0,
             warnings: Vec::new(),
             other_configuration: Vec::new(),
             limits: pipeline.evaluate.limits().iter().map(count).collect(),
@@ -140,6 +141,7 @@ impl BatchReport {
     pub(super) fn count(&mut self, recording: &str, found: Found) {
         if found.warnings > 0 {
             self.warned += 1;
+            self.warning_count += found.warnings;
             if self.warnings.len() < MOST_WARNED {
                 let Found { warnings: count, first, .. } = found;
                 self.warnings.push(Warned { recording: recording.to_owned(), count, first });

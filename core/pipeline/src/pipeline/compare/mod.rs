@@ -33,6 +33,7 @@ use super::{
     record_reader::{RecordReader, separate},
     registry::Context,
     result::{Evaluation, complete},
+    warnings::of_station,
 };
 use crate::{
     stage::{Averager, Conditioner, Request, Source, Station, StationSeparator},
@@ -114,7 +115,7 @@ impl<'a> Comparing<'a> {
         threads: Option<NonZeroUsize>,
         observer: &dyn Observer,
         outputs: Vec<PathBuf>,
-        take: impl FnMut(StationComparison) -> Result<()> + Send,
+        mut take: impl FnMut(StationComparison) -> Result<()> + Send,
     ) -> Result<Comparison> {
         let pipeline = self.pipeline;
         let Source::Turns(recording) = pipeline.loader.open(&Request { rig: Some(self.rig), columns: &[] })? else {
@@ -131,7 +132,11 @@ impl<'a> Comparing<'a> {
             alone: false,
         };
         let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref());
-        let inputs = line.run(threads, observer, work, take)?;
+        let mut warnings = recording.remarks();
+        let inputs = line.run(threads, observer, work, |station: StationComparison| {
+            warnings.extend(of_station(&station.station, &station.warnings));
+            take(station)
+        })?;
         let own = pipeline.assessment.as_ref();
         let assessments = own.into_iter().chain(self.methods.iter().map(|method| &method.assessment));
         let methods = self.names.iter().zip(assessments).map(|(name, found)| MethodSummary {
@@ -154,7 +159,7 @@ impl<'a> Comparing<'a> {
             values: Vec::new(),
             columns: Vec::new(),
             outputs,
-            warnings: recording.remarks(),
+            warnings,
         })
     }
 
@@ -162,8 +167,12 @@ impl<'a> Comparing<'a> {
         let scatter = Scatter::of(station);
         let separators = std::iter::once(self.reference).chain(self.methods.iter().map(|method| &*method.separator));
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
-        let evaluation =
-            Evaluation { evaluate: &Evaluate::ront(), radius_mm: self.rig.part_radius_mm, rig: Some(self.rig) };
+        let evaluation = Evaluation {
+            evaluate: &Evaluate::ront(),
+            radius_mm: self.rig.part_radius_mm,
+            rig: Some(self.rig),
+            stations: 1,
+        };
         let mut results = Vec::new();
         let mut estimates = Vec::new();
         let mut warnings: Vec<String> =

@@ -3,6 +3,7 @@
 //! E_n = |a − b| / (2·√(u_a² + u_b²)) (ISO 13528:2022, 9.7, with expanded uncertainties of k = 2). The methods share readings: the
 //! difference scatters less than independent results would, and scatter alone keeps E_n below 1 all the more.
 
+use runout_consistency::refuted_by;
 use runout_error::fault::Fault;
 use std::{collections::BTreeSet, path::PathBuf};
 
@@ -18,6 +19,7 @@ use crate::{
         document::{Document, Sources},
         evaluate::Evaluated,
         registry::Context,
+        warnings::of_station,
     },
     points::PointColumn,
     stage::{Outcome, PointSeparator, Request, Source},
@@ -107,7 +109,8 @@ impl<'a> ComparingPoints<'a> {
         spare_inputs(&outputs, std::slice::from_ref(&points.input))?;
         let separate = |separator: &dyn PointSeparator| {
             let mut outcome = separator.separate(&points)?;
-            let evaluated = Evaluated::of(&outcome.evaluables, &pipeline.evaluate)?;
+            let evaluated =
+                Evaluated::of(&outcome.evaluables, &pipeline.evaluate, refuted_by(&outcome.checks).as_deref())?;
             outcome.values = evaluated.named().chain(outcome.values).collect();
             Ok::<Outcome, Error>(outcome)
         };
@@ -128,8 +131,10 @@ impl<'a> ComparingPoints<'a> {
             method: name.clone(),
             unused: Vec::new(),
             lost_orders: LostOrders::default(),
-            notes: separator.notes().iter().chain(&outcome.remarks).chain(&outcome.notes).cloned().collect(),
+            notes: separator.notes().iter().chain(&outcome.notes).cloned().collect(),
         });
+        let of_methods = outcomes.iter().flat_map(|(name, _, outcome)| of_station(name, &outcome.remarks));
+        let warnings = points.remarks.iter().cloned().chain(of_methods).collect();
         let of: Vec<(&str, &Outcome)> = outcomes.iter().map(|(name, _, outcome)| (name.as_str(), outcome)).collect();
         Ok(Comparison {
             title: pipeline.title.clone(),
@@ -145,7 +150,7 @@ impl<'a> ComparingPoints<'a> {
             values: values(&of),
             columns: self::columns(&of),
             outputs,
-            warnings: Vec::new(),
+            warnings,
         })
     }
 

@@ -35,7 +35,7 @@ pub struct Comparison {
     pub columns: Vec<ColumnComparison>,
     /// Files written.
     pub outputs: Vec<PathBuf>,
-    /// What the user should know of the recording.
+    /// What the user should know of the data: of the whole, then of each station, behind the station's name.
     pub warnings: Vec<String>,
 }
 
@@ -62,7 +62,7 @@ pub struct StationComparison {
     pub z_mm: f64,
     /// Form of each section, then motion.
     pub quantities: Vec<QuantityComparison>,
-    /// What the user should know of this station.
+    /// What the user should know of this station; it is in the warnings of the whole too.
     pub warnings: Vec<String>,
 }
 

@@ -86,7 +86,7 @@ impl Exporting<'_> {
         for table in tables {
             let exporter = registry.exporters.build(table, context)?;
             if exporter.takes() == Takes::Surface && !self.gives_surface {
-                let message = "this exporter takes form along an axis or a height map; [separate] gives tables";
+                let message = "this exporter takes form along an axis or a height map; [separate] gives neither";
                 let fault = Fault::at("plugin", message);
                 return Err(document::resolve(fault.help("take one that writes tables"), table));
             }

@@ -69,9 +69,10 @@ impl Route {
         self.evaluables().contains(&EvaluableKind::ClosedProfiles)
     }
 
-    /// Whether its result has a surface: form, or heights on a plane.
+    /// Whether its result has a surface: form of several sections, or heights on a plane.
     pub(super) fn gives_surface(&self) -> bool {
-        self.gives_form() || self.evaluables().contains(&EvaluableKind::HeightMap)
+        let one_section = self.point_separator().is_some_and(PointSeparator::is_one_section);
+        (self.gives_form() && !one_section) || self.evaluables().contains(&EvaluableKind::HeightMap)
     }
 
     /// Whether there is a model for the closed loop.

@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 use super::diagnose::DiagnoseConfig;
 use crate::{
     pipeline::{
+        document::inline,
         evaluate::EvaluateConfig,
-        registry::{Catalogue, Plugin, Registry, inline},
+        registry::{Catalogue, Plugin, Registry},
     },
     summary::Limit,
 };

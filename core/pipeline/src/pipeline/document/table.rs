@@ -3,12 +3,14 @@
 use runout_error::fault::{Fault, Place, Step, known_names};
 use std::ops::Range;
 
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use toml::{
     Spanned,
     de::{DeTable, DeValue, ValueDeserializer},
 };
 
+use super::meaning::of_missing;
 use crate::pipeline::pinpoint::pinpoint;
 
 /// A table whose every key and value knows its place.
@@ -18,7 +20,7 @@ pub type Table<'a> = Spanned<DeTable<'a>>;
 ///
 /// # Errors
 /// When the table does not fit the type.
-pub fn read<T: DeserializeOwned>(table: &Table) -> Result<T, Fault> {
+pub fn read<T: DeserializeOwned + JsonSchema>(table: &Table) -> Result<T, Fault> {
     read_besides(table, &[])
 }
 
@@ -26,20 +28,29 @@ pub fn read<T: DeserializeOwned>(table: &Table) -> Result<T, Fault> {
 ///
 /// # Errors
 /// When the table does not fit the type.
-pub fn read_besides<T: DeserializeOwned>(table: &Table, besides: &[&str]) -> Result<T, Fault> {
-    let value = Spanned::new(table.span(), DeValue::Table(table.get_ref().clone()));
-    T::deserialize(ValueDeserializer::from(value)).map_err(|error| {
+pub fn read_besides<T: DeserializeOwned + JsonSchema>(table: &Table, besides: &[&str]) -> Result<T, Fault> {
+    deserialized(table).map_err(|error| {
         let span = error.span().filter(|span| *span != table.span());
         let exact = pinpoint(table.get_ref(), span.as_ref(), error.message());
-        explain(exact.or(span).unwrap_or_else(|| head(table.span())), error.message(), besides)
+        let fault = explain(exact.or(span).unwrap_or_else(|| head(table.span())), error.message(), besides);
+        let missing = error.message().strip_prefix("missing field `").and_then(|rest| rest.strip_suffix('`'));
+        match missing.and_then(of_missing::<T>) {
+            Some(meaning) => fault.help(meaning),
+            None => fault,
+        }
     })
+}
+
+fn deserialized<T: DeserializeOwned>(table: &Table) -> Result<T, toml::de::Error> {
+    let value = Spanned::new(table.span(), DeValue::Table(table.get_ref().clone()));
+    T::deserialize(ValueDeserializer::from(value))
 }
 
 /// Reads a table and checks it, with the places of the check's faults resolved.
 ///
 /// # Errors
 /// The first mistake.
-pub fn checked<C: serde::de::DeserializeOwned, T>(
+pub fn checked<C: DeserializeOwned + JsonSchema, T>(
     table: &Table,
     check: impl FnOnce(C) -> Result<T, Fault>,
 ) -> Result<T, Fault> {
@@ -94,7 +105,7 @@ pub(in crate::pipeline) fn tables<'a>(root: &Table<'a>, key: &str) -> Result<Vec
 /// # Errors
 /// When a value cannot be written.
 pub fn table_text(table: &Table) -> Result<String, Fault> {
-    let table: toml::Table = read(table)?;
+    let table: toml::Table = deserialized(table).map_err(|error| Fault::here(error.to_string()))?;
     toml::to_string(&table).map_err(|error| Fault::here(error.to_string()))
 }
 

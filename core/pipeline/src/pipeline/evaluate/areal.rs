@@ -4,7 +4,7 @@ use std::{borrow::Cow, collections::BTreeSet};
 
 use super::{
     ArealFilter, Content, Evaluate, Filter, FormRemoval, Found, Group, Label, PartSummary, labelled_with_reasons,
-    texture::found,
+    section_gaps::SectionGaps, texture::found,
 };
 use runout_error::Result;
 use runout_numerics::{
@@ -55,7 +55,7 @@ pub(crate) fn add_areal(
     }
     let sections = uncertain.sections();
     let blank = blanks(sections, surface.angles);
-    let prepared = Prepared::new(surface, &blank, evaluate);
+    let prepared = Prepared::new(surface, uncertain.z_mm(), &blank, evaluate);
     let map = match prepared.map(surface.deviation_um.clone()) {
         Ok(map) => map,
         Err(problem) if evaluate.all => {
@@ -65,6 +65,7 @@ pub(crate) fn add_areal(
         Err(problem) => return Err(problem),
     };
     part.remarks.extend(prepared.remark());
+    part.remarks.extend(prepared.gaps.remark());
     let lost: BTreeSet<usize> = sections.iter().flat_map(Section::lost_orders).collect();
     let highest = max_order(surface.angles);
     let orders = sections.iter().map(|section| section.orders.len().saturating_sub(1));
@@ -82,11 +83,10 @@ pub(crate) fn add_areal(
         values.extend(labelled_with_reasons(labels, numbers, &filter, &held, there.min(used)));
     };
     if evaluate.has(Group::Areal) {
-        let (draws, found) = threads::both(
-            || prepared.draws(uncertain, lowest),
-            || areal::areal(&map, &areal::Settings::default()).parameters(),
-        );
-        add(&mut part.values, prepared.areal(&map, &found, &draws));
+        let (draws, found) =
+            threads::both(|| prepared.draws(uncertain, lowest), || areal::areal(&map, &areal::Settings::default()));
+        part.remarks.extend(found.features.problem());
+        add(&mut part.values, prepared.areal(&map, &found.parameters(), &draws));
     }
     if evaluate.has(Group::Twist) {
         match twist::twist(&map) {
@@ -131,17 +131,18 @@ struct Prepared<'a> {
     surface: &'a Surface,
     blank: &'a [bool],
     evaluate: &'a Evaluate,
+    gaps: SectionGaps,
     /// Rings at each end that are left out after filtering.
     ends: usize,
 }
 
 impl<'a> Prepared<'a> {
-    fn new(surface: &'a Surface, blank: &'a [bool], evaluate: &'a Evaluate) -> Self {
+    fn new(surface: &'a Surface, measured_mm: &[f64], blank: &'a [bool], evaluate: &'a Evaluate) -> Self {
         let ends = match (&surface.z_mm[..], evaluate.lambda_c_mm) {
             ([first, second, .., last], Some(longest)) => end_rings(second - first, last - first, longest),
             _ => 0,
         };
-        Self { surface, blank, evaluate, ends }
+        Self { surface, blank, evaluate, gaps: SectionGaps::new(measured_mm, evaluate.lambda_c_mm), ends }
     }
 
     /// What is said of the ends.
@@ -172,7 +173,7 @@ impl<'a> Prepared<'a> {
         for ring in there.chunks_mut(self.surface.angles) {
             ring.iter_mut().zip(self.blank).filter(|(_, blank)| **blank).for_each(|(height, _)| *height = f64::NAN);
         }
-        let map = whole.with(there);
+        let map = self.gaps.left_out(whole.with(there), &self.surface.z_mm, 0.0);
         let options = &self.evaluate.areal;
         let mut map = match options.form {
             FormRemoval::None => map,
@@ -182,6 +183,9 @@ impl<'a> Prepared<'a> {
             FormRemoval::Polynomial => areal::without_turned_body(&map, options.degree)?,
         };
         map = filtered(map, self.evaluate);
+        if let Some(longest) = self.evaluate.lambda_c_mm.filter(|_| self.ends > 0) {
+            map = self.gaps.left_out(map, &self.surface.z_mm, 0.5 * longest);
+        }
         Ok(if self.ends > 0 { map.without_ends(self.ends) } else { map })
     }
 

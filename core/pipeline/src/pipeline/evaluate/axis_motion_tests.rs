@@ -42,7 +42,7 @@ fn settings(text: &str) -> Evaluate {
 }
 
 fn evaluated(motion: AxisMotion, text: &str) -> Evaluated {
-    Evaluated::of(&[Evaluable::AxisMotion(motion)], &settings(text)).unwrap()
+    Evaluated::of(&[Evaluable::AxisMotion(motion)], &settings(text), None).unwrap()
 }
 
 fn find<'a>(found: &'a Evaluated, symbol: &str) -> &'a Value {

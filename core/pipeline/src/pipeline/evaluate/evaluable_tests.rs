@@ -92,7 +92,7 @@ fn values(deviation_um: Vec<f64>, errors: Result<OpenErrors, String>, of: &str, 
     let mut evaluate = evaluate(text).unwrap();
     evaluate.keep_given(&[EvaluableKind::OpenProfile]);
     let profile = OpenProfile { of: of.into(), z_mm: z_mm(), deviation_um, errors };
-    let found = Evaluated::of(&[Evaluable::OpenProfile(profile)], &evaluate).unwrap();
+    let found = Evaluated::of(&[Evaluable::OpenProfile(profile)], &evaluate, None).unwrap();
     assert!(found.values.iter().all(|(own, _)| own == of));
     found.values.into_iter().map(|(_, value)| value).collect()
 }
@@ -252,7 +252,7 @@ fn what_is_asked_for_is_given_and_nothing_else() {
         deviation_um: vec![0.0, 1.0, 0.0],
         errors: Err("why".into()),
     };
-    let found = Evaluated::of(&[Evaluable::OpenProfile(short)], &evaluate(ALL).unwrap()).unwrap();
+    let found = Evaluated::of(&[Evaluable::OpenProfile(short)], &evaluate(ALL).unwrap(), None).unwrap();
     let unknown = "STRt about LSLI, STRp about LSLI, STRv about LSLI, STRq about LSLI, STRt about MZLI: why";
     assert_eq!(
         found.remarks,
@@ -267,12 +267,13 @@ fn what_has_no_uncertainty_is_said_with_the_reason() {
         let (z_mm, deviation_um) = (z_mm(), truth(Shape::Waves, 1));
         Evaluable::OpenProfile(OpenProfile { of: "guideway".into(), z_mm, deviation_um, errors })
     };
-    let said = |errors, text: &str| Evaluated::of(&[profile(errors)], &evaluate(text).unwrap()).unwrap().remarks;
+    let said = |errors, text: &str| Evaluated::of(&[profile(errors)], &evaluate(text).unwrap(), None).unwrap().remarks;
     let unknown = || Err("one trace only".to_owned());
     let mzli = said(unknown(), "values = ['straightness']\nreferences = ['MZCI']");
     assert_eq!(mzli, ["guideway: no uncertainty of STRt about MZLI: one trace only"]);
     let both =
-        Evaluated::of(&[profile(unknown()), profile(unknown())], &evaluate("references = ['MZCI']").unwrap()).unwrap();
+        Evaluated::of(&[profile(unknown()), profile(unknown())], &evaluate("references = ['MZCI']").unwrap(), None)
+            .unwrap();
     assert_eq!(both.remarks, ["guideway, guideway: no uncertainty of STRt about MZLI: one trace only"], "said once");
     let texture = said(unknown(), "values = ['texture']\nlambda_c_mm = 40.0");
     assert!(texture[0].ends_with(" values: one trace only") && texture.len() == 1, "{texture:?}");
@@ -300,7 +301,7 @@ fn plane(heights_nm: impl Fn(f64, f64) -> f64) -> PlaneMap {
 fn areal(map: PlaneMap, text: &str) -> Evaluated {
     let mut evaluate = evaluate(text).unwrap();
     evaluate.keep_given(&[EvaluableKind::HeightMap]);
-    Evaluated::of(&[Evaluable::HeightMap(map)], &evaluate).unwrap()
+    Evaluated::of(&[Evaluable::HeightMap(map)], &evaluate, None).unwrap()
 }
 
 #[test]

@@ -17,11 +17,12 @@ pub(in crate::pipeline) struct Evaluated {
 }
 
 impl Evaluated {
-    /// Of each of these; closed profiles are evaluated section by section and count for nothing here.
+    /// Of each of these; closed profiles are evaluated section by section and count for nothing here. What refutes the separation refutes
+    /// what comes from it; a height map is what was measured.
     ///
     /// # Errors
     /// When a height map cannot be evaluated as it is asked for.
-    pub(crate) fn of(evaluables: &[Evaluable], evaluate: &Evaluate) -> Result<Self> {
+    pub(crate) fn of(evaluables: &[Evaluable], evaluate: &Evaluate, refuted_by: Option<&str>) -> Result<Self> {
         let (mut all, mut remarks) = (Self::default(), Remarks::default());
         for one in evaluables {
             let (of, (values, said)) = match one {
@@ -31,16 +32,12 @@ impl Evaluated {
                 Evaluable::AxisMotion(motion) => (&motion.of, axis_motion::values(motion, evaluate)),
             };
             said.into_iter().chain(unknown(&values)).for_each(|sentence| remarks.add(of, sentence));
-            all.values.extend(values.into_iter().map(|value| (of.clone(), value)));
+            let refuted_by = refuted_by.filter(|_| one.kind() != EvaluableKind::HeightMap).map(str::to_owned);
+            let marked = |value| Value { refuted_by: refuted_by.clone(), ..value };
+            all.values.extend(values.into_iter().map(|value| (of.clone(), marked(value))));
         }
         all.remarks = remarks.sentences();
         Ok(all)
-    }
-
-    /// Marks all values as refuted by what their data say.
-    pub(crate) fn refute(&mut self, by: Option<&str>) {
-        let Some(by) = by else { return };
-        self.values.iter_mut().for_each(|(_, value)| value.refuted_by = Some(by.to_owned()));
     }
 
     /// As values of a result.

@@ -10,7 +10,7 @@ use super::{
     Content, Evaluate, Found, Group, Label, PartSummary, labelled_with_reasons,
     texture::{found, sensitivity},
 };
-use runout_numerics::Complex64;
+use runout_numerics::{Complex64, stretches::covered};
 use runout_standards::{
     Value,
     drawn::in_pairs,
@@ -54,6 +54,9 @@ pub(crate) fn add_generatrices(
         for kind in &evaluate.texture.profiles {
             let centred = if placed { "" } else { " of centred sections" };
             let reference = format!("generatrix at {angle_deg}°{centred}");
+            let settings = generatrix.settings(*kind, evaluate);
+            let said = texture::over_gaps(generatrix.z_mm, &generatrix.profile_um, &settings);
+            part.remarks.extend(said.map(|said| format!("{} profile, {reference}: {said}", kind.letter())));
             part.values.extend(generatrix.values(*kind, evaluate, radius_mm, &reference));
         }
     }
@@ -109,15 +112,19 @@ impl<'a> Generatrix<'a> {
         }
     }
 
-    fn values(&self, kind: Kind, evaluate: &Evaluate, radius_mm: f64, reference: &str) -> Vec<Value> {
-        let Some(filter) = evaluate.profile_filter(kind, radius_mm) else { return Vec::new() };
+    fn settings(&self, kind: Kind, evaluate: &Evaluate) -> Settings {
         let length_mm = self.z_mm.last().copied().unwrap_or(0.0) - self.z_mm.first().copied().unwrap_or(0.0);
-        let settings = Settings {
+        Settings {
             lambda_s_mm: evaluate.lambda_s_mm,
             lambda_c_mm: evaluate.lambda_c_mm,
             lambda_f_mm: evaluate.texture.lambda_f_mm,
             ..evaluate.profile_settings(kind, length_mm)
-        };
+        }
+    }
+
+    fn values(&self, kind: Kind, evaluate: &Evaluate, radius_mm: f64, reference: &str) -> Vec<Value> {
+        let Some(filter) = evaluate.profile_filter(kind, radius_mm) else { return Vec::new() };
+        let settings = self.settings(kind, evaluate);
         let look = |profile_um: &[f64]| texture::along(self.z_mm, profile_um, &settings);
         let measured = look(&self.profile_um);
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
@@ -139,7 +146,10 @@ impl<'a> Generatrix<'a> {
         let numbers = values.iter().enumerate();
         let numbers: Vec<Found> =
             numbers.map(|(index, value)| found(drawn.as_ref(), index, *value, sensitivity(index))).collect();
-        let coverage = measured.points as f64 / (measured.points + measured.missing).max(1) as f64;
+        let there = self.z_mm.iter().zip(&self.profile_um).filter(|(_, height)| height.is_finite());
+        let there: Vec<f64> = there.map(|(z_mm, _)| *z_mm).collect();
+        let share = measured.points as f64 / (measured.points + measured.missing).max(1) as f64;
+        let coverage = share.min(covered(&there));
         let held = Content {
             highest: self.highest,
             all_to: self.highest,

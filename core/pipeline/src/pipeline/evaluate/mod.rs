@@ -16,6 +16,7 @@ mod plane_map;
 mod positions;
 mod roundness;
 mod section;
+mod section_gaps;
 mod steepest;
 mod texture;
 mod wall;
@@ -150,6 +151,8 @@ mod coverage_tests;
 mod evaluable_tests;
 #[cfg(test)]
 mod extreme_tests;
+#[cfg(test)]
+mod gap_tests;
 #[cfg(test)]
 mod likely_tests;
 #[cfg(test)]

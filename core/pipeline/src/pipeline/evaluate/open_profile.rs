@@ -5,9 +5,10 @@ use super::{
     texture::{found, sensitivity},
 };
 use crate::stage::OpenProfile;
+use runout_numerics::stretches::covered;
 use runout_standards::{
     Value,
-    drawn::{Drawn, Sensitivity},
+    drawn::{Drawn, Sensitivity, share_in_words},
     roundness::Reference,
     straightness::Straightness,
     texture::{self, Kind, Settings},
@@ -40,7 +41,12 @@ pub(super) fn values(profile: &OpenProfile, evaluate: &Evaluate) -> (Vec<Value>,
             .collect();
         let points = profile.deviation_um.iter().filter(|value| value.is_finite()).count();
         if points >= FEWEST {
-            values.extend(kinds.into_iter().flat_map(|kind| texture(profile, kind, evaluate)));
+            for kind in kinds {
+                values.extend(texture(profile, kind, evaluate));
+                let settings = settings(profile, kind, evaluate);
+                let said = texture::over_gaps(&profile.z_mm, &profile.deviation_um, &settings);
+                remarks.extend(said.map(|said| format!("{} profile of {}: {said}", kind.letter(), profile.of)));
+            }
         } else if !kinds.is_empty() {
             remarks.push(format!("texture needs {FEWEST} points or more, found {points}"));
         }
@@ -77,18 +83,26 @@ fn straightness(profile: &OpenProfile, references: &[Reference]) -> Vec<Value> {
     values
 }
 
-/// ISO 21920-2's values of one profile.
-fn texture(profile: &OpenProfile, kind: Kind, evaluate: &Evaluate) -> Vec<Value> {
+fn length_mm(profile: &OpenProfile) -> f64 {
     let ends = [profile.z_mm.first(), profile.z_mm.last()].map(|z| z.copied().unwrap_or(0.0));
-    let length_mm = ends[1] - ends[0];
-    // Around a part a filter has orders, which a line has not: its name alone is of use.
-    let Some(filter) = evaluate.profile_filter(kind, length_mm / std::f64::consts::TAU) else { return Vec::new() };
-    let settings = Settings {
+    ends[1] - ends[0]
+}
+
+fn settings(profile: &OpenProfile, kind: Kind, evaluate: &Evaluate) -> Settings {
+    Settings {
         lambda_s_mm: evaluate.lambda_s_mm,
         lambda_c_mm: evaluate.lambda_c_mm,
         lambda_f_mm: evaluate.texture.lambda_f_mm,
-        ..evaluate.profile_settings(kind, length_mm)
-    };
+        ..evaluate.profile_settings(kind, length_mm(profile))
+    }
+}
+
+/// ISO 21920-2's values of one profile.
+fn texture(profile: &OpenProfile, kind: Kind, evaluate: &Evaluate) -> Vec<Value> {
+    // Around a part a filter has orders, which a line has not: its name alone is of use.
+    let turn_mm = length_mm(profile);
+    let Some(filter) = evaluate.profile_filter(kind, turn_mm / std::f64::consts::TAU) else { return Vec::new() };
+    let settings = settings(profile, kind, evaluate);
     let look = |deviation_um: &[f64]| texture::along(&profile.z_mm, deviation_um, &settings).values().to_vec();
     let drawn = drawn(profile, kind.material_ratio_symbol(), look).map(|drawn| drawn.behind_filter(RQ));
     let mut values = Vec::new();
@@ -117,10 +131,9 @@ fn with_reason(
     sensitivity: Result<Sensitivity, &str>,
 ) -> Found {
     let reason = match (drawn, sensitivity) {
-        (Ok(drawn), Ok(sensitivity)) if drawn.share() > largest_share(sensitivity) => format!(
-            "errors are {:.2} % of the variance of what it is taken from; of an open profile no interval holds 95 % then",
-            100.0 * drawn.share()
-        ),
+        (Ok(drawn), Ok(sensitivity)) if drawn.share() > largest_share(sensitivity) => {
+            share_in_words(drawn.share()) + "; of an open profile no interval holds 95 % then"
+        }
         (Ok(drawn), sensitivity) => {
             let found = found(Some(drawn), index, value, sensitivity);
             return if sensitivity == Ok(Sensitivity::Extreme) { with_uncertain_shift(found) } else { found };
@@ -165,7 +178,9 @@ fn largest_share(sensitivity: Sensitivity) -> f64 {
 
 /// A number under its label; nothing where the profile does not have that value. A line has no undulations per revolution.
 fn labelled(label: Label, found: Found, filter: &str, profile: &OpenProfile) -> Option<Value> {
-    let there = profile.deviation_um.iter().filter(|value| value.is_finite()).count();
+    let there = profile.z_mm.iter().zip(&profile.deviation_um).filter(|(_, value)| value.is_finite());
+    let there: Vec<f64> = there.map(|(z_mm, _)| *z_mm).collect();
+    let share = there.len() as f64 / profile.deviation_um.len().max(1) as f64;
     found.value.is_finite().then(|| Value {
         symbol: label.symbol.into(),
         unit: ascii_unit(label.unit),
@@ -177,7 +192,7 @@ fn labelled(label: Label, found: Found, filter: &str, profile: &OpenProfile) -> 
         absent_above_upr: None,
         filter: filter.to_owned(),
         reference: label.reference,
-        coverage: there as f64 / profile.deviation_um.len().max(1) as f64,
+        coverage: share.min(covered(&there)),
         uncertainty: found.uncertainty,
         no_uncertainty: found.no_uncertainty,
         refuted_by: None,

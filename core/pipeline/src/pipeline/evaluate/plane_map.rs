@@ -34,8 +34,9 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
         _ => "least-squares plane removed, mean".to_owned(),
     };
     let standard = |clause: &str| format!("ISO 25178-2:2021, {clause}");
-    let found = areal::areal(&map, &areal::Settings::default()).parameters();
+    let found = areal::areal(&map, &areal::Settings::default());
     let mut labelled: Vec<(Label, f64)> = found
+        .parameters()
         .iter()
         .map(|one| (Label::new(one.symbol, one.unit, standard(one.clause), reference.clone()), one.value))
         .collect();
@@ -69,7 +70,7 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
         no_uncertainty: Some(POINT_BY_POINT.into()),
         refuted_by: None,
     });
-    Ok((values.collect(), remark.into_iter().collect()))
+    Ok((values.collect(), remark.into_iter().chain(found.features.problem()).collect()))
 }
 
 /// The map without form, filtered, without the edges at which λc lacks a part of its Gaussian; and what is said of these.

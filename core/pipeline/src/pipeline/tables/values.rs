@@ -172,6 +172,7 @@ pub(crate) fn consistency() -> TableSpec {
         "tests of the data on themselves",
         vec![
             ColumnSpec::name("test", "which test"),
+            ColumnSpec::name("part", "part of the data that it is of, as a station; empty for the whole"),
             ColumnSpec::text("of", "what was tested: a value, an effect, an order, a block"),
             ColumnSpec::number(
                 "statistic",
@@ -201,6 +202,7 @@ pub(crate) fn consistency_rows(checks: &[Check]) -> Result<Option<TableRows>> {
     let spec = consistency();
     let rows = spec.rows(vec![
         texts(checks.iter().map(|check| check.test.name())),
+        texts(checks.iter().map(|check| &check.part)),
         texts(checks.iter().map(|check| &check.of)),
         numbers(checks.iter().map(|check| check.statistic)),
         numbers_or_null(checks.iter().map(|check| check.dof.first().copied())),

@@ -43,7 +43,7 @@ pub(crate) fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Statio
                 added.distinguished_by = Some(by.into());
             }
         }
-        remarks.extend(remark(line, &added.targets));
+        remarks.extend(remark(line, &added.targets, rate_of(stations)));
     }
     diagnosis.warnings.extend(remarks);
     diagnosis.warnings.extend(whole_order(diagnosis, stations));
@@ -81,15 +81,15 @@ impl Line {
 }
 
 /// Whether a line is the mains, and whether all channels may have picked it up.
-fn remark(line: &Line, targets: &[String]) -> Option<String> {
+fn remark(line: &Line, targets: &[String], rate_hz: Option<f64>) -> Option<String> {
     let hertz = line.turns_hz.map(|turns_hz| line.order * turns_hz);
     let mains = line.turns_hz.and_then(|turns_hz| {
         // What the record resolves: a quarter of a period over all of its turns.
         let resolution = 0.25 / line.turns.max(1.0);
-        mains::near(line.order * turns_hz, (3.0 * line.order_std).max(resolution) * turns_hz)
+        mains::near(line.order * turns_hz, (3.0 * line.order_std).max(resolution) * turns_hz, rate_hz)
     });
     let frequency = hertz.map_or_else(|| format!("order {:.3}", line.order), |hertz| format!("{hertz:.2} Hz"));
-    let is_mains = mains.map(|mains| format!("is mains ({mains:.0} Hz)"));
+    let is_mains = mains.map(|mains| format!("is {mains}"));
     match (&line.source, is_mains) {
         (Source::Sensors { channels, .. }, mains) => {
             let several = if channels.len() > 1 {
@@ -111,6 +111,11 @@ fn remark(line: &Line, targets: &[String]) -> Option<String> {
     }
 }
 
+/// Samples a second of the first capture, where known.
+fn rate_of(stations: &[Station]) -> Option<f64> {
+    stations.first()?.profiles.first()?.sample_rate_hz
+}
+
 /// What is left at an order that is the mains at the spindle's speed, within a part of a period over the record.
 fn whole_order(diagnosis: &Diagnosis, stations: &[Station]) -> Option<String> {
     let profile = stations.first()?.profiles.first()?;
@@ -118,10 +123,11 @@ fn whole_order(diagnosis: &Diagnosis, stations: &[Station]) -> Option<String> {
     let resolution_hz = turns_hz / profile.turns.used.max(1) as f64;
     let narrow = diagnosis.unexplained.iter().filter(|left| left.orders[1] - left.orders[0] <= 1);
     let mut orders = narrow.flat_map(|left| left.orders);
-    let found = orders.find_map(|order| Some((order, mains::near(order as f64 * turns_hz, resolution_hz)?)));
+    let found =
+        orders.find_map(|order| Some((order, mains::near(order as f64 * turns_hz, resolution_hz, rate_of(stations))?)));
     found.map(|(order, mains)| {
         format!(
-            "order {order} is mains ({mains:.0} Hz) at this speed: pick-up at a whole order cannot be distinguished from what repeats every turn; measure at another speed"
+            "order {order} is {mains} at this speed: pick-up at a whole order cannot be distinguished from what repeats every turn; measure at another speed"
         )
     })
 }

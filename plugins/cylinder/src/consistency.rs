@@ -1,0 +1,44 @@
+//! The tests of measured circles on their own points.
+
+use runout_core::{
+    consistency::{Check, Kind, Structure, rows},
+    numerics::least_squares::Basis,
+};
+
+use crate::{
+    circle::Harmonics,
+    robust::{ROUNDING_UM, rms},
+    scan::Scan,
+};
+
+/// What is declared of circles of these names: they are independent, have the same noise and may be offset.
+///
+/// No order along the angle: a covariance that is fitted to what a radius leaves takes several lobes for correlated errors, and refuses
+/// them all. Circles are independent whatever errors do along them, and have to agree.
+pub(crate) fn structure(scans: &[Scan], names: &[String]) -> Structure {
+    let of_circle = |(circle, scan): (usize, &Scan)| {
+        let name = &names[circle];
+        scan.angle_rad.iter().map(|angle| format!("{name} at {:.1}°", angle.to_degrees())).collect::<Vec<String>>()
+    };
+    let structure = Structure::default().naming(scans.iter().enumerate().flat_map(of_circle).collect());
+    if scans.len() < 2 {
+        return structure;
+    }
+    let circle: Vec<usize> = scans.iter().enumerate().flat_map(|(circle, scan)| vec![circle; scan.len()]).collect();
+    let divided = |structure: Structure, kind: Kind| structure.divided("circles", kind, circle.clone(), names.to_vec());
+    [Kind::Blocks, Kind::Alike, Kind::Shift].into_iter().fold(structure, divided)
+}
+
+impl Harmonics {
+    /// Names points of a circle that are not like the others about them.
+    pub(crate) fn unlike(&self, scan: &Scan, name: &str) -> Option<Check> {
+        let basis = Basis::of(self.columns(scan));
+        let mut left = scan.deviation_um.clone();
+        basis.remove_from(&mut left);
+        if rms(left.iter().copied()) < ROUNDING_UM {
+            return None;
+        }
+        let declared = structure(std::slice::from_ref(scan), &[name.to_owned()]);
+        Some(rows::unlike(&left, basis.columns())?.check(&declared, "µm"))
+    }
+}

@@ -1,0 +1,135 @@
+//! What a station's residual says of its uncertainty: all orders together, and each by itself, against the noise that the turns show.
+
+use runout_core::{
+    consistency::{
+        Check,
+        check::FINDING,
+        groups::{Group, Level, alike, compared},
+        linear,
+    },
+    profile::{NEIGHBOURS, SMOOTHING, orders_beside},
+    separation::{OrderResidual, Residual},
+};
+
+/// Real degrees of freedom behind the covariance of one order by itself: of the neighbours that captures of so many turns have, and of both
+/// parts of each.
+pub(crate) fn noise_freedom(turns: impl IntoIterator<Item = usize>) -> usize {
+    let of = |turns: usize| match turns {
+        0 | 1 => 0,
+        2 => 2,
+        turns => 4 * NEIGHBOURS.min((turns - 1) / 2),
+    };
+    turns.into_iter().map(of).sum()
+}
+
+/// Classes of orders, by how many neighbours their covariance is averaged over.
+const CLASSES: f64 = (SMOOTHING + 1) as f64;
+/// Degrees of freedom of the noise of all orders together, at most and at least: the few turns' scatter that weights are taken from biases it by
+/// some percent however many orders there are, and asynchronous motion of low frequency makes it scatter as from so few.
+const MOST_FREEDOM: f64 = 400.0;
+const LEAST_FREEDOM: f64 = 8.0;
+
+/// Judges the residual: its checks are set, and what the covariance of each of so many orders from 1 is to be taken times is given.
+///
+/// Where all orders together are above the noise, each is uncertain by as much more, or by its own residual where that is larger; an order
+/// that is above it by itself, by its own.
+pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> Vec<f64> {
+    let mut factors = vec![1.0; orders];
+    let known: Vec<OrderResidual> = residual.by_order.iter().filter(|order| order.expected > 0.0).copied().collect();
+    let freedom = noise_freedom(turns.iter().copied()) as f64;
+    if known.is_empty() || freedom <= 0.0 {
+        return factors;
+    }
+    let whole: f64 = known.iter().map(|order| order.expected).sum();
+    let effective = |of: &dyn Fn(&OrderResidual) -> f64| {
+        whole * whole / known.iter().map(|order| order.expected * order.expected / of(order)).sum::<f64>()
+    };
+    let dof = effective(&|order| order.dof as f64);
+    // Known no better than the residual, and to some percent at best: weights follow a part of the noise.
+    let below = effective(&|_| freedom).min(dof).clamp(LEAST_FREEDOM, MOST_FREEDOM);
+    let pooled = linear::residual(residual.chi2_per_dof, dof, below);
+    let above = if pooled.refutes() && residual.chi2_per_dof > 1.0 { residual.chi2_per_dof } else { 1.0 };
+    factors.fill(above);
+    // Orders whose covariance is averaged over as many neighbours have noise that is known as well.
+    let mut single: Vec<Check> = Vec::new();
+    for beside in 0..=SMOOTHING {
+        let alike_orders: Vec<&OrderResidual> =
+            known.iter().filter(|order| orders_beside(order.order) == beside).collect();
+        let groups: Vec<Group> = alike_orders.iter().map(|order| group(order)).collect();
+        let level = Level::Known { variance: 1.0, dof: freedom * (2 * beside + 1) as f64 };
+        for one in compared(&groups, level) {
+            let place = alike_orders[one.group].order - 1;
+            let is_above = one.ratio > 1.0 && (above > 1.0 || one.p * CLASSES < FINDING);
+            if is_above && let Some(factor) = factors.get_mut(place) {
+                *factor = factor.max(one.ratio);
+            }
+        }
+        let checks = alike("orders", &groups, level, "the noise there is overestimated");
+        single.extend(checks.into_iter().map(|check| check.among(CLASSES as usize)));
+    }
+    // Of those that are as they should be, the least likely one is enough.
+    single.sort_by(|a, b| a.p.total_cmp(&b.p));
+    let said = single.iter().filter(|check| !check.finding.is_empty()).count();
+    // What all orders have is no finding of each.
+    let pooled_above = above > 1.0;
+    single.truncate(if pooled_above { 1 } else { said.max(1) });
+    if pooled_above {
+        single = single.into_iter().map(Check::named).collect();
+    }
+    let largest = factors.iter().copied().fold(1.0, f64::max).sqrt();
+    let pooled = pooled.widening(if above > 1.0 { largest } else { 1.0 });
+    residual.checks = std::iter::once(pooled).chain(single).map(above_refutes).collect();
+    factors
+}
+
+/// Less than the noise is said, and refutes nothing: what changes from turn to turn makes the noise of an average look larger than it is.
+fn above_refutes(check: Check) -> Check {
+    if check.statistic < 1.0 { check.named() } else { check }
+}
+
+fn group(order: &OrderResidual) -> Group {
+    let freedom = order.dof as f64;
+    Group { name: format!("order {}", order.order), squares: order.chi2_per_dof() * freedom, freedom }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn residual(chi2: impl Fn(usize) -> f64) -> Residual {
+        let order = |order| OrderResidual { order, squares: 3.0 * chi2(order), expected: 3.0, dof: 6 };
+        let by_order: Vec<OrderResidual> = (2..=128).map(order).collect();
+        let chi2_per_dof = by_order.iter().map(OrderResidual::chi2_per_dof).sum::<f64>() / 127.0;
+        Residual { chi2_per_dof, dof: 6 * 127, by_order, ..Residual::default() }
+    }
+
+    #[test]
+    fn one_order_of_many_is_named_and_widened_by_its_own_residual() {
+        for at in [3, 40] {
+            let mut found = residual(|order| if order == at { 30.0 } else { 1.0 });
+            let factors = judge(&mut found, &[60, 60, 60], 128);
+            let named: Vec<&str> =
+                found.checks.iter().filter(|check| check.refutes()).map(|check| &*check.of).collect();
+            assert_eq!(named, [format!("order {at}")], "{:?}", found.checks);
+            assert!((factors[at - 1] - 30.0).abs() < 1e-9 && (factors[at] - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn all_orders_are_widened_where_all_are_above_the_noise() {
+        let mut found = residual(|order| if order == 5 { 1000.0 } else { 100.0 });
+        let factors = judge(&mut found, &[60, 60, 60], 130);
+        assert!(found.checks[0].refutes() && (found.checks[0].factor - 1000_f64.sqrt()).abs() < 1e-9);
+        // Orders at which nothing is redundant have no residual of their own.
+        assert!((factors[0] - found.chi2_per_dof).abs() < 1e-9 && (factors[4] - 1000.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn less_than_the_noise_refutes_nothing() {
+        let mut found = residual(|_| 0.1);
+        let factors = judge(&mut found, &[60, 60, 60], 128);
+        assert!(found.checks[0].finding.contains("only") && !found.checks.iter().any(Check::bars_verdict));
+        assert!(factors.iter().all(|factor| (*factor - 1.0).abs() < 1e-12));
+        assert_eq!([0, 1, 2, 3, 4, 60].map(|turns| noise_freedom([turns])), [0, 0, 2, 4, 4, 8]);
+    }
+}

@@ -1,0 +1,165 @@
+//! How often the tests of the data on themselves speak on sound campaigns, and what they find on troubled ones: whole pipelines, from points
+//! to a diagnosis, of campaigns that share no formula with the solvers.
+
+mod campaigns;
+
+use std::{fmt::Write as _, path::Path};
+
+use runout_core::{
+    Error, Result,
+    model::diagnosis::{Diagnosis, Verdict},
+    pipeline::{
+        INCLUDE_KEY, Pipeline, Registry,
+        diagnose::diagnose,
+        document::Sources,
+        run::{Silent, run},
+    },
+    summary::Summary,
+};
+
+use crate::{chance::Chance, each::each};
+pub use campaigns::ROWS;
+
+/// A kind of campaign.
+pub struct Kind {
+    /// The domain.
+    pub domain: &'static str,
+    /// What is in the data beside the noise that the domain declares.
+    pub trouble: &'static str,
+    /// The pipeline; it reads `points.csv`.
+    pub pipeline: &'static str,
+    /// Draws the points, as CSV.
+    pub points: fn(&mut Chance) -> String,
+    /// Words of which a finding or a warning has one; without them, a finding is false.
+    pub expected: &'static [&'static str],
+    /// Effects that are there; others are false.
+    pub there: &'static [&'static str],
+    /// A parameter of an effect with its true value, whose interval is counted.
+    pub truth: Option<(&'static str, usize, f64)>,
+}
+
+/// What came of the campaigns of one kind.
+#[derive(Debug, Clone, Default)]
+pub struct Row {
+    /// Campaigns.
+    pub campaigns: usize,
+    /// With any finding.
+    pub found: usize,
+    /// With an expected word, in findings and warnings of `run` and `diagnose`.
+    pub named: usize,
+    /// With an effect that is not there.
+    pub false_effects: usize,
+    /// With the verdict that noise only is left.
+    pub at_the_floor: usize,
+    /// Intervals of the true parameter that hold it, and those stated.
+    pub held: [usize; 2],
+    /// Their standard uncertainties.
+    pub std: Vec<f64>,
+}
+
+/// Judges so many campaigns of a kind.
+///
+/// # Errors
+/// When a stage fails.
+pub fn row(kind: &Kind, campaigns: u64, seed: u64) -> Result<Row> {
+    let judged = each(campaigns, seed, |index| {
+        let folder = tempfile::tempdir().map_err(|error| Error::new("make", "a temporary folder", error))?;
+        judge(kind, &mut Chance::new(seed, index), folder.path())
+    })?;
+    let mut row = Row::default();
+    for (summary, diagnosis) in &judged {
+        row.campaigns += 1;
+        let checks = summary.consistency.iter().chain(&diagnosis.consistency);
+        let findings: Vec<&str> =
+            checks.map(|check| check.finding.as_str()).filter(|finding| !finding.is_empty()).collect();
+        let said = summary.warnings.iter().cloned().chain(diagnosis.warnings.iter().cloned());
+        let said: Vec<String> = said.chain(findings.iter().map(|finding| (*finding).to_owned())).collect();
+        row.found += usize::from(!findings.is_empty());
+        row.named += usize::from(kind.expected.iter().any(|word| said.iter().any(|text| text.contains(word))));
+        let is_false = |effect: &str| !kind.there.iter().any(|known| effect.starts_with(known));
+        row.false_effects += usize::from(diagnosis.added.iter().any(|one| is_false(&one.effect)));
+        row.at_the_floor += usize::from(matches!(diagnosis.verdict, Verdict::AtNoiseFloor | Verdict::Explained));
+        let Some((effect, parameter, truth)) = kind.truth else { continue };
+        let found = diagnosis.added.iter().find(|one| one.effect == effect);
+        let Some(found) = found.and_then(|one| one.parameters.get(parameter)) else { continue };
+        if let Some(std) = found.std {
+            row.held[0] += usize::from((found.value - truth).abs() <= 1.96 * std);
+            row.held[1] += 1;
+            row.std.push(std);
+        }
+    }
+    row.std.sort_by(f64::total_cmp);
+    Ok(row)
+}
+
+fn judge(kind: &Kind, chance: &mut Chance, folder: &Path) -> Result<(Summary, Diagnosis)> {
+    let path = folder.join("points.csv");
+    std::fs::write(&path, (kind.points)(chance))
+        .map_err(|error| Error::new("write", path.display().to_string(), error))?;
+    let mut registry = Registry::default();
+    for register in [
+        runout_points::register,
+        runout_cylinder::register,
+        runout_straightness::register,
+        runout_rotary_axis::register,
+        runout_touch_probe::register,
+        runout_spatial_error::register,
+    ] {
+        register(&mut registry);
+    }
+    let sources = Sources::from_text("pipeline.toml", kind.pipeline, folder.to_owned(), &[], INCLUDE_KEY)
+        .map_err(|error| Error::new("read", "the pipeline", error))?;
+    let pipeline =
+        Pipeline::from_sources(&sources, &registry).map_err(|error| Error::new("check", "the pipeline", error))?;
+    Ok((run(&pipeline, None, &Silent)?, diagnose(&pipeline, None, &Silent)?))
+}
+
+/// The rows as a table in Markdown.
+#[must_use]
+pub fn table(rows: &[(&Kind, Row)]) -> String {
+    let mut text = String::from(
+        "| domain | data | campaigns | with a finding | named | false effects | \"noise only\" | 95 % intervals hold | median std |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for (kind, row) in rows {
+        let share = |count: usize| format!("{:.1} %", 100.0 * count as f64 / row.campaigns.max(1) as f64);
+        let named = if kind.expected.is_empty() { "-".into() } else { share(row.named) };
+        let [held, stated] = row.held;
+        let holds =
+            if stated == 0 { "-".into() } else { format!("{:.1} % of {stated}", 100.0 * held as f64 / stated as f64) };
+        let median = row.std.get(row.std.len() / 2).map_or_else(|| "-".into(), |std| format!("{std:.3}"));
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {} | {named} | {} | {} | {holds} | {median} |",
+            kind.domain,
+            kind.trouble,
+            row.campaigns,
+            share(row.found),
+            share(row.false_effects),
+            share(row.at_the_floor)
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few campaigns of each kind: sound ones have no finding and no false effect, troubled ones are named.
+    #[test]
+    fn sound_campaigns_say_nothing_and_troubled_ones_are_named() {
+        for kind in ROWS {
+            let campaigns = 4;
+            let row = row(kind, campaigns, 11).unwrap();
+            let place = format!("{}, {}: {row:?}", kind.domain, kind.trouble);
+            assert!(row.false_effects <= 1, "{place}");
+            if kind.expected.is_empty() {
+                assert!(row.found <= 1, "{place}");
+            } else {
+                assert!(row.named >= 3, "{place}");
+            }
+        }
+    }
+}
