@@ -9,7 +9,6 @@ mod axis;
 mod bias;
 mod campaign;
 mod config;
-mod consistency;
 mod diagnose;
 mod effects;
 mod kinematics;

@@ -15,14 +15,13 @@ use runout_core::{
 };
 
 use crate::{
-    config::TouchProbeConfig,
     consistency::structure,
-    design::{Content, Design, Noise, Parameter, name},
+    design::{Content, Design, Noise, name},
     effects::{Missing, highest},
     second_order::SecondOrder,
     separate::{Prepared, TouchProbe},
     tables::residual_rows,
-    waves::{Part, angles},
+    waves::angles,
 };
 
 /// Orders above those declared that may be added: more of them describe something local, which they do not explain.

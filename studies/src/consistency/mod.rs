@@ -101,9 +101,7 @@ fn judge(kind: &Kind, chance: &mut Chance, folder: &Path) -> Result<(Summary, Di
         runout_points::register,
         runout_cylinder::register,
         runout_straightness::register,
-        runout_rotary_axis::register,
         runout_touch_probe::register,
-        runout_spatial_error::register,
     ] {
         register(&mut registry);
     }

@@ -6,7 +6,7 @@ use runout_core::{
 };
 
 use super::{
-    algebra::apply,
+    algebra::{apply, pooled},
     angles,
     consistency::judge,
     operators::{Operators, OrderOperator},
