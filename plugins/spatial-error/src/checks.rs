@@ -134,7 +134,10 @@ fn of_repeated(campaign: &Campaign, residual: &[[f64; 3]], axis: usize) -> Vec<C
     let fit = LinearFit { residual: &left, basis: basis.columns(), names: &[], weights: &[], noise: None, unit: "µm" };
     let checks = judge(fit, &structure).checks.into_iter();
     // Which of two readings of a place is the bad one is not known.
-    checks.filter(|check| check.test != Test::Rows).map(|check| check.among(campaign.measured.len()).within(COMPONENTS[axis])).collect()
+    checks
+        .filter(|check| check.test != Test::Rows)
+        .map(|check| check.among(campaign.measured.len()).within(COMPONENTS[axis]))
+        .collect()
 }
 
 fn structure(campaign: &Campaign, members: &[&Vec<usize>], rows: &[usize]) -> Structure {

@@ -27,6 +27,7 @@ mod residual;
 mod rough;
 mod separate;
 pub mod simulate;
+mod smooth;
 mod solution;
 mod solve;
 mod span;

@@ -7,14 +7,13 @@ use runout_core::{
 };
 
 use crate::{
-    campaign::{COMPONENTS, Campaign},
+    campaign::COMPONENTS,
     checks::{checks, factors},
     compensate::{Chain, Correction},
     conclusion::{At, Conclusion},
     joint::{LeftOut, Predicted},
     remarks,
     residual::residual_um,
-    solve::Solution,
     variogram,
 };
 
@@ -127,7 +126,7 @@ impl Conclusion<'_> {
         for at in predicted.iter_mut().flat_map(|at| at.iter_mut().zip(factors)) {
             at.0.variance_um2 *= at.1 * at.1;
         }
-        let rough = solution.rough_um(campaign, places);
+        let rough = solution.rough_um(campaign, places, &predicted);
         let one = |((place_mm, predicted), rough_um): ((&[f64; 3], [Predicted; 3]), [f64; 3])| {
             let place_mm = *place_mm;
             let held = campaign.span.holds(place_mm);

@@ -10,6 +10,7 @@ use crate::{
     neighbours::Neighbours,
     noise::Noise,
     projections::Projections,
+    smooth::Spacing,
     solve::Solution,
     terms::Term,
 };
@@ -173,27 +174,47 @@ impl Solution {
         all
     }
 
-    /// What of the predictions at places is not smooth, in µm: the nugget that was found at a measured place, where it is no noise.
+    /// What of the predictions at places is not smooth, in µm, where it is no noise: the nugget that was found at a measured place, and a
+    /// field that neighbouring places do not share.
     #[must_use]
-    pub(crate) fn rough_um(&self, campaign: &Campaign, places: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    pub(crate) fn rough_um(
+        &self,
+        campaign: &Campaign,
+        places: &[[f64; 3]],
+        predicted: &[[Predicted; 3]],
+    ) -> Vec<[f64; 3]> {
         let mut all = vec![self.by_axis(self.measured.iter().map(|_| 0.0), f64::NAN); places.len()];
         if !Self::nugget_counts(campaign) {
             return all;
         }
-        for (row, place) in at_measured(&self.data.places, places) {
-            let of_field = |(field, axis): (usize, &usize)| match &self.neighbours {
-                None => self.covariances[field].nugget_um.powi(2) * self.joint.fields[field].alpha[place],
-                Some(near) => {
-                    let places = &places[row..=row];
-                    let design = self.design(campaign, places, *axis);
-                    let mean = |nugget_counts: bool| {
-                        let query = Query { places, design: design.as_ref(), nugget_counts };
-                        near.predict(&self.data, &self.joint, field, &query).first().map_or(0.0, |at| at.mean_um)
+        let spacing = Spacing::of(&self.data.places);
+        let measured = at_measured(&self.data.places, places);
+        for (field, axis) in self.measured.iter().copied().enumerate() {
+            let design = self.design(campaign, places, axis);
+            if spacing.is_smooth(&self.covariances[field]) {
+                for (row, place) in &measured {
+                    all[*row][axis] = match &self.neighbours {
+                        None => self.covariances[field].nugget_um.powi(2) * self.joint.fields[field].alpha[*place],
+                        Some(near) => {
+                            let query = |nugget_counts: bool| Query {
+                                places: &places[*row..=*row],
+                                design: design.submatrix(*row, 0, 1, design.ncols()),
+                                nugget_counts,
+                            };
+                            let mean = |nugget_counts: bool| {
+                                let found = near.predict(&self.data, &self.joint, field, &query(nugget_counts));
+                                found.first().map_or(0.0, |at| at.mean_um)
+                            };
+                            mean(true) - mean(false)
+                        }
                     };
-                    mean(true) - mean(false)
                 }
-            };
-            all[row] = self.by_axis(self.measured.iter().enumerate().map(of_field), f64::NAN);
+            } else {
+                for (row, at) in predicted.iter().enumerate() {
+                    let trend: f64 = (0..design.ncols()).map(|at| design[(row, at)] * self.joint.trend[at]).sum();
+                    all[row][axis] = at[axis].mean_um - trend;
+                }
+            }
         }
         all
     }

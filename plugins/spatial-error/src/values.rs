@@ -20,7 +20,9 @@ impl Conclusion<'_> {
         let mut values = self.of_trend();
         for (axis, component) in COMPONENTS.into_iter().enumerate() {
             // A nugget above the noise refutes no number: it is one of them.
-            let is_own = |check: &&Check| check.test != Test::Residual && check.of.starts_with(component);
+            let is_own = |check: &&Check| {
+                check.test != Test::Residual && (check.part == component || check.of.starts_with(component))
+            };
             let refuted = refuted_by(&checks.iter().filter(is_own).cloned().collect::<Vec<_>>());
             values.extend(self.of_covariance(axis).into_iter().map(|value| value.refuted_by(refuted.clone())));
             values.extend(of_left_out(axis, left_out));

@@ -13,7 +13,7 @@ use runout_core::{
     points::Points,
     stage::{Outcome, PointSeparator},
 };
-use runout_spatial_error::simulate::{Layout, Scenario, Simulated};
+use runout_spatial_error::simulate::{Field, Layout, Scenario, Simulated};
 use support::{column, scenario, separator, table, value};
 
 fn change(points: &mut Points, name: &str, to: impl FnMut((usize, &mut f64))) {
@@ -158,12 +158,13 @@ fn what_is_not_smooth_remains_and_is_no_noise() {
 /// A given nugget of a third of the true one: regions that are left out refute it, and predictions are wider by about what is missing.
 #[test]
 fn a_covariance_that_the_readings_refute_widens_predictions() {
-    let mut scenario = Scenario { passes: 1, ..scenario(81) };
+    let field = Field { std_um: [4.0; 3], range_mm: [260.0, 220.0, 200.0], smoothness: Some(2.5) };
+    let mut scenario = Scenario { passes: 1, field: Some(field), ..scenario(81) };
     scenario.tracker.noise_um = 3.0;
     let points = scenario.simulate().points();
     let given = |nugget: f64| {
         let kriging =
-            format!("variogram = \"matern-5/2\", sill_um = 4.0, range_mm = [120, 100, 95], nugget_um = {nugget}");
+            format!("variogram = \"matern-5/2\", sill_um = 4.0, range_mm = [260, 220, 200], nugget_um = {nugget}");
         separator(&format!("kriging = {{ {kriging} }}")).separate(&points).unwrap()
     };
     let (right, wrong) = (given(3.0), given(0.9));
