@@ -21,7 +21,7 @@ pub(crate) struct Rough {
     /// The component.
     pub axis: usize,
     /// Standard deviation from place to place beyond noise, in µm.
-    pub rough_um: f64,
+    pub size_um: f64,
     /// Of one reading, in µm.
     pub noise_um: f64,
     /// Chance of so large a nugget where it is the noise at most, times the number of components.
@@ -44,26 +44,26 @@ impl Rough {
             _ => 1.0,
         };
         let each = |(field, axis): (usize, &usize)| {
-            let (rough_um, noise_um) = (spacing.rough_um(&solution.covariances[field]), campaign.noise_um(*axis));
-            let p = if rough_um > largest * noise_um {
+            let (size_um, noise_um) = (spacing.rough_um(&solution.covariances[field]), campaign.noise_um(*axis));
+            let p = if size_um > largest * noise_um {
                 let smooth = |covariance: &Covariance| spacing.is_smooth(covariance);
                 let gain = gain_of_nugget(&data, &prior, field, families, largest * noise_um, &smooth);
                 0.5 * chi2_tail(gain, 1.0) * solution.measured.len() as f64
             } else {
                 1.0
             };
-            Self { axis: *axis, rough_um, noise_um, p }
+            Self { axis: *axis, size_um, noise_um, p }
         };
         solution.measured.iter().enumerate().map(each).collect()
     }
 
     /// As a test: nothing where it is the noise at most.
     pub(crate) fn check(&self) -> Check {
-        let Self { axis, rough_um, noise_um, p } = *self;
-        let (component, ratio) = (COMPONENTS[axis], rough_um / noise_um);
+        let Self { axis, size_um, noise_um, p } = *self;
+        let (component, ratio) = (COMPONENTS[axis], size_um / noise_um);
         Check::new(Test::Residual, component, ratio * ratio, &[], p).finding(|| {
             format!(
-                "{component} varies from place to place by {rough_um:.1} µm (standard deviation), {ratio:.1} times the noise of \
+                "{component} varies from place to place by {size_um:.1} µm (standard deviation), {ratio:.1} times the noise of \
                  {noise_um:.1} µm: no axis takes it away, and `remains_rms` contains it"
             )
         })
