@@ -6,18 +6,18 @@ use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
     Error, Result,
+    consistency::Check,
     points::{PointColumn, PointKind::Number, Points},
 };
 
+pub(crate) use crate::measured::COMPONENTS;
 use crate::{
     joint::{Data, Observed, Within},
+    measured::Measured,
     noise::{Noise, of_repeats},
     span::Span,
     terms::{Term, Volume},
 };
-
-/// Components of the error.
-pub(crate) const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
 
 /// Commands that differ by less than this, in mm, are one place.
 const SAME_MM: f64 = 1e-6;
@@ -36,9 +36,24 @@ pub(crate) const COLUMNS: [PointColumn; 9] = [
     PointColumn::needed("x_mm", Number, "mm", "command of X"),
     PointColumn::needed("y_mm", Number, "mm", "command of Y"),
     PointColumn::needed("z_mm", Number, "mm", "command of Z"),
-    PointColumn::needed("dx_um", Number, "um", "actual less commanded place along x"),
-    PointColumn::needed("dy_um", Number, "um", "actual less commanded place along y"),
-    PointColumn::needed("dz_um", Number, "um", "actual less commanded place along z"),
+    PointColumn::optional(
+        "dx_um",
+        Number,
+        "um",
+        "actual less commanded place along x; absent or empty where it was not measured",
+    ),
+    PointColumn::optional(
+        "dy_um",
+        Number,
+        "um",
+        "actual less commanded place along y; absent or empty where it was not measured",
+    ),
+    PointColumn::optional(
+        "dz_um",
+        Number,
+        "um",
+        "actual less commanded place along z; absent or empty where it was not measured",
+    ),
     PointColumn::optional("time_s", Number, "s", "time; without it the rows are in the order of time, evenly"),
     PointColumn::optional("repeat", Number, "", "number of the pass"),
     PointColumn::optional("std_um", Number, "um", "standard uncertainty of one coordinate of this row"),
@@ -53,8 +68,10 @@ pub struct Campaign {
     pub places_mm: Vec<[f64; 3]>,
     /// Place of each reading.
     pub place_of: Vec<usize>,
-    /// Deviations of each reading, in µm.
+    /// Deviations of each reading, in µm; NaN of components that were not measured.
     pub readings_um: Vec<[f64; 3]>,
+    /// Components that were measured: 0 dx, 1 dy, 2 dz. Each is a field of the fit.
+    pub measured: Vec<usize>,
     /// Time of each reading, 0 at the first and 1 at the last.
     pub time: Vec<f64>,
     /// Whether the file gives times.
@@ -69,6 +86,10 @@ pub struct Campaign {
     pub span: Span,
     /// What looks wrong.
     pub remarks: Vec<String>,
+    /// Components that are absent.
+    pub notes: Vec<String>,
+    /// Components that count as not measured.
+    pub checks: Vec<Check>,
 }
 
 impl Campaign {
@@ -81,7 +102,6 @@ impl Campaign {
         let refuse = |problem: String| Error::new("read", &file, problem);
         let optional = |name: &str| points.columns.iter().find(|column| column.name == name);
         let commands = [points.column("x_mm")?, points.column("y_mm")?, points.column("z_mm")?];
-        let deviations = [points.column("dx_um")?, points.column("dy_um")?, points.column("dz_um")?];
         let count = commands[0].len();
         for column in &points.columns {
             if let Some(row) = column.values.iter().position(|value| !value.is_finite()) {
@@ -92,10 +112,9 @@ impl Campaign {
         if count == 0 {
             return Err(refuse("it holds no reading".into()));
         }
-        let at = |columns: &[&[f64]; 3], row: usize| [0, 1, 2].map(|axis| columns[axis][row]);
-        let rows: Vec<[f64; 3]> = (0..count).map(|row| at(&commands, row)).collect();
+        let rows: Vec<[f64; 3]> = (0..count).map(|row| commands.map(|column| column[row])).collect();
         let (places_mm, place_of) = distinct(&rows);
-        let readings_um: Vec<[f64; 3]> = (0..count).map(|row| at(&deviations, row)).collect();
+        let Measured { axes: measured, readings_um, notes, checks } = Measured::of(points, &rows)?;
         let time = scaled(optional("time_s").map(|column| column.values.as_slice()), count);
         let repeat = match optional("repeat") {
             Some(column) => column
@@ -114,12 +133,12 @@ impl Campaign {
         if let Some(row) = stated.and_then(|values| values.iter().position(|value| *value <= 0.0)) {
             return Err(refuse(format!("row {} of the column `std_um` must be above 0 µm", row + 1)));
         }
-        let mut remarks = looks_wrong(&rows, &readings_um);
+        let mut remarks = looks_wrong(&rows, &readings_um, &measured);
         remarks.extend(points.copies());
         let noise = match (stated, std_um) {
             (Some(stated), _) => Noise::Column(stated.to_vec()),
             (None, Some(std_um)) => Noise::Stated(std_um),
-            (None, None) => of_repeats(&place_of, places_mm.len(), &readings_um, &time),
+            (None, None) => of_repeats(&place_of, places_mm.len(), &readings_um, &measured, &time),
         };
         if place_of.len() > places_mm.len() && noise == Noise::Unknown {
             remarks.push(format!(
@@ -131,7 +150,22 @@ impl Campaign {
         let timed = optional("time_s").is_some();
         let volume = Volume::around(&places_mm, tool_mm, chain);
         let span = Span::of(&places_mm);
-        Ok(Self { file, places_mm, place_of, readings_um, time, timed, repeat, noise, volume, span, remarks })
+        Ok(Self {
+            file,
+            places_mm,
+            place_of,
+            readings_um,
+            measured,
+            time,
+            timed,
+            repeat,
+            noise,
+            volume,
+            span,
+            remarks,
+            notes,
+            checks,
+        })
     }
 
     /// Variance of the noise of a reading, in µm²; `None` where it is not known.
@@ -152,7 +186,20 @@ impl Campaign {
         (each.sum::<f64>() / self.place_of.len() as f64).sqrt()
     }
 
-    /// Means of some places (all without `some`), and the columns of the trend.
+    /// Numbers that were read.
+    #[must_use]
+    pub fn numbers(&self) -> usize {
+        self.measured.len() * self.place_of.len()
+    }
+
+    /// A displacement in words, with a dash for a component that was not measured.
+    #[must_use]
+    pub fn displacement(&self, by_um: [f64; 3]) -> String {
+        let each = |axis| if self.measured.contains(&axis) { format!("{:.1}", by_um[axis]) } else { "–".to_owned() };
+        format!("({}) µm", [0, 1, 2].map(each).join(", "))
+    }
+
+    /// Means of some places (all without `some`), and the columns of the trend, of each measured component.
     #[must_use]
     pub fn data(&self, terms: &[Term], some: Option<&[usize]>) -> Data {
         let all: Vec<usize> = (0..self.places_mm.len()).collect();
@@ -175,7 +222,7 @@ impl Campaign {
         let at = |row: usize, axis: usize, term: Term| {
             term.at(&self.volume, self.places_mm[self.place_of[row]], self.time[row])[axis]
         };
-        for axis in 0..3 {
+        for axis in self.measured.iter().copied() {
             let mut weights = vec![0.0; count];
             let mut repeats = vec![0_usize; count];
             let mut mean_um = vec![0.0; count];
@@ -264,9 +311,10 @@ fn scaled(time: Option<&[f64]>, count: usize) -> Vec<f64> {
     time.iter().map(|at| if last > first { (at - first) / (last - first) } else { 0.0 }).collect()
 }
 
-fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]]) -> Vec<String> {
+fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]], measured: &[usize]) -> Vec<String> {
     let mut remarks = Vec::new();
-    let mut sizes: Vec<f64> = readings_um.iter().flatten().map(|value| value.abs()).collect();
+    let sizes_of = |axis: usize| readings_um.iter().map(move |reading| reading[axis].abs());
+    let mut sizes: Vec<f64> = measured.iter().flat_map(|axis| sizes_of(*axis)).collect();
     sizes.sort_by(f64::total_cmp);
     let median = sizes[sizes.len() / 2];
     let largest = sizes.last().copied().unwrap_or(0.0);
@@ -283,15 +331,16 @@ fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]]) -> Vec<String> {
         .fold(0.0, f64::max);
     // No machine is as good as that over its travel, and a tracker is not placed so well.
     let small_um = SMALL_UM.max(SMALL_SHARE * extent * 1e3);
-    let of_column = [0, 1, 2].map(|axis| readings_um.iter().map(|reading| reading[axis].abs()).fold(0.0, f64::max));
+    let of_column = |axis: usize| sizes_of(axis).fold(0.0, f64::max);
     if largest > 0.0 && largest < small_um {
         remarks.push(format!(
             "the largest deviation is {largest:.2e} µm over {extent:.0} mm: are `dx_um`, `dy_um`, `dz_um` in mm?"
         ));
     } else {
-        for (axis, own) in of_column.into_iter().enumerate() {
-            let others =
-                (0..3).filter(|other| *other != axis).map(|other| of_column[other]).fold(f64::INFINITY, f64::min);
+        for axis in measured.iter().copied() {
+            let own = of_column(axis);
+            let others = measured.iter().filter(|other| **other != axis).map(|other| of_column(*other));
+            let others = others.fold(f64::INFINITY, f64::min);
             if own > 0.0 && own < small_um && own < UNLIKE * others {
                 remarks.push(format!(
                     "`{}_um` is {own:.2e} µm at most, and the other components are {others:.1} µm or more: is it in mm?",

@@ -186,11 +186,16 @@ impl Chain {
         Matrix3xX::from_columns(&columns)
     }
 
-    /// What takes a displacement, in µm, away.
+    /// What takes a displacement, in µm, away. Of a component that is NaN nothing is known: it is not corrected, and an axis that moves
+    /// nothing else has no correction.
     #[must_use]
     pub fn correct(&self, place_mm: [f64; 3], displaced_um: [f64; 3]) -> Correction {
-        let jacobian = self.jacobian(place_mm);
-        let wanted = -Vector3::from(displaced_um);
+        let mut jacobian = self.jacobian(place_mm);
+        let whole: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+        let unknown: Vec<usize> = (0..3).filter(|axis| displaced_um[*axis].is_nan()).collect();
+        unknown.iter().for_each(|axis| jacobian.row_mut(*axis).fill(0.0));
+        let displaced = Vector3::from(displaced_um).map(|by| if by.is_nan() { 0.0 } else { by });
+        let wanted = -displaced;
         let count = self.axes.len();
         let mut add = DVector::<f64>::zeros(count);
         let mut held = vec![false; count];
@@ -221,7 +226,12 @@ impl Chain {
         for axis in 0..count {
             add[axis] = add[axis].clamp(-self.limits[axis], self.limits[axis]);
         }
-        let remains = Vector3::from(displaced_um) + &jacobian * &add;
+        let mut remains = displaced + &jacobian * &add;
+        unknown.iter().for_each(|axis| remains[*axis] = f64::NAN);
+        for axis in (0..count).filter(|axis| whole[*axis] > 0.0 && jacobian.column(*axis).norm() <= NONE * whole[*axis])
+        {
+            add[axis] = f64::NAN;
+        }
         Correction { add: add.iter().copied().collect(), remains_um: remains.into(), limited: held.contains(&true) }
     }
 

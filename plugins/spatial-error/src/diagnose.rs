@@ -1,7 +1,10 @@
 //! The spatial error as a model for the closed loop.
+//!
+//! Long because the loop and what it says of each step belong together.
 
 use runout_core::{
     Error, Result,
+    consistency::Check,
     model::{
         Effect,
         closed_loop::Settings,
@@ -96,11 +99,12 @@ impl PointModel for SpatialError {
         if unexplained.is_empty() {
             unexplained.extend(groups(&campaign, &after).iter().map(|group| together(&campaign, group)));
         }
+        unexplained.extend(outcome.checks.iter().filter(|check| check.bars_verdict()).map(inconsistent));
         let levels = [&before, &after].map(|solution| level(&campaign, solution));
         let trend_std = after.trend_std(&campaign);
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
         let mut diagnosis = Diagnosis {
-            consistency: Vec::new(),
+            consistency: outcome.checks.clone(),
             verdict: verdict(&campaign, added.is_empty(), unexplained.is_empty()),
             before: levels[0].clone(),
             added: added
@@ -190,21 +194,24 @@ impl SpatialError {
     fn unexplained(&self, campaign: &Campaign, terms: &[Term], jump: &crate::effects::Jump) -> Result<Unexplained> {
         let all: Vec<Term> = terms.iter().chain(&jump.terms).copied().collect();
         let solution = solve(campaign, &self.config, &all)?;
-        let mut sizes = [f64::NAN; 3];
+        let size = |wanted: &Term| {
+            let column = solution.terms.iter().position(|term| term == wanted);
+            column.map_or(f64::NAN, |column| solution.joint.trend[column])
+        };
         let mut squares = 0.0;
-        for (size, wanted) in sizes.iter_mut().zip(&jump.terms) {
-            let Some(column) = solution.terms.iter().position(|term| term == wanted) else { continue };
-            *size = solution.joint.trend[column];
+        for (wanted, size) in
+            jump.terms.iter().map(|wanted| (wanted, size(wanted))).filter(|(_, size)| size.is_finite())
+        {
             let adds = campaign.places_mm.iter().map(|place| wanted.at(&campaign.volume, *place, 0.0));
-            squares += adds.flatten().map(|adds| (adds * *size).powi(2)).sum::<f64>();
+            squares += adds.flatten().map(|adds| (adds * size).powi(2)).sum::<f64>();
         }
-        let [x, y, z] = sizes;
+        let by_um = solution.by_axis(jump.terms.iter().map(size), f64::NAN);
         Ok(Unexplained {
             sensor: None,
             setup: None,
             orders: [0, 0],
-            rms_um: (squares / (3 * campaign.places_mm.len()) as f64).sqrt(),
-            place: format!("a jump by ({x:.1}, {y:.1}, {z:.1}) µm {}", jump.place),
+            rms_um: (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt(),
+            place: format!("a jump by {} {}", campaign.displacement(by_um), jump.place),
         })
     }
 
@@ -232,14 +239,19 @@ impl SpatialError {
 
 /// Neighbouring places that err together.
 fn together(campaign: &Campaign, group: &Group) -> Unexplained {
-    let squares: f64 = group.by_um.iter().flatten().map(|by| by * by).sum();
+    let squares: f64 = group.by_um.iter().flatten().filter(|by| by.is_finite()).map(|by| by * by).sum();
     Unexplained {
         sensor: None,
         setup: None,
         orders: [0, 0],
-        rms_um: (squares / (3 * campaign.places_mm.len()) as f64).sqrt(),
+        rms_um: (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt(),
         place: format!("neighbouring places: {}", group.named(campaign)),
     }
+}
+
+/// What a test of the readings on themselves found.
+fn inconsistent(check: &Check) -> Unexplained {
+    Unexplained { sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
 }
 
 /// Takes effects that are declared with their values out of the readings.

@@ -137,7 +137,7 @@ pub(crate) fn candidates() -> Vec<Candidate> {
     missing().into_iter().enumerate().flat_map(of).collect()
 }
 
-/// A jump that no effect describes: across a plane, or within a box at a corner, along all three axes.
+/// A jump that no effect describes: across a plane, or within a box at a corner, along all axes that were measured.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Jump {
     /// Its columns.
@@ -151,6 +151,7 @@ pub(crate) struct Jump {
 pub(crate) fn jumps(campaign: &Campaign) -> Vec<Jump> {
     let places = &campaign.places_mm;
     let axes = [0, 1, 2];
+    let measured = || campaign.measured.iter().copied();
     let cuts = axes.map(|axis| cuts(places, axis));
     let mut all = Vec::new();
     for axis in axes {
@@ -158,7 +159,8 @@ pub(crate) fn jumps(campaign: &Campaign) -> Vec<Jump> {
             let above = places.iter().filter(|place| place[axis] > at_mm).count();
             if above.min(places.len() - above) >= FEWEST {
                 let place = format!("across the plane {} = {at_mm:.1} mm", LETTERS[axis].to_lowercase());
-                all.push(Jump { terms: axes.map(|moved| Term::Step { moved, axis, at_mm }).into(), place });
+                let terms = measured().map(|moved| Term::Step { moved, axis, at_mm }).collect();
+                all.push(Jump { terms, place });
             }
         }
     }
@@ -180,7 +182,8 @@ pub(crate) fn jumps(campaign: &Campaign) -> Vec<Jump> {
                         format!("{} {sign} {:.1}", LETTERS[axis].to_lowercase(), limit_mm[axis])
                     };
                     let place = format!("in the corner {} mm", axes.map(side).join(", "));
-                    all.push(Jump { terms: axes.map(|moved| Term::Corner { moved, limit_mm, above }).into(), place });
+                    let terms = measured().map(|moved| Term::Corner { moved, limit_mm, above }).collect();
+                    all.push(Jump { terms, place });
                 }
             }
         }

@@ -6,6 +6,7 @@
 
 mod predict;
 
+pub(crate) use predict::at_measured;
 pub use predict::{Predicted, Predictor, Query};
 
 use faer::{
@@ -287,6 +288,11 @@ pub(crate) struct LeftOut {
     pub residual_um: f64,
     /// Standard deviation expected of it, noise included, in µm.
     pub std_um: f64,
+}
+
+impl LeftOut {
+    /// Nothing.
+    pub(crate) const LOST: Self = Self { residual_um: f64::NAN, std_um: f64::NAN };
 }
 
 /// L⁻¹.

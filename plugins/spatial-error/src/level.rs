@@ -2,13 +2,13 @@
 
 use runout_core::model::diagnosis::Level;
 
-use crate::{campaign::Campaign, noise::Noise, outcome::residual_um, solve::Solution};
+use crate::{campaign::Campaign, noise::Noise, projections::Projections, residual::residual_um, solve::Solution};
 
 /// How far a fit is from its readings.
 pub(crate) fn level(campaign: &Campaign, solution: &Solution) -> Level {
     let residual = residual_um(campaign, solution);
-    let readings = (3 * residual.len()) as f64;
-    let squares: f64 = residual.iter().flatten().map(|left| left * left).sum();
+    let readings = campaign.numbers() as f64;
+    let squares: f64 = residual.iter().flatten().filter(|left| left.is_finite()).map(|left| left * left).sum();
     let left_out = solution.left_out();
     let each = || left_out.iter().flatten().filter(|one| one.std_um.is_finite());
     let count = each().count().max(1) as f64;
@@ -17,7 +17,7 @@ pub(crate) fn level(campaign: &Campaign, solution: &Solution) -> Level {
     let finite = |value: f64| value.is_finite().then_some(value);
     Level {
         residual_rms_um: (squares / readings).sqrt(),
-        degrees_of_freedom: (3 * residual.len()).saturating_sub(solution.terms.len()),
+        degrees_of_freedom: campaign.numbers().saturating_sub(solution.terms.len()),
         noise_floor_um: expected.and_then(|expected| finite((expected / readings).sqrt())),
         chi2_per_dof: expected.and_then(|expected| finite(squares / expected)),
         held_out_rms_um: finite((each().map(|one| one.residual_um.powi(2)).sum::<f64>() / count).sqrt()),
@@ -35,14 +35,15 @@ fn expected_squares(campaign: &Campaign, solution: &Solution) -> Option<f64> {
     if solution.fitted.is_some() {
         return None;
     }
-    let projections = solution.projections();
+    let projections = Projections::of(&solution.joint);
     let mut repeats = vec![0.0; campaign.places_mm.len()];
     campaign.place_of.iter().for_each(|place| repeats[*place] += 1.0);
     let mut expected = 0.0;
-    for axis in 0..3 {
-        for (place, projection) in projections.iter().enumerate() {
-            let noise = solution.noise_um2(campaign, place, axis);
-            expected += repeats[place] * noise * noise * projection[(axis, axis)];
+    for place in 0..campaign.places_mm.len() {
+        let projection = projections.block(&[place]);
+        for field in 0..campaign.measured.len() {
+            let noise = solution.noise_um2(campaign, place, field);
+            expected += repeats[place] * noise * noise * projection[(field, field)];
             // Scatter within a place: (n − 1)·σ², and σ² is n times the variance of the mean.
             expected += (repeats[place] - 1.0) * repeats[place] * noise;
         }

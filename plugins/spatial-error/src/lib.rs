@@ -5,22 +5,29 @@
 //! name moves a chain of rigid bodies.
 
 mod campaign;
+mod checks;
 mod compensate;
 mod conclusion;
 mod config;
 mod correlation;
 mod diagnose;
 mod effects;
+mod families;
 mod joint;
 mod level;
 mod likelihood;
+mod measured;
 mod neighbours;
 mod noise;
 mod outcome;
+mod projections;
 mod query;
 mod remarks;
+mod residual;
+mod rough;
 mod separate;
 pub mod simulate;
+mod smooth;
 mod solution;
 mod solve;
 mod span;
@@ -28,6 +35,7 @@ mod suspects;
 mod terms;
 mod trace;
 mod trend;
+mod values;
 mod variogram;
 
 use runout_core::pipeline::{Plugin, Registry};

@@ -51,17 +51,18 @@ pub(crate) struct Prior {
 }
 
 impl Prior {
-    fn ln(&self, at: &DVector<f64>) -> f64 {
+    /// ln of its density, but for a constant.
+    pub(crate) fn ln(&self, at: &DVector<f64>) -> f64 {
         let term = |((at, centre), precision): ((&f64, &f64), &f64)| {
             if precision.is_finite() { -0.5 * precision * (at - centre).powi(2) } else { 0.0 }
         };
         at.iter().zip(&self.centre).zip(&self.precision).map(term).sum()
     }
 
-    /// The same of one field's parameters.
-    pub(crate) fn ln_of(&self, field: usize, at: &DVector<f64>) -> f64 {
+    /// That of one field's parameters.
+    pub(crate) fn of(&self, field: usize) -> Self {
         let part = |all: &DVector<f64>| all.rows(field * PARAMETERS, PARAMETERS).into_owned();
-        Self { centre: part(&self.centre), precision: part(&self.precision) }.ln(at)
+        Self { centre: part(&self.centre), precision: part(&self.precision) }
     }
 
     fn is_free(&self, parameter: usize) -> bool {
@@ -84,16 +85,16 @@ pub(crate) struct Estimate {
     pub joint: Joint,
 }
 
-/// Covariances of parameters.
+/// Covariances of parameters, each of a family of its own.
 #[must_use]
-pub(crate) fn covariances(family: Family, parameters: &DVector<f64>) -> Vec<Covariance> {
-    let one = |field: &[f64]| Covariance {
-        family,
+pub(crate) fn covariances(families: &[Family], parameters: &DVector<f64>) -> Vec<Covariance> {
+    let one = |(family, field): (&Family, &[f64])| Covariance {
+        family: *family,
         sill_um: field[0].exp(),
         range_mm: [1, 2, 3].map(|axis| field[axis].exp()),
         nugget_um: field[4].exp(),
     };
-    parameters.as_slice().chunks_exact(PARAMETERS).map(one).collect()
+    families.iter().zip(parameters.as_slice().chunks_exact(PARAMETERS)).map(one).collect()
 }
 
 /// ln of the likelihood of a fit.
@@ -103,17 +104,17 @@ pub(crate) fn ln_likelihood(joint: &Joint, criterion: Criterion) -> f64 {
     -0.5 * (joint.ln_determinant + of_trend + joint.squares)
 }
 
-/// The most likely covariances of a family, from a start on. `None` where no step is possible.
+/// The most likely covariances of a family a field, from a start on. `None` where no step is possible.
 #[must_use]
 pub(crate) fn estimate(
     data: &Data,
-    family: Family,
+    families: &[Family],
     prior: &Prior,
     start: &DVector<f64>,
     criterion: Criterion,
 ) -> Option<Estimate> {
     let at = |parameters: &DVector<f64>| {
-        let joint = Joint::new(data, &covariances(family, parameters))?;
+        let joint = Joint::new(data, &covariances(families, parameters))?;
         let value = ln_likelihood(&joint, criterion) + prior.ln(parameters);
         value.is_finite().then_some((value, joint))
     };
@@ -142,7 +143,7 @@ pub(crate) fn estimate(
         slope = self::slope(data, &joint, prior, &parameters, criterion);
     }
     let covariance = inverse_of(&slope.information, prior);
-    let covariances = covariances(family, &parameters);
+    let covariances = covariances(families, &parameters);
     Some(Estimate { covariances, parameters, covariance, ln_likelihood: value, joint })
 }
 
@@ -169,9 +170,12 @@ fn step(slope: &Slope, prior: &Prior, damping: f64) -> Option<DVector<f64>> {
             |index, _| if prior.is_free(index) { slope.gradient[index] } else { 0.0 },
         );
     let mut step = Cholesky::new(system)?.solve(&gradient);
-    let longest = step.amax();
-    if longest > LONGEST {
-        step *= LONGEST / longest;
+    // A field that is far from its best does not hold the others back.
+    for field in step.as_mut_slice().chunks_exact_mut(PARAMETERS) {
+        let longest = field.iter().fold(0.0_f64, |longest, one| longest.max(one.abs()));
+        if longest > LONGEST {
+            field.iter_mut().for_each(|one| *one *= LONGEST / longest);
+        }
     }
     Some(step)
 }

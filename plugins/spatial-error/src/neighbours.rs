@@ -62,12 +62,11 @@ impl Neighbours {
         query.places.iter().enumerate().map(one).collect()
     }
 
-    /// Each place's mean reading less its prediction from its neighbours.
+    /// Each place's mean reading less its prediction from its neighbours, of each field.
     #[must_use]
-    pub(crate) fn left_out(&self, data: &Data, joint: &Joint) -> Vec<[LeftOut; 3]> {
+    pub(crate) fn left_out(&self, data: &Data, joint: &Joint) -> Vec<Vec<LeftOut>> {
         let one = |(index, place): (usize, &[f64; 3])| {
-            [0, 1, 2].map(|field| {
-                let covariance = &self.covariances[field];
+            let of_field = |(field, covariance): (usize, &Covariance)| {
                 let local = Local { data, joint, field, covariance };
                 let mut near = self.nearest(field, place, NEAREST[1] + 1);
                 near.retain(|other| *other != index);
@@ -79,7 +78,8 @@ impl Neighbours {
                     residual_um: observed.mean_um[index] - found.mean_um,
                     std_um: (found.variance_um2 + own).sqrt(),
                 }
-            })
+            };
+            self.covariances.iter().enumerate().map(of_field).collect()
         };
         data.places.iter().enumerate().map(one).collect()
     }
@@ -92,14 +92,13 @@ fn scaled(place: &[f64; 3], covariance: &Covariance) -> [f64; 3] {
 impl Local<'_> {
     /// From some places; a matrix that is not positive definite predicts nothing.
     fn predict(&self, near: &[usize], place: &[f64; 3], design: &DVector<f64>, nugget_counts: bool) -> Predicted {
-        let lost = Predicted { mean_um: f64::NAN, variance_um2: f64::NAN };
         let places: Vec<[f64; 3]> = near.iter().map(|index| self.data.places[*index]).collect();
         let observed = &self.data.observed[self.field];
         let of = |values: &[f64]| near.iter().map(|index| values[*index]).collect::<Vec<f64>>();
         let part =
             Observed { mean_um: of(&observed.mean_um), noise_um2: of(&observed.noise_um2), share: of(&observed.share) };
         let cloud = Scaled::of(&places, self.covariance.range_mm);
-        let Some(lower) = factor(&matrix(self.covariance, &cloud, &part)) else { return lost };
+        let Some(lower) = factor(&matrix(self.covariance, &cloud, &part)) else { return Predicted::LOST };
         let columns = design.len();
         let known = &self.data.design[self.field];
         let trend = &self.joint.trend;

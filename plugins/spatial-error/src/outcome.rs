@@ -3,20 +3,17 @@
 use runout_core::{
     Result,
     stage::Outcome,
-    summary::NamedValue,
     table::{ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers},
 };
 
 use crate::{
-    campaign::{COMPONENTS, Campaign},
+    campaign::COMPONENTS,
+    checks::{checks, factors},
     compensate::{Chain, Correction},
     conclusion::{At, Conclusion},
     joint::{LeftOut, Predicted},
-    likelihood::PARAMETERS,
-    noise::Noise,
     remarks,
-    solve::Solution,
-    terms::Term,
+    residual::residual_um,
     variogram,
 };
 
@@ -92,7 +89,8 @@ impl Conclusion<'_> {
     /// When the query cannot be read.
     pub(crate) fn outcome(&self) -> Result<Outcome> {
         let places = self.separator.query.places(self.campaign)?;
-        let queries = self.queries(&places);
+        let checks = checks(self.campaign, self.solution, &self.separator.config.kriging);
+        let queries = self.queries(&places, factors(&checks));
         let left_out = self.solution.left_out();
         let tables = vec![
             self.rows("prediction", prediction_columns(&queries))?,
@@ -105,7 +103,8 @@ impl Conclusion<'_> {
                          orders count from the middle of the measured volume"
                 .into(),
             tables,
-            values: self.values(&queries, &left_out),
+            values: self.values(&queries, &left_out, &checks),
+            checks,
             remarks: remarks::remarks(self, &queries, &left_out),
             notes: remarks::notes(self, &queries),
             ..Outcome::default()
@@ -118,27 +117,36 @@ impl Conclusion<'_> {
         Ok(TableRows { rows: spec.rows(columns)?, table: spec.name })
     }
 
-    fn queries(&self, places: &[[f64; 3]]) -> Vec<At> {
+    /// Predictions and corrections at places, with a factor on the standard uncertainty of each component.
+    fn queries(&self, places: &[[f64; 3]], factors: [f64; 3]) -> Vec<At> {
         let (campaign, solution) = (self.campaign, self.solution);
-        let prior = [0, 1, 2].map(|axis| solution.prior_std_um(campaign, axis).powi(2));
+        let prior = solution.prior_std_um(campaign).map(|std_um| std_um * std_um);
         let largest = prior.iter().copied().fold(0.0, f64::max);
-        let lost = Predicted { mean_um: f64::NAN, variance_um2: f64::NAN };
-        let predicted = solution.predict(campaign, places, true);
-        let one = |(place_mm, predicted): (&[f64; 3], [Predicted; 3])| {
+        let mut predicted = solution.predict(campaign, places, true);
+        for at in predicted.iter_mut().flat_map(|at| at.iter_mut().zip(factors)) {
+            at.0.variance_um2 *= at.1 * at.1;
+        }
+        let rough = solution.rough_um(campaign, places, &predicted);
+        let one = |((place_mm, predicted), rough_um): ((&[f64; 3], [Predicted; 3]), [f64; 3])| {
             let place_mm = *place_mm;
             let held = campaign.span.holds(place_mm);
-            let predicted = if held { predicted } else { [lost; 3] };
+            let predicted = if held { predicted } else { [Predicted::LOST; 3] };
             let uncertain = (0..3).any(|axis| {
                 prior[axis] >= SMALL * largest && predicted[axis].variance_um2 > UNCERTAIN * UNCERTAIN * prior[axis]
             });
             let extrapolated = !held || uncertain || campaign.span.is_outside(place_mm);
             let placement = solution.placement_um(campaign, place_mm);
             let error_um = [0, 1, 2].map(|axis| predicted[axis].mean_um - placement[axis]);
-            let known = error_um.iter().all(|error| error.is_finite());
-            let correction = known.then(|| self.separator.chain.correct(place_mm, error_um));
+            // What varies from place to place is not corrected: between places, no axis would follow it.
+            let correction = solution.measured.iter().all(|axis| error_um[*axis].is_finite()).then(|| {
+                let smooth_um = [0, 1, 2].map(|axis| error_um[axis] - rough_um[axis]);
+                let mut correction = self.separator.chain.correct(place_mm, smooth_um);
+                correction.remains_um.iter_mut().zip(rough_um).for_each(|(remains, rough)| *remains += rough);
+                correction
+            });
             At { place_mm, predicted, extrapolated, correction, error_um }
         };
-        places.iter().zip(predicted).map(one).collect()
+        places.iter().zip(predicted).zip(rough).map(one).collect()
     }
 
     fn residual_columns(&self, left_out: &[[LeftOut; 3]]) -> Vec<ArrayRef> {
@@ -173,126 +181,6 @@ impl Conclusion<'_> {
         columns.push(flags(queries.iter().map(|query| query.extrapolated)));
         columns
     }
-
-    fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]]) -> Vec<NamedValue> {
-        let (campaign, solution) = (self.campaign, self.solution);
-        let mut values = Vec::new();
-        let trend_std = solution.trend_std(campaign);
-        let fitted = |wanted: Term| {
-            let column = solution.terms.iter().position(|term| *term == wanted);
-            column.map_or([f64::NAN; 2], |column| [solution.joint.trend[column], trend_std[column]])
-        };
-        for wanted in self.separator.config.declared_terms() {
-            let [number, std] = fitted(wanted);
-            let (symbol, about) = match wanted {
-                Term::Turn(axis) => (["RX", "RY", "RZ"][axis], "rotation of the placement about the axis"),
-                Term::Shift(axis) => {
-                    (["TX", "TY", "TZ"][axis], "displacement of the placement, at the middle of the volume")
-                }
-                _ => continue,
-            };
-            values.push(NamedValue::new(symbol, number, std, wanted.unit(), about));
-        }
-        for (id, target, term) in self.names {
-            let [number, std] = fitted(*term);
-            values.push(NamedValue::new(id, number, std, term.unit(), "effect that was added").of(target));
-        }
-        for (axis, component) in COMPONENTS.into_iter().enumerate() {
-            let covariance = &solution.covariances[axis];
-            let of_estimate = |parameter: usize, number: f64| {
-                let index = axis * PARAMETERS + parameter;
-                solution.estimate.as_ref().map_or(f64::NAN, |estimate| {
-                    // d(exp θ) = exp θ · dθ.
-                    number * estimate.covariance[(index, index)].sqrt()
-                })
-            };
-            let mut add = |symbol: &str, number: f64, std: f64, unit: &str, about: &str| {
-                values.push(NamedValue::new(symbol, number, std, unit, about).of(component));
-            };
-            let sill = covariance.sill_um;
-            add("sill", sill, of_estimate(0, sill), "um", "standard deviation of the field");
-            for (direction, letter) in ["x", "y", "z"].into_iter().enumerate() {
-                let seen = campaign.volume.half_mm[direction] > 0.0 || solution.estimate.is_none();
-                let range = if seen { covariance.range_mm[direction] } else { f64::NAN };
-                let symbol = format!("range_{letter}");
-                add(&symbol, range, of_estimate(1 + direction, range), "mm", "range of the covariance along the axis");
-            }
-            let nugget = covariance.nugget_um;
-            let about = if Solution::nugget_counts(campaign) {
-                "standard deviation from place to place beyond noise"
-            } else {
-                "standard deviation from place to place, noise included"
-            };
-            add("nugget", nugget, of_estimate(4, nugget), "um", about);
-            let noise = campaign.noise_um(axis);
-            let of_noise = match &campaign.noise {
-                Noise::Repeats { dof, .. } => noise / (2.0 * *dof as f64).sqrt(),
-                _ => f64::NAN,
-            };
-            add("noise", noise, of_noise, "um", "standard uncertainty of one reading");
-            let each = || left_out.iter().map(|place| place[axis]).filter(|one| one.std_um.is_finite());
-            let count = each().count() as f64;
-            let rms = (each().map(|one| one.residual_um.powi(2)).sum::<f64>() / count).sqrt();
-            let chi2 = each().map(|one| (one.residual_um / one.std_um).powi(2)).sum::<f64>() / count;
-            add("left_out_rms", rms, f64::NAN, "um", "root mean square of what the other places do not predict");
-            add("left_out_chi2", chi2, f64::NAN, "", "mean square of the same in its standard deviations");
-        }
-        let known = || queries.iter().filter_map(|query| Some((query, query.correction.as_ref()?)));
-        let rms = |of: &dyn Fn(&At, &Correction) -> [f64; 3]| {
-            let sum: f64 =
-                known().map(|(query, correction)| of(query, correction).iter().map(|e| e * e).sum::<f64>()).sum();
-            (sum / known().count() as f64).sqrt()
-        };
-        let about = "root mean square length of the predicted error without the placement, at the places of the query";
-        values.push(NamedValue::new("error_rms", rms(&|query, _| query.error_um), f64::NAN, "um", about));
-        let about = "the same that the corrections leave";
-        values.push(NamedValue::new("remains_rms", rms(&|_, correction| correction.remains_um), f64::NAN, "um", about));
-        values
-    }
-}
-
-/// Reading less the fit at its place, trend and field, in µm.
-#[must_use]
-pub(crate) fn residual_um(campaign: &Campaign, solution: &Solution) -> Vec<[f64; 3]> {
-    let terms = &solution.terms;
-    let trend = &solution.joint.trend;
-    // What noise is taken to be of the mean at each place.
-    let of_mean: Vec<[f64; 3]> = if solution.fitted.is_none() {
-        (0..campaign.places_mm.len())
-            .map(|place| {
-                [0, 1, 2]
-                    .map(|axis| solution.noise_um2(campaign, place, axis) * solution.joint.fields[axis].alpha[place])
-            })
-            .collect()
-    } else {
-        let predicted = solution.predict(campaign, &campaign.places_mm, false);
-        let mean = |place: usize, axis: usize| {
-            let of_trend: f64 =
-                (0..terms.len()).map(|column| solution.data.design[axis][(place, column)] * trend[column]).sum();
-            let at_first: f64 = terms
-                .iter()
-                .zip(trend.iter())
-                .map(|(term, value)| value * term.at(&campaign.volume, campaign.places_mm[place], 0.0)[axis])
-                .sum();
-            solution.data.observed[axis].mean_um[place] - predicted[place][axis].mean_um - of_trend + at_first
-        };
-        (0..campaign.places_mm.len()).map(|place| [0, 1, 2].map(|axis| mean(place, axis))).collect()
-    };
-    let moving: Vec<usize> = (0..terms.len()).filter(|column| terms[*column].moves_in_time()).collect();
-    let one = |(row, place): (usize, &usize)| {
-        [0, 1, 2].map(|axis| {
-            let drift: f64 = moving
-                .iter()
-                .map(|column| {
-                    let now = terms[*column].at(&campaign.volume, campaign.places_mm[*place], campaign.time[row])[axis];
-                    trend[*column] * (now - solution.data.design[axis][(*place, *column)])
-                })
-                .sum();
-            let from_mean = campaign.readings_um[row][axis] - solution.data.observed[axis].mean_um[*place];
-            of_mean[*place][axis] + from_mean - drift
-        })
-    };
-    campaign.place_of.iter().enumerate().map(one).collect()
 }
 
 fn prediction_columns(queries: &[At]) -> Vec<ArrayRef> {

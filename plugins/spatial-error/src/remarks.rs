@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::{
     campaign::{COMPONENTS, Campaign},
     conclusion::{At, Conclusion},
-    joint::{Joint, LeftOut, Predictor, Query},
+    joint::{Covariance, Joint, LeftOut, Predictor, Query},
     neighbours::{NEAREST, Neighbours},
     noise::Noise,
     solve::{Solution, estimated_from},
@@ -24,7 +24,6 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
     let Conclusion { campaign, solution, .. } = conclusion;
     let mut all = campaign.remarks.clone();
     all.extend(of_span(campaign, solution, queries));
-    all.extend(of_stated(campaign));
     let limited = queries.iter().filter(|query| query.correction.as_ref().is_some_and(|one| one.limited)).count();
     if limited > 0 {
         all.push(format!(
@@ -47,6 +46,7 @@ pub(crate) fn remarks(conclusion: &Conclusion, queries: &[At], left_out: &[[Left
 pub(crate) fn notes(conclusion: &Conclusion, queries: &[At]) -> Vec<String> {
     let Conclusion { separator, campaign, solution, .. } = conclusion;
     let mut all = vec![of_field(campaign, solution)];
+    all.extend(campaign.notes.iter().cloned());
     all.extend(of_noise(campaign));
     if campaign.place_of.len() == campaign.places_mm.len() {
         all.push(
@@ -102,7 +102,7 @@ fn of_span(campaign: &Campaign, solution: &Solution, queries: &[At]) -> Vec<Stri
     }
     if !solution.lost.is_empty() {
         let names: Vec<String> = solution.lost.iter().map(|term| name(*term)).collect();
-        all.push(format!("the places do not determine {}", names.join(", ")));
+        all.push(format!("the readings do not determine {}", names.join(", ")));
     }
     all
 }
@@ -117,25 +117,31 @@ fn name(term: Term) -> String {
 }
 
 pub(crate) fn of_field(campaign: &Campaign, solution: &Solution) -> String {
-    let sizes: Vec<String> =
-        (0..3).map(|axis| format!("{} {:.2}", COMPONENTS[axis], solution.covariances[axis].sill_um)).collect();
-    let nuggets: Vec<String> =
-        (0..3).map(|axis| format!("{} {:.2}", COMPONENTS[axis], solution.covariances[axis].nugget_um)).collect();
+    let each = |of: &dyn Fn(&Covariance) -> String| {
+        let fields = solution.measured.iter().zip(&solution.covariances);
+        fields
+            .map(|(axis, covariance)| format!("{} {}", COMPONENTS[*axis], of(covariance)))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     let what =
         if Solution::nugget_counts(campaign) { "from place to place beyond noise" } else { "nugget, noise included" };
     format!(
-        "smooth field beside the trend, {}: standard deviation {} µm; {what}: {} µm",
-        solution.family.name(),
-        sizes.join(", "),
-        nuggets.join(", ")
+        "smooth field beside the trend: standard deviation {} µm; {what}: {} µm",
+        each(&|covariance| format!("{:.2} ({})", covariance.sill_um, covariance.family.name())),
+        each(&|covariance| format!("{:.2}", covariance.nugget_um))
     )
 }
 
 fn of_noise(campaign: &Campaign) -> Option<String> {
     match &campaign.noise {
-        Noise::Repeats { std_um: [x, y, z], dof } => Some(format!(
-            "noise of one reading from repeats, after a common smooth drift: {x:.2}, {y:.2}, {z:.2} µm ({dof} degrees of freedom each)"
-        )),
+        Noise::Repeats { std_um, dof } => {
+            let each = campaign.measured.iter().map(|axis| format!("{} {:.2}", COMPONENTS[*axis], std_um[*axis]));
+            Some(format!(
+                "noise of one reading from repeats, after a common smooth drift: {} µm ({dof} degrees of freedom each)",
+                each.collect::<Vec<_>>().join(", ")
+            ))
+        }
         Noise::Unknown => Some(
             "the noise is not known, without repeats, `std_um` or a column `std_um`: noise and what varies from place to place are one, \
              the nugget, which predictions do not include"
@@ -143,20 +149,6 @@ fn of_noise(campaign: &Campaign) -> Option<String> {
         ),
         Noise::Column(_) | Noise::Stated(_) => None,
     }
-}
-
-/// Repeats that scatter unlike the stated uncertainty.
-fn of_stated(campaign: &Campaign) -> Option<String> {
-    if !matches!(campaign.noise, Noise::Column(_) | Noise::Stated(_)) {
-        return None;
-    }
-    let (places, readings) = (&campaign.place_of, &campaign.readings_um);
-    let known = crate::noise::of_repeats(places, campaign.places_mm.len(), readings, &campaign.time);
-    let Noise::Repeats { std_um, .. } = known else { return None };
-    let ratios = [0, 1, 2].map(|axis| std_um[axis] / campaign.noise_um(axis));
-    let worst = ratios.into_iter().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs())).unwrap_or(1.0);
-    (!(0.6..1.7).contains(&worst))
-        .then(|| format!("repeats scatter {worst:.2} times as much as the stated uncertainty: is `std_um` right?"))
 }
 
 fn of_numbers(campaign: &Campaign, solution: &Solution) -> Vec<String> {
@@ -192,18 +184,18 @@ fn against_full(campaign: &Campaign, solution: &Solution) -> Option<String> {
     let near = Neighbours::new(&data, &solution.covariances);
     let predictor = Predictor::new(&joint, &data.places, true);
     let (mut squares, mut worst, mut ratio) = (0.0, 0.0_f64, 1.0_f64);
-    for axis in 0..3 {
-        let design = solution.design(campaign, &queries, axis);
+    for (field, axis) in solution.measured.iter().enumerate() {
+        let design = solution.design(campaign, &queries, *axis);
         let nugget_counts = Solution::nugget_counts(campaign);
         let query = Query { places: &queries, design: design.as_ref(), nugget_counts };
-        for (full, part) in predictor.predict(axis, &query).iter().zip(near.predict(&data, &joint, axis, &query)) {
+        for (full, part) in predictor.predict(field, &query).iter().zip(near.predict(&data, &joint, field, &query)) {
             let difference = (full.mean_um - part.mean_um).abs();
             squares += difference * difference;
             worst = worst.max(difference);
             ratio = ratio.max((part.variance_um2 / full.variance_um2).sqrt());
         }
     }
-    let rms = (squares / (3 * queries.len()) as f64).sqrt();
+    let rms = (squares / (solution.measured.len() * queries.len()) as f64).sqrt();
     Some(format!(
         "beside the full solution of {} of these places, predictions from neighbours differ by {rms:.2e} µm rms and {worst:.2e} µm at \
          most, and their standard uncertainty is up to {:.2} % larger",

@@ -1,14 +1,16 @@
 //! What a solution predicts, and with which uncertainty.
 
 use faer::Mat;
-use nalgebra::{DVector, Matrix3, Vector3};
 
 use crate::{
     campaign::Campaign,
-    joint::{Covariance, Joint, LeftOut, Predicted, Predictor, Query, inverse},
+    families::{Guess, likely},
+    joint::{Covariance, Joint, LeftOut, Predicted, Predictor, Query, at_measured},
     likelihood::{PARAMETERS, covariances},
     neighbours::Neighbours,
     noise::Noise,
+    projections::Projections,
+    smooth::Spacing,
     solve::Solution,
     terms::Term,
 };
@@ -46,8 +48,9 @@ impl Solution {
         all
     }
 
-    /// Adds what is not known of the covariances, to first order in the mean and to second order in the variance, along the
-    /// directions in which the parameters of each field are independent (Harville, Jeske, J. Am. Stat. Assoc. 87 (1992) 724).
+    /// Adds what is not known of the covariances: of their parameters to first order in the mean and to second order in the variance,
+    /// along the directions in which the parameters of each field are independent (Harville, Jeske, J. Am. Stat. Assoc. 87 (1992) 724);
+    /// of their families the mean over the likely ones of variance and squared distance (law of total variance).
     /// Where predictions are many, every so many are computed, and the others are widened by their mean ratio. Predictions from nearest
     /// places keep the trend, of which next to nothing is left beside so many places.
     fn widen(&self, campaign: &Campaign, places: &[[f64; 3]], all: &mut [[Predicted; 3]]) {
@@ -78,6 +81,17 @@ impl Solution {
                 }
             }
         }
+        for (covariances, weight) in self.other_families() {
+            let Some(other) = predicted(&covariances) else { continue };
+            for (index, extra) in extra.iter_mut().enumerate() {
+                let at = &all[some[index]];
+                for axis in 0..3 {
+                    let (other, at) = (other[index][axis], at[axis]);
+                    extra[axis] +=
+                        weight[axis] * ((other.mean_um - at.mean_um).powi(2) + (other.variance_um2 - at.variance_um2));
+                }
+            }
+        }
         for axis in 0..3 {
             let plain: f64 = some.iter().map(|index| all[*index][axis].variance_um2).sum();
             let ratio =
@@ -93,6 +107,21 @@ impl Solution {
         }
     }
 
+    /// Covariances of the next likely families of all fields together, with the probability of each component's.
+    fn other_families(&self) -> Vec<(Vec<Covariance>, [f64; 3])> {
+        let all: Vec<Vec<(&Guess, f64)>> = self.guesses.iter().map(|guesses| likely(guesses)).collect();
+        let most = all.iter().map(Vec::len).max().unwrap_or(0);
+        let of_rank = |rank: usize| {
+            let fields = self.covariances.iter().zip(&all).map(|(best, guesses)| {
+                let other = guesses.get(rank).and_then(|(guess, weight)| Some((guess.field()?, *weight)));
+                other.unwrap_or((*best, 0.0))
+            });
+            let (covariances, weights): (Vec<_>, Vec<_>) = fields.unzip();
+            (covariances, self.by_axis(weights, 0.0))
+        };
+        (1..most).map(of_rank).collect()
+    }
+
     /// Covariances with the parameters of all fields moved by their standard uncertainty, to both sides of each independent direction.
     fn alternatives(&self) -> Vec<[Vec<Covariance>; 2]> {
         let Some(estimate) = &self.estimate else { return Vec::new() };
@@ -104,6 +133,7 @@ impl Solution {
                 nalgebra::SymmetricEigen::new(block)
             })
             .collect();
+        let families: Vec<_> = self.covariances.iter().map(|covariance| covariance.family).collect();
         let moved = |direction: usize, sign: f64| {
             let mut parameters = estimate.parameters.clone();
             for (field, known) in directions.iter().enumerate() {
@@ -111,7 +141,7 @@ impl Solution {
                 let mut part = parameters.rows_mut(field * PARAMETERS, PARAMETERS);
                 part.axpy(sign * size, &known.eigenvectors.column(direction), 1.0);
             }
-            covariances(self.family, &parameters)
+            covariances(&families, &parameters)
         };
         (0..PARAMETERS).map(|direction| [moved(direction, 1.0), moved(direction, -1.0)]).collect()
     }
@@ -128,25 +158,82 @@ impl Solution {
         let predictor = near.is_none().then(|| Predictor::new(joint, &self.data.places, variance));
         let mut all = Vec::with_capacity(places.len());
         for places in places.chunks(CHUNK) {
-            let axes = [0, 1, 2].map(|axis| {
-                let design = self.design(campaign, places, axis);
+            let of_field = |(field, axis): (usize, &usize)| {
+                let design = self.design(campaign, places, *axis);
                 let query = Query { places, design: design.as_ref(), nugget_counts };
                 match (&predictor, near) {
-                    (Some(predictor), _) => predictor.predict(axis, &query),
-                    (None, Some(near)) => near.predict(&self.data, joint, axis, &query),
+                    (Some(predictor), _) => predictor.predict(field, &query),
+                    (None, Some(near)) => near.predict(&self.data, joint, field, &query),
                     (None, None) => Vec::new(),
                 }
-            });
-            all.extend((0..places.len()).map(|row| [axes[0][row], axes[1][row], axes[2][row]]));
+            };
+            let fields: Vec<Vec<Predicted>> = self.measured.iter().enumerate().map(of_field).collect();
+            let of_place = |row: usize| self.by_axis(fields.iter().map(|field| field[row]), Predicted::LOST);
+            all.extend((0..places.len()).map(of_place));
         }
         all
     }
 
-    /// Standard deviation of the field and what varies from place to place, before any reading.
+    /// What of the predictions at places is not smooth, in µm, where it is no noise: the nugget that was found at a measured place, and a
+    /// field that neighbouring places do not share.
     #[must_use]
-    pub(crate) fn prior_std_um(&self, campaign: &Campaign, axis: usize) -> f64 {
-        let covariance = &self.covariances[axis];
-        covariance.sill_um.hypot(if Self::nugget_counts(campaign) { covariance.nugget_um } else { 0.0 })
+    pub(crate) fn rough_um(
+        &self,
+        campaign: &Campaign,
+        places: &[[f64; 3]],
+        predicted: &[[Predicted; 3]],
+    ) -> Vec<[f64; 3]> {
+        let mut all = vec![self.by_axis(self.measured.iter().map(|_| 0.0), f64::NAN); places.len()];
+        if !Self::nugget_counts(campaign) {
+            return all;
+        }
+        let spacing = Spacing::of(&self.data.places);
+        let measured = at_measured(&self.data.places, places);
+        for (field, axis) in self.measured.iter().copied().enumerate() {
+            let design = self.design(campaign, places, axis);
+            if spacing.is_smooth(&self.covariances[field]) {
+                for (row, place) in &measured {
+                    all[*row][axis] = match &self.neighbours {
+                        None => self.covariances[field].nugget_um.powi(2) * self.joint.fields[field].alpha[*place],
+                        Some(near) => {
+                            let query = |nugget_counts: bool| Query {
+                                places: &places[*row..=*row],
+                                design: design.submatrix(*row, 0, 1, design.ncols()),
+                                nugget_counts,
+                            };
+                            let mean = |nugget_counts: bool| {
+                                let found = near.predict(&self.data, &self.joint, field, &query(nugget_counts));
+                                found.first().map_or(0.0, |at| at.mean_um)
+                            };
+                            mean(true) - mean(false)
+                        }
+                    };
+                }
+            } else {
+                for (row, at) in predicted.iter().enumerate() {
+                    let trend: f64 = (0..design.ncols()).map(|at| design[(row, at)] * self.joint.trend[at]).sum();
+                    all[row][axis] = at[axis].mean_um - trend;
+                }
+            }
+        }
+        all
+    }
+
+    /// What each field has, by axis; `lost` of a component that was not measured.
+    #[must_use]
+    pub(crate) fn by_axis<T: Copy>(&self, fields: impl IntoIterator<Item = T>, lost: T) -> [T; 3] {
+        let mut all = [lost; 3];
+        self.measured.iter().zip(fields).for_each(|(axis, of_field)| all[*axis] = of_field);
+        all
+    }
+
+    /// Standard deviation of each field and what varies from place to place, before any reading.
+    #[must_use]
+    pub(crate) fn prior_std_um(&self, campaign: &Campaign) -> [f64; 3] {
+        let counts = Self::nugget_counts(campaign);
+        let of_field =
+            |covariance: &Covariance| covariance.sill_um.hypot(if counts { covariance.nugget_um } else { 0.0 });
+        self.by_axis(self.covariances.iter().map(of_field), f64::NAN)
     }
 
     /// What of a prediction is the declared placement, at a place.
@@ -164,12 +251,12 @@ impl Solution {
 
     /// Noise variance that averaging over the repeats leaves of the mean at a place: where the noise is not known, the nugget's.
     #[must_use]
-    pub(crate) fn noise_um2(&self, campaign: &Campaign, place: usize, axis: usize) -> f64 {
-        let observed = &self.data.observed[axis];
+    pub(crate) fn noise_um2(&self, campaign: &Campaign, place: usize, field: usize) -> f64 {
+        let observed = &self.data.observed[field];
         if Self::nugget_counts(campaign) {
             observed.noise_um2[place]
         } else {
-            self.covariances[axis].nugget_um.powi(2) * observed.share[place]
+            self.covariances[field].nugget_um.powi(2) * observed.share[place]
         }
     }
 
@@ -177,46 +264,19 @@ impl Solution {
     #[must_use]
     pub(crate) fn left_out(&self) -> Vec<[LeftOut; 3]> {
         if let Some(near) = &self.neighbours {
-            return near.left_out(&self.data, &self.joint);
+            let all = near.left_out(&self.data, &self.joint);
+            return all.into_iter().map(|fields| self.by_axis(fields, LeftOut::LOST)).collect();
         }
-        let projections = self.projections();
-        let of = |(place, projection): (usize, &Matrix3<f64>)| {
-            let pull = Vector3::from_fn(|axis, _| self.joint.fields[axis].alpha[place]);
+        let projections = Projections::of(&self.joint);
+        let of_place = |place: usize| {
             // A place that alone determines a parameter of the trend is not predicted by the others.
-            let covariance = projection.try_inverse().filter(|all| all.diagonal().iter().all(|entry| *entry > 0.0));
-            let covariance = covariance.unwrap_or_else(|| Matrix3::from_element(f64::NAN));
-            let residual = covariance * pull;
-            [0, 1, 2].map(|axis| LeftOut { residual_um: residual[axis], std_um: covariance[(axis, axis)].sqrt() })
+            let covariance = projections.block(&[place]).try_inverse();
+            let covariance = covariance.filter(|all| all.diagonal().iter().all(|entry| *entry > 0.0));
+            let Some(covariance) = covariance else { return [LeftOut::LOST; 3] };
+            let residual = &covariance * projections.pull(&[place]);
+            let of_field = |field| LeftOut { residual_um: residual[field], std_um: covariance[(field, field)].sqrt() };
+            self.by_axis((0..residual.len()).map(of_field), LeftOut::LOST)
         };
-        projections.iter().enumerate().map(of).collect()
-    }
-
-    /// Blocks of P = K⁻¹ − K⁻¹X(XᵀK⁻¹X)⁻¹XᵀK⁻¹, one a place of the fit.
-    #[must_use]
-    pub(crate) fn projections(&self) -> Vec<Matrix3<f64>> {
-        let count = self.joint.fields[0].alpha.len();
-        let columns = self.terms.len();
-        let mut blocks = vec![Matrix3::zeros(); count];
-        let mut back = Vec::new();
-        for (axis, field) in self.joint.fields.iter().enumerate() {
-            let lower = inverse(&field.factor);
-            for (place, block) in blocks.iter_mut().enumerate() {
-                block[(axis, axis)] = lower.col(place).squared_norm_l2();
-            }
-            let mut design = field.white.clone();
-            field.factor.transpose().solve_upper_triangular_in_place(design.as_mut());
-            back.push(design);
-        }
-        for (place, block) in blocks.iter_mut().enumerate() {
-            let rows: Vec<DVector<f64>> =
-                back.iter().map(|design| DVector::from_fn(columns, |column, _| design[(place, column)])).collect();
-            for one in 0..3 {
-                let weighted = &self.joint.trend_covariance * &rows[one];
-                for other in 0..3 {
-                    block[(one, other)] -= weighted.dot(&rows[other]);
-                }
-            }
-        }
-        blocks
+        (0..projections.places()).map(of_place).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! From a campaign to covariances, trend and predictions.
 
 use faer::Mat;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use runout_core::{Error, Result};
@@ -10,8 +10,9 @@ use crate::{
     campaign::Campaign,
     config::{Kriging, SpatialErrorConfig},
     correlation::Family,
+    families::{Guess, INDEPENDENT, Likely, basis, most_likely},
     joint::{Covariance, Data, Joint},
-    likelihood::{Criterion, Estimate, PARAMETERS, Prior, estimate},
+    likelihood::{Criterion, Estimate, PARAMETERS, Prior},
     neighbours::Neighbours,
     noise::Noise,
     terms::Term,
@@ -25,23 +26,21 @@ const CLUSTER: usize = 50;
 const TREND_FROM: usize = 1500;
 /// Distinct places that an estimated covariance needs at least.
 const FEWEST: usize = 10;
-/// Share of a column outside the span of those before it, below which it is none of its own.
-const INDEPENDENT: f64 = 1e-6;
 
 /// Covariances and trend.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
-    /// The family of all three covariances.
-    pub family: Family,
-    /// Their estimation; `None` where they are given.
+    /// Components that were measured: 0 dx, 1 dy, 2 dz. Each is a field.
+    pub measured: Vec<usize>,
+    /// Estimation of the covariances; `None` where they are given.
     pub estimate: Option<Estimate>,
-    /// The best estimate of each family that was tried.
-    pub guesses: Vec<Guess>,
-    /// Covariance of dx, dy, dz.
+    /// The best estimate of each family that was tried, of each field.
+    pub guesses: Vec<Vec<Guess>>,
+    /// Covariance of each field.
     pub covariances: Vec<Covariance>,
     /// Columns of the trend.
     pub terms: Vec<Term>,
-    /// Declared columns that the places do not determine.
+    /// Declared columns that the readings do not determine.
     pub lost: Vec<Term>,
     /// Means at all places.
     pub data: Data,
@@ -52,19 +51,6 @@ pub(crate) struct Solution {
     pub(crate) neighbours: Option<Neighbours>,
 }
 
-/// Parameters of a family's most likely covariances, with their covariance.
-#[derive(Debug, Clone)]
-pub(crate) struct Guess {
-    /// The family.
-    pub family: Family,
-    /// As in an [`Estimate`].
-    pub parameters: DVector<f64>,
-    /// As in an [`Estimate`].
-    pub ln_likelihood: f64,
-    /// Their covariance.
-    pub covariance: DMatrix<f64>,
-}
-
 /// The columns that are not in the span of those before them, and the others.
 #[must_use]
 pub(crate) fn independent(campaign: &Campaign, terms: &[Term]) -> (Vec<Term>, Vec<Term>) {
@@ -72,8 +58,12 @@ pub(crate) fn independent(campaign: &Campaign, terms: &[Term]) -> (Vec<Term>, Ve
     let mut basis: Vec<DVector<f64>> = Vec::new();
     for term in terms {
         let rows = campaign.place_of.iter().zip(&campaign.time);
-        let column: Vec<f64> =
-            rows.flat_map(|(place, time)| term.at(&campaign.volume, campaign.places_mm[*place], *time)).collect();
+        let column: Vec<f64> = rows
+            .flat_map(|(place, time)| {
+                let adds = term.at(&campaign.volume, campaign.places_mm[*place], *time);
+                campaign.measured.iter().map(move |axis| adds[*axis])
+            })
+            .collect();
         let column = DVector::from_vec(column);
         let whole = column.norm();
         let mut left = column;
@@ -122,80 +112,11 @@ pub(crate) fn prior(campaign: &Campaign, data: &Data) -> Prior {
 /// Sum of squares that ordinary least squares leaves.
 fn left_of_trend(values: &[f64], design: &Mat<f64>) -> f64 {
     let mut left = DVector::from_column_slice(values);
-    let mut basis: Vec<DVector<f64>> = Vec::new();
-    for column in 0..design.ncols() {
-        let mut own = DVector::from_fn(values.len(), |row, _| design[(row, column)]);
-        let whole = own.norm();
-        for known in &basis {
-            let share = known.dot(&own);
-            own.axpy(-share, known, 1.0);
-        }
-        let size = own.norm();
-        if size > INDEPENDENT * whole && size > 0.0 {
-            own /= size;
-            let share = own.dot(&left);
-            left.axpy(-share, &own, 1.0);
-            basis.push(own);
-        }
+    for known in basis(design).1 {
+        let share = known.dot(&left);
+        left.axpy(-share, &known, 1.0);
     }
     left.norm_squared()
-}
-
-/// The most likely family and covariances.
-#[must_use]
-pub(crate) fn most_likely(
-    data: &Data,
-    prior: &Prior,
-    families: &[Family],
-    criterion: Criterion,
-    start: Option<(Family, &DVector<f64>)>,
-) -> Option<(Family, Estimate)> {
-    best_of(each_family(data, prior, families, criterion, start))
-}
-
-fn best_of(all: Vec<(Family, Estimate)>) -> Option<(Family, Estimate)> {
-    all.into_iter().reduce(|best, next| if next.1.ln_likelihood > best.1.ln_likelihood { next } else { best })
-}
-
-/// The most likely covariances of each family.
-fn each_family(
-    data: &Data,
-    prior: &Prior,
-    families: &[Family],
-    criterion: Criterion,
-    start: Option<(Family, &DVector<f64>)>,
-) -> Vec<(Family, Estimate)> {
-    let mut all: Vec<(Family, Estimate)> = Vec::new();
-    let moved = |from: &DVector<f64>, by: f64| {
-        let shift = |index: usize, value: f64| {
-            let is_range = (1..4).contains(&(index % PARAMETERS)) && prior.precision[index].is_finite();
-            if is_range { value + by } else { value }
-        };
-        DVector::from_fn(from.len(), |index, _| shift(index, from[index]))
-    };
-    for family in families {
-        let best = all.iter().max_by(|one, other| one.1.ln_likelihood.total_cmp(&other.1.ln_likelihood));
-        let starts = match (best, start) {
-            (Some((known, found)), _) => vec![moved(&found.parameters, (reach(*known) / reach(*family)).ln())],
-            (None, Some((known, from))) => vec![moved(from, (reach(known) / reach(*family)).ln())],
-            (None, None) => vec![prior.centre.clone(), moved(&prior.centre, 0.9)],
-        };
-        let found = starts.iter().filter_map(|start| estimate(data, *family, prior, start, criterion));
-        let found = found.reduce(|best, next| if next.ln_likelihood > best.ln_likelihood { next } else { best });
-        all.extend(found.map(|found| (*family, found)));
-    }
-    all
-}
-
-/// Distance, in ranges, at which a family's correlation is 0.5.
-fn reach(family: Family) -> f64 {
-    match family {
-        Family::Exponential => 0.69,
-        Family::Gaussian => 1.18,
-        Family::Spherical => 0.35,
-        Family::Matern32 => 0.97,
-        Family::Matern52 => 1.05,
-    }
 }
 
 /// Families that may be taken.
@@ -249,44 +170,34 @@ pub(crate) fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[T
     has_enough(campaign, config, &terms)?;
     if let Some(covariance) = config.kriging.fixed() {
         no_contradiction(campaign, &covariance)?;
-        let (family, covariances) = (covariance.family, vec![covariance; 3]);
-        let guesses = Vec::new();
-        return complete(campaign, config, Found { family, estimate: None, guesses, covariances, terms, lost });
+        let (guesses, covariances) = (Vec::new(), vec![covariance; campaign.measured.len()]);
+        return complete(campaign, config, Found { estimate: None, guesses, covariances, terms, lost });
     }
     let some = estimated_from(campaign);
     let data = campaign.data(&terms, some.as_deref());
     let prior = prior(campaign, &data);
-    let all = each_family(&data, &prior, &families(&config.kriging), Criterion::Restricted, None);
-    let guess = |(family, estimate): &(Family, Estimate)| Guess {
-        family: *family,
-        parameters: estimate.parameters.clone(),
-        ln_likelihood: estimate.ln_likelihood,
-        covariance: estimate.covariance.clone(),
-    };
-    let guesses = all.iter().map(guess).collect();
-    let (family, estimate) = best_of(all).ok_or_else(|| {
+    let likely = most_likely(&data, &prior, &families(&config.kriging), Criterion::Restricted, None);
+    let Likely { estimate, guesses, .. } = likely.ok_or_else(|| {
         let problem = "no covariance with a positive definite matrix was found".to_owned();
         Error::new("estimate the covariance of", &campaign.file, problem)
             .help("are places or readings far out of their usual size? `kriging` takes a covariance of your own")
     })?;
     let covariances = estimate.covariances.clone();
     let estimate = Some(estimate);
-    complete(campaign, config, Found { family, estimate, guesses, covariances, terms, lost })
+    complete(campaign, config, Found { estimate, guesses, covariances, terms, lost })
 }
 
 /// Covariances and columns, without the fit of all places.
 pub(crate) struct Found {
-    /// The family.
-    pub family: Family,
-    /// Its estimation.
+    /// Estimation of the covariances.
     pub estimate: Option<Estimate>,
-    /// The best estimate of each family that was tried.
-    pub guesses: Vec<Guess>,
-    /// Covariance of dx, dy, dz.
+    /// The best estimate of each family that was tried, of each field.
+    pub guesses: Vec<Vec<Guess>>,
+    /// Covariance of each field.
     pub covariances: Vec<Covariance>,
     /// Columns of the trend.
     pub terms: Vec<Term>,
-    /// Declared columns that the places do not determine.
+    /// Declared columns that the readings do not determine.
     pub lost: Vec<Term>,
 }
 
@@ -295,7 +206,7 @@ pub(crate) struct Found {
 /// # Errors
 /// When a covariance has no positive definite matrix.
 pub(crate) fn complete(campaign: &Campaign, config: &SpatialErrorConfig, found: Found) -> Result<Solution> {
-    let Found { family, estimate, guesses, covariances, terms, lost } = found;
+    let Found { estimate, guesses, covariances, terms, lost } = found;
     let count = campaign.places_mm.len();
     let by_neighbours = count > config.kriging.full_places;
     let data = campaign.data(&terms, None);
@@ -319,13 +230,15 @@ pub(crate) fn complete(campaign: &Campaign, config: &SpatialErrorConfig, found: 
             .help("a nugget above 0, a shorter range or another variogram makes it so: smooth ones need a nugget")
     })?;
     let neighbours = by_neighbours.then(|| Neighbours::new(&data, &covariances));
-    Ok(Solution { family, estimate, guesses, covariances, terms, lost, data, joint, fitted, neighbours })
+    let measured = campaign.measured.clone();
+    Ok(Solution { measured, estimate, guesses, covariances, terms, lost, data, joint, fitted, neighbours })
 }
 
 fn has_enough(campaign: &Campaign, config: &SpatialErrorConfig, terms: &[Term]) -> Result<()> {
     let count = campaign.places_mm.len();
     let fixed = config.kriging.fixed().is_some();
-    let needed = if fixed { terms.len().div_ceil(3) } else { FEWEST.max(terms.len().div_ceil(3) + 4) };
+    let of_trend = terms.len().div_ceil(campaign.measured.len());
+    let needed = if fixed { of_trend } else { FEWEST.max(of_trend + 4) };
     if count >= needed {
         return Ok(());
     }

@@ -1,12 +1,11 @@
 //! What a result should not be silent about: places that err together, and a drift that is not in the model.
 
-use faer::Mat;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use runout_core::numerics::statistics::f_tail;
 
 use crate::{
     campaign::{COMPONENTS, Campaign},
-    joint::inverse,
+    projections::Projections,
     solve::{Solution, independent},
     terms::Term,
 };
@@ -39,9 +38,9 @@ pub(crate) struct Group {
 impl Group {
     /// The places with what they are off.
     pub(crate) fn named(&self, campaign: &Campaign) -> String {
-        let each = self.places.iter().zip(&self.by_um).map(|(place, [dx, dy, dz])| {
+        let each = self.places.iter().zip(&self.by_um).map(|(place, by_um)| {
             let [x, y, z] = campaign.places_mm[*place];
-            format!("({x}, {y}, {z}) mm by ({dx:.1}, {dy:.1}, {dz:.1}) µm")
+            format!("({x}, {y}, {z}) mm by {}", campaign.displacement(*by_um))
         });
         each.collect::<Vec<String>>().join(", ")
     }
@@ -50,18 +49,18 @@ impl Group {
 /// Neighbouring places that all other places do not predict. They predict each other, so that no single one of them need be far.
 pub(crate) fn groups(campaign: &Campaign, solution: &Solution) -> Vec<Group> {
     let count = campaign.places_mm.len();
-    if solution.fitted.is_some() || !(3 * TOGETHER..=MOST_PLACES).contains(&count) || solution.joint.fields.len() != 3 {
+    if solution.fitted.is_some() || !(3 * TOGETHER..=MOST_PLACES).contains(&count) {
         return Vec::new();
     }
-    let projections = Projections::of(solution);
+    let projections = Projections::of(&solution.joint);
     let mut found: Vec<(f64, [usize; TOGETHER])> = Vec::new();
     for place in 0..count {
         let near = nearest(campaign, place);
         for (index, one) in near.iter().enumerate() {
             for other in &near[index + 1..] {
                 let group = [place, *one, *other];
-                let Some((chi2, _)) = projections.left_out(solution, &group) else { continue };
-                let free = (3 * TOGETHER) as f64;
+                let Some((chi2, _)) = left_out(&projections, &group) else { continue };
+                let free = (campaign.measured.len() * TOGETHER) as f64;
                 if f_tail(chi2 / free, free, OF_COVARIANCE) < CHANCE / (count * NEAREST * NEAREST / 2) as f64 {
                     found.push((chi2, group));
                 }
@@ -81,14 +80,15 @@ pub(crate) fn groups(campaign: &Campaign, solution: &Solution) -> Vec<Group> {
         // Members that add nothing are only near.
         let adds = |place: &usize| {
             let rest: Vec<usize> = group.iter().copied().filter(|other| other != place).collect();
-            projections.left_out(solution, &rest).is_none_or(|(without, _)| chi2 - without > OWN)
+            left_out(&projections, &rest).is_none_or(|(without, _)| chi2 - without > OWN)
         };
         let places: Vec<usize> = group.iter().copied().filter(adds).collect();
         if places.len() < 2 {
             continue;
         }
-        if let Some((_, residual)) = projections.left_out(solution, &places) {
-            let by_um = (0..places.len()).map(|index| [0, 1, 2].map(|axis| residual[axis * places.len() + index]));
+        if let Some((_, residual)) = left_out(&projections, &places) {
+            let by_um = (0..places.len())
+                .map(|index| solution.by_axis(residual.iter().skip(index).step_by(places.len()).copied(), f64::NAN));
             all.push(Group { by_um: by_um.collect(), places });
         }
     }
@@ -108,46 +108,11 @@ fn nearest(campaign: &Campaign, place: usize) -> Vec<usize> {
     others
 }
 
-/// What P = K⁻¹ − K⁻¹X(XᵀK⁻¹X)⁻¹XᵀK⁻¹ needs of each field: L⁻¹ and K⁻¹X.
-struct Projections(Vec<(Mat<f64>, Mat<f64>)>);
-
-impl Projections {
-    fn of(solution: &Solution) -> Self {
-        let each = solution.joint.fields.iter().map(|field| {
-            let mut back = field.white.clone();
-            field.factor.transpose().solve_upper_triangular_in_place(back.as_mut());
-            (inverse(&field.factor), back)
-        });
-        Self(each.collect())
-    }
-
-    /// χ² of a group against all other places, and its residuals, component by component.
-    fn left_out(&self, solution: &Solution, group: &[usize]) -> Option<(f64, Vec<f64>)> {
-        let columns = solution.terms.len();
-        let together = group.len();
-        let size = self.0.len() * together;
-        let mut block = DMatrix::<f64>::zeros(size, size);
-        let mut rows = Vec::with_capacity(size);
-        let mut pull = DVector::<f64>::zeros(size);
-        for (axis, (lower, back)) in self.0.iter().enumerate() {
-            for (index, place) in group.iter().enumerate() {
-                pull[axis * together + index] = solution.joint.fields[axis].alpha[*place];
-                rows.push(DVector::from_fn(columns, |column, _| back[(*place, column)]));
-                for (other_index, other) in group.iter().enumerate() {
-                    let product = lower.col(*place).transpose() * lower.col(*other);
-                    block[(axis * together + index, axis * together + other_index)] = product;
-                }
-            }
-        }
-        for row in 0..size {
-            let weighted = &solution.joint.trend_covariance * &rows[row];
-            for column in 0..size {
-                block[(row, column)] -= weighted.dot(&rows[column]);
-            }
-        }
-        let residual = Cholesky::new(block)?.solve(&pull);
-        Some((residual.dot(&pull), residual.iter().copied().collect()))
-    }
+/// χ² of a group against all other places, and its residuals, component by component.
+fn left_out(projections: &Projections, group: &[usize]) -> Option<(f64, DVector<f64>)> {
+    let pull = projections.pull(group);
+    let residual = Cholesky::new(projections.block(group))?.solve(&pull);
+    Some((residual.dot(&pull), residual))
 }
 
 /// A drift in time that is not in the model, where places or their order separate it from errors of the axes.

@@ -10,9 +10,10 @@ use crate::{
     campaign::Campaign,
     correlation::Family,
     effects::{Candidate, Jump},
+    families::{Likely, most_likely},
     joint::Data,
     likelihood::{Criterion, Estimate, Prior, estimate},
-    solve::{estimated_from, independent, most_likely},
+    solve::{estimated_from, independent},
     terms::Term,
 };
 
@@ -85,7 +86,8 @@ pub(crate) struct Tracing<'a> {
 #[derive(Clone)]
 struct State {
     found: Vec<Found>,
-    family: Family,
+    /// Of each component.
+    families: Vec<Family>,
     estimate: Estimate,
 }
 
@@ -130,7 +132,8 @@ impl<'a> Tracing<'a> {
 
     /// Readings that evidence counts.
     fn count(&self) -> f64 {
-        3.0 * self.some.as_ref().map_or(self.campaign.places_mm.len(), Vec::len) as f64
+        let places = self.some.as_ref().map_or(self.campaign.places_mm.len(), Vec::len);
+        (self.campaign.measured.len() * places) as f64
     }
 
     fn terms_of(&self, found: &Found) -> &[Term] {
@@ -152,13 +155,13 @@ impl<'a> Tracing<'a> {
 
     fn start(&self) -> Option<State> {
         let data = self.data(&self.declared);
-        let (family, estimate) = most_likely(&data, &self.prior, self.families, Criterion::Full, None)?;
-        Some(State { found: Vec::new(), family, estimate })
+        let Likely { families, estimate, .. } = most_likely(&data, &self.prior, self.families, Criterion::Full, None)?;
+        Some(State { found: Vec::new(), families, estimate })
     }
 
     fn refit(&self, terms: &[Term], from: &State) -> Option<Estimate> {
         let data = self.data(terms);
-        estimate(&data, from.family, &self.prior, &from.estimate.parameters, Criterion::Full)
+        estimate(&data, &from.families, &self.prior, &from.estimate.parameters, Criterion::Full)
     }
 
     fn gain(&self, likelihood: f64, parameters: usize, candidates: usize) -> Gain {
@@ -180,19 +183,17 @@ impl<'a> Tracing<'a> {
         state
     }
 
-    /// Takes the most likely family again.
+    /// Takes the most likely families again.
     fn renew(&self, state: &mut State) {
         if self.fixed || self.families.len() < 2 {
             return;
         }
         let data = self.data(&self.terms(&state.found));
-        let from = Some((state.family, &state.estimate.parameters));
-        let mut order = vec![state.family];
-        order.extend(self.families.iter().copied().filter(|family| *family != state.family));
-        if let Some((family, estimate)) = most_likely(&data, &self.prior, &order, Criterion::Full, from)
-            && estimate.ln_likelihood > state.estimate.ln_likelihood
+        let from = Some((state.families.as_slice(), &state.estimate.parameters));
+        if let Some(likely) = most_likely(&data, &self.prior, self.families, Criterion::Full, from)
+            && likely.estimate.ln_likelihood > state.estimate.ln_likelihood
         {
-            (state.family, state.estimate) = (family, estimate);
+            (state.families, state.estimate) = (likely.families, likely.estimate);
         }
     }
 
@@ -250,7 +251,7 @@ impl<'a> Tracing<'a> {
         }
         let mut found = state.found.clone();
         found.push(Found { members, jump, gain });
-        Some(State { found, family: state.family, estimate })
+        Some(State { found, families: state.families.clone(), estimate })
     }
 
     /// The state without what is explained by what was found after it.
@@ -266,7 +267,7 @@ impl<'a> Tracing<'a> {
             let total = if removed.jump { self.jumps.len() } else { self.candidates.len() };
             let gain = self.gain(likelihood, self.terms_of(&removed).len(), total);
             if gain.p > P_LIMIT || gain.bic > BIC_LIMIT {
-                return Some(State { found, family: state.family, estimate });
+                return Some(State { found, families: state.families.clone(), estimate });
             }
         }
         None

@@ -2,20 +2,21 @@
 //!
 //! A field whose range is near the extent of the measured volume looks like placement in part, and how large it is there is known to
 //! a factor only: the likelihood is skew, and a step of one standard deviation to both sides does not show its tail. So covariances
-//! of each field are drawn about the estimate of each family, and weighted by restricted likelihood and prior, one field after the
-//! other given the others (Gibbs sampling; Geman, Geman, IEEE Trans. Pattern Anal. Mach. Intell. 6 (1984) 721). The variance of the
+//! of each field are drawn about the estimate of each likely family, and weighted by restricted likelihood and prior, one field after
+//! the other given the others (Gibbs sampling; Geman, Geman, IEEE Trans. Pattern Anal. Mach. Intell. 6 (1984) 721). The variance of the
 //! trend is the mean of those given each covariance and of the squared distance from the stated trend (law of total variance).
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DVector, SymmetricEigen};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use crate::{
     campaign::Campaign,
+    families::{Guess, likely},
     joint::{Data, Field, Joint, Sums},
     likelihood::{PARAMETERS, Prior, covariances},
-    solve::{Guess, Solution, prior},
+    solve::{Solution, prior},
 };
 
 /// Places at random that the draws take at most: how far the uncertainty grows depends on them little.
@@ -28,8 +29,6 @@ const PASSES: [usize; 2] = [24, 6];
 const SPREADS: [f64; 2] = [1.2, 2.4];
 /// Precision of the usual ranges as a share of that of the estimate: where ranges are longer than the volume, no reading shows it.
 const RANGES: f64 = 0.3;
-/// Families with less ln of the evidence than the best one by this are left out.
-const UNLIKELY: f64 = 4.0;
 
 /// Draws of one field's covariance: sums, and ln of prior over density of the draw.
 type Draws = Vec<(Sums, f64)>;
@@ -60,29 +59,16 @@ impl Solution {
         let mut prior = prior(campaign, &data);
         let ranges = (0..prior.precision.len()).filter(|index| (1..4).contains(&(index % PARAMETERS)));
         ranges.for_each(|index| prior.precision[index] *= RANGES);
-        let evidence: Vec<f64> = self.guesses.iter().map(ln_evidence).collect();
-        let best = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut whole = 0.0;
-        let mut variance = DVector::<f64>::zeros(self.terms.len());
-        for (guess, evidence) in self.guesses.iter().zip(&evidence).filter(|(_, evidence)| **evidence > best - UNLIKELY)
-        {
-            let fields: Vec<Draws> =
-                (0..self.covariances.len()).map(|field| draws(&data, &prior, guess, field, &mut random)).collect();
-            let Some(of_family) = mean_variance(&data, &fields, &stated.trend, &mut random) else { continue };
-            let weight = (evidence - best).exp();
-            variance += of_family * weight;
-            whole += weight;
-        }
-        let growth = (variance / whole).component_div(&stated.trend_covariance.diagonal());
+        let of_field = |(field, guesses): (usize, &Vec<Guess>)| {
+            let own = prior.of(field);
+            likely(guesses).into_iter().flat_map(|(guess, _)| draws(&data, &own, guess, field, &mut random)).collect()
+        };
+        let fields: Vec<Draws> = self.guesses.iter().enumerate().map(of_field).collect();
+        let variance = mean_variance(&data, &fields, &stated.trend, &mut random)?;
+        let growth = variance.component_div(&stated.trend_covariance.diagonal());
         growth.iter().all(|factor| factor.is_finite()).then(|| growth.map(|factor| factor.max(1.0)))
     }
-}
-
-/// ln of likelihood and prior times the volume of parameters that are as likely.
-fn ln_evidence(guess: &Guess) -> f64 {
-    let sizes = SymmetricEigen::new(guess.covariance.clone()).eigenvalues;
-    guess.ln_likelihood + 0.5 * sizes.iter().filter(|size| **size > 0.0).map(|size| size.ln()).sum::<f64>()
 }
 
 /// Mean over likely covariances of the variance of the trend and of its squared distance from the stated one.
@@ -134,25 +120,22 @@ fn mean_variance(
 }
 
 fn draws(data: &Data, prior: &Prior, guess: &Guess, field: usize, random: &mut ChaCha8Rng) -> Draws {
-    let first = field * PARAMETERS;
-    let block: DMatrix<f64> = guess.covariance.view((first, first), (PARAMETERS, PARAMETERS)).into_owned();
-    let directions = SymmetricEigen::new(block);
+    let directions = SymmetricEigen::new(guess.covariance.clone());
     let sizes = directions.eigenvalues.map(|value| value.max(0.0).sqrt());
     let free = sizes.iter().filter(|size| **size > 0.0).count();
     let ln_size: f64 = sizes.iter().filter(|size| **size > 0.0).map(|size| size.ln()).sum();
-    let centre = guess.parameters.rows(first, PARAMETERS).into_owned();
     let one = |index: usize| {
         let spread = SPREADS[index % SPREADS.len()];
         let draw =
             |place: usize| if sizes[place] > 0.0 { spread * random.sample::<f64, _>(StandardNormal) } else { 0.0 };
         let moved = DVector::from_iterator(PARAMETERS, (0..PARAMETERS).map(draw));
-        let at = &centre + &directions.eigenvectors * moved.component_mul(&sizes);
-        let covariance = covariances(guess.family, &at).first().copied()?;
+        let at = &guess.parameters + &directions.eigenvectors * moved.component_mul(&sizes);
+        let covariance = covariances(&[guess.family], &at).first().copied()?;
         let (_, _, sums) = Field::new(data, field, &covariance)?;
         // Density of the mixture of all spreads.
         let square = moved.norm_squared();
         let parts = SPREADS.map(|spread| (-0.5 * square / (spread * spread)).exp() / spread.powf(free as f64));
-        Some((sums, prior.ln_of(field, &at) - parts.iter().sum::<f64>().ln() + ln_size))
+        Some((sums, prior.ln(&at) - parts.iter().sum::<f64>().ln() + ln_size))
     };
     (0..DRAWS).filter_map(one).collect()
 }

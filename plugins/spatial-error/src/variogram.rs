@@ -50,7 +50,8 @@ pub(crate) fn columns(campaign: &Campaign, solution: &Solution) -> Vec<ArrayRef>
     let chosen: Vec<usize> = (0..count).step_by(every).collect();
     let (mut component, mut axis_of, mut lag_of, mut pairs_of) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut semivariance, mut model) = (Vec::new(), Vec::new());
-    let left: Vec<Vec<f64>> = (0..3)
+    let fields = solution.measured.len();
+    let left: Vec<Vec<f64>> = (0..fields)
         .map(|field| {
             let of_trend = |place: usize| -> f64 {
                 (0..solution.terms.len()).map(|at| data.design[field][(place, at)] * solution.joint.trend[at]).sum()
@@ -71,12 +72,12 @@ pub(crate) fn columns(campaign: &Campaign, solution: &Solution) -> Vec<ArrayRef>
                 let sums = &mut sums[((distance / longest * CLASSES as f64) as usize).min(CLASSES - 1)];
                 sums[0] += 1.0;
                 sums[1] += distance;
-                for field in 0..3 {
+                for field in 0..fields {
                     sums[2 + field] += 0.5 * (left[field][one] - left[field][other]).powi(2);
                 }
             }
         }
-        for (field, name) in COMPONENTS.into_iter().enumerate() {
+        for (field, of) in solution.measured.iter().enumerate() {
             let covariance = &solution.covariances[field];
             let observed = &data.observed[field];
             let noise = observed.noise_um2.iter().sum::<f64>() / count as f64;
@@ -85,7 +86,7 @@ pub(crate) fn columns(campaign: &Campaign, solution: &Solution) -> Vec<ArrayRef>
             for sums in sums.iter().filter(|sums| sums[0] > 0.0) {
                 let lag = sums[1] / sums[0];
                 let correlation = covariance.family.correlation(lag / covariance.range_mm[axis]);
-                component.push(name);
+                component.push(COMPONENTS[*of]);
                 axis_of.push(["x", "y", "z"][axis]);
                 lag_of.push(lag);
                 pairs_of.push(sums[0] as usize);

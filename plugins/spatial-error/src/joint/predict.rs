@@ -18,6 +18,11 @@ pub struct Predicted {
     pub variance_um2: f64,
 }
 
+impl Predicted {
+    /// Nothing.
+    pub(crate) const LOST: Self = Self { mean_um: f64::NAN, variance_um2: f64::NAN };
+}
+
 /// What is to be predicted.
 pub struct Query<'a> {
     /// Places, in mm.
@@ -68,7 +73,8 @@ impl<'a> Predictor<'a> {
                 .collect();
         };
         let count = known.cloud.len();
-        let same = if query.nugget_counts && nugget > 0.0 { self.same(query.places) } else { Vec::new() };
+        let same =
+            if query.nugget_counts && nugget > 0.0 { at_measured(self.places, query.places) } else { Vec::new() };
         let alpha = faer::ColRef::from_slice(&known.alpha);
         let mut block = Mat::<f64>::zeros(count, BLOCK);
         let mut white = Mat::<f64>::zeros(count, BLOCK);
@@ -105,14 +111,15 @@ impl<'a> Predictor<'a> {
         }
         predicted
     }
+}
 
-    /// Queries that are at a measured place, with this place.
-    fn same(&self, queries: &[[f64; 3]]) -> Vec<(usize, usize)> {
-        let key = |place: &[f64; 3]| place.map(|value| (value * 1e6).round() as i64);
-        let known: std::collections::HashMap<[i64; 3], usize> =
-            self.places.iter().enumerate().map(|(index, place)| (key(place), index)).collect();
-        queries.iter().enumerate().filter_map(|(row, place)| Some((row, *known.get(&key(place))?))).collect()
-    }
+/// Queries that are at a measured place, with this place.
+#[must_use]
+pub(crate) fn at_measured(places: &[[f64; 3]], queries: &[[f64; 3]]) -> Vec<(usize, usize)> {
+    let key = |place: &[f64; 3]| place.map(|value| (value * 1e6).round() as i64);
+    let known: std::collections::HashMap<[i64; 3], usize> =
+        places.iter().enumerate().map(|(index, place)| (key(place), index)).collect();
+    queries.iter().enumerate().filter_map(|(row, place)| Some((row, *known.get(&key(place))?))).collect()
 }
 
 /// Rows of a lower triangle that are multiplied at once.

@@ -1,0 +1,139 @@
+//! Values of a result: the trend, each component's covariance, and the error before and after compensation.
+
+use runout_core::{
+    consistency::{Check, Test, refuted_by},
+    summary::NamedValue,
+};
+
+use crate::{
+    campaign::COMPONENTS,
+    conclusion::{At, Conclusion},
+    joint::LeftOut,
+    likelihood::PARAMETERS,
+    noise::Noise,
+    solve::Solution,
+    terms::Term,
+};
+
+impl Conclusion<'_> {
+    pub(crate) fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]], checks: &[Check]) -> Vec<NamedValue> {
+        let mut values = self.of_trend();
+        for (axis, component) in COMPONENTS.into_iter().enumerate() {
+            // A nugget above the noise refutes no number: it is one of them.
+            let is_own = |check: &&Check| {
+                check.test != Test::Residual && (check.part == component || check.of.starts_with(component))
+            };
+            let refuted = refuted_by(&checks.iter().filter(is_own).cloned().collect::<Vec<_>>());
+            values.extend(self.of_covariance(axis).into_iter().map(|value| value.refuted_by(refuted.clone())));
+            values.extend(of_left_out(axis, left_out));
+        }
+        values.extend(of_compensation(queries));
+        values
+    }
+
+    fn of_trend(&self) -> Vec<NamedValue> {
+        let solution = self.solution;
+        let mut values = Vec::new();
+        let trend_std = solution.trend_std(self.campaign);
+        let fitted = |wanted: Term| {
+            let column = solution.terms.iter().position(|term| *term == wanted);
+            column.map_or([f64::NAN; 2], |column| [solution.joint.trend[column], trend_std[column]])
+        };
+        for wanted in self.separator.config.declared_terms() {
+            let [number, std] = fitted(wanted);
+            let (symbol, about) = match wanted {
+                Term::Turn(axis) => (["RX", "RY", "RZ"][axis], "rotation of the placement about the axis"),
+                Term::Shift(axis) => {
+                    (["TX", "TY", "TZ"][axis], "displacement of the placement, at the middle of the volume")
+                }
+                _ => continue,
+            };
+            values.push(NamedValue::new(symbol, number, std, wanted.unit(), about));
+        }
+        for (id, target, term) in self.names {
+            let [number, std] = fitted(*term);
+            values.push(NamedValue::new(id, number, std, term.unit(), "effect that was added").of(target));
+        }
+        values
+    }
+
+    /// Covariance and noise of a component; null where it was not measured.
+    fn of_covariance(&self, axis: usize) -> Vec<NamedValue> {
+        let (campaign, solution) = (self.campaign, self.solution);
+        let field = solution.measured.iter().position(|measured| *measured == axis);
+        // d(exp θ) = exp θ · dθ.
+        let relative_std = |parameter: usize| match (&solution.estimate, field) {
+            (Some(estimate), Some(field)) => {
+                let index = field * PARAMETERS + parameter;
+                estimate.covariance[(index, index)].sqrt()
+            }
+            _ => f64::NAN,
+        };
+        let covariance = field.map(|field| &solution.covariances[field]);
+        let mut values = Vec::new();
+        let mut add = |symbol: &str, number: f64, std: f64, unit: &str, about: &str| {
+            values.push(NamedValue::new(symbol, number, std, unit, about).of(COMPONENTS[axis]));
+        };
+        let sill = covariance.map_or(f64::NAN, |covariance| covariance.sill_um);
+        add("sill", sill, sill * relative_std(0), "um", "standard deviation of the field");
+        for (direction, letter) in ["x", "y", "z"].into_iter().enumerate() {
+            let seen = campaign.volume.half_mm[direction] > 0.0 || solution.estimate.is_none();
+            let range = covariance.filter(|_| seen).map_or(f64::NAN, |covariance| covariance.range_mm[direction]);
+            let std = range * relative_std(1 + direction);
+            add(&format!("range_{letter}"), range, std, "mm", "range of the covariance along the axis");
+        }
+        let nugget = covariance.map_or(f64::NAN, |covariance| covariance.nugget_um);
+        let about = if Solution::nugget_counts(campaign) {
+            "standard deviation from place to place beyond noise"
+        } else {
+            "standard deviation from place to place, noise included"
+        };
+        add("nugget", nugget, nugget * relative_std(4), "um", about);
+        let noise = field.map_or(f64::NAN, |_| campaign.noise_um(axis));
+        let of_noise = match &campaign.noise {
+            Noise::Repeats { dof, .. } => noise / (2.0 * *dof as f64).sqrt(),
+            _ => f64::NAN,
+        };
+        add("noise", noise, of_noise, "um", "standard uncertainty of one reading");
+        values
+    }
+}
+
+fn of_left_out(axis: usize, left_out: &[[LeftOut; 3]]) -> [NamedValue; 2] {
+    let each = || left_out.iter().map(|place| place[axis]).filter(|one| one.std_um.is_finite());
+    let count = each().count() as f64;
+    let rms = (each().map(|one| one.residual_um.powi(2)).sum::<f64>() / count).sqrt();
+    let chi2 = each().map(|one| (one.residual_um / one.std_um).powi(2)).sum::<f64>() / count;
+    let value = |symbol: &str, number: f64, unit: &str, about: &str| {
+        NamedValue::new(symbol, number, f64::NAN, unit, about).of(COMPONENTS[axis])
+    };
+    [
+        value("left_out_rms", rms, "um", "root mean square of what the other places do not predict"),
+        value("left_out_chi2", chi2, "", "mean square of the same in its standard deviations"),
+    ]
+}
+
+/// Error without the placement before and after compensation: expected squares, with the variance of the predictions.
+fn of_compensation(queries: &[At]) -> [NamedValue; 2] {
+    let known = || queries.iter().filter_map(|query| Some((query, query.correction.as_ref()?)));
+    let rms = |squares: f64| (squares / known().count() as f64).sqrt();
+    let expected = |mean_um: [f64; 3], at: &At| -> f64 {
+        let each = mean_um.iter().zip(&at.predicted).map(|(mean, predicted)| mean * mean + predicted.variance_um2);
+        each.filter(|square| square.is_finite()).sum()
+    };
+    let before = rms(known().map(|(query, _)| expected(query.error_um, query)).sum());
+    let after = rms(known().map(|(query, correction)| expected(correction.remains_um, query)).sum());
+    let value = |symbol: &str, number: f64, about: &str| NamedValue::new(symbol, number, f64::NAN, "um", about);
+    [
+        value(
+            "error_rms",
+            before,
+            "expected root mean square length of the error without the placement, at the places of the query",
+        ),
+        value(
+            "remains_rms",
+            after,
+            "the same after the corrections: what axes cannot take away, what is not smooth, and what is not known of the prediction",
+        ),
+    ]
+}
