@@ -201,10 +201,12 @@ fn a_keyway_between_samples_stays_where_it_is() {
         });
         assert_eq!(values(&masked).len(), values(&grooved).len());
         for (one, other) in values(&masked).iter().zip(values(&grooved)) {
-            let uncertainty = one.uncertainty.as_ref().unwrap();
+            // Where errors are too much of a slope, neither has an interval.
+            assert_eq!(one.no_uncertainty, other.no_uncertainty);
+            let std = one.uncertainty.as_ref().map_or(0.0, |uncertainty| uncertainty.std);
             let apart = (one.value - other.value).abs();
             println!("{name}, {} {}: {:.4} and {:.4}", one.symbol, one.filter, one.value, other.value);
-            assert!(apart < uncertainty.std + 0.002 * one.value, "{}: {} and {}", one.symbol, one.value, other.value);
+            assert!(apart < std + 0.002 * one.value, "{}: {} and {}", one.symbol, one.value, other.value);
         }
     }
 }

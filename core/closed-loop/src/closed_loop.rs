@@ -17,7 +17,7 @@ use super::{
     keyed::Keyed,
     report::{added, blind, inconsistent, level, moved, verdict},
 };
-use runout_consistency::{Check, Kind, Partition, Test};
+use runout_consistency::{Check, Test};
 use runout_error::Result;
 use runout_numerics::least_squares::{dot, orthonormal};
 
@@ -215,20 +215,7 @@ impl<M: Model> Tracing<'_, M> {
             .iter()
             .filter_map(|effect| Some((*effect, self.model.start(*effect, &current.settings)?)))
             .collect();
-        let mut ranked: Vec<(usize, f64)> = candidates
-            .iter()
-            .map(|effect| {
-                if self.model.effects()[*effect].parameters.is_empty() {
-                    return (*effect, before.chi2() - self.with(current, *effect, Vec::new()));
-                }
-                let columns = independent(current.fit.signature(*effect), &basis);
-                let linear: f64 = columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum();
-                let started =
-                    starts.get(effect).map(|values| before.chi2() - self.with(current, *effect, values.clone()));
-                (*effect, linear.max(started.unwrap_or(linear)))
-            })
-            .collect();
-        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut ranked = self.ranked(current, candidates, &basis, &starts);
         let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
         let mut trials: Vec<(usize, Refit<Remainder>, Evidence)> = Vec::new();
         // Effects of single parts are many and alike: they do not crowd out the others.
@@ -240,7 +227,14 @@ impl<M: Model> Tracing<'_, M> {
             listed
         });
         let keyed = Keyed::of(&current.fit, &basis);
-        let beside = keyed.explained(&ranked);
+        let mut beside: Vec<(usize, f64)> = ranked
+            .iter()
+            .filter_map(|(effect, _)| {
+                let columns = independent(current.fit.signature(*effect), &basis);
+                Some((*effect, keyed.explained(&columns)?))
+            })
+            .collect();
+        beside.sort_by(|a, b| b.1.total_cmp(&a.1));
         let listed = |rank: usize, effect: usize, gain: f64| {
             let explains = || beside.iter().take(BESIDE_CORRELATED).any(|(other, _)| *other == effect);
             rank < SHORTLIST.0 && gain >= promising || explains()
@@ -269,13 +263,18 @@ impl<M: Model> Tracing<'_, M> {
         let place = |bic: f64| if bic - best <= SAME * best.abs() { best } else { bic };
         trials.sort_by(|a, b| place(a.2.delta_bic).total_cmp(&place(b.2.delta_bic)).then(a.0.cmp(&b.0)));
         // Beside correlated errors, the one that explains most beside them.
-        let beside = |effect: usize| beside.iter().find(|(other, _)| *other == effect).map_or(0.0, |(_, gain)| *gain);
+        let explained: BTreeMap<usize, f64> = trials
+            .iter()
+            .filter_map(|(effect, trial, _)| {
+                Some((*effect, keyed.explained(&self.taken(*effect, current, &trial.fit, &basis))?))
+            })
+            .collect();
+        let beside = |effect: usize| explained.get(&effect).copied().unwrap_or(0.0);
         trials.sort_by(|a, b| beside(b.0).total_cmp(&beside(a.0)));
         let mut believed = None;
         while believed.is_none() && !trials.is_empty() {
             let (effect, trial, evidence) = trials.remove(0);
-            let columns = independent(current.fit.signature(effect), &basis);
-            let keys = keyed.keys(effect, &columns, count);
+            let keys = keyed.keys(effect, &self.taken(effect, current, &trial.fit, &basis), count);
             // Each key has its own limit; the chance that is stated is the largest.
             let stated = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
             let by_keys = keys.refused.is_some();
@@ -314,20 +313,48 @@ impl<M: Model> Tracing<'_, M> {
         Some(Found { members, alone, values, std, evidence, before, after })
     }
 
+    /// Candidates with what each lowers χ² by, to first order or from where its fit starts, the most first.
+    fn ranked(
+        &self,
+        current: &Refit<M::Fit>,
+        candidates: &[usize],
+        basis: &[Vec<f64>],
+        starts: &BTreeMap<usize, Vec<f64>>,
+    ) -> Vec<(usize, f64)> {
+        let before = current.fit.remainder();
+        let mut ranked: Vec<(usize, f64)> = candidates
+            .iter()
+            .map(|effect| {
+                if self.model.effects()[*effect].parameters.is_empty() {
+                    return (*effect, before.chi2() - self.with(current, *effect, Vec::new()));
+                }
+                let columns = independent(current.fit.signature(*effect), basis);
+                let linear: f64 = columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum();
+                let started =
+                    starts.get(effect).map(|values| before.chi2() - self.with(current, *effect, values.clone()));
+                (*effect, linear.max(started.unwrap_or(linear)))
+            })
+            .collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        ranked
+    }
+
+    /// What an effect takes away: the direction in which its fit changed the residual, and its signature where it has more parameters. Of an
+    /// effect that acts in proportion to its size these span the signature; of another, the first alone is what it does at its size.
+    fn taken(&self, effect: usize, current: &Refit<M::Fit>, after: &Remainder, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let before = &current.fit.remainder().residual;
+        let taken = before.iter().zip(&after.residual).map(|(before, after)| before - after).collect();
+        let columns = std::iter::once(taken).chain(current.fit.signature(effect)).collect();
+        let mut columns = orthonormal(columns, basis, INDEPENDENT);
+        columns.truncate(self.model.effects()[effect].parameters.len());
+        columns
+    }
+
     /// Why an effect is not believed, by what is left without and with it.
     fn doubt(&self, effect: usize, [before, after]: [&Remainder; 2], evidence: &Evidence) -> Option<String> {
         let lowered = before.chi2() - after.chi2();
-        // Where errors may depend on each other along an order, keys say what blocks do.
-        let blocks = before.structure.of_kind(Kind::Blocks).filter(|_| before.structure.order.is_none());
-        let parts = blocks.map(Partition::count).max().unwrap_or(1);
-        let each = -lowered / parts.max(1) as f64;
         if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
             Some(weak(evidence))
-        } else if parts > 1 && !above_chance(before) && before.noise_is_known() && each > BIC_LIMIT {
-            // Noise may be all that is left, and in each part it is not known better because there are more parts.
-            Some(format!(
-                "it would explain too little of each of {parts} parts of the data: Δχ² {each:.1}, above {BIC_LIMIT}"
-            ))
         } else if lowered <= before.disturbed_chi2 {
             Some(disturbed(lowered, before.disturbed_chi2))
         } else if raises_held_out(before, after, self.model.is_seen_besides(effect)) {

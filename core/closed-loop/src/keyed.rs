@@ -1,6 +1,6 @@
 //! Keys of effects on the readings that a fit's structure is of.
 
-use super::{Fit, fit::INDEPENDENT, judgement::independent};
+use super::{Fit, fit::INDEPENDENT};
 use runout_consistency::{
     Partition, Structure,
     blocks::agreement,
@@ -42,17 +42,11 @@ impl<'a, F: Fit> Keyed<'a, F> {
         &self.fit.remainder().structure
     }
 
-    /// χ² that effects explain beside correlated errors, the most first; nothing where errors are independent.
-    pub(super) fn explained(&self, effects: &[(usize, f64)]) -> Vec<(usize, f64)> {
-        let Some(models) = self.models.as_ref().filter(|models| models.is_correlated()) else { return Vec::new() };
-        let of = |(effect, _): &(usize, f64)| {
-            let columns = independent(self.fit.signature(*effect), self.found);
-            let tested: Vec<Vec<f64>> = columns.iter().map(|column| self.fit.tested(column)).collect();
-            (*effect, models.explained(&tested))
-        };
-        let mut all: Vec<(usize, f64)> = effects.iter().map(of).collect();
-        all.sort_by(|a, b| b.1.total_cmp(&a.1));
-        all
+    /// χ² that columns, in the residual's coordinates, explain beside correlated errors; `None` where errors are independent.
+    pub(super) fn explained(&self, columns: &[Vec<f64>]) -> Option<f64> {
+        let models = self.models.as_ref().filter(|models| models.is_correlated())?;
+        let tested: Vec<Vec<f64>> = columns.iter().map(|column| self.fit.tested(column)).collect();
+        Some(models.explained(&tested))
     }
 
     /// The keys of an effect, of which `columns` are orthonormal in the residual's coordinates.

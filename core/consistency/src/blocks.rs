@@ -11,7 +11,7 @@ use runout_numerics::{
     statistics::{chi2_tail, f_tail},
 };
 
-use crate::order::Correlated;
+use crate::{check::widening, order::Correlated};
 
 /// How the errors of the readings are taken to be.
 #[derive(Debug, Clone, Copy)]
@@ -149,7 +149,8 @@ const ABSORBED: f64 = 1e-9;
 /// Chance that blocks agree so well on an effect that is not there, with F and its degrees of freedom below; `None` where they are too
 /// few to say. `columns` are the effect's, orthonormal and outside `basis`, which is that of the fit that left `residual`.
 ///
-/// The effect's size is set against the scatter of its sums over the blocks, F = (|Cᵀr|²/q)/(Σ u²/tr K) with (q, ν).
+/// The effect's size is set against the scatter of its sums over the blocks, F = (|Cᵀr|²/q)/(Σ u²/tr K) with (q, ν). Blocks that are few
+/// know their scatter badly: where it agrees with the noise of single readings, that noise with all its degrees of freedom takes its place.
 #[must_use]
 pub fn agreement(
     columns: &[Vec<f64>],
@@ -167,18 +168,24 @@ pub fn agreement(
         left.iter_mut().zip(column).for_each(|(entry, column)| *entry -= size * column);
     }
     let joint: Vec<Vec<f64>> = basis.iter().chain(columns).cloned().collect();
-    let unit = Errors::White { variance: 1.0, dof: f64::INFINITY };
-    let scatter = Sums::of(columns, &joint, &left, &members, unit).dispersion(0, 1, unit)?;
+    let dof = left.len().saturating_sub(joint.len()).max(1) as f64;
+    let noise = Errors::White { variance: dot(&left, &left) / dof, dof };
+    let scatter = Sums::of(columns, &joint, &left, &members, noise).dispersion(0, 1, noise)?;
     if scatter.freedom < LEAST_FREEDOM {
         return None;
     }
+    let is_noise = scatter.freedom < FEW_FREEDOM && scatter.p > widening(members.len());
+    let (ratio, freedom) = if is_noise { (1.0, dof) } else { (scatter.ratio, scatter.freedom) };
     let parameters = columns.len() as f64;
-    let f = sizes.iter().map(|size| size * size).sum::<f64>() / parameters / scatter.ratio.max(f64::MIN_POSITIVE);
-    Some((f_tail(f, parameters, scatter.freedom), f, scatter.freedom))
+    let expected = parameters * ratio * dot(&left, &left) / dof;
+    let f = sizes.iter().map(|size| size * size).sum::<f64>() / expected.max(f64::MIN_POSITIVE);
+    Some((f_tail(f, parameters, freedom), f, freedom))
 }
 
 /// Degrees of freedom of the blocks' scatter from which they can check an effect.
 const LEAST_FREEDOM: f64 = 1.5;
+/// Degrees of freedom below which blocks are few: with them, F at a chance of 0.001 asks for less than 5 standard deviations.
+const FEW_FREEDOM: f64 = 8.0;
 
 #[cfg(test)]
 mod tests {

@@ -231,20 +231,26 @@ fn shift(fit: LinearFit, partition: &Partition, models: Option<&OrderModels>, pa
     }))
 }
 
-/// Whether a finding of the residual as a whole, against a noise that is known: χ² per degree of freedom on both sides.
+/// The residual as a whole against a noise that is known: χ² per degree of freedom, on both sides. One that is too small is named only.
 #[must_use]
 pub fn residual(chi2_per_dof: f64, dof: f64, noise_dof: f64) -> Check {
     let group = Group { name: "residual".into(), squares: chi2_per_dof * dof, freedom: dof };
     let level = Level::Known { variance: 1.0, dof: noise_dof };
     let one = crate::groups::compared(std::slice::from_ref(&group), level).first().map_or(1.0, |one| one.p);
     let size = chi2_per_dof.max(0.0).sqrt();
-    Check::new(Test::Residual, "residual", chi2_per_dof, &[dof, noise_dof], one).finding(|| {
-        if chi2_per_dof > 1.0 {
+    let check = Check::new(Test::Residual, "residual", chi2_per_dof, &[dof, noise_dof], one);
+    if chi2_per_dof > 1.0 {
+        return check.finding(|| {
             format!("the residual is {size:.2} times the noise (χ² per degree of freedom {chi2_per_dof:.2})")
-        } else {
-            format!("the residual is only {size:.2e} times the noise: the noise is stated too large, or readings are smoothed or copied")
-        }
-    })
+        });
+    }
+    // Uncertainties are too large then, so that values hold.
+    let words = || {
+        format!(
+            "the residual is only {size:.2e} times the noise: the noise is stated too large, or readings are smoothed or copied"
+        )
+    };
+    check.finding(words).named()
 }
 
 impl Check {
@@ -356,6 +362,7 @@ mod tests {
     fn a_residual_is_judged_on_both_sides() {
         assert!(!residual(1.3, 40.0, f64::INFINITY).refutes());
         assert!(residual(104.0, 40.0, 60.0).finding.contains("10.20 times"));
-        assert!(residual(1e-6, 40.0, f64::INFINITY).finding.contains("too large"));
+        let small = residual(1e-6, 40.0, f64::INFINITY);
+        assert!(small.finding.contains("too large") && !small.refutes());
     }
 }

@@ -23,6 +23,8 @@ const LENGTHS: [f64; 9] = [0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 400.0];
 const LEAST_INDEPENDENT: f64 = 1e-6;
 /// Twice the gain in log likelihood from which errors are called correlated: a chance of about 0.005 with two parameters at the edge.
 const CORRELATED: f64 = 9.2;
+/// Of shares and of lengths, every so many is tried at first: neighbours in the grid differ by less than half of that gain.
+const SCREENED: usize = 2;
 /// Weight of a model below which it is left out of a mean.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Readings of a series at most; more are averaged with their neighbours.
@@ -111,12 +113,24 @@ impl OrderModels {
         chi2_tail(self.gain, 2.0)
     }
 
-    /// Restricted likelihoods, with more columns in the fit, to weights.
+    /// Restricted likelihoods, with more columns in the fit, to weights: of few models at first, and of all where one of these is likely.
     fn weigh(&mut self, columns: &[Vec<f64>]) {
+        let every = |step: usize| {
+            let lengths = move |share: &f64| {
+                LENGTHS.iter().skip(step / 2).step_by(step).map(|length| (*share, *length)).collect::<Vec<_>>()
+            };
+            SHARES.iter().skip(step / 2).step_by(step).flat_map(lengths).collect::<Vec<(f64, f64)>>()
+        };
+        self.weigh_models(columns, &every(SCREENED));
+        if self.gain > 0.5 * CORRELATED {
+            self.weigh_models(columns, &every(1));
+        }
+    }
+
+    fn weigh_models(&mut self, columns: &[Vec<f64>], correlated: &[(f64, f64)]) {
         let mut logs = Vec::new();
         self.models.clear();
-        let correlated = SHARES.iter().flat_map(|share| LENGTHS.iter().map(move |length| (*share, *length)));
-        for (share, length) in std::iter::once((0.0, 1.0)).chain(correlated) {
+        for (share, length) in std::iter::once((0.0, 1.0)).chain(correlated.iter().copied()) {
             let (basis, residual, log_determinant) = self.whitened(share, length, columns);
             let dof = (residual.len() - basis.rank()).max(1) as f64;
             let variance = dot(&residual, &residual) / dof;

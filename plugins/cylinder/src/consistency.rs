@@ -11,20 +11,21 @@ use crate::{
     scan::Scan,
 };
 
-/// What is declared of circles of these names: they are independent, have the same noise and may be offset.
-///
-/// No order along the angle: a covariance that is fitted to what a radius leaves takes several lobes for correlated errors, and refuses
-/// them all. Circles are independent whatever errors do along them, and have to agree.
+/// What is declared of circles of these names: errors may depend on each other along the angle; circles are independent, have the same noise
+/// and may be offset.
 pub(crate) fn structure(scans: &[Scan], names: &[String]) -> Structure {
     let of_circle = |(circle, scan): (usize, &Scan)| {
         let name = &names[circle];
         scan.angle_rad.iter().map(|angle| format!("{name} at {:.1}°", angle.to_degrees())).collect::<Vec<String>>()
     };
-    let structure = Structure::default().naming(scans.iter().enumerate().flat_map(of_circle).collect());
+    let circle: Vec<usize> = scans.iter().enumerate().flat_map(|(circle, scan)| vec![circle; scan.len()]).collect();
+    let angle = scans.iter().flat_map(|scan| scan.angle_rad.iter().copied()).collect();
+    let structure = Structure::default()
+        .along("angle", circle.clone(), angle)
+        .naming(scans.iter().enumerate().flat_map(of_circle).collect());
     if scans.len() < 2 {
         return structure;
     }
-    let circle: Vec<usize> = scans.iter().enumerate().flat_map(|(circle, scan)| vec![circle; scan.len()]).collect();
     let divided = |structure: Structure, kind: Kind| structure.divided("circles", kind, circle.clone(), names.to_vec());
     [Kind::Blocks, Kind::Alike, Kind::Shift].into_iter().fold(structure, divided)
 }

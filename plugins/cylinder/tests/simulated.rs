@@ -289,7 +289,9 @@ fn a_list_that_ends_at_its_highest_order_says_so() {
     let effects = |separate: &str| {
         let found = diagnosed(&points, separate);
         let ends = found.warnings.iter().any(|warning| warning.contains("`max_lobes`"));
-        (found.added.into_iter().map(|added| added.effect).collect::<Vec<_>>(), ends)
+        let mut added: Vec<String> = found.added.into_iter().map(|added| added.effect).collect();
+        added.sort();
+        (added, ends)
     };
     assert_eq!(effects("radius_mm = 12.0, max_lobes = 4"), (vec!["lobes-4".to_owned()], true));
     assert_eq!(effects("radius_mm = 12.0, max_lobes = 12"), (vec!["lobes-4".to_owned(), "lobes-9".to_owned()], false));

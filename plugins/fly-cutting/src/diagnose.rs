@@ -76,6 +76,7 @@ impl FlyCutting {
     ) -> Result<PointDiagnosis> {
         let Closed { mut diagnosis, before, after: last, settings } = closed;
         let mut after = self.fitted_outcome(measured, (&before, &last), &settings, measured.remarks.clone())?;
+        after.checks.clone_from(&diagnosis.consistency);
         diagnosis.moved = moved(&after);
         for set in aliases {
             confound(&mut diagnosis, set);

@@ -6,6 +6,7 @@
 //! surface by interference of all passes of the tool.
 
 mod aliases;
+mod cells;
 mod config;
 mod diagnose;
 mod effects;

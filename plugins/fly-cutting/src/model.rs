@@ -4,15 +4,18 @@ use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Error, Result,
-    consistency::Structure,
+    consistency::{Check, Partition, Test, keys::among_family},
     model::{
         Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
         diagnosis::{Estimated, Unexplained},
         fit::refit,
+        tested::Tested,
     },
+    numerics::least_squares::Basis,
 };
 
 use crate::{
+    cells::Cells,
     config::FlyCuttingConfig,
     effects::{MISSING, Missing, applied, tidy},
     heights::Heights,
@@ -30,8 +33,6 @@ const SAMPLED: usize = 4_000;
 const HELD_OUT: usize = 5;
 /// A nose radius of less than this share of the declared one, or of more than its inverse, is none.
 const LEAST_RADIUS: f64 = 0.1;
-/// Parts of the map that have to agree on an effect where the noise is not known.
-const PARTS: usize = 8;
 
 /// The data of a model.
 #[derive(Debug)]
@@ -202,6 +203,11 @@ pub(crate) struct CutFit {
     pub phased: Phased,
     settings: Vec<Setting>,
     remainder: Remainder,
+    /// What the tests are made on.
+    cells: Cells,
+    /// Orthonormal columns of level and phase there.
+    declared: OnceLock<Basis>,
+    judged: OnceLock<Tested>,
     /// Starts of a line in the height and in the tilt, once they were asked for.
     starts: [OnceLock<Vec<[f64; 3]>>; 2],
 }
@@ -220,6 +226,7 @@ impl CutFit {
         let left = data.held_out.height_nm.iter().zip(&held_out.height_nm);
         let held_out_chi2: f64 = left.map(|(height, model)| ((height - model - phased.level_nm) * scale).powi(2)).sum();
         let rms = |chi2: f64, count: usize| (chi2 / count as f64).sqrt() * std_um.unwrap_or(1.0);
+        let cells = Cells::of(&data.fitted, &phased.surface);
         let remainder = Remainder {
             rms: rms(dot(&residual, &residual), count),
             noise_floor: std_um.map_or(f64::NAN, |std| std * (dof as f64 / count.max(1) as f64).sqrt()),
@@ -228,16 +235,26 @@ impl CutFit {
                 .map_or(f64::NAN, |std| std * (1.0 + parameters as f64 / count.max(1) as f64).sqrt()),
             held_out_chi2: if data.held_out.len() > 0 { held_out_chi2 } else { f64::NAN },
             disturbed_chi2: 0.0,
-            structure: Arc::new(if std_um.is_some() {
-                Structure::default()
-            } else {
-                Structure::default().in_stretches("parts of the map", &parts(count))
-            }),
+            structure: Arc::new(cells.structure()),
             residual,
             dof,
             unit: "um".into(),
         };
-        Self { data, cut, phased, settings: applied.to_vec(), remainder, starts: [OnceLock::new(), OnceLock::new()] }
+        let (declared, judged, starts) = (OnceLock::new(), OnceLock::new(), [OnceLock::new(), OnceLock::new()]);
+        Self { data, cut, phased, settings: applied.to_vec(), remainder, cells, declared, judged, starts }
+    }
+
+    /// What the tests of the passes say.
+    fn judged(&self) -> &Tested {
+        self.judged.get_or_init(|| {
+            let free: Vec<&Setting> =
+                self.settings.iter().filter(|setting| !self.data.known.contains(&setting.effect)).collect();
+            let effects: Vec<Effect> = MISSING.iter().map(|missing| missing.effect()).collect();
+            let mut tested = Tested::of(self, &free, &effects, self.data.fitted.std_nm.unwrap_or(1e3), "nm");
+            // Single places are found point by point ([`crate::strangers`]).
+            tested.checks.retain(|check| check.test != Test::Rows);
+            tested
+        })
     }
 
     pub(crate) fn left(&self) -> Left<'_> {
@@ -286,11 +303,6 @@ impl CutFit {
     }
 }
 
-/// Lengths of equal parts.
-fn parts(count: usize) -> Vec<usize> {
-    (0..PARTS).map(|part| count * (part + 1) / PARTS - count * part / PARTS).collect()
-}
-
 impl Fit for CutFit {
     fn remainder(&self) -> &Remainder {
         &self.remainder
@@ -316,6 +328,43 @@ impl Fit for CutFit {
             column.iter_mut().for_each(|entry| *entry *= scale);
         }
         columns
+    }
+
+    fn tested(&self, vector: &[f64]) -> Vec<f64> {
+        self.cells.means(vector)
+    }
+
+    fn averaged(&self) -> f64 {
+        self.cells.averaged()
+    }
+
+    fn declared_columns(&self) -> &[Vec<f64>] {
+        let made = || {
+            let level = vec![1.0; self.data.fitted.len()];
+            let columns = [&level, &self.phased.direction].into_iter().filter(|column| !column.is_empty());
+            Basis::of(columns.map(|column| self.cells.means(column)).collect())
+        };
+        self.declared.get_or_init(made).columns()
+    }
+
+    fn blocks_of_entries(&self) -> Option<Partition> {
+        Some(self.cells.groups_of_points())
+    }
+
+    fn among_family(&self, effect: usize) -> Option<f64> {
+        let missing = MISSING.get(effect)?;
+        let [ratio, ..] = *self.starts(*missing).first()?;
+        let means = self.cells.means(&self.remainder.residual);
+        let (gains, place) = self.cells.spectrum(&means, ratio, missing.line()?, FEWEST_PERIODS);
+        among_family(&gains, place)
+    }
+
+    fn consistency(&self) -> Vec<Check> {
+        self.judged().checks.clone()
+    }
+
+    fn tested_std(&self, effect: usize) -> Vec<f64> {
+        self.judged().std(effect)
     }
 
     /// What one unit does to the surface; a line is always looked for, so that its bias says nothing.

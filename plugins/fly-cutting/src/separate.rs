@@ -87,7 +87,8 @@ impl PointSeparator for FlyCutting {
             ));
         }
         remarks.extend(smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof));
-        self.fitted_outcome(&measured, (&fit, &fit), &[], remarks)
+        let checks = fit.consistency();
+        Ok(Outcome { checks, ..self.fitted_outcome(&measured, (&fit, &fit), &[], remarks)? })
     }
 
     fn evaluables(&self) -> Vec<EvaluableKind> {

@@ -62,6 +62,10 @@ pub(crate) struct Campaign {
     pub duration_s: f64,
     /// Direction in which each command was approached, 1 or -1.
     pub direction: Vec<f64>,
+    /// Turn of each command, from that of the smallest one on: −180° and 180° are a turn apart.
+    pub turn: Vec<usize>,
+    /// Number of the pass, from 0: how often the ball was read at the command, not counting whole turns, before.
+    pub pass: Vec<usize>,
     pub noise: Noise,
     pub warnings: Vec<String>,
 }
@@ -125,6 +129,11 @@ impl Campaign {
                 std: 1e-3,
             })
             .collect();
+        let of_turn = turns(command);
+        let pass = match optional("repeat") {
+            Some(_) => ranks(&repeat),
+            None => occurrences(&order.rows, &readings, &of_turn),
+        };
         let stated = optional("std_um").map(|column| column.values.as_slice());
         if let Some(row) = stated.and_then(|values| values.iter().position(|value| *value <= 0.0)) {
             return Err(refuse(format!("point {}: `std_um` must be above 0", row + 1)));
@@ -149,7 +158,7 @@ impl Campaign {
                         Vector3::z().cross(&place) * *direction
                     })
                     .collect();
-                noise::of_repeats(&readings, &order.time, &direction, &lost_motion)
+                noise::of_repeats(&readings, &of_turn, &order.time, &direction, &lost_motion)
             }
         };
         if let Noise::Repeats { std_um, .. } = noise {
@@ -178,6 +187,8 @@ impl Campaign {
             time: order.time,
             duration_s: order.duration_s,
             direction,
+            turn: of_turn,
+            pass,
             noise,
             warnings,
         })
@@ -278,6 +289,32 @@ fn directions(order: &[usize], balls: &[usize], repeat: &[f64], command: &[f64])
         }
     }
     direction
+}
+
+/// The turn of each command, from that of the smallest one on.
+fn turns(command: &[f64]) -> Vec<usize> {
+    let first = command.iter().copied().fold(f64::INFINITY, f64::min);
+    command.iter().map(|command| ((command - first + SAME_COMMAND_DEG) / 360.0) as usize).collect()
+}
+
+/// The place of each number among those that differ.
+fn ranks(numbers: &[f64]) -> Vec<usize> {
+    let mut distinct = numbers.to_vec();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup();
+    numbers.iter().map(|number| distinct.iter().take_while(|other| *other < number).count()).collect()
+}
+
+/// How often each reading's ball was read at its command in its turn before.
+fn occurrences(order: &[usize], readings: &[Reading], turn: &[usize]) -> Vec<usize> {
+    let mut seen = std::collections::BTreeMap::new();
+    let mut pass = vec![0; readings.len()];
+    for row in order {
+        let count = seen.entry((readings[*row].ball, readings[*row].command, turn[*row])).or_insert(0);
+        pass[*row] = *count;
+        *count += 1;
+    }
+    pass
 }
 
 /// Units that look wrong.

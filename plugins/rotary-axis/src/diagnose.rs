@@ -7,6 +7,7 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::{Check, Kind, Structure},
     model::{
         Effect, Fit as _, Setting,
         closed_loop::{self, Settings},
@@ -29,6 +30,8 @@ use crate::{
     solve::{Column, Redundant, fit, redundant},
 };
 
+/// Parts of the commands that are independent of each other.
+const PARTS: usize = 8;
 /// Time constants that are tried for an exponential drift.
 const TRIED: usize = 24;
 /// Runs of the loop in which time constants settle, and the share of a change at which they are settled.
@@ -233,9 +236,13 @@ impl RotaryAxis {
             values: sized(&data.rows),
             unit: "um".into(),
             std: (campaign.noise != Noise::Unknown).then_some(typical),
+            std_dof: match campaign.noise {
+                Noise::Repeats { dof, .. } => Some(dof as f64),
+                _ => None,
+            },
             group: data.command.clone(),
             groups: campaign.commands_deg.iter().map(|deg| format!("{} = {deg}°", axis.letter())).collect(),
-            ..Observations::default()
+            structure: parts(&data.command, campaign.commands_deg.len()),
         };
         let declared = data.declared.iter().enumerate().map(|(index, column)| Declared {
             name: format!("shape {}", index + 1),
@@ -334,6 +341,11 @@ impl RotaryAxis {
                 .warnings
                 .push(format!("time constants are shares of the campaign, which took {:.0} s", campaign.duration_s));
         }
+        diagnosis.consistency.extend(after.checks.iter().cloned());
+        if diagnosis.consistency.iter().any(Check::bars_verdict) {
+            diagnosis.verdict = Verdict::Unexplained;
+        }
+        after.checks.clone_from(&diagnosis.consistency);
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after })
     }
@@ -347,8 +359,15 @@ pub(crate) fn constant_of(candidate: Candidate, constants: [f64; 3]) -> f64 {
     if let Candidate::Exponential(coordinate) = candidate { constants[coordinate] } else { USUAL_TIME_CONSTANT }
 }
 
+/// Neighbouring commands make a part, which is independent of the others.
+fn parts(command: &[usize], commands: usize) -> Structure {
+    let names = (1..=PARTS).map(|part| format!("part {part} of the commands")).collect();
+    let level = command.iter().map(|command| command * PARTS / commands).collect();
+    Structure::default().divided("parts of the commands", Kind::Blocks, level, names)
+}
+
 /// Root mean square of the readings' standard uncertainties, harmonic: the typical weight.
-fn typical_um(campaign: &Campaign) -> f64 {
+pub(crate) fn typical_um(campaign: &Campaign) -> f64 {
     let weights: f64 = campaign.readings.iter().map(|reading| reading.std.powi(-2)).sum();
     1e3 * (campaign.readings.len() as f64 / weights).sqrt()
 }

@@ -9,6 +9,7 @@ mod axis;
 mod bias;
 mod campaign;
 mod config;
+mod consistency;
 mod diagnose;
 mod effects;
 mod kinematics;

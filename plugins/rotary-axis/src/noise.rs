@@ -1,7 +1,7 @@
 //! Noise of one reading from repeats: their scatter after a common smooth drift.
 
 use nalgebra::{DVector, Vector3};
-use runout_core::numerics::least_squares::least_norm;
+use runout_core::{consistency::repeats::FEWEST, numerics::least_squares::least_norm};
 
 use crate::solve::Reading;
 
@@ -18,8 +18,6 @@ pub(crate) enum Noise {
     Unknown,
 }
 
-/// Fewer degrees of freedom give no standard deviation.
-const FEWEST: usize = 3;
 /// Highest power of time in the drift.
 const HIGHEST_POWER: usize = 6;
 /// Functions of the drift that add less than this to the others, relative, are not fitted.
@@ -27,13 +25,19 @@ const DETERMINED: f64 = 1e-9;
 /// Degrees of freedom a function of the drift.
 const FREEDOM_A_FUNCTION: usize = 12;
 
-/// Standard deviation of one coordinate from repeats of one ball at one command.
+/// Standard deviation of one coordinate from repeats of one ball at one command, which is the same in the same turn only.
 ///
 /// Each ball and command, approached in one direction, has a level of its own; a drift common to all, a polynomial of time in each
 /// coordinate, is fitted beside. Where no repeats share a direction, both directions share a level, and what lost motion of the
 /// rotary axis adds (`lost_motion`, of any size) is fitted, too.
-pub(crate) fn of_repeats(readings: &[Reading], time: &[f64], direction: &[f64], lost_motion: &[Vector3<f64>]) -> Noise {
-    let place = |index: usize| (readings[index].ball, readings[index].command);
+pub(crate) fn of_repeats(
+    readings: &[Reading],
+    turn: &[usize],
+    time: &[f64],
+    direction: &[f64],
+    lost_motion: &[Vector3<f64>],
+) -> Noise {
+    let place = |index: usize| (readings[index].ball, readings[index].command, turn[index]);
     let in_one_direction = scatter(readings, time, None, |index| (place(index), direction[index] > 0.0));
     let found = in_one_direction.or_else(|| scatter(readings, time, Some(lost_motion), place));
     found.unwrap_or(Noise::Unknown)
@@ -89,7 +93,7 @@ fn scatter<K: PartialEq>(
     let dof = (3 * free).saturating_sub(rank);
     let squares: f64 = fitted.residual.iter().map(|value| value * value).sum();
     let std_um = 1e3 * (squares / dof.max(1) as f64).sqrt();
-    (dof >= FEWEST && std_um > 0.0).then_some(Noise::Repeats { std_um, dof })
+    (dof as f64 >= FEWEST && std_um > 0.0).then_some(Noise::Repeats { std_um, dof })
 }
 
 /// Legendre polynomials of degree 1 to `count`.

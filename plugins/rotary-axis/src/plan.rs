@@ -93,6 +93,8 @@ impl RotaryAxis {
             balls: self.0.balls.iter().map(|ball| ball.id.clone()).collect(),
             time: (0..count).map(|row| row as f64 / (count - 1) as f64).collect(),
             direction: vec![1.0; count],
+            turn: vec![0; count],
+            pass: vec![0; count],
             duration_s: f64::NAN,
             noise: Noise::Stated(1e3 * NOISE_MM),
             warnings: Vec::new(),
@@ -246,7 +248,8 @@ fn with_ball(campaign: &Campaign, place: Vector3<f64>) -> Campaign {
     layout.balls.push(place);
     let mut readings = campaign.readings.clone();
     readings.extend((0..commands).map(|command| reading(ball, command)));
-    let (before, all) = (campaign.readings.len() as f64, readings.len() as f64);
+    let (before, count) = (campaign.readings.len() as f64, readings.len());
+    let all = count as f64;
     let mut time: Vec<f64> = campaign.time.iter().map(|time| time * before / all).collect();
     time.extend((1..=commands).map(|row| (before + row as f64) / all));
     let mut direction = campaign.direction.clone();
@@ -261,6 +264,8 @@ fn with_ball(campaign: &Campaign, place: Vector3<f64>) -> Campaign {
         time,
         duration_s: campaign.duration_s,
         direction,
+        turn: vec![0; count],
+        pass: vec![0; count],
         noise: campaign.noise,
         warnings: Vec::new(),
     }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::refuted_by,
     points::{PointColumn, Points},
     stage::{
         Evaluable, EvaluableKind, Outcome, PointModel, PointPlan, PointSeparator, far_below_noise, residual_table,
@@ -15,6 +16,8 @@ use crate::{
     axis::Axis,
     campaign::{Campaign, columns},
     config::RotaryAxis,
+    consistency::{checks, closing_errors},
+    diagnose::typical_um,
     left_out::left_out,
     motion::axis_motion,
     noise::Noise,
@@ -192,6 +195,10 @@ impl RotaryAxis {
         let mut values = location_values(axis, [0, 1, 2, 3].map(|index| widened(&|fit| fit.location()[index])));
         let left_out = left_out(campaign, effects, &found);
         values.extend(self.ranges(campaign, &left_out));
+        values.extend(closing_errors(campaign, scale.factor * typical_um(campaign)));
+        let checks = checks(axis, campaign, effects, &found);
+        let refuted = refuted_by(&checks);
+        values = values.into_iter().map(|value| value.refuted_by(refuted.clone())).collect();
         let mut remarks = campaign.warnings.clone();
         remarks.extend(self.lost(&found, campaign));
         let notes = noise_remark(campaign.noise).into_iter().collect();
@@ -223,7 +230,7 @@ impl RotaryAxis {
         );
         let motion = || Evaluable::AxisMotion(axis_motion(axis, campaign, &found, &others, &scale));
         let evaluables = if self.evaluables().is_empty() { Vec::new() } else { vec![motion()] };
-        Ok(Outcome { convention, tables, values, evaluables, remarks, notes, ..Outcome::default() })
+        Ok(Outcome { convention, tables, values, checks, evaluables, remarks, notes, ..Outcome::default() })
     }
 
     fn lost(&self, found: &Fit, campaign: &Campaign) -> Option<String> {

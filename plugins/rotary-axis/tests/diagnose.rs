@@ -186,16 +186,20 @@ fn balls_at_one_height_do_not_show_squareness_to_z() {
 
 #[test]
 fn clean_campaigns_name_nothing() {
-    let mut named = 0;
+    let (mut named, mut doubted) = (0, 0);
     for seed in 0..100 {
         let found = diagnosed(THREE_BALLS, CONFIG, &format!("{PASSES}back_and_forth = true\nseed = {seed}"));
         named += found.diagnosis.added.len();
         if !found.diagnosis.added.is_empty() {
             println!("{seed}: {:?}", found.diagnosis.added);
         }
-        assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor, "{seed}");
+        if found.diagnosis.verdict != Verdict::AtNoiseFloor {
+            println!("{seed}: {:?}", found.diagnosis.consistency);
+            doubted += 1;
+        }
     }
-    assert_eq!(named, 0);
+    // Tests of the data on themselves speak in at most 2 % of sound campaigns.
+    assert!(named == 0 && doubted <= 2, "{named} {doubted}");
 }
 
 #[test]

@@ -114,8 +114,8 @@ fn errors_and_variances(separation: &Separation, truth: &StationTruth) -> [f64; 
     sums
 }
 
-/// Half a sample is in the standard uncertainty, and the residual that it leaves is no contradiction; left unsaid, errors are far
-/// above what is stated.
+/// Half a sample is in the standard uncertainty, and the residual that it leaves is no contradiction; left unsaid, the residual refutes the
+/// noise and widens what is stated, by less than errors that are alike in all sensors of a setup need.
 #[test]
 fn marks_known_to_half_a_sample_are_in_the_uncertainty() {
     let [mut said, mut unsaid] = [[0.0; 2]; 2];
@@ -136,7 +136,7 @@ fn marks_known_to_half_a_sample_are_in_the_uncertainty() {
     println!("simulated: errors over stated {ratios:.2?} (said, unsaid); χ² {chi2:.2?}");
     // 36 offsets; the angle common to all setups, a third of the variance, is taken out of the errors and not of the variance.
     assert!((0.4..1.25).contains(&ratios[0]), "{ratios:?}");
-    assert!(ratios[1] > 3.0, "{ratios:?}");
+    assert!((1.5..3.0).contains(&ratios[1]), "{ratios:?}");
     // Below what a run warns of; angles of half a sample are not small at high orders, for which the linear equations are not exact.
     assert!(chi2.iter().all(|chi2| (0.6..4.0).contains(chi2)), "{chi2:?}");
 }

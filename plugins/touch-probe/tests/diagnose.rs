@@ -69,7 +69,18 @@ fn every_effect_is_named_with_its_size() {
             change(&mut scenario, size);
             let found = diagnosed(&scenario, 15, None).diagnosis;
             let first = found.added.first().map(|added| (added.parameters.clone(), added.confounded_with.clone()));
-            println!("{name} {size}: {:?} {:?} {first:?}", found.verdict, named(&found));
+            println!(
+                "{name} {size}: {:?} {:?} {first:?} {:?} {:?}",
+                found.verdict,
+                named(&found),
+                found.refused,
+                found
+                    .consistency
+                    .iter()
+                    .map(|check| &check.finding)
+                    .filter(|finding| !finding.is_empty())
+                    .collect::<Vec<_>>()
+            );
             assert_eq!(found.verdict, Verdict::Explained);
             assert_eq!(found.added.len(), 1, "{name} {size}");
             let added = &found.added[0];

@@ -115,7 +115,7 @@ fn a_refusal_states_the_limit() {
     let found = diagnosed(|circle, angle, _| if circle == 7 { 8.0 * (angle - 1.0).cos() } else { 0.0 });
     assert!(!found.refused.is_empty());
     for refused in &found.refused {
-        let stated = ["above 1e-3", "above -10", "less than 0.05 %", "does not lower", "above 0.05"];
+        let stated = ["above 1e-3", "above -10", "less than 0.05 %", "does not lower", "above 0.01"];
         assert!(stated.iter().any(|limit| refused.reason.contains(limit)), "{refused:?}");
     }
 }

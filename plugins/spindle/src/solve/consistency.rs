@@ -65,7 +65,9 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
             }
         }
         let checks = alike("orders", &groups, level, "the noise there is overestimated");
-        single.extend(checks.into_iter().map(|check| check.among(CLASSES as usize)));
+        // Less than the noise is no finding of an order: a low-pass leaves less than what its covariance is at least.
+        let above = checks.into_iter().filter(|check| check.statistic > 1.0);
+        single.extend(above.map(|check| check.among(CLASSES as usize)));
     }
     // Of those that are as they should be, the least likely one is enough.
     single.sort_by(|a, b| a.p.total_cmp(&b.p));
@@ -78,13 +80,8 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
     }
     let largest = factors.iter().copied().fold(1.0, f64::max).sqrt();
     let pooled = pooled.widening(if above > 1.0 { largest } else { 1.0 });
-    residual.checks = std::iter::once(pooled).chain(single).map(above_refutes).collect();
+    residual.checks = std::iter::once(pooled).chain(single).collect();
     factors
-}
-
-/// Less than the noise is said, and refutes nothing: what changes from turn to turn makes the noise of an average look larger than it is.
-fn above_refutes(check: Check) -> Check {
-    if check.statistic < 1.0 { check.named() } else { check }
 }
 
 fn group(order: &OrderResidual) -> Group {

@@ -149,9 +149,11 @@ impl Readings {
         self.add_angle_uncertainty();
         let sensors = self.count / self.turns.len().max(1);
         for (setup, (matrices, course)) in self.covariance.iter_mut().flatten().zip(&self.courses).enumerate() {
+            // What a tone near an order does to it from turn to turn is in the covariance already.
+            let has_tone = |order: usize| self.near_tones[setup].iter().any(|(near, _)| *near == order);
             let means = self.mean.chunks_exact(self.count).map(|order| &order[setup * sensors..(setup + 1) * sensors]);
             for (order, (matrix, mean)) in matrices.chunks_exact_mut(sensors * sensors).zip(means).enumerate().skip(1) {
-                if let Some(course) = course.covariance(order, mean) {
+                if let Some(course) = course.covariance(order, mean).filter(|_| !has_tone(order)) {
                     matrix.iter_mut().zip(course).for_each(|(entry, course)| *entry += course);
                 }
             }
