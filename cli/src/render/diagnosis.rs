@@ -165,7 +165,7 @@ fn unexplained(diagnosis: &Diagnosis) -> Table {
                 _ => format!("{first}-{last}"),
             },
             one.place.clone(),
-            significant(one.rms_um, 3),
+            if one.rms_um > 0.0 { significant(one.rms_um, 3) } else { String::new() },
         ]);
     }
     table

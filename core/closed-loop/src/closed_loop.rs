@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use super::{
     Effect, Fit, Model, Remainder, Setting,
-    diagnosis::{Diagnosis, Refused},
+    diagnosis::{Diagnosis, Refused, Unexplained},
     evidence::Evidence,
     fit::{INDEPENDENT, Refit, refit},
     found::Found,
@@ -15,7 +15,7 @@ use super::{
         noise_only, overlap, raises_held_out, unit, weak,
     },
     keyed::Keyed,
-    report::{added, blind, inconsistent, level, moved, verdict},
+    report::{added, blind, level, moved, verdict},
 };
 use runout_consistency::{Check, Test};
 use runout_error::Result;
@@ -123,7 +123,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     // A residual is said by where it comes from, where that shows.
     let placed = !unexplained.is_empty();
     let said = |check: &&Check| check.bars_verdict() && !(placed && check.test == Test::Residual);
-    unexplained.extend(consistency.iter().filter(said).map(inconsistent));
+    unexplained.extend(consistency.iter().filter(said).map(Unexplained::from));
     let warnings = tracing.ended_by_limits();
     let diagnosis = Diagnosis {
         verdict,

@@ -282,11 +282,18 @@ pub struct Unexplained {
     pub setup: Option<String>,
     /// Lowest and highest order that it has.
     pub orders: [usize; 2],
-    /// Its size.
+    /// Its size; 0 of what a test of the data on themselves found.
     pub rms_um: f64,
     /// Where it is within the turn or in time.
     #[serde(rename = "where")]
     pub place: String,
+}
+
+impl From<&Check> for Unexplained {
+    /// What a test of the data on themselves says against the model.
+    fn from(check: &Check) -> Self {
+        Self { sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
+    }
 }
 
 /// An effect that the data cannot show.

@@ -53,6 +53,7 @@ impl<'a, F: Fit> Keyed<'a, F> {
     pub(super) fn keys(&self, effect: usize, columns: &[Vec<f64>], candidates: usize) -> Keys {
         let tested: Vec<Vec<f64>> = columns.iter().map(|column| self.fit.tested(column)).collect();
         let squares = |columns: &[Vec<f64>]| columns.iter().map(|column| dot(column, column)).sum::<f64>();
+        let candidates = candidates.saturating_mul(self.fit.tried(effect).max(1));
         let is_shown = squares(&tested) * self.fit.averaged() > SHOWN * squares(columns);
         let keys = if let Some(blocks) = self.fit.blocks_of_entries().filter(|_| !is_shown) {
             self.by_entries(&blocks, columns, candidates)

@@ -159,6 +159,10 @@ pub trait Fit {
     fn blocks_of_entries(&self) -> Option<Partition> {
         None
     }
+    /// Frequencies or other places at which an effect was looked for: it is as many candidates.
+    fn tried(&self, _effect: usize) -> usize {
+        1
+    }
     /// Chance of an effect's gain among those of the other members of its family ([`runout_consistency::keys::among_family`]): what it
     /// explains elsewhere in the spectrum.
     fn among_family(&self, _effect: usize) -> Option<f64> {

@@ -2,7 +2,7 @@
 
 use super::{
     Effect, Fit, Model, Remainder, Setting,
-    diagnosis::{Added, BiasPerUnit, Blind, Estimated, Level, Moved, Step, Unexplained, Verdict},
+    diagnosis::{Added, BiasPerUnit, Blind, Estimated, Level, Moved, Step, Verdict},
     found::Found,
     judgement::noise_only,
 };
@@ -27,11 +27,6 @@ pub(super) fn verdict(left: &Remainder, consistency: &[Check], nothing_added: bo
         (false, _, true) => Verdict::NothingFound,
         (false, _, false) => Verdict::Improved,
     }
-}
-
-/// What a test of the data says against the model.
-pub(super) fn inconsistent(check: &Check) -> Unexplained {
-    Unexplained { sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
 }
 
 /// `held_out` is what a fit without the held-out data leaves of them.

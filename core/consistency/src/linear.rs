@@ -6,7 +6,7 @@ use runout_numerics::{
 };
 
 use crate::{
-    blocks::{Dispersion, Errors, dispersion},
+    blocks::{Dispersion, Errors, agreement, dispersion},
     check::{Check, FINDING, Test, factor, widening},
     groups::{Group, Level, alike},
     order::{Correlated, OrderModels},
@@ -66,10 +66,8 @@ pub fn judge(fit: LinearFit, structure: &Structure) -> Judgement {
         };
         judgement.checks.extend(alike(&partition.name, &groups, level, "it is constant, smoothed or copied"));
     }
-    let shifts: Vec<&Partition> = structure.of_kind(Kind::Shift).collect();
-    for partition in &shifts {
-        judgement.checks.extend(shift(fit, partition, models.as_ref(), shifts.len()));
-    }
+    let shifts = structure.of_kind(Kind::Shift);
+    judgement.checks.extend(shifts.filter_map(|partition| shift(fit, partition, models.as_ref(), structure)));
     if correlated.is_none() {
         judgement.checks.extend(rows::unlike(fit.residual, fit.basis).map(|rows| rows.check(structure, fit.unit)));
     }
@@ -187,9 +185,9 @@ impl Judgement {
     }
 }
 
-/// Whether parts are offset against each other: F of their levels, beside everything that is fitted; averaged over the models of
-/// correlated errors.
-fn shift(fit: LinearFit, partition: &Partition, models: Option<&OrderModels>, partitions: usize) -> Option<Check> {
+/// Whether parts are offset against each other: F of their levels, beside everything that is fitted, with the keys of an effect: averaged
+/// over the models of correlated errors, and against the scatter of independent blocks.
+fn shift(fit: LinearFit, partition: &Partition, models: Option<&OrderModels>, structure: &Structure) -> Option<Check> {
     let members = partition.members();
     let mut basis = Basis::of(fit.basis.to_vec());
     let declared = basis.rank();
@@ -214,7 +212,13 @@ fn shift(fit: LinearFit, partition: &Partition, models: Option<&OrderModels>, pa
     let f = gain / parameters as f64 / (dot(&left, &left) / dof as f64).max(f64::MIN_POSITIVE);
     let plain = f_tail(f, parameters as f64, dof as f64);
     let carried = models.filter(|models| models.is_correlated()).and_then(|models| models.evidence(&columns));
-    let p = carried.map_or(plain, |(p, _)| p.max(plain)) * partitions as f64;
+    let blocks = structure.of_kind(Kind::Blocks).filter(|blocks| blocks.level != partition.level);
+    let agreed = blocks.filter_map(|blocks| {
+        let members = blocks.members();
+        agreement(&basis.columns()[declared..], fit.basis, fit.residual, &members).map(|(p, ..)| p)
+    });
+    let p = carried.map(|(p, _)| p).into_iter().chain(agreed).fold(plain, f64::max);
+    let p = p * structure.of_kind(Kind::Shift).count() as f64;
     let check = Check::new(Test::Shift, &partition.name, f, &[parameters as f64, dof as f64], p);
     Some(check.finding(|| {
         let mean =

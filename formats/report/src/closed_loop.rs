@@ -184,7 +184,7 @@ fn unexplained(all: &[Unexplained], unit: &str) -> Markup {
                         td { bdi { (one.setup.as_deref().unwrap_or("several")) } }
                         td { @if one.orders != [0, 0] { (one.orders[0]) @if one.orders[0] != one.orders[1] { " to " (one.orders[1]) } } }
                         td { (one.place) }
-                        td.number { (significant(one.rms_um, 3)) }
+                        td.number { @if one.rms_um > 0.0 { (significant(one.rms_um, 3)) } }
                     }
                 }
             }

@@ -73,6 +73,11 @@ impl Cells {
         Self { all: cells, of, first, passes, bins }
     }
 
+    /// Passes from the first to the last.
+    pub(crate) fn passes(&self) -> usize {
+        self.passes
+    }
+
     /// Points of a mean.
     pub(crate) fn averaged(&self) -> f64 {
         self.all.iter().map(|cell| cell.points).sum::<f64>() / self.all.len().max(1) as f64

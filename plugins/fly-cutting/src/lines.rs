@@ -2,10 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use runout_core::numerics::least_squares::dot;
+
 use crate::{
     model::CutFit,
     passes::{Cut, Line},
-    phase::{self, dot},
+    phase,
 };
 
 /// Δχ² below which a line is not tried: less is no evidence for its three parameters in any map.

@@ -11,7 +11,7 @@ use runout_core::{
         fit::refit,
         tested::Tested,
     },
-    numerics::least_squares::Basis,
+    numerics::least_squares::{Basis, dot},
 };
 
 use crate::{
@@ -20,8 +20,8 @@ use crate::{
     effects::{MISSING, Missing, applied, tidy},
     heights::Heights,
     passes::{Cut, Line},
-    phase::{self, Phased, dot, without_mean},
-    search::{FEWEST_PERIODS, Left},
+    phase::{self, Phased, without_mean},
+    search::{self, FEWEST_PERIODS, Left},
 };
 
 /// Points that the search looks at, and those of the final fit.
@@ -351,6 +351,15 @@ impl Fit for CutFit {
         Some(self.cells.groups_of_points())
     }
 
+    fn tried(&self, effect: usize) -> usize {
+        let passes = self.cells.passes().max(1);
+        match MISSING.get(effect) {
+            Some(missing) if missing.line().is_some() => passes * self.data.config.max_frequency_ratio,
+            Some(Missing::FeedScale) => search::feeds(passes),
+            _ => 1,
+        }
+    }
+
     fn among_family(&self, effect: usize) -> Option<f64> {
         let missing = MISSING.get(effect)?;
         let [ratio, ..] = *self.starts(*missing).first()?;
@@ -389,6 +398,9 @@ impl Fit for CutFit {
 
     fn unexplained(&self) -> Vec<Unexplained> {
         let left = &self.remainder;
+        if !left.noise_is_known() {
+            return Vec::new();
+        }
         let excess = left.rms.powi(2) - left.noise_floor.powi(2);
         let extent = |of: [f64; 2]| format!("{:.3} to {:.3} mm", of[0], of[1]);
         vec![Unexplained {

@@ -1,5 +1,7 @@
 //! Level and phase of the scallops: what is always fitted.
 
+use runout_core::numerics::least_squares::dot;
+
 use crate::{
     heights::Heights,
     passes::{Cut, Surface},
@@ -122,10 +124,6 @@ pub(crate) fn fit(cut: &Cut, heights: &Heights, sample: &Heights) -> Phased {
 pub(crate) fn squares_near(cut: &Cut, sample: &Heights, phase_mm: f64) -> f64 {
     let at = |index: usize| phase_mm + index as f64 / NEAR as f64 * cut.feed_mm;
     (0..NEAR).map(|index| Trial::new(cut, sample, at(index)).squares).fold(f64::INFINITY, f64::min)
-}
-
-pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {
-    one.iter().zip(other).map(|(one, other)| one * other).sum()
 }
 
 pub(crate) fn without_mean(column: &mut [f64]) {

@@ -32,6 +32,11 @@ const FEEDS: f64 = 0.03;
 /// Part of a period at the end of the map between feeds that are looked at.
 const FEED_STEP: f64 = 0.4;
 
+/// Other feeds that are looked at, of a map of so many passes.
+pub(crate) fn feeds(passes: usize) -> usize {
+    (2.0 * FEEDS * passes as f64 / FEED_STEP).ceil() as usize
+}
+
 /// What is left of a map, pass by pass.
 pub(crate) struct Left<'a> {
     pub heights: &'a Heights,

@@ -4,6 +4,7 @@ use runout_core::{
     Result,
     fault::Fault,
     model::{Fit, Model, Setting},
+    numerics::least_squares::dot,
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
     stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator, far_below_noise},
@@ -17,7 +18,6 @@ use crate::{
     model::{CutFit, CutModel},
     outcome::{Known, tables},
     passes::{Applied, Cut},
-    phase::dot,
 };
 
 /// Share of the root mean square of the scallops below which a map is too smooth for its cut.

@@ -1,9 +1,8 @@
 //! What is left in single places: scratches, pits, dust. No effect of the library is local.
 
-use crate::{
-    heights::{Grid, Heights},
-    phase::dot,
-};
+use runout_core::numerics::least_squares::dot;
+
+use crate::heights::{Grid, Heights};
 
 /// Chance of noise being taken for a stranger anywhere on the map, about.
 const CHANCE: f64 = 1e-3;

@@ -4,7 +4,6 @@
 
 use runout_core::{
     Error, Result,
-    consistency::Check,
     model::{
         Effect,
         closed_loop::Settings,
@@ -99,7 +98,7 @@ impl PointModel for SpatialError {
         if unexplained.is_empty() {
             unexplained.extend(groups(&campaign, &after).iter().map(|group| together(&campaign, group)));
         }
-        unexplained.extend(outcome.checks.iter().filter(|check| check.bars_verdict()).map(inconsistent));
+        unexplained.extend(outcome.checks.iter().filter(|check| check.bars_verdict()).map(Unexplained::from));
         let levels = [&before, &after].map(|solution| level(&campaign, solution));
         let trend_std = after.trend_std(&campaign);
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
@@ -247,11 +246,6 @@ fn together(campaign: &Campaign, group: &Group) -> Unexplained {
         rms_um: (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt(),
         place: format!("neighbouring places: {}", group.named(campaign)),
     }
-}
-
-/// What a test of the readings on themselves found.
-fn inconsistent(check: &Check) -> Unexplained {
-    Unexplained { sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
 }
 
 /// Takes effects that are declared with their values out of the readings.

@@ -28,6 +28,11 @@ pub static ROWS: &[Kind] = &[
     ),
     probe("independent errors", |chance| touches(chance, 0.0), &[]),
     probe("one touch of 540 off by 13 std", |chance| touches(chance, 13.0), &["is off by"]),
+    rotary("independent errors", |chance| r_test(chance, 0.0, 0.0), &[]),
+    rotary("the second pass is offset by 4 std", |chance| r_test(chance, 6.0, 0.0), &["pass 2", "differs"]),
+    rotary("the turn does not close by 40 std", |chance| r_test(chance, 0.0, 60.0), &["close"]),
+    spatial("independent errors of 4 µm", |chance| plate(chance, 0.0, false), &[]),
+    spatial("dz was not measured", |chance| plate(chance, 0.0, true), &["not measured"]),
 ];
 
 const ALONG: &[&str] = &["depend on each other along"];
@@ -71,6 +76,29 @@ setups = [{ id = "r0" }, { id = "r100", ring_deg = 100.0 }, { id = "r217", ring_
 const fn probe(trouble: &'static str, points: fn(&mut Chance) -> String, expected: &'static [&'static str]) -> Kind {
     let there = &["pretravel", "lobing"];
     Kind { domain: "touch probe", trouble, pipeline: PROBE, points, expected, there, truth: None }
+}
+
+const ROTARY: &str = r#"
+load = { plugin = "points", path = "points.csv" }
+[separate]
+plugin = "rotary-axis"
+axis = "C"
+balls = [{ id = "P1", x_mm = 120, y_mm = 0, z_mm = 60 }, { id = "P2", x_mm = -50, y_mm = 95, z_mm = 110 }]
+component_errors = false
+"#;
+
+const fn rotary(trouble: &'static str, points: fn(&mut Chance) -> String, expected: &'static [&'static str]) -> Kind {
+    let there = &["differs-by"];
+    Kind { domain: "rotary axis", trouble, pipeline: ROTARY, points, expected, there, truth: None }
+}
+
+const SPATIAL: &str = r#"
+load = { plugin = "points", path = "points.csv" }
+separate = { plugin = "spatial-error", declared = ["rigid"] }
+"#;
+
+const fn spatial(trouble: &'static str, points: fn(&mut Chance) -> String, expected: &'static [&'static str]) -> Kind {
+    Kind { domain: "spatial error", trouble, pipeline: SPATIAL, points, expected, there: &[], truth: None }
 }
 
 /// Errors of one series of so many readings, in standard deviations.
@@ -177,6 +205,63 @@ fn touches(chance: &mut Chance, off: f64) -> String {
                 number += 1;
             }
         }
+    }
+    text
+}
+
+/// An R-test with two balls and two passes; errors of 1.5 µm. The second pass is offset, and the last command of each pass is off.
+fn r_test(chance: &mut Chance, offset_um: f64, open_um: f64) -> String {
+    let mut text = String::from("ball,repeat,c_deg,dx_mm,dy_mm,dz_mm\n");
+    let mut axis = |size: f64| [size * chance.normal(), size * chance.normal()];
+    let (offset, tilt) = (axis(8.0), axis(8e-3));
+    let balls = [("P1", [120.0, 0.0, 60.0_f64]), ("P2", [-50.0, 95.0, 110.0])]
+        .map(|(ball, place)| (ball, place, [3.0 * chance.normal(), 3.0 * chance.normal(), 3.0 * chance.normal()]));
+    for pass in 1..=2 {
+        for (ball, place, seat) in balls {
+            for step in 0..=24 {
+                let degrees = -180.0 + 15.0 * f64::from(step);
+                let (sine, cosine) = degrees.to_radians().sin_cos();
+                // The axis stands off by `offset` at z = 0 and leans: the ball turns about where it is at the ball's height.
+                let [off_x, off_y] = [offset[0] + tilt[1] * place[2], offset[1] - tilt[0] * place[2]];
+                let x = off_x * (1.0 - cosine) + off_y * sine;
+                let y = off_y * (1.0 - cosine) - off_x * sine;
+                let moved = [place[0] * (cosine - 1.0) - place[1] * sine, place[0] * sine + place[1] * (cosine - 1.0)];
+                let z = tilt[0] * moved[1] - tilt[1] * moved[0];
+                let open = if step == 24 { open_um } else { 0.0 };
+                let shift = if pass == 2 { offset_um } else { 0.0 };
+                // A ball that sits elsewhere on the table turns with it.
+                let seated = [seat[0] * cosine - seat[1] * sine, seat[0] * sine + seat[1] * cosine, seat[2]];
+                let mut read = |truth: f64, seat: f64| 1e-3 * (truth + seat + 1.5 * chance.normal());
+                let [dx, dy, dz] = [read(x + open, seated[0]), read(y + shift, seated[1]), read(z, seated[2])];
+                line(&mut text, format_args!("{ball},{pass},{degrees},{dx:.6},{dy:.6},{dz:.6}"));
+            }
+        }
+    }
+    text
+}
+
+/// 80 places of a plane: waves of 8 µm, errors of 4 µm in each component; dz may be missing.
+fn plate(chance: &mut Chance, nugget_um: f64, flat: bool) -> String {
+    let mut text = String::from("x_mm,y_mm,z_mm,dx_um,dy_um,dz_um\n");
+    let waves: Vec<[f64; 5]> = (0..3)
+        .flat_map(|component| (0..3).map(move |_| component))
+        .map(|component| {
+            let angle = chance.between(0.0, TAU);
+            let length = chance.between(250.0, 600.0);
+            let [k, l] = [angle.cos(), angle.sin()].map(|part| part * TAU / length);
+            [f64::from(component), k, l, 5.0 * chance.normal(), chance.between(0.0, TAU)]
+        })
+        .collect();
+    for _ in 0..80 {
+        let [x, y] = [chance.between(-300.0, 300.0), chance.between(-300.0, 300.0)];
+        let mut of = |component: f64| {
+            let mine = waves.iter().filter(|wave| (wave[0] - component).abs() < 0.5);
+            let smooth: f64 = mine.map(|[_, k, l, size, phase]| size * (k * x + l * y + phase).cos()).sum();
+            smooth + (16.0 + nugget_um * nugget_um).sqrt() * chance.normal()
+        };
+        let [dx, dy, dz] = [of(0.0), of(1.0), of(2.0)];
+        let dz = if flat { 0.0 } else { dz };
+        line(&mut text, format_args!("{x:.3},{y:.3},0,{dx:.4},{dy:.4},{dz:.4}"));
     }
     text
 }

@@ -99,6 +99,8 @@ fn judge(kind: &Kind, chance: &mut Chance, folder: &Path) -> Result<(Summary, Di
     let mut registry = Registry::default();
     for register in [
         runout_points::register,
+        runout_rotary_axis::register,
+        runout_spatial_error::register,
         runout_cylinder::register,
         runout_straightness::register,
         runout_touch_probe::register,

@@ -1,16 +1,29 @@
 //! Orthogonal columns: fits, and what they predict of points left out.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVectorView, SymmetricEigen};
 
 /// A column whose part outside the span of those before it is smaller than this, relative, depends on them.
 const INDEPENDENT: f64 = 1e-9;
 /// Directions that the remaining points determine with less than this share of their weight are not determined at all.
 const DETERMINED: f64 = 1e-12;
 
+/// Sums that a scalar product is made of, so that additions do not wait for each other.
+const LANES: usize = 8;
+
 /// Scalar product.
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let count = a.len().min(b.len());
+    let (a, a_rest) = a[..count].as_chunks::<LANES>();
+    let (b, b_rest) = b[..count].as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.iter().zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 /// Euclidean norm.
@@ -203,25 +216,15 @@ impl Basis {
     /// 1 − Q_gᵀQ_g, well conditioned because Q is orthonormal. A direction that only the group shows is predicted as 0.
     #[must_use]
     pub fn left_out(&self, values: &[f64], groups: &[Vec<usize>]) -> Vec<f64> {
-        let count = self.rank();
-        let full: Vec<f64> = self.orthonormal.iter().map(|column| dot(column, values)).collect();
         let mut left = values.to_vec();
         self.remove_from(&mut left);
         let mut found = left.clone();
         for points in groups {
-            let (inside, others) = self.without(points);
-            let mut change = vec![0.0; count];
-            for (direction, weight) in others.eigenvectors.column_iter().zip(others.eigenvalues.iter()) {
-                let step = if *weight > DETERMINED {
-                    let shown = &inside * direction;
-                    shown.iter().zip(points).map(|(entry, point)| entry * left[*point]).sum::<f64>() / weight
-                } else {
-                    direction.iter().zip(&full).map(|(entry, full)| entry * full).sum()
-                };
-                change.iter_mut().zip(direction.iter()).for_each(|(sum, entry)| *sum += step * entry);
-            }
-            for (row, point) in points.iter().enumerate() {
-                found[*point] += (0..count).map(|column| inside[(row, column)] * change[column]).sum::<f64>();
+            for (direction, share) in self.followed(points) {
+                let along = |of: &[f64]| direction.iter().zip(points).map(|(entry, point)| entry * of[*point]).sum();
+                let own: f64 = along(&left);
+                let step = if 1.0 - share > DETERMINED { own * share / (1.0 - share) } else { along(values) - own };
+                direction.iter().zip(points).for_each(|(entry, point)| found[*point] += step * entry);
             }
         }
         found
@@ -232,12 +235,8 @@ impl Basis {
     /// A group's own noise has the covariance 1, that of its prediction Q_g·(1 − Q_gᵀQ_g)⁻¹·Q_gᵀ.
     #[must_use]
     pub fn left_out_gain(&self, groups: &[Vec<usize>], points: usize) -> f64 {
-        let predicted = groups.iter().map(|group| {
-            let (inside, others) = self.without(group);
-            let directions = others.eigenvectors.column_iter().zip(others.eigenvalues.iter());
-            let determined = directions.filter(|(_, weight)| **weight > DETERMINED);
-            determined.map(|(direction, weight)| (&inside * direction).norm_squared() / weight).sum::<f64>()
-        });
+        let shares = groups.iter().flat_map(|group| self.followed(group)).map(|(_, share)| share);
+        let predicted = shares.filter(|share| 1.0 - share > DETERMINED).map(|share| share / (1.0 - share));
         (1.0 + predicted.sum::<f64>() / points.max(1) as f64).sqrt()
     }
 
@@ -247,12 +246,20 @@ impl Basis {
         self.orthonormal.iter().flat_map(|column| points.iter().map(|point| column[*point].powi(2))).sum()
     }
 
-    /// The rows of Q of some points, and the normal matrix of the others, 1 − Q_gᵀQ_g, by its eigenvalues.
-    fn without(&self, points: &[usize]) -> (DMatrix<f64>, SymmetricEigen<f64, nalgebra::Dyn>) {
-        let count = self.rank();
-        let inside = DMatrix::from_fn(points.len(), count, |row, column| self.orthonormal[column][points[row]]);
-        let others = DMatrix::identity(count, count) - inside.tr_mul(&inside);
-        (inside, SymmetricEigen::new(others))
+    /// The directions of some points that a fit follows, each with the share of it that it takes: Q_gQ_gᵀ by its eigenvectors and
+    /// eigenvalues, of which that matrix or Q_gᵀQ_g, whichever is smaller, has all.
+    fn followed(&self, points: &[usize]) -> Vec<(Vec<f64>, f64)> {
+        let inside = DMatrix::from_fn(points.len(), self.rank(), |row, column| self.orthonormal[column][points[row]]);
+        let by_points = points.len() <= self.rank();
+        let eigen = SymmetricEigen::new(if by_points { &inside * inside.transpose() } else { inside.tr_mul(&inside) });
+        let of = |(direction, share): (DVectorView<f64>, &f64)| {
+            if *share <= f64::EPSILON {
+                return None;
+            }
+            let of_points = if by_points { direction.into_owned() } else { &inside * direction / share.sqrt() };
+            Some((of_points.as_slice().to_vec(), *share))
+        };
+        eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()).filter_map(of).collect()
     }
 }
 
