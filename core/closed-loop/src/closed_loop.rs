@@ -230,8 +230,8 @@ impl<M: Model> Tracing<'_, M> {
         let mut beside: Vec<(usize, f64)> = ranked
             .iter()
             .filter_map(|(effect, _)| {
-                let columns = independent(current.fit.signature(*effect), &basis);
-                Some((*effect, keyed.explained(&columns)?))
+                let columns = || independent(current.fit.signature(*effect), &basis);
+                Some((*effect, keyed.explained(columns)?))
             })
             .collect();
         beside.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -266,7 +266,7 @@ impl<M: Model> Tracing<'_, M> {
         let explained: BTreeMap<usize, f64> = trials
             .iter()
             .filter_map(|(effect, trial, _)| {
-                Some((*effect, keyed.explained(&self.taken(*effect, current, &trial.fit, &basis))?))
+                Some((*effect, keyed.explained(|| self.taken(*effect, current, &trial.fit, &basis))?))
             })
             .collect();
         let beside = |effect: usize| explained.get(&effect).copied().unwrap_or(0.0);

@@ -43,9 +43,9 @@ impl<'a, F: Fit> Keyed<'a, F> {
     }
 
     /// χ² that columns, in the residual's coordinates, explain beside correlated errors; `None` where errors are independent.
-    pub(super) fn explained(&self, columns: &[Vec<f64>]) -> Option<f64> {
+    pub(super) fn explained(&self, columns: impl FnOnce() -> Vec<Vec<f64>>) -> Option<f64> {
         let models = self.models.as_ref().filter(|models| models.is_correlated())?;
-        let tested: Vec<Vec<f64>> = columns.iter().map(|column| self.fit.tested(column)).collect();
+        let tested: Vec<Vec<f64>> = columns().iter().map(|column| self.fit.tested(column)).collect();
         Some(models.explained(&tested))
     }
 

@@ -147,7 +147,7 @@ pub trait Fit {
     fn tested(&self, vector: &[f64]) -> Vec<f64> {
         vector.to_vec()
     }
-    /// Entries of the residual that each of these readings is a mean of.
+    /// Entries of the residual that each of these readings is a mean of: the factor by which its variance is smaller.
     fn averaged(&self) -> f64 {
         1.0
     }

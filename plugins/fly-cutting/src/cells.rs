@@ -78,9 +78,9 @@ impl Cells {
         self.passes
     }
 
-    /// Points of a mean.
+    /// Points of a mean, harmonic: by which its variance is smaller.
     pub(crate) fn averaged(&self) -> f64 {
-        self.all.iter().map(|cell| cell.points).sum::<f64>() / self.all.len().max(1) as f64
+        self.all.len() as f64 / self.all.iter().map(|cell| cell.points.recip()).sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
     /// Means of values at the points.

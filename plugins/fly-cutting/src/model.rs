@@ -1,4 +1,6 @@
 //! A cut with its effects, as a model for the closed loop.
+//!
+//! Long because a fit answers all that the closed loop asks of it, each in a few lines.
 
 use std::sync::{Arc, OnceLock};
 
