@@ -88,8 +88,7 @@ component_errors = false
 "#;
 
 const fn rotary(trouble: &'static str, points: fn(&mut Chance) -> String, expected: &'static [&'static str]) -> Kind {
-    // A drift explains three quarters of a step between passes: it is named, beside the finding that the passes differ.
-    let there = &["thermal-drift"];
+    let there = &[];
     Kind { domain: "rotary axis", trouble, pipeline: ROTARY, points, expected, there, truth: None }
 }
 
