@@ -188,6 +188,21 @@ impl Fit for LinearFit {
         self.judgement().checks.clone()
     }
 
+    fn tested_std(&self, effect: usize) -> Vec<f64> {
+        let factors = self.factors_of(effect);
+        if factors.iter().all(|factor| *factor <= 1.0) {
+            return Vec::new();
+        }
+        let count = |effect: usize| self.data.effects.get(effect).map_or(0, |effect| effect.parameters.len());
+        let before: usize = self.free().take_while(|other| *other != effect).map(count).sum();
+        let weights = self.joint.weights();
+        let own = weights.iter().skip(self.data.declared.len() + before);
+        let mut residual = self.residual();
+        self.joint.remove_from(&mut residual);
+        let variance = dot(&residual, &residual) / self.remainder.dof.max(1) as f64;
+        factors.iter().zip(own).map(|(factor, weights)| factor * (variance * dot(weights, weights)).sqrt()).collect()
+    }
+
     fn bias(&self, effect: usize) -> Vec<Bias> {
         let parameters = self.data.effects.get(effect).map_or(&[][..], |effect| &effect.parameters);
         let leverage = self.data.leverage(effect).into_iter().zip(parameters);
