@@ -1,6 +1,9 @@
 //! A fit of linear terms: what it leaves, what it says of the declared parameters, and what else might be in the residual.
 
-use std::sync::{Arc, OnceLock};
+use std::{
+    ops::Range,
+    sync::{Arc, OnceLock},
+};
 
 use super::{Data, HeldOut, Observations, subtract};
 use crate::{
@@ -98,16 +101,17 @@ impl LinearFit {
         self.applied.iter().map(|setting| setting.effect).filter(|effect| !self.data.known.contains(effect))
     }
 
-    /// Factors on the standard uncertainties of an effect's parameters.
-    fn factors_of(&self, effect: usize) -> Vec<f64> {
+    /// Where the parameters of a fitted effect are among all that are fitted; nothing of a known one.
+    fn places_of(&self, effect: usize) -> Range<usize> {
         let count = |effect: usize| self.data.effects.get(effect).map_or(0, |effect| effect.parameters.len());
         let before: usize = self.free().take_while(|other| *other != effect).map(count).sum();
-        let factors = self.judgement().factors.iter().skip(self.data.declared.len() + before);
-        if self.data.known.contains(&effect) {
-            vec![1.0; count(effect)]
-        } else {
-            factors.copied().take(count(effect)).collect()
-        }
+        let first = self.data.declared.len() + before;
+        first..first + if self.data.known.contains(&effect) { 0 } else { count(effect) }
+    }
+
+    /// Factors on the standard uncertainties of a fitted effect's parameters.
+    fn factors_of(&self, effect: usize) -> &[f64] {
+        self.judgement().factors.get(self.places_of(effect)).unwrap_or_default()
     }
 
     /// Declared parameters, in their order.
@@ -193,10 +197,8 @@ impl Fit for LinearFit {
         if factors.iter().all(|factor| *factor <= 1.0) {
             return Vec::new();
         }
-        let count = |effect: usize| self.data.effects.get(effect).map_or(0, |effect| effect.parameters.len());
-        let before: usize = self.free().take_while(|other| *other != effect).map(count).sum();
         let weights = self.joint.weights();
-        let own = weights.iter().skip(self.data.declared.len() + before);
+        let own = weights.get(self.places_of(effect)).unwrap_or_default();
         let mut residual = self.residual();
         self.joint.remove_from(&mut residual);
         let variance = dot(&residual, &residual) / self.remainder.dof.max(1) as f64;
