@@ -184,8 +184,8 @@ pub fn agreement(
 
 /// Degrees of freedom of the blocks' scatter from which they can check an effect.
 const LEAST_FREEDOM: f64 = 1.5;
-/// Degrees of freedom below which blocks are few: with them, F at a chance of 0.001 asks for less than 5 standard deviations.
-const FEW_FREEDOM: f64 = 8.0;
+/// Degrees of freedom below which blocks are few: with them, F at a chance of 0.001 asks for 6 standard deviations.
+const FEW_FREEDOM: f64 = 6.0;
 
 #[cfg(test)]
 mod tests {
