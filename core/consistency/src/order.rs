@@ -23,7 +23,7 @@ const LENGTHS: [f64; 9] = [0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 400.0];
 const LEAST_INDEPENDENT: f64 = 1e-6;
 /// Twice the gain in log likelihood from which errors are called correlated: a chance of about 0.005 with two parameters at the edge.
 const CORRELATED: f64 = 9.2;
-/// Of shares and of lengths, every so many is tried at first: neighbours in the grid differ by less than half of that gain.
+/// Of shares and of lengths, every so many is tried at first; half of that gain at one of these asks for all.
 const SCREENED: usize = 2;
 /// Weight of a model below which it is left out of a mean.
 const NEGLIGIBLE: f64 = 1e-4;
