@@ -18,7 +18,7 @@ use runout_studies::{
 const USAGE: &str = "usage: runout-studies eccentricity [SEEDS]   form error against clamping eccentricity
        runout-studies averaging [PICTURE]    Ra against the turns averaged; PICTURE is a PNG file
        runout-studies axial [CAMPAIGNS [SEED]]   the same of axial error motion, from a seed on
-       runout-studies consistency [CAMPAIGNS [SEED]]   what the tests of the data say of sound and of troubled campaigns
+       runout-studies consistency [CAMPAIGNS [SEED [DOMAIN]]]   what the tests of the data say of sound and of troubled campaigns
        runout-studies coverage [CAMPAIGNS]   how often the 95 % intervals hold the truth
        runout-studies value-coverage [CAMPAIGNS [SEED [LAYOUT]]]   the same of every value of the standards, two rigs and two
                                              spectra, from a seed on; LAYOUT is four or six
@@ -73,8 +73,8 @@ fn main() -> ExitCode {
             let [campaigns, seed] = sizes(rest, [200, 0]).unwrap_or_default();
             axial(campaigns, seed)
         }
-        ["consistency", ref rest @ ..] if rest.len() <= 2 && sizes(rest, [100, 1]).is_some() => {
-            consistency_of_domains(sizes(rest, [100, 1]).unwrap_or_default())
+        ["consistency", ref rest @ ..] if rest.len() <= 3 && sizes(rest, [100, 1]).is_some() => {
+            consistency_of_domains(sizes(rest, [100, 1]).unwrap_or_default(), rest.get(2).copied())
         }
         ["coverage"] => coverage(500),
         ["coverage", campaigns] if campaigns.parse::<u64>().is_ok() => coverage(campaigns.parse().unwrap_or_default()),
@@ -147,11 +147,13 @@ fn main() -> ExitCode {
 }
 
 /// Takes `--domain NAME` out of the words; nothing where there is none, or where it is the spindle, which has a benchmark of its own.
-fn consistency_of_domains([campaigns, seed]: [u64; 2]) -> Result<()> {
+fn consistency_of_domains([campaigns, seed]: [u64; 2], domain: Option<&str>) -> Result<()> {
     let mut rows = Vec::new();
-    for kind in consistency::ROWS {
+    for kind in consistency::ROWS.iter().filter(|kind| domain.is_none_or(|domain| kind.domain.starts_with(domain))) {
         eprintln!("{}, {}", kind.domain, kind.trouble);
-        rows.push((kind, consistency::row(kind, campaigns, seed)?));
+        let row = consistency::row(kind, campaigns, seed)?;
+        row.falsely.iter().for_each(|said| eprintln!("  {said}"));
+        rows.push((kind, row));
     }
     println!("{}", consistency::table(&rows));
     Ok(())

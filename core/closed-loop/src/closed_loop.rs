@@ -340,11 +340,13 @@ impl<M: Model> Tracing<'_, M> {
     }
 
     /// What an effect takes away: the direction in which its fit changed the residual, and its signature where it has more parameters. Of an
-    /// effect that acts in proportion to its size these span the signature; of another, the first alone is what it does at its size.
+    /// effect that acts in proportion to its size these span the signature; of another, the first alone is what it does at its size. Where an
+    /// effect moves readings, that direction holds the change of their errors, and the signature alone counts.
     fn taken(&self, effect: usize, current: &Refit<M::Fit>, after: &Remainder, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let before = &current.fit.remainder().residual;
-        let taken = before.iter().zip(&after.residual).map(|(before, after)| before - after).collect();
-        let columns = std::iter::once(taken).chain(current.fit.signature(effect)).collect();
+        let taken: Vec<f64> = before.iter().zip(&after.residual).map(|(before, after)| before - after).collect();
+        let taken = (!current.fit.moves_readings(effect)).then_some(taken);
+        let columns = taken.into_iter().chain(current.fit.signature(effect)).collect();
         let mut columns = orthonormal(columns, basis, INDEPENDENT);
         columns.truncate(self.model.effects()[effect].parameters.len());
         columns

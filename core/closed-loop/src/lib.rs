@@ -163,6 +163,10 @@ pub trait Fit {
     fn tried(&self, _effect: usize) -> usize {
         1
     }
+    /// Whether an effect compares readings with others than before: a shift along the order of the readings.
+    fn moves_readings(&self, _effect: usize) -> bool {
+        false
+    }
     /// Chance of an effect's gain among those of the other members of its family ([`runout_consistency::keys::among_family`]): what it
     /// explains elsewhere in the spectrum.
     fn among_family(&self, _effect: usize) -> Option<f64> {

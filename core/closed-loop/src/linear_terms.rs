@@ -95,6 +95,8 @@ struct Data {
     judged: Option<Range<usize>>,
     /// What measurement separates effects of a confounded set.
     distinguished_by: Option<String>,
+    /// Effects that were looked for at several places, and how many.
+    tried: Vec<(usize, usize)>,
 }
 
 impl LinearTerms {
@@ -149,6 +151,7 @@ impl LinearTerms {
             chosen,
             judged,
             distinguished_by,
+            tried: Vec::new(),
         })))
     }
 
@@ -189,6 +192,13 @@ impl LinearTerms {
     #[must_use]
     pub fn distinguished_by(mut self, measurement: &str) -> Self {
         Arc::make_mut(&mut self.0).distinguished_by = Some(measurement.to_owned());
+        self
+    }
+
+    /// Says at how many places (times, time constants) an effect was looked for before its columns were made ([`super::Fit::tried`]).
+    #[must_use]
+    pub fn looked_for(mut self, effect: usize, places: usize) -> Self {
+        Arc::make_mut(&mut self.0).tried.push((effect, places));
         self
     }
 

@@ -4,7 +4,7 @@
 //! the parts' sums must scatter as that model says. A domain declares what its parts are ([`Structure`]), never a test.
 //!
 //! ```
-//! use runout_consistency::{Kind, LinearFit, Structure, judge};
+//! use runout_consistency::{LinearFit, Structure, judge};
 //! use runout_numerics::least_squares::Basis;
 //!
 //! // A level measured in three passes of 20 readings, of which the last is off by 1 µm beside noise of 0.1 µm.
@@ -15,7 +15,7 @@
 //! level.remove_from(&mut residual);
 //! let passes: Vec<usize> = (0..60).map(|i| i / 20).collect();
 //! let names: Vec<String> = (1..=3).map(|pass| format!("pass {pass}")).collect();
-//! let structure = Structure::default().divided("passes", Kind::Shift, passes, names);
+//! let structure = Structure::default().shifting("passes", &passes, &names);
 //! let fit = LinearFit {
 //!     residual: &residual,
 //!     basis: level.columns(),
@@ -44,4 +44,4 @@ pub mod turns;
 
 pub use check::{Action, Check, Test, findings, refuted_by};
 pub use linear::{Judgement, LinearFit, judge};
-pub use structure::{Kind, Order, Partition, Structure};
+pub use structure::{Kind, Order, Partition, Shift, Structure};

@@ -11,7 +11,7 @@ use crate::{
     groups::{Group, Level, alike},
     order::{Correlated, OrderModels},
     rows,
-    structure::{Kind, Partition, Structure},
+    structure::{Kind, Partition, Shift, Structure},
 };
 
 /// A linear fit, to be tested.
@@ -66,8 +66,7 @@ pub fn judge(fit: LinearFit, structure: &Structure) -> Judgement {
         };
         judgement.checks.extend(alike(&partition.name, &groups, level, "it is constant, smoothed or copied"));
     }
-    let shifts = structure.of_kind(Kind::Shift);
-    judgement.checks.extend(shifts.filter_map(|partition| shift(fit, partition, models.as_ref(), structure)));
+    judgement.checks.extend(structure.shifts.iter().filter_map(|one| shift(fit, one, models.as_ref(), structure)));
     if correlated.is_none() {
         judgement.checks.extend(rows::unlike(fit.residual, fit.basis).map(|rows| rows.check(structure, fit.unit)));
     }
@@ -185,23 +184,13 @@ impl Judgement {
     }
 }
 
-/// Whether parts are offset against each other: F of their levels, beside everything that is fitted, with the keys of an effect: averaged
+/// Whether parts are offset against each other: F of their offsets, beside everything that is fitted, with the keys of an effect: averaged
 /// over the models of correlated errors, and against the scatter of independent blocks.
-fn shift(fit: LinearFit, partition: &Partition, models: Option<&OrderModels>, structure: &Structure) -> Option<Check> {
-    let members = partition.members();
-    let mut basis = Basis::of(fit.basis.to_vec());
-    let declared = basis.rank();
-    let used: Vec<&Vec<usize>> = members.iter().filter(|part| !part.is_empty()).collect();
-    let columns: Vec<Vec<f64>> = used
-        .iter()
-        .map(|part| {
-            let mut column = vec![0.0; fit.residual.len()];
-            part.iter().for_each(|reading| column[*reading] = 1.0);
-            column
-        })
-        .collect();
-    basis = basis.extended(columns.clone());
-    let parameters = basis.rank().saturating_sub(declared);
+fn shift(fit: LinearFit, parts: &Shift, models: Option<&OrderModels>, structure: &Structure) -> Option<Check> {
+    let declared = Basis::of(fit.basis.to_vec());
+    let basis = declared.extended(parts.columns.clone());
+    let of_parts = &basis.columns()[declared.rank()..];
+    let parameters = of_parts.len();
     let dof = fit.residual.len().saturating_sub(basis.rank());
     if parameters == 0 || dof == 0 {
         return None;
@@ -211,26 +200,23 @@ fn shift(fit: LinearFit, partition: &Partition, models: Option<&OrderModels>, st
     let gain = dot(fit.residual, fit.residual) - dot(&left, &left);
     let f = gain / parameters as f64 / (dot(&left, &left) / dof as f64).max(f64::MIN_POSITIVE);
     let plain = f_tail(f, parameters as f64, dof as f64);
-    let carried = models.filter(|models| models.is_correlated()).and_then(|models| models.evidence(&columns));
-    let blocks = structure.of_kind(Kind::Blocks).filter(|blocks| blocks.level != partition.level);
+    let carried = models.filter(|models| models.is_correlated()).and_then(|models| models.evidence(&parts.columns));
+    // Parts that are the blocks have nothing beside them that their offsets could be compared with.
+    let blocks = structure.of_kind(Kind::Blocks).filter(|blocks| blocks.name != parts.name);
     let agreed = blocks.filter_map(|blocks| {
         let members = blocks.members();
-        agreement(&basis.columns()[declared..], fit.basis, fit.residual, &members).map(|(p, ..)| p)
+        agreement(of_parts, fit.basis, fit.residual, &members).map(|(p, ..)| p)
     });
     let p = carried.map(|(p, _)| p).into_iter().chain(agreed).fold(plain, f64::max);
-    let p = p * structure.of_kind(Kind::Shift).count() as f64;
-    let check = Check::new(Test::Shift, &partition.name, f, &[parameters as f64, dof as f64], p);
+    let p = p * structure.shifts.len() as f64;
+    let check = Check::new(Test::Shift, &parts.name, f, &[parameters as f64, dof as f64], p);
     Some(check.finding(|| {
-        let mean =
-            |part: &Vec<usize>| part.iter().map(|reading| fit.residual[*reading]).sum::<f64>() / part.len() as f64;
-        let mut means: Vec<(f64, &str)> = members
-            .iter()
-            .zip(&partition.levels)
-            .filter(|(part, _)| !part.is_empty())
-            .map(|(part, name)| (mean(part), name.as_str()))
-            .collect();
-        means.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (low, high) = (means[0], means[means.len() - 1]);
+        let coefficients = basis.coefficients(fit.residual);
+        let of_parts = &coefficients[coefficients.len() - parts.columns.len()..];
+        let offsets = std::iter::once(0.0).chain(of_parts.iter().copied()).zip(&parts.levels);
+        let mut offsets: Vec<(f64, &String)> = offsets.collect();
+        offsets.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (low, high) = (&offsets[0], &offsets[offsets.len() - 1]);
         format!("{} differs from {} by {:.3} {}", high.1, low.1, high.0 - low.0, fit.unit)
     }))
 }
@@ -288,7 +274,7 @@ mod tests {
             .along("angle", circle.clone(), (0..count * each).map(angle).collect())
             .divided("circles", Kind::Blocks, circle.clone(), names.clone())
             .divided("circles", Kind::Alike, circle.clone(), names.clone())
-            .divided("circles", Kind::Shift, circle, names);
+            .shifting("circles", &circle, &names);
         (Basis::of(columns), structure, ["radius", "x", "y", "lobes"].map(str::to_owned).to_vec())
     }
 

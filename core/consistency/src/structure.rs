@@ -8,6 +8,8 @@ pub struct Structure {
     pub order: Option<Order>,
     /// Ways to divide the readings.
     pub partitions: Vec<Partition>,
+    /// What may be offset against each other: direction, pass, half, first and second reading.
+    pub shifts: Vec<Shift>,
     /// Candidates (indices of effects) that are tried at many frequencies or orders: each is measured by the others.
     pub families: Vec<Vec<usize>>,
     /// The name of each reading; without them, they are "reading 17".
@@ -45,15 +47,24 @@ pub enum Kind {
     Blocks,
     /// They have the same noise level.
     Alike,
-    /// They may be offset against each other: direction, pass, half, first and second reading.
-    Shift,
+}
+
+/// Parts of the readings that may be offset against the first one of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shift {
+    /// What the parts are, in the plural: "passes", "directions in dx".
+    pub name: String,
+    /// Names of the parts.
+    pub levels: Vec<String>,
+    /// What an offset of one unit of each part but the first adds to each reading: `[part][reading]`.
+    pub columns: Vec<Vec<f64>>,
 }
 
 impl Structure {
     /// Whether nothing is declared.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.order.is_none() && self.partitions.is_empty()
+        self.order.is_none() && self.partitions.is_empty() && self.shifts.is_empty()
     }
 
     /// With errors that may depend on each other along `name`: the series of each reading and its place there.
@@ -66,6 +77,18 @@ impl Structure {
     #[must_use]
     pub fn divided(mut self, name: &str, kind: Kind, level: Vec<usize>, levels: Vec<String>) -> Self {
         self.partitions.push(Partition { name: name.into(), level, levels, kind });
+        self
+    }
+
+    /// With parts that may be offset: the part of each reading, an index into `levels`. Nothing where there is one only.
+    #[must_use]
+    pub fn shifting(mut self, name: &str, level: &[usize], levels: &[String]) -> Self {
+        let used: Vec<usize> = (0..levels.len()).filter(|part| level.contains(part)).collect();
+        let columns =
+            used.iter().skip(1).map(|part| level.iter().map(|own| f64::from(u8::from(own == part))).collect());
+        let levels = used.iter().map(|part| levels[*part].clone()).collect();
+        self.shifts.push(Shift { name: name.into(), levels, columns: columns.collect() });
+        self.shifts.retain(|shift| !shift.columns.is_empty());
         self
     }
 
@@ -116,9 +139,14 @@ impl Structure {
             at: pick(&order.at, places),
         });
         let partition = |one: &Partition| Partition { level: pick(&one.level, places), ..one.clone() };
+        let shift = |one: &Shift| Shift {
+            columns: one.columns.iter().map(|column| pick(column, places)).collect(),
+            ..one.clone()
+        };
         Self {
             order,
             partitions: self.partitions.iter().map(partition).collect(),
+            shifts: self.shifts.iter().map(shift).collect(),
             families: self.families.clone(),
             rows: pick(&self.rows, places),
         }
@@ -154,11 +182,14 @@ mod tests {
         let names = ["a", "b"].map(str::to_owned).to_vec();
         let declared = Structure::default()
             .along("z", vec![0, 0, 1, 1], vec![0.0, 1.0, 0.0, 1.0])
+            .shifting("halves", &[0, 1, 0, 1], &names)
             .divided("halves", Kind::Blocks, vec![0, 1, 0, 1], names)
             .naming((0..4).map(|row| format!("row {row}")).collect());
         let sorted = declared.sorted(&[2, 0, 3, 1]);
         assert_eq!(sorted.order.as_ref().unwrap().series, [1, 0, 1, 0]);
         assert_eq!(sorted.partitions[0].members(), [vec![0, 1], vec![2, 3]]);
+        assert_eq!(sorted.shifts[0].columns, [[0.0, 0.0, 1.0, 1.0]]);
+        assert_eq!(declared.clone().shifting("halves", &[1, 1, 1, 1], &sorted.partitions[0].levels).shifts.len(), 1);
         assert_eq!((sorted.row(0).as_str(), sorted.partitions[0].count()), ("row 2", 2));
         assert_eq!(Structure::default().row(7), "reading 7");
     }

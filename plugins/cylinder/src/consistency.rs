@@ -26,8 +26,10 @@ pub(crate) fn structure(scans: &[Scan], names: &[String]) -> Structure {
     if scans.len() < 2 {
         return structure;
     }
-    let divided = |structure: Structure, kind: Kind| structure.divided("circles", kind, circle.clone(), names.to_vec());
-    [Kind::Blocks, Kind::Alike, Kind::Shift].into_iter().fold(structure, divided)
+    structure
+        .shifting("circles", &circle, names)
+        .divided("circles", Kind::Blocks, circle.clone(), names.to_vec())
+        .divided("circles", Kind::Alike, circle, names.to_vec())
 }
 
 impl Harmonics {

@@ -112,17 +112,12 @@ impl Cells {
         let numbered = |count: usize| (1..=count).map(|number| format!("pass {number}")).collect::<Vec<String>>();
         let passes: Vec<usize> = self.all.iter().map(|cell| cell.pass).collect();
         let groups = self.all.iter().map(|cell| self.group(cell.pass)).collect();
-        let halves = self.all.iter().map(|cell| usize::from(2 * cell.bin >= self.bins)).collect();
+        let halves: Vec<usize> = self.all.iter().map(|cell| usize::from(2 * cell.bin >= self.bins)).collect();
         Structure::default()
             .along("y", passes.clone(), self.all.iter().map(|cell| cell.y_mm).collect())
             .divided(self.groups_name(), Kind::Blocks, groups, numbered(self.groups()))
             .divided("passes", Kind::Alike, passes, numbered(self.passes))
-            .divided(
-                "halves",
-                Kind::Shift,
-                halves,
-                ["lower", "upper"].map(|half| format!("the {half} half of the map")).into(),
-            )
+            .shifting("halves", &halves, &["lower", "upper"].map(|half| format!("the {half} half of the map")))
     }
 
     /// The group of passes of each point, for effects that change no mean of a pass.

@@ -3,7 +3,12 @@
 use nalgebra::Vector3;
 use runout_core::model::diagnosis::{BiasPerUnit, Blind};
 
-use crate::{campaign::Campaign, config::RotaryAxis, diagnose::constant_of, effects::CANDIDATES, solve::fit};
+use crate::{
+    campaign::Campaign,
+    config::RotaryAxis,
+    effects::{CANDIDATES, Shapes},
+    solve::fit,
+};
 
 /// Smallest change of a result per usual size of an effect that is worth reporting, mm or rad times lever arm.
 const NO_BIAS: f64 = 1e-9;
@@ -15,13 +20,13 @@ impl RotaryAxis {
         campaign: &Campaign,
         blind: &Blind,
         names: &[String],
-        constants: [f64; 3],
+        shapes: &Shapes,
     ) -> Option<BiasPerUnit> {
         let own = blind.targets.iter().fold(blind.effect.clone(), |name, target| format!("{name} {target}"));
         let candidate = CANDIDATES.get(names.iter().position(|name| *name == own)?)?;
         let effect = candidate.effect();
         let parameter = effect.parameters.first()?;
-        let column = candidate.columns(self.0.axis, campaign, constant_of(*candidate, constants)).into_iter().next()?;
+        let column = candidate.columns(self.0.axis, campaign, shapes).into_iter().next()?;
         let mut readings = campaign.readings.clone();
         let plain = fit(&campaign.layout, &readings, &[]).ok()?;
         readings.iter_mut().zip(&column).for_each(|(reading, column)| reading.value += column * parameter.tolerance);

@@ -6,11 +6,8 @@
 
 use nalgebra::Vector3;
 use runout_core::{
-    consistency::{Check, check::Test, linear, repeats::repeats},
-    numerics::{
-        least_squares::{Basis, dot},
-        statistics::f_tail,
-    },
+    consistency::{Check, Kind, LinearFit, Shift, Structure, Test, judge, linear, repeats::repeats},
+    numerics::{least_squares::Basis, statistics::f_tail},
     summary::NamedValue,
 };
 
@@ -23,7 +20,10 @@ use crate::{
 
 const COORDINATES: [&str; 3] = ["dx", "dy", "dz"];
 
-/// A way to divide a campaign in parts that may be offset against each other.
+/// Parts of the commands that are independent of each other.
+const PARTS: usize = 8;
+
+/// Parts of a campaign that may be offset against the first of them.
 struct Parts {
     name: &'static str,
     level: Vec<usize>,
@@ -39,7 +39,7 @@ fn divided(campaign: &Campaign) -> Vec<Parts> {
         Parts {
             name: "directions",
             level: level(&|row| campaign.direction[row] < 0.0),
-            levels: named(["approached from below", "approached from above"]),
+            levels: named(["readings approached from below", "readings approached from above"]),
         },
         Parts {
             name: "passes",
@@ -58,6 +58,51 @@ fn divided(campaign: &Campaign) -> Vec<Parts> {
     all
 }
 
+/// What is declared of the rows that component errors cannot reach: neighbouring commands make parts that are independent of each other;
+/// directions, passes and halves may be offset in each coordinate.
+pub(crate) struct Offsets(Vec<Parts>);
+
+impl Offsets {
+    pub(crate) fn of(campaign: &Campaign) -> Self {
+        Self(divided(campaign))
+    }
+
+    /// What an offset of 1 µm of each part but the first adds to each reading, coordinate by coordinate of each way to divide.
+    pub(crate) fn columns(&self, axis: Axis) -> Vec<Column> {
+        let unit = |coordinate: usize| -> Vector3<f64> {
+            let mut machine = [0.0; 3];
+            machine[coordinate] = 1e-3;
+            axis.inward(machine)
+        };
+        let column = |parts: &Parts, part: usize, unit: Vector3<f64>| -> Column {
+            parts.level.iter().map(|own| if *own == part { unit } else { Vector3::zeros() }).collect()
+        };
+        let of_parts = |parts: &Parts| -> Vec<Column> {
+            let each = (0..3).flat_map(|coordinate| (1..parts.levels.len()).map(move |part| (coordinate, part)));
+            each.map(|(coordinate, part)| column(parts, part, unit(coordinate))).collect()
+        };
+        self.0.iter().flat_map(of_parts).collect()
+    }
+
+    /// With these columns as the rows have them.
+    pub(crate) fn structure(&self, command: &[usize], commands: usize, columns: &[Vec<f64>]) -> Structure {
+        let names = (1..=PARTS).map(|part| format!("part {part} of the commands")).collect();
+        let level = command.iter().map(|command| command * PARTS / commands).collect();
+        let mut structure = Structure::default().divided("parts of the commands", Kind::Blocks, level, names);
+        let mut left = columns;
+        for parts in &self.0 {
+            for coordinate in COORDINATES {
+                let (own, others) = left.split_at(parts.levels.len() - 1);
+                left = others;
+                let name = format!("{} in {coordinate}", parts.name);
+                let levels = parts.levels.iter().map(|level| format!("{coordinate} of {level}")).collect();
+                structure.shifts.push(Shift { name, levels, columns: own.to_vec() });
+            }
+        }
+        structure
+    }
+}
+
 /// The tests of a fit with effects.
 pub(crate) fn checks(axis: Axis, campaign: &Campaign, effects: &[Column], found: &Fit) -> Vec<Check> {
     let (left, dof) = (found.chi2_per_dof(), found.dof as f64);
@@ -69,64 +114,41 @@ pub(crate) fn checks(axis: Axis, campaign: &Campaign, effects: &[Column], found:
     };
     let mut all: Vec<Check> = of_noise.into_iter().collect();
     all.extend(closing_check(campaign, effects));
-    all.extend(offsets(axis, campaign, effects));
+    all.extend(of_rows(axis, campaign, effects));
     all
 }
 
-/// Parts that are offset against the first of them in a coordinate: F beside everything that is fitted.
-fn offsets(axis: Axis, campaign: &Campaign, effects: &[Column]) -> Vec<Check> {
-    let parts = divided(campaign);
-    let mut columns: Vec<Column> = effects.to_vec();
-    for one in &parts {
-        for coordinate in 0..3 {
-            let mut machine = [0.0; 3];
-            machine[coordinate] = 1e-3;
-            let unit: Vector3<f64> = axis.inward(machine);
-            columns.extend((1..one.levels.len()).map(|level| {
-                one.level.iter().map(|own| if *own == level { unit } else { Vector3::zeros() }).collect::<Column>()
-            }));
-        }
-    }
+/// The tests of the rows that component errors cannot reach.
+fn of_rows(axis: Axis, campaign: &Campaign, effects: &[Column]) -> Vec<Check> {
+    let offsets = Offsets::of(campaign);
+    let columns: Vec<Column> = effects.iter().cloned().chain(offsets.columns(axis)).collect();
     let Ok(data) = redundant(&campaign.layout, &campaign.readings, &columns) else { return Vec::new() };
-    let declared = Basis::of(data.declared.clone()).extended(data.effects[..effects.len()].to_vec());
-    let mut residual = data.rows.clone();
-    declared.remove_from(&mut residual);
-    let squares = dot(&residual, &residual);
-    let tests = (3 * parts.len()) as f64;
-    let mut first = effects.len();
-    let mut all = Vec::new();
-    for one in &parts {
-        let others = one.levels.len() - 1;
-        let of_coordinates = COORDINATES.iter().filter_map(|coordinate| {
-            let columns = data.effects[first..first + others].to_vec();
-            first += others;
-            let joint = declared.extended(columns);
-            let parameters = joint.rank() - declared.rank();
-            let dof = residual.len().saturating_sub(joint.rank());
-            if parameters == 0 || dof == 0 {
-                return None;
-            }
-            let gain: f64 =
-                joint.columns()[declared.rank()..].iter().map(|column| dot(column, &residual).powi(2)).sum();
-            let f = gain / parameters as f64 / ((squares - gain) / dof as f64).max(f64::MIN_POSITIVE);
-            let p = f_tail(f, parameters as f64, dof as f64) * tests;
-            let coefficients = joint.coefficients(&residual);
-            let of_levels = coefficients[coefficients.len() - others..].iter().copied().enumerate();
-            let (level, size) = of_levels.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-            let check = Check::new(Test::Shift, one.name, f, &[parameters as f64, dof as f64], p);
-            Some(check.finding(|| {
-                format!("{} differs from {} in {coordinate} by {size:.2} µm", one.levels[level + 1], one.levels[0])
-            }))
-        });
-        let of_coordinates: Vec<Check> = of_coordinates.collect();
-        all.extend(of_coordinates.into_iter().min_by(|a, b| a.p.total_cmp(&b.p)));
-    }
-    all
+    let (of_effects, of_offsets) = data.effects.split_at(effects.len());
+    let basis = Basis::of(data.declared.iter().chain(of_effects).cloned().collect());
+    let mut residual = data.rows;
+    basis.remove_from(&mut residual);
+    let names: Vec<String> = (0..data.declared.len()).map(combination).collect();
+    let weights = basis.weights();
+    let fit = LinearFit {
+        residual: &residual,
+        basis: basis.columns(),
+        names: &names,
+        weights: weights.get(..names.len()).unwrap_or_default(),
+        noise: None,
+        unit: "µm",
+    };
+    let structure = offsets.structure(&data.command, campaign.commands_deg.len(), of_offsets);
+    judge(fit, &structure).checks.into_iter().filter(|check| check.test != Test::Rows).collect()
 }
 
-/// Readings of one ball at commands that are whole turns apart, `[earlier turn, later turn]`, and what they differ by, in mm.
+/// What the rows determine of location errors and placement, each a number.
+pub(crate) fn combination(place: usize) -> String {
+    format!("combination {} of location and placement", place + 1)
+}
+
+/// Readings of one ball in one pass at commands that are a turn apart, `[earlier turn, later turn]`, and what they differ by, in mm.
 fn closings(campaign: &Campaign) -> Vec<([usize; 2], Vector3<f64>)> {
-    let of = |row: usize| (campaign.readings[row].ball, campaign.readings[row].command);
+    let of = |row: usize| (campaign.readings[row].ball, campaign.readings[row].command, campaign.pass[row]);
     let all = 0..campaign.readings.len();
     let pairs = all.clone().flat_map(|row| all.clone().map(move |other| [row, other]));
     let closes = |[row, other]: &[usize; 2]| of(*row) == of(*other) && campaign.turn[*row] + 1 == campaign.turn[*other];
@@ -151,18 +173,26 @@ pub(crate) fn closing_errors(campaign: &Campaign, std_um: f64) -> Vec<NamedValue
 }
 
 /// Whether the turn closes: differences over a turn against what the fit leaves of one turn.
-fn closing_check(campaign: &Campaign, effects: &[Column]) -> Option<Check> {
+fn closing_check(campaign: &Campaign, all_effects: &[Column]) -> Option<Check> {
     let pairs = closings(campaign);
     let later: Vec<usize> = pairs.iter().map(|([_, other], _)| *other).collect();
     let rows: Vec<usize> = (0..campaign.readings.len()).filter(|row| !later.contains(row)).collect();
     let pick = |column: &Column| rows.iter().map(|row| column[*row]).collect::<Column>();
     let readings: Vec<Reading> = rows.iter().map(|row| campaign.readings[*row]).collect();
-    let effects: Vec<Column> = effects.iter().map(pick).collect();
+    let effects: Vec<Column> = all_effects.iter().map(pick).collect();
     let one_turn = if pairs.is_empty() { return None } else { fit(&campaign.layout, &readings, &effects).ok()? };
     let (dof, count) = (one_turn.dof as f64, 3.0 * pairs.len() as f64);
     if one_turn.dof == 0 {
         return None;
     }
+    let values: Vec<f64> = one_turn.effects().iter().map(|effect| effect.value).collect();
+    let pairs: Vec<([usize; 2], Vector3<f64>)> = pairs
+        .into_iter()
+        .map(|([row, other], difference)| {
+            let of_effect = |(column, value): (&Column, &f64)| (column[other] - column[row]) * *value;
+            ([row, other], difference - all_effects.iter().zip(&values).map(of_effect).sum::<Vector3<f64>>())
+        })
+        .collect();
     let in_noise = |([row, other], difference): &([usize; 2], Vector3<f64>)| {
         difference.norm_squared() / (campaign.readings[*row].std.powi(2) + campaign.readings[*other].std.powi(2))
     };

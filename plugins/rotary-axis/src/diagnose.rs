@@ -7,11 +7,11 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
-    consistency::{Check, Kind, Structure},
+    consistency::Check,
     model::{
         Effect, Fit as _, Setting,
         closed_loop::{self, Settings},
-        diagnosis::{Diagnosis, Moved, Unexplained, Verdict},
+        diagnosis::{Diagnosis, Estimated, Moved, Unexplained, Verdict},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
     numerics::least_squares::dot,
@@ -23,18 +23,15 @@ use runout_core::{
 use crate::{
     campaign::Campaign,
     config::RotaryAxis,
-    effects::{CANDIDATES, Candidate, TIME_CONSTANTS, USUAL_TIME_CONSTANT},
+    consistency::{Offsets, combination},
+    effects::{CANDIDATES, Candidate, Shapes, TRIED, USUAL, tried},
     nest::{self, Nest},
     noise::Noise,
     scale::scale,
     solve::{Column, Redundant, fit, redundant},
 };
 
-/// Parts of the commands that are independent of each other.
-const PARTS: usize = 8;
-/// Time constants that are tried for an exponential drift.
-const TRIED: usize = 24;
-/// Runs of the loop in which time constants settle, and the share of a change at which they are settled.
+/// Runs of the loop in which shapes settle, and the share of a change at which they are settled.
 const MOST_RUNS: usize = 5;
 const SETTLED: f64 = 0.01;
 
@@ -59,49 +56,40 @@ impl PointModel for RotaryAxis {
         self.take_known(&mut campaign, &settings.known);
         // What is taken from the readings is known with 0 more of it, and not looked for.
         settings.known.iter_mut().for_each(|known| known.values.iter_mut().for_each(|value| *value = 0.0));
-        let grid: Vec<f64> = (0..TRIED)
-            .map(|index| {
-                let [low, high] = TIME_CONSTANTS;
-                low * (high / low).powf(index as f64 / (TRIED - 1) as f64)
-            })
-            .collect();
-        let mut constants = [USUAL_TIME_CONSTANT; 3];
-        let mut run = self.run(&campaign, &settings, constants, &grid).map_err(failure)?;
+        let grids = tried(&campaign);
+        let (_, rows) = self.assembled(&campaign, USUAL, &grids).map_err(failure)?;
+        let start = rows.shapes(USUAL, &[], &grids);
+        let mut run = self.run(&campaign, &settings, start, &grids).map_err(failure)?;
         for _ in 1..MOST_RUNS {
-            let next = run.next_constants(&grid);
-            let changed = next.iter().zip(constants).any(|(next, now)| (next / now - 1.0).abs() > SETTLED);
+            let next = run.rows.shapes(run.shapes, &run.added, &grids);
+            let changed = next.iter().zip(run.shapes).any(|(next, now)| (next / now - 1.0).abs() > SETTLED);
             if !changed {
                 break;
             }
-            constants = next;
-            run = self.run(&campaign, &settings, constants, &grid).map_err(failure)?;
+            run = self.run(&campaign, &settings, next, &grids).map_err(failure)?;
         }
         self.report(points, &campaign, &declared, &before, &settings, run)
     }
 }
 
-/// The readings and effects of the loop.
-struct Assembled {
-    terms: LinearTerms,
+/// The rows that the loop works with.
+struct Rows {
     data: Redundant,
+    /// In `data.effects`, the first column of each candidate.
     first: Vec<usize>,
-    tried: [usize; 3],
+    /// And that of the first shape tried, of each.
+    tried: [usize; 6],
+    /// And those of errors of the nest.
     nest: usize,
 }
 
-/// One run of the loop at fixed time constants.
+/// One run of the loop at fixed shapes.
 struct Run {
     diagnosis: Diagnosis,
     /// Effects that were added, with their values; of each set the first.
     added: Vec<Setting>,
-    constants: [f64; 3],
-    data: Redundant,
-    /// In `data.effects`, the first column of each candidate.
-    first: Vec<usize>,
-    /// And that of the first time constant tried, of each coordinate.
-    tried: [usize; 3],
-    /// And those of errors of the nest.
-    nest: usize,
+    shapes: Shapes,
+    rows: Rows,
     /// Where most is left.
     left: Vec<Unexplained>,
 }
@@ -110,7 +98,11 @@ impl Run {
     /// Errors of the nest that explain as much as scale and squareness that were added.
     fn nests(&self) -> Vec<Nest> {
         let columns_of = |setting: &Setting| {
-            self.data.effects[self.first[setting.effect]..].iter().take(setting.values.len()).cloned().collect()
+            self.rows.data.effects[self.rows.first[setting.effect]..]
+                .iter()
+                .take(setting.values.len())
+                .cloned()
+                .collect()
         };
         let added: Vec<(bool, Vec<Vec<f64>>)> = self
             .added
@@ -121,36 +113,42 @@ impl Run {
                 (of_axes, columns_of(setting))
             })
             .collect();
-        nest::instead(&self.data, &added, self.nest)
+        nest::instead(&self.rows.data, &added, self.rows.nest)
     }
+}
 
-    /// Time constants for the next run: of a drift that was added, its own; else the one that explains most of what is left.
-    fn next_constants(&self, grid: &[f64]) -> [f64; 3] {
-        let [low, high] = TIME_CONSTANTS;
-        [0, 1, 2].map(|coordinate| {
-            let own = index_of(Candidate::Exponential(coordinate));
-            if let Some([drift, change]) =
-                self.added.iter().find(|setting| setting.effect == own).map(|setting| &setting.values[..])
+impl Rows {
+    /// Shapes beside effects that were added: of one that was, its own; else the one that explains most of what is left.
+    fn shapes(&self, from: Shapes, added: &[Setting], grids: &[Vec<f64>; 6]) -> Shapes {
+        let mut next = from;
+        for candidate in CANDIDATES {
+            let Some(place) = candidate.shape() else { continue };
+            let own = index_of(candidate);
+            let fitted = added.iter().find(|setting| setting.effect == own);
+            if let (Some([drift, change]), Some([low, .., high])) =
+                (fitted.map(|setting| &setting.values[..]), grids[place].get(..))
             {
-                let next = self.constants[coordinate] + change / drift;
-                return if next.is_finite() { next.clamp(low, high) } else { self.constants[coordinate] };
+                let changed = next[place] + change / drift;
+                next[place] = if changed.is_finite() { changed.clamp(*low, *high) } else { next[place] };
+                continue;
             }
             let mut left = self.data.rows.clone();
-            for setting in &self.added {
+            for setting in added.iter().filter(|setting| setting.effect != own) {
                 for (column, value) in self.data.effects[self.first[setting.effect]..].iter().zip(&setting.values) {
                     left.iter_mut().zip(column).for_each(|(entry, column)| *entry -= value * column);
                 }
             }
             remove(&self.data.declared, &mut left);
             let gain = |index: usize| {
-                let mut column = self.data.effects[self.tried[coordinate] + index].clone();
+                let mut column = self.data.effects[self.tried[place] + index].clone();
                 remove(&self.data.declared, &mut column);
                 let size = dot(&column, &column);
                 if size > 0.0 { dot(&column, &left).powi(2) / size } else { 0.0 }
             };
-            let best = (0..grid.len()).max_by(|a, b| gain(*a).total_cmp(&gain(*b)));
-            best.map_or(self.constants[coordinate], |index| grid[index])
-        })
+            let best = (0..grids[place].len()).max_by(|a, b| gain(*a).total_cmp(&gain(*b)));
+            next[place] = best.map_or(next[place], |index| grids[place][index]);
+        }
+        next
     }
 }
 
@@ -166,13 +164,13 @@ impl RotaryAxis {
     fn take_known(&self, campaign: &mut Campaign, known: &[Setting]) {
         for setting in known {
             let Some(candidate) = CANDIDATES.get(setting.effect) else { continue };
-            let (values, constant) = match (candidate, &setting.values[..]) {
-                (Candidate::Exponential(_), [drift, constant]) => {
-                    (vec![*drift], if *constant > 0.0 { *constant } else { USUAL_TIME_CONSTANT })
-                }
-                (_, values) => (values.to_vec(), USUAL_TIME_CONSTANT),
-            };
-            let columns = candidate.columns(self.0.axis, campaign, constant);
+            let mut shapes = USUAL;
+            let mut values = setting.values.clone();
+            if let (Some(place), [_, shape]) = (candidate.shape(), &setting.values[..]) {
+                shapes[place] = if *shape > 0.0 { *shape } else { USUAL[place] };
+                values.truncate(1);
+            }
+            let columns = candidate.columns(self.0.axis, campaign, &shapes);
             for (column, value) in columns.iter().zip(values) {
                 campaign.readings.iter_mut().zip(column).for_each(|(reading, column)| reading.value -= column * value);
             }
@@ -183,44 +181,47 @@ impl RotaryAxis {
         &self,
         campaign: &Campaign,
         settings: &Settings,
-        constants: [f64; 3],
-        grid: &[f64],
+        shapes: Shapes,
+        grids: &[Vec<f64>; 6],
     ) -> std::result::Result<Run, String> {
-        let Assembled { terms, data, first, tried, nest } = self.assembled(campaign, constants, grid)?;
+        let (terms, rows) = self.assembled(campaign, shapes, grids)?;
         let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
         let closed = closed_loop::diagnose(&terms, settings).map_err(|error| error.to_string())?;
         let added = closed.settings.into_iter().skip(settings.known.len()).collect();
         let left = closed.after.unexplained();
-        Ok(Run { diagnosis: closed.diagnosis, added, constants, data, first, tried, nest, left })
+        Ok(Run { diagnosis: closed.diagnosis, added, shapes, rows, left })
     }
 
-    /// The terms of the loop at the usual time constants.
+    /// The terms of the loop at the usual shapes.
     pub(crate) fn linear_terms(&self, campaign: &Campaign) -> std::result::Result<LinearTerms, String> {
-        self.assembled(campaign, [USUAL_TIME_CONSTANT; 3], &[]).map(|assembled| assembled.terms)
+        self.assembled(campaign, USUAL, &Default::default()).map(|(terms, _)| terms)
     }
 
-    /// The terms of the loop at fixed time constants, and further ones to try.
+    /// The terms of the loop at fixed shapes, and further ones to try.
     fn assembled(
         &self,
         campaign: &Campaign,
-        constants: [f64; 3],
-        grid: &[f64],
-    ) -> std::result::Result<Assembled, String> {
+        shapes: Shapes,
+        grids: &[Vec<f64>; 6],
+    ) -> std::result::Result<(LinearTerms, Rows), String> {
         let axis = self.0.axis;
         let mut columns: Vec<Column> = Vec::new();
         let mut first = Vec::with_capacity(CANDIDATES.len());
         for candidate in CANDIDATES {
             first.push(columns.len());
-            columns.extend(candidate.columns(axis, campaign, constant_of(candidate, constants)));
+            columns.extend(candidate.columns(axis, campaign, &shapes));
         }
-        let tried = [0, 1, 2].map(|coordinate| {
-            let start = columns.len();
-            let drift = Candidate::Exponential(coordinate);
-            columns.extend(grid.iter().filter_map(|tried| drift.columns(axis, campaign, *tried).into_iter().next()));
-            start
-        });
+        let mut tried = [0; 6];
+        for (candidate, place) in CANDIDATES.iter().filter_map(|candidate| Some((candidate, candidate.shape()?))) {
+            tried[place] = columns.len();
+            let at = |shape: &f64| candidate.columns(axis, campaign, &[*shape; 6]).into_iter().next();
+            columns.extend(grids[place].iter().filter_map(at));
+        }
         let nest = columns.len();
         columns.extend(nest::columns(self.0.axis, campaign)?);
+        let offsets = columns.len();
+        let parts = Offsets::of(campaign);
+        columns.extend(parts.columns(axis));
         let data = redundant(&campaign.layout, &campaign.readings, &columns)?;
         if data.rows.len() <= data.declared.len() {
             return Err(
@@ -242,15 +243,21 @@ impl RotaryAxis {
             },
             group: data.command.clone(),
             groups: campaign.commands_deg.iter().map(|deg| format!("{} = {deg}°", axis.letter())).collect(),
-            structure: parts(&data.command, campaign.commands_deg.len()),
+            structure: parts.structure(
+                &data.command,
+                campaign.commands_deg.len(),
+                &data.effects[offsets..].iter().map(sized).collect::<Vec<_>>(),
+            ),
         };
         let declared = data.declared.iter().enumerate().map(|(index, column)| Declared {
-            name: format!("shape {}", index + 1),
+            name: combination(index),
             unit: "um".into(),
             column: column.clone(),
         });
         let terms = CANDIDATES.iter().zip(&first).map(|(candidate, first)| {
-            let effect = candidate.effect();
+            let mut effect = candidate.effect();
+            // The time of a step is looked for, and not fitted.
+            effect.parameters.truncate(candidate.columns(axis, campaign, &shapes).len());
             let columns = data.effects[*first..].iter().take(effect.parameters.len()).map(sized).collect();
             Term { effect, columns, rank: 0 }
         });
@@ -259,13 +266,15 @@ impl RotaryAxis {
             .distinguished_by(
                 "a calibration of the linear axes on their own, or a campaign with the balls in another order of time",
             );
-        Ok(Assembled { terms: model, data, first, tried, nest })
+        let searched = CANDIDATES.iter().enumerate().filter(|(_, one)| one.shape().is_some());
+        let model = searched.fold(model, |model, (effect, _)| model.looked_for(effect, TRIED));
+        Ok((model, Rows { data, first, tried, nest }))
     }
 
     /// Columns of effects that were added.
-    fn columns_of(&self, campaign: &Campaign, effects: &[usize], constants: [f64; 3]) -> Vec<Column> {
+    fn columns_of(&self, campaign: &Campaign, effects: &[usize], shapes: &Shapes) -> Vec<Column> {
         let all = effects.iter().filter_map(|effect| CANDIDATES.get(*effect));
-        all.flat_map(|candidate| candidate.columns(self.0.axis, campaign, constant_of(*candidate, constants))).collect()
+        all.flat_map(|candidate| candidate.columns(self.0.axis, campaign, shapes)).collect()
     }
 
     fn report(
@@ -278,7 +287,7 @@ impl RotaryAxis {
         run: Run,
     ) -> Result<PointDiagnosis> {
         let instead = run.nests();
-        let Run { mut diagnosis, added, constants, left, .. } = run;
+        let Run { mut diagnosis, added, shapes, left, .. } = run;
         let names: Vec<String> = CANDIDATES.iter().map(|candidate| name(&candidate.effect())).collect();
         let effects: Vec<usize> = added.iter().map(|setting| setting.effect).collect();
         // Members of confounded sets: the results with each of them.
@@ -290,7 +299,7 @@ impl RotaryAxis {
                 if let Some(own) = chosen.get_mut(place) {
                     *own = member;
                 }
-                alternatives.push(self.columns_of(campaign, &chosen, constants));
+                alternatives.push(self.columns_of(campaign, &chosen, &shapes));
             }
         }
         // Errors of the nest that explain as much as errors of the linear axes.
@@ -298,12 +307,12 @@ impl RotaryAxis {
         for Nest { index, replaced } in &instead {
             let kept: Vec<usize> =
                 (0..effects.len()).filter(|place| !replaced.contains(place)).map(|place| effects[place]).collect();
-            let mut columns = self.columns_of(campaign, &kept, constants);
+            let mut columns = self.columns_of(campaign, &kept, &shapes);
             columns.extend(of_nest.get(*index).cloned());
             alternatives.push(columns);
         }
         nest::confound(&mut diagnosis, &instead);
-        let columns = self.columns_of(campaign, &effects, constants);
+        let columns = self.columns_of(campaign, &effects, &shapes);
         let mut after = self.fitted_outcome(points, campaign, &columns, before, &alternatives)?;
         let last = fit(&campaign.layout, &campaign.readings, &columns)
             .map_err(|problem| Error::new("fit", points.input.display().to_string(), problem))?;
@@ -313,18 +322,24 @@ impl RotaryAxis {
             diagnosis.unexplained.extend(left);
         }
         for (found, setting) in diagnosis.added.iter_mut().zip(&added) {
-            if let (Some(Candidate::Exponential(coordinate)), [drift, ..]) =
-                (CANDIDATES.get(setting.effect), &setting.values[..])
-                && let Some(parameter) = found.parameters.get_mut(1)
-            {
-                // The linear column holds D·ΔT.
-                parameter.value = constants[*coordinate] + parameter.value / drift;
-                parameter.std = parameter.std.map(|std| std / drift.abs());
+            let shape =
+                CANDIDATES.get(setting.effect).and_then(|candidate| candidate.shape()).map(|place| shapes[place]);
+            match (shape, &setting.values[..], found.parameters.get_mut(1)) {
+                (Some(constant), [drift, ..], Some(parameter)) => {
+                    // The linear column holds D·ΔT.
+                    parameter.value = constant + parameter.value / drift;
+                    parameter.std = parameter.std.map(|std| std / drift.abs());
+                }
+                (Some(at), _, None) => {
+                    let (name, unit) = ("at".into(), "campaign".into());
+                    found.parameters.push(Estimated { name, value: at, std: None, unit });
+                }
+                _ => {}
             }
         }
         diagnosis.moved = moved(&declared.values, &after.values);
         for blind in &mut diagnosis.blind_to {
-            if let Some(bias) = self.bias(campaign, blind, &names, constants) {
+            if let Some(bias) = self.bias(campaign, blind, &names, &shapes) {
                 blind.bias_per_unit = bias;
             }
         }
@@ -341,11 +356,10 @@ impl RotaryAxis {
                 .warnings
                 .push(format!("time constants are shares of the campaign, which took {:.0} s", campaign.duration_s));
         }
-        diagnosis.consistency.extend(after.checks.iter().cloned());
+        diagnosis.consistency.clone_from(&after.checks);
         if diagnosis.consistency.iter().any(Check::bars_verdict) {
             diagnosis.verdict = Verdict::Unexplained;
         }
-        after.checks.clone_from(&diagnosis.consistency);
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after })
     }
@@ -353,17 +367,6 @@ impl RotaryAxis {
 
 fn name(effect: &Effect) -> String {
     effect.targets.iter().fold(effect.id.clone(), |name, target| format!("{name} {target}"))
-}
-
-pub(crate) fn constant_of(candidate: Candidate, constants: [f64; 3]) -> f64 {
-    if let Candidate::Exponential(coordinate) = candidate { constants[coordinate] } else { USUAL_TIME_CONSTANT }
-}
-
-/// Neighbouring commands make a part, which is independent of the others.
-fn parts(command: &[usize], commands: usize) -> Structure {
-    let names = (1..=PARTS).map(|part| format!("part {part} of the commands")).collect();
-    let level = command.iter().map(|command| command * PARTS / commands).collect();
-    Structure::default().divided("parts of the commands", Kind::Blocks, level, names)
 }
 
 /// Root mean square of the readings' standard uncertainties, harmonic: the typical weight.

@@ -10,6 +10,8 @@
 //! | `thermal-drift` | x, y, z, linear | D·t |
 //! | `thermal-drift` | x, y, z, exponential | D·(1 − e^(−t/T)) |
 //! | `backlash` | | ±B/2 of rotation, by the direction of approach |
+//! | `nest-by-direction` | x, y, z | ±S/2, by the direction of approach |
+//! | `nest-step` | x, y, z | S from a time on |
 
 use nalgebra::Vector3;
 use runout_core::model::{Effect, Parameter};
@@ -23,16 +25,59 @@ pub(crate) enum Kind {
     LinearAxisSquareness,
     ThermalDrift,
     Backlash,
+    NestByDirection,
+    NestStep,
 }
 
 /// Every effect.
-pub(crate) const KINDS: [Kind; 4] =
-    [Kind::LinearAxisScale, Kind::LinearAxisSquareness, Kind::ThermalDrift, Kind::Backlash];
+pub(crate) const KINDS: [Kind; 6] = [
+    Kind::LinearAxisScale,
+    Kind::LinearAxisSquareness,
+    Kind::ThermalDrift,
+    Kind::Backlash,
+    Kind::NestByDirection,
+    Kind::NestStep,
+];
 
 /// Time constant at which a known drift without one counts, as a share of the campaign.
 pub(crate) const USUAL_TIME_CONSTANT: f64 = 0.3;
 /// Time constants that are looked for: shorter ones end within the first readings, longer ones are straight lines.
-pub(crate) const TIME_CONSTANTS: [f64; 2] = [0.02, 1.0];
+const TIME_CONSTANTS: [f64; 2] = [0.02, 1.0];
+/// Time constants that are tried for an exponential drift.
+pub(crate) const TRIED: usize = 24;
+/// Times that are tried for a step, besides those between passes: neighbouring ones are nearly the same effect.
+const STEPS: usize = 240;
+
+/// Shapes of the effects that are not linear in one parameter: the time constant of an exponential drift of each coordinate, then the time
+/// of a step in each, as shares of the campaign.
+pub(crate) type Shapes = [f64; 6];
+/// Before any of them is looked for.
+pub(crate) const USUAL: Shapes = [USUAL_TIME_CONSTANT, USUAL_TIME_CONSTANT, USUAL_TIME_CONSTANT, 0.5, 0.5, 0.5];
+
+/// What is tried of each shape.
+pub(crate) fn tried(campaign: &Campaign) -> [Vec<f64>; 6] {
+    let [low, high] = TIME_CONSTANTS;
+    let constants: Vec<f64> =
+        (0..TRIED).map(|index| low * (high / low).powf(index as f64 / (TRIED - 1) as f64)).collect();
+    // A step is between two readings.
+    let mut rows: Vec<usize> = (0..campaign.time.len()).collect();
+    rows.sort_by(|a, b| campaign.time[*a].total_cmp(&campaign.time[*b]));
+    let gaps: Vec<(f64, bool)> = rows
+        .windows(2)
+        .map(|pair| [pair[0], pair[1]])
+        .filter(|[one, next]| campaign.time[*next] > campaign.time[*one])
+        .map(|[one, next]| {
+            (f64::midpoint(campaign.time[one], campaign.time[next]), campaign.pass[one] != campaign.pass[next])
+        })
+        .collect();
+    let every = gaps.len().div_ceil(STEPS).max(1);
+    let of_passes = gaps.iter().filter(|(_, between)| *between).take(TRIED);
+    let mut steps: Vec<f64> =
+        gaps.iter().skip(every / 2).step_by(every).chain(of_passes).map(|(time, _)| *time).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.dedup();
+    [constants.clone(), constants.clone(), constants, steps.clone(), steps.clone(), steps]
+}
 
 impl Kind {
     /// Its id.
@@ -42,6 +87,8 @@ impl Kind {
             Self::LinearAxisSquareness => "linear-axis-squareness",
             Self::ThermalDrift => "thermal-drift",
             Self::Backlash => "backlash",
+            Self::NestByDirection => "nest-by-direction",
+            Self::NestStep => "nest-step",
         }
     }
 
@@ -52,6 +99,8 @@ impl Kind {
             Self::LinearAxisSquareness => "two linear axes that measure are not square to each other",
             Self::ThermalDrift => "readings drift along an axis in time: linearly or exponentially",
             Self::Backlash => "a rotary axis loses motion where its direction reverses",
+            Self::NestByDirection => "a nest of sensors is displaced by the direction of approach: a cable pulls it",
+            Self::NestStep => "a nest of sensors, or the table, is displaced from a time on",
         }
     }
 
@@ -63,6 +112,8 @@ impl Kind {
             Self::LinearAxisSquareness => vec![of("angle", "urad", 50.0)],
             Self::ThermalDrift => vec![of("drift", "um", 10.0)],
             Self::Backlash => vec![of("lost_motion", "urad", 50.0)],
+            Self::NestByDirection => vec![of("shift", "um", 5.0)],
+            Self::NestStep => vec![of("step", "um", 5.0)],
         }
     }
 }
@@ -77,10 +128,12 @@ pub(crate) enum Candidate {
     Linear(usize),
     Exponential(usize),
     Backlash,
+    ByDirection(usize),
+    Step(usize),
 }
 
 /// Everything that is looked for.
-pub(crate) const CANDIDATES: [Candidate; 13] = [
+pub(crate) const CANDIDATES: [Candidate; 19] = [
     Candidate::Scale(0),
     Candidate::Scale(1),
     Candidate::Scale(2),
@@ -94,6 +147,12 @@ pub(crate) const CANDIDATES: [Candidate; 13] = [
     Candidate::Exponential(1),
     Candidate::Exponential(2),
     Candidate::Backlash,
+    Candidate::ByDirection(0),
+    Candidate::ByDirection(1),
+    Candidate::ByDirection(2),
+    Candidate::Step(0),
+    Candidate::Step(1),
+    Candidate::Step(2),
 ];
 
 impl Candidate {
@@ -103,6 +162,17 @@ impl Candidate {
             Self::Squareness(..) => Kind::LinearAxisSquareness,
             Self::Linear(_) | Self::Exponential(_) => Kind::ThermalDrift,
             Self::Backlash => Kind::Backlash,
+            Self::ByDirection(_) => Kind::NestByDirection,
+            Self::Step(_) => Kind::NestStep,
+        }
+    }
+
+    /// Place of its shape among [`Shapes`].
+    pub(crate) fn shape(self) -> Option<usize> {
+        match self {
+            Self::Exponential(coordinate) => Some(coordinate),
+            Self::Step(coordinate) => Some(3 + coordinate),
+            _ => None,
         }
     }
 
@@ -124,13 +194,20 @@ impl Candidate {
                 });
                 vec![lower[coordinate].to_owned(), "exponential".to_owned()]
             }
+            Self::Step(coordinate) => {
+                parameters.push(Parameter { name: "at".into(), unit: "campaign".into(), tolerance: 0.5 });
+                vec![lower[coordinate].to_owned()]
+            }
+            Self::ByDirection(coordinate) => vec![lower[coordinate].to_owned()],
             Self::Backlash => Vec::new(),
         };
         Effect { id: self.kind().id().into(), targets, parameters }
     }
 
-    /// What one unit of each parameter adds to each reading, mm; of an exponential drift, D and D·ΔT at a time constant T.
-    pub(crate) fn columns(self, axis: Axis, campaign: &Campaign, time_constant: f64) -> Vec<Column> {
+    /// What one unit of each parameter adds to each reading, mm; of an exponential drift, D and D·ΔT at a time constant T; of a step, S at
+    /// its time.
+    pub(crate) fn columns(self, axis: Axis, campaign: &Campaign, shapes: &Shapes) -> Vec<Column> {
+        let shape = self.shape().map_or(f64::NAN, |place| shapes[place]);
         let each = |add: &dyn Fn(usize, [f64; 3]) -> [f64; 3]| -> Column {
             let readings = campaign.readings.iter().enumerate();
             readings
@@ -150,12 +227,18 @@ impl Candidate {
             Self::Squareness(one, other) => vec![each(&|_, at| along(one, 1e-6 * at[other]))],
             Self::Linear(coordinate) => vec![each(&|row, _| along(coordinate, 1e-3 * campaign.time[row]))],
             Self::Exponential(coordinate) => {
-                let settled = |row: usize| (-campaign.time[row] / time_constant).exp();
-                let slope = |row: usize| -settled(row) * campaign.time[row] / (time_constant * time_constant);
+                let settled = |row: usize| (-campaign.time[row] / shape).exp();
+                let slope = |row: usize| -settled(row) * campaign.time[row] / (shape * shape);
                 vec![
                     each(&|row, _| along(coordinate, 1e-3 * (1.0 - settled(row)))),
                     each(&|row, _| along(coordinate, 1e-3 * slope(row))),
                 ]
+            }
+            Self::ByDirection(coordinate) => {
+                vec![each(&|row, _| along(coordinate, 0.5e-3 * campaign.direction[row]))]
+            }
+            Self::Step(coordinate) => {
+                vec![each(&|row, _| along(coordinate, if campaign.time[row] > shape { 1e-3 } else { 0.0 }))]
             }
             Self::Backlash => {
                 let about = Vector3::z();

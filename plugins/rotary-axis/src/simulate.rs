@@ -107,7 +107,7 @@ impl Scenario {
                 let carried = location * Self::isometry(component[index]) * turned;
                 let place = carried * stands;
                 let share = row as f64 / (total.max(2) - 1) as f64;
-                let read = measures * place.coords + self.drift_at(share);
+                let read = measures * place.coords + self.drift_at(share) + self.nest_at(share, back);
                 let mut deviation = read - (ideal * nominal).coords + bad;
                 for coordinate in 0..3 {
                     deviation[coordinate] += 1e-3 * self.noise_um * noise.sample::<f64, _>(StandardNormal);
@@ -188,6 +188,22 @@ impl Scenario {
         reads
     }
 
+    /// By how much the nest is displaced.
+    fn nest_at(&self, share: f64, back: bool) -> Vector3<f64> {
+        let mut sum = Vector3::zeros();
+        for effect in &self.effect {
+            let (target, by_um) = match effect {
+                SimulatedEffect::NestByDirection { targets: [target], shift_um } => {
+                    (target, if back { -0.5 * shift_um } else { 0.5 * shift_um })
+                }
+                SimulatedEffect::NestStep { targets: [target], step_um, at } if share > *at => (target, *step_um),
+                _ => continue,
+            };
+            sum[DRIFTS.iter().position(|letter| letter == target).unwrap_or(0)] += 1e-3 * by_um;
+        }
+        sum
+    }
+
     fn drift_at(&self, share: f64) -> Vector3<f64> {
         let mut sum = Vector3::zeros();
         for effect in &self.effect {
@@ -262,7 +278,9 @@ impl Scenario {
                 SimulatedEffect::LinearAxisSquareness { targets: [target], .. } => {
                     one_of(target, names(&SQUARENESS.map(|(name, _)| name)))
                 }
-                SimulatedEffect::ThermalDrift { targets: [target], .. } => one_of(target, names(&DRIFTS)),
+                SimulatedEffect::ThermalDrift { targets: [target], .. }
+                | SimulatedEffect::NestByDirection { targets: [target], .. }
+                | SimulatedEffect::NestStep { targets: [target], .. } => one_of(target, names(&DRIFTS)),
                 _ => None,
             };
             if let Some(help) = unknown {

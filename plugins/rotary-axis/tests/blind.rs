@@ -13,7 +13,7 @@ use runout_core::{
 };
 
 /// Effects with a name and the size at which they are made, µm/m, µrad or µm.
-const EFFECTS: [(&str, &str, [f64; 2]); 8] = [
+const EFFECTS: [(&str, &str, [f64; 2]); 10] = [
     ("linear-axis-scale X", "{ plugin = 'linear-axis-scale', targets = ['X'], scale_um_per_m = SIZE }", [20.0, 300.0]),
     ("linear-axis-scale Y", "{ plugin = 'linear-axis-scale', targets = ['Y'], scale_um_per_m = SIZE }", [20.0, 300.0]),
     (
@@ -38,6 +38,8 @@ const EFFECTS: [(&str, &str, [f64; 2]); 8] = [
         [8.0, 60.0],
     ),
     ("backlash", "{ plugin = 'backlash', lost_motion_urad = SIZE }", [20.0, 200.0]),
+    ("nest-by-direction", "{ plugin = 'nest-by-direction', targets = ['COORDINATE'], shift_um = SIZE }", [3.0, 40.0]),
+    ("nest-step", "{ plugin = 'nest-step', targets = ['COORDINATE'], step_um = SIZE, at = 0.63 }", [5.0, 40.0]),
 ];
 
 #[test]
@@ -94,7 +96,8 @@ fn random_campaigns_are_diagnosed() {
         let diagnosis = &found.diagnosis;
         let is = |added: &runout_core::model::diagnosis::Added| {
             let own = added.targets.iter().fold(added.effect.clone(), |name, target| format!("{name} {target}"));
-            let wanted = if name == "thermal-drift" { format!("{name} {coordinate}") } else { name.to_owned() };
+            let by_coordinate = ["thermal-drift", "nest-by-direction", "nest-step"].contains(&name);
+            let wanted = if by_coordinate { format!("{name} {coordinate}") } else { name.to_owned() };
             own.starts_with(&wanted) || added.confounded_with.iter().any(|other| other.starts_with(&wanted))
         };
         match kind {

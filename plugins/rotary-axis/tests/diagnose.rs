@@ -45,7 +45,7 @@ struct Case {
 
 const PASSES: &str = "passes = 2\nball_by_ball = true\n";
 
-const CASES: [Case; 9] = [
+const CASES: [Case; 11] = [
     Case {
         name: "linear-axis-scale X",
         keys: |size| format!("effect = [{{ plugin = 'linear-axis-scale', targets = ['X'], scale_um_per_m = {size} }}]"),
@@ -109,6 +109,26 @@ const CASES: [Case; 9] = [
         keys: |size| format!("effect = [{{ plugin = 'backlash', lost_motion_urad = {size} }}]\nback_and_forth = true"),
         parameter: "lost_motion",
         sizes: [12.0, 1000.0],
+    },
+    Case {
+        name: "nest-by-direction x",
+        keys: |size| {
+            format!(
+                "effect = [{{ plugin = 'nest-by-direction', targets = ['x'], shift_um = {size} }}]\nback_and_forth = true"
+            )
+        },
+        parameter: "shift",
+        sizes: [3.0, -60.0],
+    },
+    Case {
+        name: "nest-step z",
+        keys: |size| {
+            format!(
+                "effect = [{{ plugin = 'nest-step', targets = ['z'], step_um = {size}, at = 0.31 }}]\nback_and_forth = true"
+            )
+        },
+        parameter: "step",
+        sizes: [-4.0, 60.0],
     },
 ];
 

@@ -146,11 +146,11 @@ fn structure(campaign: &Campaign, members: &[&Vec<usize>], rows: &[usize]) -> St
     let halves: Vec<usize> = rows.iter().map(|row| usize::from(campaign.time[*row] > 0.5)).collect();
     let first = passes.iter().copied().min().unwrap_or(0);
     let same = passes.iter().zip(&halves).all(|(pass, half)| pass - first == *half);
-    let names = (0..=last).map(|pass| format!("pass {pass}")).collect();
-    let mut structure = Structure::default().divided("passes", Kind::Shift, passes, names);
+    let names: Vec<String> = (0..=last).map(|pass| format!("pass {pass}")).collect();
+    let mut structure = Structure::default().shifting("passes", &passes, &names);
     if !same {
-        let names = ["the first half of the campaign", "the second half"].map(str::to_owned).into();
-        structure = structure.divided("halves of the campaign", Kind::Shift, halves, names);
+        let names = ["the first half of the campaign", "the second half"].map(str::to_owned);
+        structure = structure.shifting("halves of the campaign", &halves, &names);
     }
     if members.iter().filter(|rows| rows.len() >= FEWEST_READINGS).count() > 1 {
         // Places with few readings are in none of the groups.

@@ -282,6 +282,10 @@ impl Fit for TracesFit {
         self.contrasts.averaged
     }
 
+    fn moves_readings(&self, effect: usize) -> bool {
+        self.design.data.candidates.get(effect).is_some_and(|one| one.kind == Kind::AxialRegistration)
+    }
+
     fn declared_columns(&self) -> &[Vec<f64>] {
         let made = || Basis::of(self.design.dense.iter().map(|column| self.contrasts.made(column)).collect());
         self.declared.get_or_init(made).columns()

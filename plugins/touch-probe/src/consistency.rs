@@ -40,13 +40,13 @@ pub(crate) fn structure(config: &TouchProbeConfig, touches: &Touches) -> Structu
         .divided("setups", Kind::Blocks, setup.clone(), names.clone())
         .divided("sectors of the ring", Kind::Alike, ring, range("the ring at", of_ring))
         .divided("directions", Kind::Alike, machine, range("directions from", of_machine))
-        .divided("setups", Kind::Shift, setup, names)
+        .shifting("setups", &setup, &names)
         .naming(all.iter().enumerate().map(row).collect());
     if touches.repeats.len() > 1 {
         let place = |repeat: usize| touches.repeats.iter().position(|known| *known == repeat).unwrap_or(usize::MAX);
-        let level = all.iter().map(|touch| place(touch.repeat)).collect();
-        let names = touches.repeats.iter().map(|repeat| format!("repeat {repeat}")).collect();
-        structure = structure.divided("repeats", Kind::Shift, level, names);
+        let level: Vec<usize> = all.iter().map(|touch| place(touch.repeat)).collect();
+        let names: Vec<String> = touches.repeats.iter().map(|repeat| format!("repeat {repeat}")).collect();
+        structure = structure.shifting("repeats", &level, &names);
     }
     structure
 }

@@ -7,6 +7,7 @@ use std::{fmt::Write as _, path::Path};
 
 use runout_core::{
     Error, Result,
+    consistency::Check,
     model::diagnosis::{Diagnosis, Verdict},
     pipeline::{
         INCLUDE_KEY, Pipeline, Registry,
@@ -55,6 +56,8 @@ pub struct Row {
     pub held: [usize; 2],
     /// Their standard uncertainties.
     pub std: Vec<f64>,
+    /// Findings of sound campaigns and effects that are not there, each with its chance.
+    pub falsely: Vec<String>,
 }
 
 /// Judges so many campaigns of a kind.
@@ -70,14 +73,25 @@ pub fn row(kind: &Kind, campaigns: u64, seed: u64) -> Result<Row> {
     for (summary, diagnosis) in &judged {
         row.campaigns += 1;
         let checks = summary.consistency.iter().chain(&diagnosis.consistency);
-        let findings: Vec<&str> =
-            checks.map(|check| check.finding.as_str()).filter(|finding| !finding.is_empty()).collect();
+        let found: Vec<&Check> = checks.filter(|check| !check.finding.is_empty()).collect();
+        let findings: Vec<&str> = found.iter().map(|check| check.finding.as_str()).collect();
         let said = summary.warnings.iter().cloned().chain(diagnosis.warnings.iter().cloned());
         let said: Vec<String> = said.chain(findings.iter().map(|finding| (*finding).to_owned())).collect();
         row.found += usize::from(!findings.is_empty());
         row.named += usize::from(kind.expected.iter().any(|word| said.iter().any(|text| text.contains(word))));
         let is_false = |effect: &str| !kind.there.iter().any(|known| effect.starts_with(known));
         row.false_effects += usize::from(diagnosis.added.iter().any(|one| is_false(&one.effect)));
+        let number = row.campaigns - 1;
+        let wrong = diagnosis.added.iter().filter(|one| is_false(&one.effect));
+        row.falsely.extend(wrong.map(|one| {
+            let values: Vec<String> =
+                one.parameters.iter().map(|parameter| format!("{:.4}", parameter.value)).collect();
+            let targets = one.targets.join(" ");
+            format!("{number}: {} {targets} {} (p {:.1e})", one.effect, values.join(", "), one.p_value)
+        }));
+        if kind.expected.is_empty() {
+            row.falsely.extend(found.iter().map(|check| format!("{number}: {} (p {:.1e})", check.finding, check.p)));
+        }
         row.at_the_floor += usize::from(matches!(diagnosis.verdict, Verdict::AtNoiseFloor | Verdict::Explained));
         let Some((effect, parameter, truth)) = kind.truth else { continue };
         let found = diagnosis.added.iter().find(|one| one.effect == effect);

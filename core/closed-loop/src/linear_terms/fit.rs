@@ -188,6 +188,10 @@ impl Fit for LinearFit {
         self.data.basis.columns()
     }
 
+    fn tried(&self, effect: usize) -> usize {
+        self.data.tried.iter().find(|(known, _)| *known == effect).map_or(1, |(_, places)| (*places).max(1))
+    }
+
     fn consistency(&self) -> Vec<Check> {
         self.judgement().checks.clone()
     }

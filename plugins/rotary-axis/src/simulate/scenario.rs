@@ -122,6 +122,22 @@ pub enum SimulatedEffect {
         /// In µrad.
         lost_motion_urad: f64,
     },
+    /// A cable pulls the nest of sensors one way or the other, by the direction of approach.
+    NestByDirection {
+        /// x, y or z.
+        targets: [String; 1],
+        /// Between the two directions, in µm.
+        shift_um: f64,
+    },
+    /// The nest of sensors is displaced at one time.
+    NestStep {
+        /// x, y or z.
+        targets: [String; 1],
+        /// In µm.
+        step_um: f64,
+        /// Share of the campaign that is before it.
+        at: f64,
+    },
     /// A ball slips on the table: a stranger to the closed loop.
     SlippedBall {
         /// Row from which it stands elsewhere.

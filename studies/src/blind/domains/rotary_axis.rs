@@ -50,8 +50,15 @@ const LAYOUTS: [Layout; 3] = [
     },
 ];
 
-const EFFECTS: [&str; 5] =
-    ["linear-axis-scale", "linear-axis-squareness", "thermal-drift linear", "thermal-drift exponential", "backlash"];
+const EFFECTS: [&str; 7] = [
+    "linear-axis-scale",
+    "linear-axis-squareness",
+    "thermal-drift linear",
+    "thermal-drift exponential",
+    "backlash",
+    "nest-by-direction",
+    "nest-step",
+];
 const STRANGERS: [&str; 2] = ["slipped-ball", "bad-reading"];
 const COORDINATES: [&str; 3] = ["X", "Y", "Z"];
 const COMMANDS: usize = 36;
@@ -194,6 +201,18 @@ fn plant(id: &'static str, large: bool, layout: &Layout, scenario: &mut Scenario
             let size = chance.signed(6.0 * noise, 300.0, large);
             let planted = Planted::effect(id, "", format!("{size:.1} µrad"), vec![("lost_motion", size)]);
             (SimulatedEffect::Backlash { lost_motion_urad: size }, planted)
+        }
+        "nest-by-direction" => {
+            let target = chance.one_of(&["x", "y", "z"]);
+            let size = chance.signed(noise, 60.0, large);
+            let planted = Planted::effect(id, target, format!("{size:.1} µm"), vec![("shift", size)]);
+            (SimulatedEffect::NestByDirection { targets: [target.to_owned()], shift_um: size }, planted)
+        }
+        "nest-step" => {
+            let (target, at) = (chance.one_of(&["x", "y", "z"]), chance.between(0.1, 0.9));
+            let size = chance.signed(1.5 * noise, 60.0, large);
+            let planted = Planted::effect(id, target, format!("{size:.1} µm at {at:.2}"), vec![("step", size)]);
+            (SimulatedEffect::NestStep { targets: [target.to_owned()], step_um: size, at }, planted)
         }
         "slipped-ball" => {
             let row = chance.below(rows);
