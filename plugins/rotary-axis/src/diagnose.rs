@@ -34,6 +34,8 @@ use crate::{
 /// Runs of the loop in which shapes settle, and the share of a change at which they are settled.
 const MOST_RUNS: usize = 5;
 const SETTLED: f64 = 0.01;
+/// Sizes in what is usual of an effect that no machine has.
+const ABSURD: f64 = 1000.0;
 
 /// Place of a candidate among all.
 fn index_of(candidate: Candidate) -> usize {
@@ -56,17 +58,11 @@ impl PointModel for RotaryAxis {
         self.take_known(&mut campaign, &settings.known);
         // What is taken from the readings is known with 0 more of it, and not looked for.
         settings.known.iter_mut().for_each(|known| known.values.iter_mut().for_each(|value| *value = 0.0));
-        let grids = tried(&campaign);
-        let (_, rows) = self.assembled(&campaign, USUAL, &grids).map_err(failure)?;
-        let start = rows.shapes(USUAL, &[], &grids);
-        let mut run = self.run(&campaign, &settings, start, &grids).map_err(failure)?;
-        for _ in 1..MOST_RUNS {
-            let next = run.rows.shapes(run.shapes, &run.added, &grids);
-            let changed = next.iter().zip(run.shapes).any(|(next, now)| (next / now - 1.0).abs() > SETTLED);
-            if !changed {
-                break;
-            }
-            run = self.run(&campaign, &settings, next, &grids).map_err(failure)?;
+        let mut run = self.settled(&campaign, &settings).map_err(failure)?;
+        let doubtful = run.doubtful();
+        if !doubtful.is_empty() {
+            settings.left_out.extend(doubtful);
+            run = self.settled(&campaign, &settings).map_err(failure)?;
         }
         self.report(points, &campaign, &declared, &before, &settings, run)
     }
@@ -95,6 +91,23 @@ struct Run {
 }
 
 impl Run {
+    /// Effects that are not believed: of a size that no machine has, as those have that the rows hardly show; and, where something else is in
+    /// the data, steps: their time is free, so that they take a part of much that is none.
+    fn doubtful(&self) -> Vec<usize> {
+        let absurd = |setting: &Setting| {
+            let parameters =
+                CANDIDATES.get(setting.effect).map_or_else(Vec::new, |candidate| candidate.effect().parameters);
+            setting.values.iter().zip(&parameters).any(|(value, known)| value.abs() > ABSURD * known.tolerance)
+        };
+        let absurd: Vec<usize> = self.added.iter().filter(|one| absurd(one)).map(|one| one.effect).collect();
+        let is_step = |index: &usize| matches!(CANDIDATES[*index], Candidate::Step(_));
+        let unexplained = self.diagnosis.verdict == Verdict::Unexplained || !absurd.is_empty();
+        if unexplained && self.added.iter().any(|one| is_step(&one.effect)) {
+            return absurd.into_iter().chain((0..CANDIDATES.len()).filter(is_step)).collect();
+        }
+        absurd
+    }
+
     /// Errors of the nest that explain as much as scale and squareness that were added.
     fn nests(&self) -> Vec<Nest> {
         let columns_of = |setting: &Setting| {
@@ -175,6 +188,25 @@ impl RotaryAxis {
                 campaign.readings.iter_mut().zip(column).for_each(|(reading, column)| reading.value -= column * value);
             }
         }
+    }
+
+    /// Runs until the shapes settle.
+    fn settled(&self, campaign: &Campaign, settings: &Settings) -> std::result::Result<Run, String> {
+        let mut grids = tried(campaign, &USUAL);
+        let (_, rows) = self.assembled(campaign, USUAL, &grids)?;
+        let start = rows.shapes(USUAL, &[], &grids);
+        grids = tried(campaign, &start);
+        let mut run = self.run(campaign, settings, start, &grids)?;
+        for _ in 1..MOST_RUNS {
+            let next = run.rows.shapes(run.shapes, &run.added, &grids);
+            let changed = next.iter().zip(run.shapes).any(|(next, now)| (next / now - 1.0).abs() > SETTLED);
+            if !changed {
+                break;
+            }
+            grids = tried(campaign, &next);
+            run = self.run(campaign, settings, next, &grids)?;
+        }
+        Ok(run)
     }
 
     fn run(

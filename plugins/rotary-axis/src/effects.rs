@@ -43,10 +43,8 @@ pub(crate) const KINDS: [Kind; 6] = [
 pub(crate) const USUAL_TIME_CONSTANT: f64 = 0.3;
 /// Time constants that are looked for: shorter ones end within the first readings, longer ones are straight lines.
 const TIME_CONSTANTS: [f64; 2] = [0.02, 1.0];
-/// Time constants that are tried for an exponential drift.
+/// Time constants that are tried for an exponential drift, and times for a step.
 pub(crate) const TRIED: usize = 24;
-/// Times that are tried for a step, besides those between passes: neighbouring ones are nearly the same effect.
-const STEPS: usize = 240;
 
 /// Shapes of the effects that are not linear in one parameter: the time constant of an exponential drift of each coordinate, then the time
 /// of a step in each, as shares of the campaign.
@@ -54,29 +52,32 @@ pub(crate) type Shapes = [f64; 6];
 /// Before any of them is looked for.
 pub(crate) const USUAL: Shapes = [USUAL_TIME_CONSTANT, USUAL_TIME_CONSTANT, USUAL_TIME_CONSTANT, 0.5, 0.5, 0.5];
 
-/// What is tried of each shape.
-pub(crate) fn tried(campaign: &Campaign) -> [Vec<f64>; 6] {
+/// What is tried of each shape: of steps, times between passes, over the whole campaign, and near those of `now`.
+pub(crate) fn tried(campaign: &Campaign, now: &Shapes) -> [Vec<f64>; 6] {
     let [low, high] = TIME_CONSTANTS;
     let constants: Vec<f64> =
         (0..TRIED).map(|index| low * (high / low).powf(index as f64 / (TRIED - 1) as f64)).collect();
     // A step is between two readings.
     let mut rows: Vec<usize> = (0..campaign.time.len()).collect();
     rows.sort_by(|a, b| campaign.time[*a].total_cmp(&campaign.time[*b]));
-    let gaps: Vec<(f64, bool)> = rows
-        .windows(2)
-        .map(|pair| [pair[0], pair[1]])
-        .filter(|[one, next]| campaign.time[*next] > campaign.time[*one])
-        .map(|[one, next]| {
-            (f64::midpoint(campaign.time[one], campaign.time[next]), campaign.pass[one] != campaign.pass[next])
-        })
-        .collect();
-    let every = gaps.len().div_ceil(STEPS).max(1);
-    let of_passes = gaps.iter().filter(|(_, between)| *between).take(TRIED);
-    let mut steps: Vec<f64> =
-        gaps.iter().skip(every / 2).step_by(every).chain(of_passes).map(|(time, _)| *time).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.dedup();
-    [constants.clone(), constants.clone(), constants, steps.clone(), steps.clone(), steps]
+    let gap = |[one, next]: [usize; 2]| {
+        let [from, to] = [campaign.time[one], campaign.time[next]];
+        (to > from).then(|| (f64::midpoint(from, to), campaign.pass[one] != campaign.pass[next]))
+    };
+    let gaps: Vec<(f64, bool)> = rows.windows(2).filter_map(|pair| gap([pair[0], pair[1]])).collect();
+    let every = gaps.len().div_ceil(TRIED).max(1);
+    let between_passes = || gaps.iter().filter(|(_, between)| *between).take(TRIED);
+    let steps = |now: f64| {
+        let place = gaps.partition_point(|(time, _)| *time < now);
+        let near = &gaps[place.saturating_sub(every)..(place + every).min(gaps.len())];
+        let near = near.iter().step_by((2 * every).div_ceil(TRIED));
+        let all = gaps.iter().skip(every / 2).step_by(every).chain(between_passes()).chain(near);
+        let mut steps: Vec<f64> = all.map(|(time, _)| *time).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.dedup();
+        steps
+    };
+    [constants.clone(), constants.clone(), constants, steps(now[3]), steps(now[4]), steps(now[5])]
 }
 
 impl Kind {
@@ -112,8 +113,8 @@ impl Kind {
             Self::LinearAxisSquareness => vec![of("angle", "urad", 50.0)],
             Self::ThermalDrift => vec![of("drift", "um", 10.0)],
             Self::Backlash => vec![of("lost_motion", "urad", 50.0)],
-            Self::NestByDirection => vec![of("shift", "um", 5.0)],
-            Self::NestStep => vec![of("step", "um", 5.0)],
+            Self::NestByDirection => vec![of("shift", "um", 2.0)],
+            Self::NestStep => vec![of("step", "um", 2.0)],
         }
     }
 }
