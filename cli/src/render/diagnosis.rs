@@ -146,7 +146,7 @@ fn moved(diagnosis: &Diagnosis) -> Table {
 
 fn unexplained(diagnosis: &Diagnosis) -> Table {
     let unit = unit(diagnosis.before.unit.as_deref().unwrap_or("um"));
-    let mut table = Table::new(5, ["sensor", "setup", "orders", "where", &format!("rms {unit}")]);
+    let mut table = Table::new(6, ["station", "sensor", "setup", "orders", "where", &format!("rms {unit}")]);
     for one in &diagnosis.unexplained {
         let [first, last] = one.orders;
         // Groups of measured points have neither sensors nor orders.
@@ -157,6 +157,7 @@ fn unexplained(diagnosis: &Diagnosis) -> Table {
             None => "several".into(),
         };
         table.row([
+            one.station.clone().unwrap_or_default(),
             several(&one.sensor),
             several(&one.setup),
             match one.orders {

@@ -276,6 +276,9 @@ pub struct Moved {
 /// Something that is left and that no known effect explains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
+    /// The station, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub station: Option<String>,
     /// Whose readings hold it, where it is one sensor's.
     pub sensor: Option<String>,
     /// In which setup, where it is in one.
@@ -292,7 +295,7 @@ pub struct Unexplained {
 impl From<&Check> for Unexplained {
     /// What a test of the data on themselves says against the model.
     fn from(check: &Check) -> Self {
-        Self { sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
+        Self { station: None, sensor: None, setup: None, orders: [0, 0], rms_um: 0.0, place: check.finding.clone() }
     }
 }
 

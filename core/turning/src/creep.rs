@@ -33,6 +33,10 @@ const REFINED: f64 = 1e-7;
 /// A time constant is determined where it is this many times its standard uncertainty.
 const DETERMINED: f64 = 3.0;
 
+/// A course is certain only where the levels at the ends of the captures differ by more than this share of what it says: what drift leaves
+/// in an averaged turn is (last level − first level)/turns, and not the slope of a line through a wave.
+const BORNE_OUT: f64 = 0.5;
+
 /// Levels that are looked at in a capture: of more turns, means over several are.
 const MOST_LEVELS: usize = 128;
 
@@ -283,6 +287,7 @@ impl Sensor {
         let rate_std = (noise / square.max(f64::MIN_POSITIVE)).sqrt();
         let over_capture_std = rate_std * fitted.course.at(self.turns);
         let time_constant = self.time_constant(&fitted, noise, None);
+        let certain = self.is_borne_out(&fitted, &fitted.rates);
         Creep {
             course: fitted.course,
             rates: fitted.rates,
@@ -291,7 +296,7 @@ impl Sensor {
             over_capture_std,
             time_constant,
             turns: self.turns,
-            certain: true,
+            certain,
         }
     }
 
@@ -306,11 +311,16 @@ impl Sensor {
         let alike = partials.chance_of_agreement(fitted.shared, all) * (all.len() as f64) < AGREEMENT;
         let dof = self.observations - 1.0 - captures as f64 - extra(fitted.course);
         let white = partials.std(noise, 0);
-        let certain = captures > 1 && alike && dof >= 1.0 && fitted.shared.abs() > CERTAIN * white;
+        let rates = vec![fitted.shared; captures];
+        let certain = captures > 1
+            && alike
+            && dof >= 1.0
+            && fitted.shared.abs() > CERTAIN * white
+            && self.is_borne_out(fitted, &rates);
         let time_constant = self.time_constant(fitted, noise, Some(time_constant_std));
         Creep {
             course: fitted.course,
-            rates: vec![fitted.shared; captures],
+            rates,
             rate_std,
             shared: true,
             over_capture_std,
@@ -318,6 +328,24 @@ impl Sensor {
             turns: self.turns,
             certain,
         }
+    }
+
+    /// Whether the levels at the ends of the captures differ as a course says, in the captures together.
+    fn is_borne_out(&self, fitted: &Fitted, rates: &[f64]) -> bool {
+        let ends = |values: &mut dyn Iterator<Item = f64>| {
+            let values: Vec<f64> = values.collect();
+            let each = (self.alike.round() as usize).clamp(1, values.len().max(2) / 2);
+            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len().max(1) as f64;
+            mean(&values[values.len() - each..]) - mean(&values[..each])
+        };
+        // Weighed by what each capture should show: captures may creep up and down.
+        let (mut shown, mut said) = (0.0, 0.0);
+        for (capture, rate) in self.captures.iter().zip(rates) {
+            let expected = rate * ends(&mut capture.middles.iter().map(|turns| fitted.course.at(*turns)));
+            shown += expected * ends(&mut capture.means_um.iter().copied());
+            said += expected * expected;
+        }
+        shown > BORNE_OUT * said
     }
 
     /// τ and its standard uncertainty, where it is determined.

@@ -150,6 +150,7 @@ fn unexplained(stranger: &Stranger) -> Unexplained {
     let Stranger { x_mm, y_mm, points, farthest_nm, rms_nm } = stranger;
     let extent = |[from, to]: [f64; 2]| format!("{from:.3} to {to:.3} mm");
     Unexplained {
+        station: None,
         sensor: None,
         setup: None,
         orders: [0, 0],

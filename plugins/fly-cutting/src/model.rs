@@ -406,6 +406,7 @@ impl Fit for CutFit {
         let excess = left.rms.powi(2) - left.noise_floor.powi(2);
         let extent = |of: [f64; 2]| format!("{:.3} to {:.3} mm", of[0], of[1]);
         vec![Unexplained {
+            station: None,
             sensor: None,
             setup: None,
             orders: [0, 0],

@@ -206,6 +206,7 @@ impl SpatialError {
         }
         let by_um = solution.by_axis(jump.terms.iter().map(size), f64::NAN);
         Ok(Unexplained {
+            station: None,
             sensor: None,
             setup: None,
             orders: [0, 0],
@@ -240,6 +241,7 @@ impl SpatialError {
 fn together(campaign: &Campaign, group: &Group) -> Unexplained {
     let squares: f64 = group.by_um.iter().flatten().filter(|by| by.is_finite()).map(|by| by * by).sum();
     Unexplained {
+        station: None,
         sensor: None,
         setup: None,
         orders: [0, 0],

@@ -124,6 +124,10 @@ impl Harmonic {
     }
 }
 
+/// Gains that a channel may have over the declared one: a wrong range or unit is 10 times off. The bounds are reciprocal, since the gain of
+/// one sensor and the inverse one of its neighbour often explain the same.
+const GAINS: std::ops::RangeInclusive<f64> = 0.05..=20.0;
+
 impl Alterations {
     /// Whether a sign, a channel, a setup or a way of counting angles is not as declared.
     #[must_use]
@@ -141,7 +145,7 @@ impl Alterations {
     #[must_use]
     pub fn are_possible(&self) -> bool {
         let sensor = |sensor: &SensorAlteration| {
-            sensor.gain.abs() < 0.9 && sensor.angle_rad.abs() < 0.5 && sensor.inverse_cutoff > -0.1
+            GAINS.contains(&(1.0 + sensor.gain)) && sensor.angle_rad.abs() < 0.5 && sensor.inverse_cutoff > -0.1
         };
         let steepness = |setup: &SetupAlteration| -> f64 {
             setup.ripples.iter().map(|ripple| ripple.order as f64 * ripple.cosine.hypot(ripple.sine)).sum()

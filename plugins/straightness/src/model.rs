@@ -330,6 +330,7 @@ impl Fit for TracesFit {
         let worst = (0..data.traces.len()).map(|trace| (of(trace), trace)).max_by(|a, b| a.0.total_cmp(&b.0));
         let excess = self.remainder.rms.powi(2) - self.remainder.noise_floor.powi(2);
         let report = |(sum, trace): (f64, usize)| Unexplained {
+            station: None,
             sensor: None,
             setup: data
                 .candidates

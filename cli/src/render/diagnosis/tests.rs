@@ -101,13 +101,21 @@ fn diagnosed() -> Diagnosis {
         ],
         unexplained: vec![
             Unexplained {
+                station: None,
                 sensor: Some("S3".into()),
                 setup: Some("k2".into()),
                 orders: [3, 9],
                 rms_um: 0.0204,
                 place: "part angle 118…123°".into(),
             },
-            Unexplained { sensor: None, setup: None, orders: [5, 5], rms_um: 0.011, place: "all turns".into() },
+            Unexplained {
+                station: None,
+                sensor: None,
+                setup: None,
+                orders: [5, 5],
+                rms_um: 0.011,
+                place: "all turns".into(),
+            },
         ],
         refused: vec![Refused {
             effect: "speed-ripple".into(),

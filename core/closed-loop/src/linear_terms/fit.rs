@@ -319,6 +319,7 @@ impl Fit for LinearFit {
             let rms_um = rms(&self.data.members[group]);
             let name = &self.data.observations.groups[group];
             Unexplained {
+                station: None,
                 sensor: None,
                 setup: None,
                 orders: [0, 0],
@@ -342,6 +343,7 @@ impl Fit for LinearFit {
         let worst = groups.map(|(points, name)| (of(points), name)).max_by(|a, b| a.0.total_cmp(&b.0));
         let excess = self.remainder.rms.powi(2) - self.remainder.noise_floor.powi(2);
         let report = |(sum, name): (f64, &String)| Unexplained {
+            station: None,
             sensor: None,
             setup: None,
             orders: [0, 0],

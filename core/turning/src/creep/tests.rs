@@ -48,3 +48,17 @@ fn steady_levels_have_no_creep() {
     assert!(!creep(&[0.0; 3], Course::Straight).certain);
     assert!(creeps(&[vec![Levels::new((0..3).map(|turn| (turn, 0.0)))]])[0].is_none());
 }
+
+/// A line through a whole wave has a slope, and an averaged turn has nothing of it.
+#[test]
+fn a_wave_of_the_level_is_no_drift() {
+    for size_um in [1.0, 20.0] {
+        let wave = |capture: usize| {
+            let turns = levels(capture, 0.0, Course::Straight).means_um.into_iter().enumerate();
+            let at = |turn: usize| size_um * (std::f64::consts::TAU * (turn as f64 + 0.5) / 60.0).sin();
+            Levels::new(turns.map(|(turn, noise)| (turn, noise + at(turn))).collect::<Vec<_>>().into_iter())
+        };
+        let found = creeps(&[(0..3).map(wave).collect()])[0].clone().unwrap();
+        assert!(!found.certain, "{found:?}");
+    }
+}

@@ -110,6 +110,7 @@ pub(crate) fn level_steps(selection: &Selection, stations: &[Station], known: &[
                 let share = numbers.iter().filter(|number| **number > turn).count() as f64 / numbers.len() as f64;
                 let at = if stations.len() > 1 { format!(" of station {}", station.name) } else { String::new() };
                 found.push(Unexplained {
+                    station: None,
                     sensor: rig.sensors.get(sensor).map(|sensor| sensor.id.clone()),
                     setup: rig.setups.get(setup).map(|setup| setup.id.clone()),
                     orders: [0, 0],
@@ -301,6 +302,7 @@ impl Change {
         });
         let rig = &selection.rig;
         Unexplained {
+            station: None,
             sensor: rig.sensors.get(self.sensor).map(|sensor| sensor.id.clone()),
             setup: rig.setups.get(self.setup).map(|setup| setup.id.clone()),
             orders: [orders.iter().copied().min().unwrap_or(0), orders.iter().copied().max().unwrap_or(0)],

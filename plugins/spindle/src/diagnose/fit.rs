@@ -347,16 +347,12 @@ impl Fit for SpindleFit {
             others.sort_by(f64::total_cmp);
             let (rms_um, median) = (rms(&all[capture]), others[others.len() / 2]);
             Unexplained {
+                station: Some(self.shared.data[capture / setups].name.clone()),
                 sensor: None,
                 setup: self.shared.selection.rig.setups.get(capture % setups).map(|setup| setup.id.clone()),
                 orders: [1, self.max_order()],
                 rms_um: rms_um * (self.max_order() as f64).sqrt(),
-                place: format!(
-                    "station {}: {:.1} times the median of {} captures",
-                    self.shared.data[capture / setups].name,
-                    rms_um / median,
-                    all.len()
-                ),
+                place: format!("{:.1} times the median of {} captures", rms_um / median, all.len()),
             }
         });
         found.collect()
@@ -364,7 +360,14 @@ impl Fit for SpindleFit {
 
     fn unexplained(&self) -> Vec<Unexplained> {
         let rig = &self.shared.selection.rig;
-        let each = self.stations.iter().filter_map(|solved| strangers::where_from(solved, &self.layout, rig));
+        // Of several stations, those that are not sound; all where each of them is and they are not together.
+        let doubted = |solved: &Solved| solved.residual.checks.iter().any(Check::bars_verdict);
+        let any = self.stations.iter().any(doubted);
+        let stations = self.stations.iter().zip(&self.shared.data).filter(|(solved, _)| !any || doubted(solved));
+        let each = stations.filter_map(|(solved, data)| {
+            let station = (self.stations.len() > 1).then(|| data.name.clone());
+            Some(Unexplained { station, ..strangers::where_from(solved, &self.layout, rig)? })
+        });
         let mut found: Vec<Unexplained> = each.collect();
         found.sort_by(|a, b| b.rms_um.total_cmp(&a.rms_um));
         found

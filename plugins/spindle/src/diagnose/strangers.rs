@@ -65,6 +65,7 @@ pub(crate) fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<
         let sensors: BTreeSet<usize> = alike.iter().map(|index| place_of(index).0).collect();
         let one_setup = alike.iter().all(|index| place_of(index).1 == reading.setup);
         return Some(Unexplained {
+            station: None,
             sensor: None,
             setup: one_setup.then(|| rig.setups[reading.setup].id.clone()),
             orders: held(&left),
@@ -87,6 +88,7 @@ pub(crate) fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<
     let harmonics = &disturbance[best];
     let squares: Vec<f64> = harmonics.iter().map(Complex64::norm_sqr).collect();
     Some(Unexplained {
+        station: None,
         sensor: sensor.map(|index| rig.sensors[index].id.clone()),
         setup: setup.map(|index| rig.setups[index].id.clone()),
         orders: held(&squares),

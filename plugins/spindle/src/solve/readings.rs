@@ -6,6 +6,10 @@ use runout_core::{
 
 use crate::{layout::Layout, selection::Selection};
 
+/// Share of a channel's readings by which resampling may change each order of them. Recordings without noise, as simulators write them, would
+/// otherwise contradict every model by what they are computed with.
+const RESAMPLING: f64 = 1e-8;
+
 /// Averaged readings of one station: Re Σ uₙ e^{−inΦ}, with their covariance.
 #[derive(Debug, Clone)]
 pub(crate) struct Readings {
@@ -97,7 +101,7 @@ impl Readings {
             };
             ordered.iter().map(one).collect()
         };
-        Ok(Self {
+        let mut readings = Self {
             count: layout.readings.len(),
             max_order,
             samples_per_rev,
@@ -115,7 +119,27 @@ impl Readings {
                 .map(|(profile, channels)| profile.course.of_channels(channels, profile.channels()))
                 .collect(),
             places,
-        })
+        };
+        readings.add_resampling();
+        Ok(readings)
+    }
+
+    /// Adds to covariance and scatter what resampling does to turns that are all alike.
+    fn add_resampling(&mut self) {
+        let sensors = self.count / self.turns.len().max(1);
+        let mut squares = vec![0.0; self.count];
+        for order in self.mean.chunks_exact(self.count.max(1)).skip(1) {
+            squares.iter_mut().zip(order).for_each(|(sum, value)| *sum += value.norm_sqr());
+        }
+        for matrices in [&mut self.covariance, &mut self.scatter].into_iter().flatten() {
+            for (matrices, squares) in matrices.iter_mut().zip(squares.chunks_exact(sensors.max(1))) {
+                for matrix in matrices.chunks_exact_mut(sensors * sensors) {
+                    for (sensor, square) in squares.iter().enumerate() {
+                        matrix[sensor * (sensors + 1)] += RESAMPLING * RESAMPLING * square;
+                    }
+                }
+            }
+        }
     }
 
     /// Adds to the covariance of the averages what tones near whole orders put into them.

@@ -4,9 +4,18 @@
 //! α* = α − asin(t/ρ(α*)), at u = along + √(ρ(α*)² − t²) − R (`docs/physics.md` section 1). What exceeds the linear reading
 //! along + h(α) is h(α*) − h(α) − t²/(ρ + √(ρ² − t²)), written so that nothing cancels.
 
+#![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
+
 use std::f64::consts::TAU;
 
-use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
+use runout_core::{
+    Complex64,
+    numerics::{
+        fourier::Fourier,
+        lanes::{NullaryFnOnce, vectorised},
+    },
+    separation::Quantity,
+};
 
 use super::estimate::Estimate;
 use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
@@ -44,6 +53,8 @@ pub(crate) struct SecondOrder<'a> {
     turned: Vec<Complex64>,
     /// Part angles where lines meet the profile, rad, `[reading][angle]`.
     met_rad: Vec<f64>,
+    /// The same of one reading at all samples.
+    met_at: Vec<f64>,
 }
 
 impl<'a> SecondOrder<'a> {
@@ -64,6 +75,7 @@ impl<'a> SecondOrder<'a> {
             table: Vec::new(),
             turned: turns.map(|turn| Complex64::from_polar(1.0, -layout.direction * TAU * turn)).collect(),
             met_rad: Vec::new(),
+            met_at: Vec::new(),
         }
     }
 
@@ -84,7 +96,7 @@ impl<'a> SecondOrder<'a> {
         self.tabulate(estimate, max_order);
         let mut motions = Vec::new();
         let mut harmonics = vec![Complex64::ZERO; max_order + 1];
-        let mut curve = vec![0.0; samples];
+        let mut curve = Vec::with_capacity(samples);
         self.met_rad.clear();
         for (index, reading) in layout.readings.iter().enumerate() {
             // What the face does where it moves sideways is left linear: its slope across the axis is not known.
@@ -99,34 +111,30 @@ impl<'a> SecondOrder<'a> {
             }
             let [x, y, tilt_x, tilt_y] = &motions[reading.setup];
             let eccentricity = estimate.eccentricity(layout, reading.setup, reading.section);
+            let at_start = eccentricity * Complex64::from_polar(1.0, reading.part_angle_rad);
             let (sine, cosine) = reading.angle_rad.sin_cos();
             let lever = reading.lever_mm * UM_PER_MM_URAD;
-            let table = &self.table[reading.section];
-            let at_start = eccentricity * Complex64::from_polar(1.0, reading.part_angle_rad);
-            // Angles of the samples are a whole number of the table's steps apart: they share their weights.
-            let (first, weights) = weights_at(table.len(), reading.part_angle_rad);
-            for (step, value) in curve.iter_mut().enumerate() {
-                let part_angle = layout.part_angle_rad(reading, step, samples);
+            let across = |step: usize| {
                 // The eccentricity Re C e^{iα} is along the sensor's line; a quarter turn on, it is across.
                 let ahead = at_start * self.turned[step];
-                let across_motion = cosine * (y[step] - lever * tilt_x[step]) - sine * (x[step] + lever * tilt_y[step]);
-                let across = reading.motion_ratio * across_motion - ahead.im;
-                let steps = OVERSAMPLING * if layout.direction < 0.0 { step } else { samples - step };
-                let here = weighted(table, (first + steps) % table.len(), &weights);
-                let (mut there, mut met, mut sine_of_shift) = (here, part_angle, 0.0);
-                for _ in 0..ROUNDS {
-                    sine_of_shift = across / (self.radius_um + there);
-                    met = part_angle - arcsine(sine_of_shift);
-                    there = interpolate(table, met);
-                    if (there - here).powi(2) < SETTLED_UM * self.radius_um {
-                        break;
-                    }
-                }
-                if step % self.finer == 0 {
-                    self.met_rad.push(met);
-                }
-                *value = there - here - across * sagitta_of_sine(sine_of_shift);
-            }
+                let motion = cosine * (y[step] - lever * tilt_x[step]) - sine * (x[step] + lever * tilt_y[step]);
+                reading.motion_ratio * motion - ahead.im
+            };
+            let met = &mut self.met_at;
+            met.clear();
+            met.extend((0..samples).map(|step| layout.part_angle_rad(reading, step, samples)));
+            curve.clear();
+            curve.extend((0..samples).map(across));
+            let line = Line {
+                table: &self.table[reading.section],
+                start_rad: reading.part_angle_rad,
+                forwards: layout.direction < 0.0,
+                radius_um: self.radius_um,
+                curve: &mut curve,
+                met,
+            };
+            vectorised(line);
+            self.met_rad.extend(met.iter().step_by(self.finer));
             self.turn.analyse(curve.iter().copied(), &mut harmonics);
             for (order, harmonic) in harmonics.iter().enumerate() {
                 excess[order * count + index] = harmonic.conj();
@@ -193,6 +201,110 @@ impl<'a> SecondOrder<'a> {
     }
 }
 
+/// A sensor's line over a turn, several samples at a time.
+struct Line<'a> {
+    /// Form on the fine grid.
+    table: &'a [f64],
+    /// Part angle of the first sample, and whether it grows with the samples.
+    start_rad: f64,
+    forwards: bool,
+    radius_um: f64,
+    /// Of each sample, how far the part's axis is off across the line; then what the reading has more than the linear one.
+    curve: &'a mut [f64],
+    /// Part angle of each sample; then the angle that the line meets.
+    met: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Line<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { table, start_rad, forwards, radius_um, curve, met } = self;
+        let samples = curve.len();
+        // Angles of the samples are a whole number of the table's steps apart: they share their weights.
+        let (first, weights) = weights_at(table.len(), start_rad);
+        for (chunk, (curve, met)) in curve.chunks_mut(LANES).zip(met.chunks_mut(LANES)).enumerate() {
+            let (mut across, mut part_angle, mut here) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            across[..curve.len()].copy_from_slice(curve);
+            part_angle[..met.len()].copy_from_slice(met);
+            for (lane, here) in here.iter_mut().enumerate().take(curve.len()) {
+                let step = chunk * LANES + lane;
+                let from = first + OVERSAMPLING * if forwards { step } else { samples - step };
+                *here = weighted(table, if from >= table.len() { from - table.len() } else { from }, &weights);
+            }
+            let (mut there, mut meets, mut sine) = (here, part_angle, [0.0; LANES]);
+            for _ in 0..ROUNDS {
+                for lane in 0..LANES {
+                    sine[lane] = across[lane] / (radius_um + there[lane]);
+                }
+                let shift = arcsines(&sine);
+                for lane in 0..LANES {
+                    meets[lane] = part_angle[lane] - shift[lane];
+                }
+                there = interpolated(table, &meets);
+                let moved = (0..LANES).map(|lane| (there[lane] - here[lane]).powi(2)).fold(0.0, f64::max);
+                if moved < SETTLED_UM * radius_um {
+                    break;
+                }
+            }
+            for (lane, (value, met)) in curve.iter_mut().zip(met).enumerate() {
+                *value = there[lane] - here[lane] - across[lane] * sagitta_of_sine(sine[lane]);
+                *met = meets[lane];
+            }
+        }
+    }
+}
+
+/// Samples that are worked on at once.
+const LANES: usize = 8;
+
+/// [`interpolate`] at several angles.
+#[inline(always)]
+fn interpolated(table: &[f64], angles_rad: &[f64; LANES]) -> [f64; LANES] {
+    let length = table.len();
+    let mut position = [0.0; LANES];
+    for (position, angle_rad) in position.iter_mut().zip(angles_rad) {
+        let turns = angle_rad / TAU;
+        *position = (turns - turns.floor()) * length as f64;
+    }
+    let base = position.map(|position| position as usize);
+    let mut from_first = [0.0; LANES];
+    for lane in 0..LANES {
+        from_first[lane] = position[lane] - base[lane] as f64 + (POINTS / 2 - 1) as f64;
+    }
+    let mut weights = [[0.0; LANES]; POINTS];
+    let mut product = [1.0; LANES];
+    for (point, weight) in weights.iter_mut().enumerate() {
+        for lane in 0..LANES {
+            weight[lane] = LAGRANGE_WEIGHTS[point] * product[lane];
+            product[lane] *= from_first[lane] - point as f64;
+        }
+    }
+    product = [1.0; LANES];
+    for (point, weight) in weights.iter_mut().enumerate().rev() {
+        for lane in 0..LANES {
+            weight[lane] *= product[lane];
+            product[lane] *= from_first[lane] - point as f64;
+        }
+    }
+    let mut sums = [0.0; LANES];
+    for (lane, (sum, base)) in sums.iter_mut().zip(base).enumerate() {
+        let own: [f64; POINTS] = std::array::from_fn(|point| weights[point][lane]);
+        *sum = weighted(table, base + length - (POINTS / 2 - 1), &own);
+    }
+    sums
+}
+
+/// [`arcsine`] of several.
+#[inline(always)]
+fn arcsines(sines: &[f64; LANES]) -> [f64; LANES] {
+    if sines.iter().any(|sine| sine * sine >= SERIES) {
+        return sines.map(arcsine);
+    }
+    sines.map(arcsine_series)
+}
+
 impl Estimate {
     /// Eccentricity C of a section in a setup, reading Re C e^{+iα}, in µm.
     fn eccentricity(&self, layout: &Layout, setup: usize, section: usize) -> Complex64 {
@@ -210,6 +322,7 @@ pub(crate) fn interpolate(table: &[f64], angle_rad: f64) -> f64 {
 }
 
 /// Sum over the points of a periodic table from one on, which may be one turn beyond its end.
+#[inline(always)]
 fn weighted(table: &[f64], first: usize, weights: &[f64; POINTS]) -> f64 {
     let first = if first >= table.len() { first - table.len() } else { first };
     match table.get(first..first + POINTS) {
@@ -220,6 +333,7 @@ fn weighted(table: &[f64], first: usize, weights: &[f64; POINTS]) -> f64 {
 
 /// The first of the points of a periodic table that an angle lies between, which may be beyond its end, and the weights of
 /// all of them.
+#[inline(always)]
 pub(super) fn weights_at(length: usize, angle_rad: f64) -> (usize, [f64; POINTS]) {
     // Casts truncate; without SSE4.1 `floor` is a call, and this is the innermost loop.
     let turns = angle_rad / TAU;
@@ -244,19 +358,24 @@ pub(super) fn weights_at(length: usize, angle_rad: f64) -> (usize, [f64; POINTS]
 
 /// asin(x). Below 0.02 the series up to x⁷ leaves out less than 1e-16 of x.
 fn arcsine(x: f64) -> f64 {
-    let square = x * x;
-    if square < 4e-4 {
-        x * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0))))
-    } else {
-        x.asin()
-    }
+    if x * x < SERIES { arcsine_series(x) } else { x.asin() }
 }
+
+#[inline(always)]
+fn arcsine_series(x: f64) -> f64 {
+    let square = x * x;
+    x * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0))))
+}
+
+/// The square below which series are taken.
+const SERIES: f64 = 4e-4;
 
 /// (1 − √(1 − x²))/x, the sagitta over the distance from the centre line. Below 0.02 the series up to x⁷ leaves out less than
 /// 1e-14 of it.
+#[inline(always)]
 fn sagitta_of_sine(x: f64) -> f64 {
     let square = x * x;
-    if square < 4e-4 {
+    if square < SERIES {
         x * (0.5 + square * (0.125 + square * (0.0625 + square * (5.0 / 128.0))))
     } else {
         x / (1.0 + (1.0 - square).sqrt())
