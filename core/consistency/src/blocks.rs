@@ -114,10 +114,11 @@ impl Sums {
         let sums = split.column_iter().map(|column| dot(column.as_slice(), residual)).collect();
         if !basis.is_empty() {
             let span = DMatrix::from_fn(readings, basis.len(), |row, column| basis[column][row]);
-            let inside = span.tr_mul(&split);
+            // A product with a transposed matrix is several times as fast as `tr_mul`.
+            let inside = span.transpose() * &split;
             split -= span * inside;
         }
-        let covariance = split.tr_mul(&errors.times(&split));
+        let covariance = split.transpose() * errors.times(&split);
         Self { sums, covariance }
     }
 

@@ -77,7 +77,7 @@ pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
     let noise = (squares / below).sqrt();
     // Variance of a suspect's prediction, in units of the noise.
     let normal =
-        columns.tr_mul(&DMatrix::from_fn(count, basis.len(), |row, column| kept[row] * columns[(row, column)]));
+        columns.transpose() * DMatrix::from_fn(count, basis.len(), |row, column| kept[row] * columns[(row, column)]);
     let inverse = normal.try_inverse()?;
     let predicted = |row: usize| {
         let own = columns.row(row);
@@ -114,7 +114,7 @@ fn weighted(columns: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64
     }
     let scaled =
         DMatrix::from_fn(columns.nrows(), columns.ncols(), |row, column| weights[row] * columns[(row, column)]);
-    let normal = columns.tr_mul(&scaled);
+    let normal = columns.transpose() * &scaled;
     let found = normal.cholesky()?.solve(&scaled.tr_mul(values));
     Some(columns * found)
 }

@@ -1,6 +1,10 @@
 //! Orthogonal columns: fits, and what they predict of points left out.
 
+#![allow(clippy::inline_always, reason = "see `lanes`")]
+
 use nalgebra::{DMatrix, DVectorView, SymmetricEigen};
+
+use crate::lanes::{NullaryFnOnce, vectorised};
 
 /// A column whose part outside the span of those before it is smaller than this, relative, depends on them.
 const INDEPENDENT: f64 = 1e-9;
@@ -13,6 +17,25 @@ const LANES: usize = 8;
 /// Scalar product.
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() < LONG { summed(a, b) } else { vectorised(Dot(a, b)) }
+}
+
+/// Entries from which on wide registers are worth a choice between them.
+const LONG: usize = 64;
+
+struct Dot<'a>(&'a [f64], &'a [f64]);
+
+impl NullaryFnOnce for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        summed(self.0, self.1)
+    }
+}
+
+#[inline(always)]
+fn summed(a: &[f64], b: &[f64]) -> f64 {
     let count = a.len().min(b.len());
     let (a, a_rest) = a[..count].as_chunks::<LANES>();
     let (b, b_rest) = b[..count].as_chunks::<LANES>();
@@ -56,14 +79,30 @@ fn without_span<'a>(
     span: &(impl Iterator<Item = &'a Vec<f64>> + Clone),
     shares: &mut [f64],
 ) -> f64 {
-    for _ in 0..2 {
-        for (share, other) in shares.iter_mut().zip(span.clone()) {
-            let part = dot(other, column);
-            *share += part;
-            column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= part * other);
+    vectorised(WithoutSpan { column, span, shares })
+}
+
+struct WithoutSpan<'a, I> {
+    column: &'a mut [f64],
+    span: &'a I,
+    shares: &'a mut [f64],
+}
+
+impl<'a, I: Iterator<Item = &'a Vec<f64>> + Clone> NullaryFnOnce for WithoutSpan<'_, I> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let Self { column, span, shares } = self;
+        for _ in 0..2 {
+            for (share, other) in shares.iter_mut().zip(span.clone()) {
+                let part = summed(other, column);
+                *share += part;
+                column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= part * other);
+            }
         }
+        summed(column, column).sqrt()
     }
-    norm(column)
 }
 
 fn divide(column: &mut [f64], by: f64) {
