@@ -36,6 +36,8 @@ pub static ROWS: &[Kind] = &[
         Some(("nest-step", 0, 6.0)),
     ),
     rotary("the turn does not close by 40 std", |chance| r_test(chance, 0.0, 60.0), &["close"], None),
+    quadrature("independent errors", |chance| signal(chance, 0.0, independent)),
+    quadrature("independent errors, slow samples of one turn", |chance| signal(chance, 1.0, independent)),
     spatial("independent errors of 4 µm", |chance| plate(chance, 0.0, false), &[]),
     spatial("dz was not measured", |chance| plate(chance, 0.0, true), &["not measured"]),
 ];
@@ -100,6 +102,16 @@ const fn rotary(
 ) -> Kind {
     let there: &[&str] = if truth.is_some() { &["nest-step"] } else { &[] };
     Kind { domain: "rotary axis", trouble, pipeline: ROTARY, points, expected, there, truth }
+}
+
+const QUADRATURE: &str = r#"
+load = { plugin = "points", path = "points.csv" }
+separate = { plugin = "quadrature" }
+"#;
+
+const fn quadrature(trouble: &'static str, points: fn(&mut Chance) -> String) -> Kind {
+    let there = &["quadrature-offset", "harmonic-2-forward"];
+    Kind { domain: "quadrature", trouble, pipeline: QUADRATURE, points, expected: &[], there, truth: None }
 }
 
 const SPATIAL: &str = r#"
@@ -246,6 +258,20 @@ fn r_test(chance: &mut Chance, offset_um: f64, open_um: f64) -> String {
                 line(&mut text, format_args!("{ball},{pass},{degrees},{dx:.6},{dy:.6},{dz:.6}"));
             }
         }
+    }
+    text
+}
+
+/// 2000 samples of a circle of 500 counts, 4 counts off its centre; errors of 1 count in each signal. Over 40 turns, or over `turns` in order.
+fn signal(chance: &mut Chance, turns: f64, errors: Errors) -> String {
+    let mut text = String::from("phase_deg,radius_counts\n");
+    let count = 2000;
+    let [cosine_errors, sine_errors] = [(); 2].map(|()| errors(chance, count));
+    let turns = if turns > 0.0 { turns } else { 40.0 };
+    for (sample, (of_cosine, of_sine)) in cosine_errors.into_iter().zip(sine_errors).enumerate() {
+        let angle = TAU * turns * (sample as f64 + chance.between(0.0, 0.5)) / count as f64;
+        let [x, y] = [500.0 * angle.cos() + 4.0 + of_cosine, 500.0 * angle.sin() + of_sine];
+        line(&mut text, format_args!("{:.4},{:.3}", y.atan2(x).to_degrees().rem_euclid(360.0), x.hypot(y)));
     }
     text
 }

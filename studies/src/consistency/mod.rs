@@ -116,6 +116,7 @@ fn judge(kind: &Kind, chance: &mut Chance, folder: &Path) -> Result<(Summary, Di
         runout_rotary_axis::register,
         runout_spatial_error::register,
         runout_cylinder::register,
+        runout_quadrature::register,
         runout_straightness::register,
         runout_touch_probe::register,
     ] {
