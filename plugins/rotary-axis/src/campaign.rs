@@ -16,7 +16,7 @@ use crate::{
     config::RotaryAxisConfig,
     kinematics::turn,
     noise::{self, Noise},
-    solve::{Layout, Reading},
+    solve::{Column, Layout, Reading},
 };
 
 /// Commands closer than this are the same, in degrees.
@@ -150,15 +150,18 @@ impl Campaign {
                 Noise::Stated(std)
             }
             (None, None) => {
-                let lost_motion: Vec<Vector3<f64>> = readings
-                    .iter()
-                    .zip(&direction)
-                    .map(|(reading, direction)| {
-                        let place = turn(commands_deg[reading.command].to_radians()) * config.ball(used[reading.ball]);
-                        Vector3::z().cross(&place) * *direction
-                    })
-                    .collect();
-                noise::of_repeats(&readings, &of_turn, &order.time, &direction, &lost_motion)
+                // Lost motion of the axis, and a nest that is displaced by the direction.
+                let lost_motion = |(reading, direction): (&Reading, &f64)| {
+                    let place = turn(commands_deg[reading.command].to_radians()) * config.ball(used[reading.ball]);
+                    Vector3::z().cross(&place) * *direction
+                };
+                let displaced = |coordinate: usize| -> Column {
+                    let unit = Vector3::from_fn(|row, _| f64::from(u8::from(row == coordinate)));
+                    direction.iter().map(|direction| unit * *direction).collect()
+                };
+                let mut by_direction = vec![readings.iter().zip(&direction).map(lost_motion).collect()];
+                by_direction.extend((0..3).map(displaced));
+                noise::of_repeats(&readings, &of_turn, &order.time, &direction, &by_direction)
             }
         };
         if let Noise::Repeats { std_um, .. } = noise {

@@ -14,7 +14,6 @@ use runout_core::{
         diagnosis::{Diagnosis, Estimated, Moved, Unexplained, Verdict},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
-    numerics::least_squares::dot,
     points::Points,
     stage::{Outcome, PointDiagnosis, PointModel, PointSeparator},
     summary::NamedValue,
@@ -27,8 +26,9 @@ use crate::{
     effects::{CANDIDATES, Candidate, Shapes, TRIED, USUAL, tried},
     nest::{self, Nest},
     noise::Noise,
+    rows::Rows,
     scale::scale,
-    solve::{Column, Redundant, fit, redundant},
+    solve::{Column, fit, redundant},
 };
 
 /// Runs of the loop in which shapes settle, and the share of a change at which they are settled.
@@ -36,11 +36,6 @@ const MOST_RUNS: usize = 5;
 const SETTLED: f64 = 0.01;
 /// Sizes in what is usual of an effect that no machine has.
 const ABSURD: f64 = 1000.0;
-
-/// Place of a candidate among all.
-fn index_of(candidate: Candidate) -> usize {
-    CANDIDATES.iter().position(|known| *known == candidate).unwrap_or_default()
-}
 
 impl PointModel for RotaryAxis {
     fn effects(&self) -> Vec<Effect> {
@@ -66,17 +61,6 @@ impl PointModel for RotaryAxis {
         }
         self.report(points, &campaign, &declared, &before, &settings, run)
     }
-}
-
-/// The rows that the loop works with.
-struct Rows {
-    data: Redundant,
-    /// In `data.effects`, the first column of each candidate.
-    first: Vec<usize>,
-    /// And that of the first shape tried, of each.
-    tried: [usize; 6],
-    /// And those of errors of the nest.
-    nest: usize,
 }
 
 /// One run of the loop at fixed shapes.
@@ -127,48 +111,6 @@ impl Run {
             })
             .collect();
         nest::instead(&self.rows.data, &added, self.rows.nest)
-    }
-}
-
-impl Rows {
-    /// Shapes beside effects that were added: of one that was, its own; else the one that explains most of what is left.
-    fn shapes(&self, from: Shapes, added: &[Setting], grids: &[Vec<f64>; 6]) -> Shapes {
-        let mut next = from;
-        for candidate in CANDIDATES {
-            let Some(place) = candidate.shape() else { continue };
-            let own = index_of(candidate);
-            let fitted = added.iter().find(|setting| setting.effect == own);
-            if let (Some([drift, change]), Some([low, .., high])) =
-                (fitted.map(|setting| &setting.values[..]), grids[place].get(..))
-            {
-                let changed = next[place] + change / drift;
-                next[place] = if changed.is_finite() { changed.clamp(*low, *high) } else { next[place] };
-                continue;
-            }
-            let mut left = self.data.rows.clone();
-            for setting in added.iter().filter(|setting| setting.effect != own) {
-                for (column, value) in self.data.effects[self.first[setting.effect]..].iter().zip(&setting.values) {
-                    left.iter_mut().zip(column).for_each(|(entry, column)| *entry -= value * column);
-                }
-            }
-            remove(&self.data.declared, &mut left);
-            let gain = |index: usize| {
-                let mut column = self.data.effects[self.tried[place] + index].clone();
-                remove(&self.data.declared, &mut column);
-                let size = dot(&column, &column);
-                if size > 0.0 { dot(&column, &left).powi(2) / size } else { 0.0 }
-            };
-            let best = (0..grids[place].len()).max_by(|a, b| gain(*a).total_cmp(&gain(*b)));
-            next[place] = best.map_or(next[place], |index| grids[place][index]);
-        }
-        next
-    }
-}
-
-fn remove(basis: &[Vec<f64>], from: &mut [f64]) {
-    for column in basis {
-        let share = dot(column, from);
-        from.iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
     }
 }
 

@@ -101,7 +101,7 @@ impl Kind {
             Self::ThermalDrift => "readings drift along an axis in time: linearly or exponentially",
             Self::Backlash => "a rotary axis loses motion where its direction reverses",
             Self::NestByDirection => "a nest of sensors is displaced by the direction of approach: a cable pulls it",
-            Self::NestStep => "a nest of sensors, or the table, is displaced from a time on",
+            Self::NestStep => "a nest of sensors, the table or a ball is displaced from a time on",
         }
     }
 

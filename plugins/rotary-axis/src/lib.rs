@@ -20,6 +20,7 @@ mod nest;
 mod noise;
 mod paper;
 mod plan;
+mod rows;
 mod scale;
 mod separate;
 pub mod simulate;

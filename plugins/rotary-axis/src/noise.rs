@@ -3,7 +3,7 @@
 use nalgebra::{DVector, Vector3};
 use runout_core::{consistency::repeats::FEWEST, numerics::least_squares::least_norm};
 
-use crate::solve::Reading;
+use crate::solve::{Column, Reading};
 
 /// What the standard uncertainty of a reading comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,25 +28,25 @@ const FREEDOM_A_FUNCTION: usize = 12;
 /// Standard deviation of one coordinate from repeats of one ball at one command, which is the same in the same turn only.
 ///
 /// Each ball and command, approached in one direction, has a level of its own; a drift common to all, a polynomial of time in each
-/// coordinate, is fitted beside. Where no repeats share a direction, both directions share a level, and what lost motion of the
-/// rotary axis adds (`lost_motion`, of any size) is fitted, too.
+/// coordinate, is fitted beside. Where no repeats share a direction, both directions share a level, and what depends on the direction
+/// (`by_direction`, each of any size) is fitted, too.
 pub(crate) fn of_repeats(
     readings: &[Reading],
     turn: &[usize],
     time: &[f64],
     direction: &[f64],
-    lost_motion: &[Vector3<f64>],
+    by_direction: &[Column],
 ) -> Noise {
     let place = |index: usize| (readings[index].ball, readings[index].command, turn[index]);
-    let in_one_direction = scatter(readings, time, None, |index| (place(index), direction[index] > 0.0));
-    let found = in_one_direction.or_else(|| scatter(readings, time, Some(lost_motion), place));
+    let in_one_direction = scatter(readings, time, &[], |index| (place(index), direction[index] > 0.0));
+    let found = in_one_direction.or_else(|| scatter(readings, time, by_direction, place));
     found.unwrap_or(Noise::Unknown)
 }
 
 fn scatter<K: PartialEq>(
     readings: &[Reading],
     time: &[f64],
-    lost_motion: Option<&[Vector3<f64>]>,
+    others: &[Column],
     key: impl Fn(usize) -> K,
 ) -> Option<Noise> {
     let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
@@ -61,8 +61,7 @@ fn scatter<K: PartialEq>(
     let rows: usize = groups.iter().map(|(_, members)| members.len()).sum();
     let free = rows - groups.len();
     let powers = HIGHEST_POWER.min(free / FREEDOM_A_FUNCTION);
-    let others = usize::from(lost_motion.is_some());
-    let mut columns = vec![vec![0.0; 3 * rows]; 3 * powers + others];
+    let mut columns = vec![vec![0.0; 3 * rows]; 3 * powers + others.len()];
     let mut values = vec![0.0; 3 * rows];
     let mut row = 0;
     for (_, members) in &groups {
@@ -70,8 +69,8 @@ fn scatter<K: PartialEq>(
             members.iter().map(|member| of(*member)).sum::<Vector3<f64>>() / members.len() as f64
         };
         let reading = |member: usize| readings[member].value;
-        let lost = |member: usize| lost_motion.map_or_else(Vector3::zeros, |lost| lost[member]);
-        let (level, lost_level) = (mean(&reading), mean(&lost));
+        let level = mean(&reading);
+        let levels: Vec<Vector3<f64>> = others.iter().map(|other| mean(&|member| other[member])).collect();
         let functions = |member: &usize| legendre(2.0 * time[*member] - 1.0, powers);
         let drift_level = members.iter().map(functions).sum::<DVector<f64>>() / members.len() as f64;
         for member in members {
@@ -81,8 +80,8 @@ fn scatter<K: PartialEq>(
                 for (power, entry) in drift.iter().enumerate() {
                     columns[3 * power + coordinate][row] = *entry;
                 }
-                if others > 0 {
-                    columns[3 * powers][row] = lost(*member)[coordinate] - lost_level[coordinate];
+                for (column, (other, level)) in columns[3 * powers..].iter_mut().zip(others.iter().zip(&levels)) {
+                    column[row] = other[*member][coordinate] - level[coordinate];
                 }
                 row += 1;
             }

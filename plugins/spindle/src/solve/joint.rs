@@ -12,8 +12,9 @@ use runout_core::{Complex64, numerics::fourier::Fourier, separation::Quantity};
 
 use super::{
     algebra::apply,
+    interpolation::{POINTS, weights_at},
     operators::Operators,
-    second_order::{OVERSAMPLING, POINTS, weights_at},
+    second_order::OVERSAMPLING,
 };
 use crate::layout::Layout;
 
