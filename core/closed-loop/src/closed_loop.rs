@@ -274,7 +274,8 @@ impl<M: Model> Tracing<'_, M> {
         let mut believed = None;
         while believed.is_none() && !trials.is_empty() {
             let (effect, trial, evidence) = trials.remove(0);
-            let keys = keyed.keys(effect, &self.taken(effect, current, &trial.fit, &basis), count);
+            let found = trial.settings.last().map_or(&[][..], |last| &last.values);
+            let keys = keyed.keys(effect, found, &self.taken(effect, current, &trial.fit, &basis), count);
             // Each key has its own limit; the chance that is stated is the largest.
             let stated = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
             let by_keys = keys.refused.is_some();

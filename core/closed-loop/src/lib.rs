@@ -167,9 +167,9 @@ pub trait Fit {
     fn moves_readings(&self, _effect: usize) -> bool {
         false
     }
-    /// Chance of an effect's gain among those of the other members of its family ([`runout_consistency::keys::among_family`]): what it
-    /// explains elsewhere in the spectrum.
-    fn among_family(&self, _effect: usize) -> Option<f64> {
+    /// Chance of the gain of an effect, with the values that were `found`, among those of the other members of its family
+    /// ([`runout_consistency::keys::among_family`]): what it explains elsewhere in the spectrum.
+    fn among_family(&self, _effect: usize, _found: &[f64]) -> Option<f64> {
         None
     }
     /// Standard uncertainties of a fitted effect's parameters where the tests make them larger than the size of the residual does.

@@ -362,11 +362,10 @@ impl Fit for CutFit {
         }
     }
 
-    fn among_family(&self, effect: usize) -> Option<f64> {
-        let missing = MISSING.get(effect)?;
-        let [ratio, ..] = *self.starts(*missing).first()?;
+    fn among_family(&self, effect: usize, found: &[f64]) -> Option<f64> {
+        let tilts = MISSING.get(effect)?.line()?;
         let means = self.cells.means(&self.remainder.residual);
-        let (gains, place) = self.cells.spectrum(&means, ratio, missing.line()?, FEWEST_PERIODS);
+        let (gains, place) = self.cells.spectrum(&means, *found.first()?, tilts, FEWEST_PERIODS);
         among_family(&gains, place)
     }
 
