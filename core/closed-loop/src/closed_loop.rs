@@ -275,7 +275,8 @@ impl<M: Model> Tracing<'_, M> {
         while believed.is_none() && !trials.is_empty() {
             let (effect, trial, evidence) = trials.remove(0);
             let found = trial.settings.last().map_or(&[][..], |last| &last.values);
-            let keys = keyed.keys(effect, found, &self.taken(effect, current, &trial.fit, &basis), count);
+            let taken = self.taken(effect, current, &trial.fit, &basis);
+            let keys = keyed.keys(effect, [found, &trial.fit.residual], &taken, count);
             // Each key has its own limit; the chance that is stated is the largest.
             let stated = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
             let by_keys = keys.refused.is_some();

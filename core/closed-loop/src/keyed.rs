@@ -49,8 +49,14 @@ impl<'a, F: Fit> Keyed<'a, F> {
         Some(models.explained(&tested))
     }
 
-    /// The keys of an effect with the values that were `found`, of which `columns` are orthonormal in the residual's coordinates.
-    pub(super) fn keys(&self, effect: usize, found: &[f64], columns: &[Vec<f64>], candidates: usize) -> Keys {
+    /// The keys of an effect whose fit has these values and leaves this; `columns` are orthonormal in the residual's coordinates.
+    pub(super) fn keys(
+        &self,
+        effect: usize,
+        [found, left]: [&[f64]; 2],
+        columns: &[Vec<f64>],
+        candidates: usize,
+    ) -> Keys {
         let tested: Vec<Vec<f64>> = columns.iter().map(|column| self.fit.tested(column)).collect();
         let squares = |columns: &[Vec<f64>]| columns.iter().map(|column| dot(column, column)).sum::<f64>();
         let candidates = candidates.saturating_mul(self.fit.tried(effect).max(1));
@@ -61,7 +67,7 @@ impl<'a, F: Fit> Keyed<'a, F> {
             let own = orthonormal(tested, &self.fixed, INDEPENDENT);
             keys(&own, candidates, &self.residual, &self.fixed, self.structure(), self.models.as_ref())
         };
-        match self.fit.among_family(effect, found) {
+        match self.fit.among_family(effect, found, left) {
             Some(p) => keys.beside_family(p),
             None => keys,
         }

@@ -168,8 +168,8 @@ pub trait Fit {
         false
     }
     /// Chance of the gain of an effect, with the values that were `found`, among those of the other members of its family
-    /// ([`runout_consistency::keys::among_family`]): what it explains elsewhere in the spectrum.
-    fn among_family(&self, _effect: usize, _found: &[f64]) -> Option<f64> {
+    /// ([`runout_consistency::keys::among_family`]): what they explain of what it leaves, `left`.
+    fn among_family(&self, _effect: usize, _found: &[f64], _left: &[f64]) -> Option<f64> {
         None
     }
     /// Standard uncertainties of a fitted effect's parameters where the tests make them larger than the size of the residual does.

@@ -362,10 +362,14 @@ impl Fit for CutFit {
         }
     }
 
-    fn among_family(&self, effect: usize, found: &[f64]) -> Option<f64> {
-        let tilts = MISSING.get(effect)?.line()?;
-        let means = self.cells.means(&self.remainder.residual);
-        let (gains, place) = self.cells.spectrum(&means, *found.first()?, tilts, FEWEST_PERIODS);
+    /// Neighbours count by what they explain beside the line: a line that buries passes makes some of its own.
+    fn among_family(&self, effect: usize, found: &[f64], left: &[f64]) -> Option<f64> {
+        let (tilts, ratio) = (MISSING.get(effect)?.line()?, *found.first()?);
+        let spectrum =
+            |residual: &[f64]| self.cells.spectrum(&self.cells.means(residual), ratio, tilts, FEWEST_PERIODS);
+        let (own, place) = spectrum(&self.remainder.residual);
+        let (mut gains, _) = spectrum(left);
+        *gains.get_mut(place)? = *own.get(place)?;
         among_family(&gains, place)
     }
 
