@@ -15,8 +15,6 @@ const MOST: usize = 6000;
 const OF_PASS: [usize; 2] = [8, 200];
 /// Groups of neighbouring passes that have to agree on an effect, at most.
 const MOST_GROUPS: usize = 12;
-/// Steps of the spectrum within which a line leaks.
-const MIRRORED: f64 = 2.0;
 
 /// One mean.
 #[derive(Debug, Clone, Copy)]
@@ -134,8 +132,7 @@ impl Cells {
     }
 
     /// What lines explain of the means at a ratio and at others that passes resolve, with the place of the ratio among them: up to a factor, in
-    /// the order of the ratios. They have at least `fewest` periods over the map. The mirror image, r and 1 − r a turn, is left out: one pass
-    /// a turn tells them apart by their course across the passes only.
+    /// the order of the ratios. They have at least `fewest` periods over the map.
     pub(crate) fn spectrum(&self, means: &[f64], ratio: f64, tilts: bool, fewest: f64) -> (Vec<f64>, usize) {
         let step = 1.0 / self.passes.max(1) as f64;
         let whole = ratio.floor();
@@ -151,11 +148,7 @@ impl Cells {
             };
             self.all.iter().zip(means).map(term).sum::<Complex64>().norm_sqr()
         };
-        let mirror = (1.0 - 2.0 * own) / step;
         let offsets = (0..=(below + above) as usize).map(|index| index as f64 - below);
-        let kept = offsets.filter(|offset| offset.abs() < MIRRORED || (offset - mirror).abs() >= MIRRORED);
-        let kept: Vec<f64> = kept.collect();
-        let place = kept.iter().filter(|offset| **offset < 0.0).count();
-        (kept.into_iter().map(at).collect(), place)
+        (offsets.map(at).collect(), below as usize)
     }
 }

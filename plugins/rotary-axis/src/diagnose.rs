@@ -50,6 +50,13 @@ impl PointModel for RotaryAxis {
         let declared = self.separate(points)?;
         let before = fit(&campaign.layout, &campaign.readings, &[]).map_err(failure)?.residual;
         let mut settings = settings.clone();
+        let is_step = |known: &&Setting| matches!(CANDIDATES.get(known.effect), Some(Candidate::Step(_)));
+        if settings.known.iter().filter(is_step).any(|known| known.values.get(1).is_none_or(|at| *at <= 0.0)) {
+            let problem = "the known `nest-step` has no time".to_owned();
+            return Err(failure(problem)
+                .of(ErrorKind::Configuration)
+                .help("add `at`, the share of the campaign before it: `values = { step = 6.0, at = 0.5 }`"));
+        }
         self.take_known(&mut campaign, &settings.known);
         // What is taken from the readings is known with 0 more of it, and not looked for.
         settings.known.iter_mut().for_each(|known| known.values.iter_mut().for_each(|value| *value = 0.0));

@@ -3,7 +3,7 @@
 use runout_core::{model::Setting, numerics::least_squares::dot};
 
 use crate::{
-    effects::{CANDIDATES, Candidate, Shapes},
+    effects::{CANDIDATES, Shapes},
     solve::Redundant,
 };
 
@@ -22,9 +22,8 @@ impl Rows {
     /// Shapes beside effects that were added: of one that was, its own; else the one that explains most of what is left.
     pub(crate) fn shapes(&self, from: Shapes, added: &[Setting], grids: &[Vec<f64>; 6]) -> Shapes {
         let mut next = from;
-        for candidate in CANDIDATES {
+        for (own, candidate) in CANDIDATES.iter().enumerate() {
             let Some(place) = candidate.shape() else { continue };
-            let own = index_of(candidate);
             let fitted = added.iter().find(|setting| setting.effect == own);
             if let (Some([drift, change]), Some([low, .., high])) =
                 (fitted.map(|setting| &setting.values[..]), grids[place].get(..))
@@ -58,9 +57,4 @@ fn remove(basis: &[Vec<f64>], from: &mut [f64]) {
         let share = dot(column, from);
         from.iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
     }
-}
-
-/// Place of a candidate among all.
-fn index_of(candidate: Candidate) -> usize {
-    CANDIDATES.iter().position(|known| *known == candidate).unwrap_or_default()
 }

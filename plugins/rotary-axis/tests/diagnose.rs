@@ -291,4 +291,9 @@ fn known_effects_are_taken_out() {
     assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor);
     let [number, std] = value(&found.after, "EB0C");
     assert!((number - 34.6).abs() < 4.5 * std, "{number} {std}");
+    // A step without its time is no step.
+    let effect = model.effects().iter().position(|effect| effect.id == "nest-step").unwrap();
+    let known = vec![runout_core::model::Setting { effect, values: vec![6.0, 0.0] }];
+    let refused = model.diagnose(&points, &Settings { known, ..Settings::default() }).unwrap_err().to_string();
+    assert!(refused.contains("`nest-step` has no time"), "{refused}");
 }

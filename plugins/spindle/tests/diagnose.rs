@@ -110,6 +110,41 @@ fn a_gain_is_found_with_its_partner() {
     finds(effect, "sensor-gain", Some("S1"), ("gain", 0.017), 0.04);
 }
 
+/// A gain of 2 and one of 1/2 of its partner are as likely: neither is out of bounds.
+#[test]
+fn a_large_gain_is_found_with_its_partner() {
+    for gain in [1.0, -0.8] {
+        let effect = format!(r#"[{{"plugin":"sensor-gain","targets":["S2"],"relative_gain":{gain}}}]"#);
+        let (found, [before, after]) = diagnosed(&campaign(3, &effect));
+        println!("simulated, gain {gain}: form error {before:.4} → {after:.4} µm, {:?}", found.diagnosis.added);
+        let named: Vec<String> = found
+            .diagnosis
+            .added
+            .iter()
+            .flat_map(|one| {
+                std::iter::once(format!("{} {}", one.effect, one.targets.join(" "))).chain(one.confounded_with.clone())
+            })
+            .collect();
+        assert!(named.contains(&"sensor-gain S2".to_owned()), "{named:?}");
+        assert!(after <= 1.01 * before, "{before} → {after}");
+    }
+}
+
+/// Turns that are all alike, as a simulator without noise writes them, have the noise of their resampling only.
+#[test]
+fn an_effect_is_found_without_noise() {
+    let mut config = campaign(1, r#"[{"plugin":"reversal-angle","targets":["b"],"angle_deg":0.34}]"#);
+    config.noise.rms_um = 0.0;
+    config.asynchronous.rms_um = None;
+    let (found, [before, after]) = diagnosed(&config);
+    println!("simulated, no noise: form error {before:.1e} → {after:.1e} µm, {:?}", found.diagnosis.added);
+    assert_eq!(found.diagnosis.verdict, Verdict::Explained, "{:?}", found.diagnosis.unexplained);
+    // Lines of single turns have no such floor yet: one of 1e-10 µm may stand beside it.
+    let added = &found.diagnosis.added[0];
+    assert!(added.effect == "reversal-angle" && (added.parameters[0].value - 0.34).abs() < 1e-5, "{added:?}");
+    assert!(after < 1e-4 * before, "{before} → {after}");
+}
+
 #[test]
 fn a_characteristic_is_found() {
     let effect = r#"[{"plugin":"sensor-nonlinearity","targets":["S2"],"quadratic_per_um":0.0017}]"#;
