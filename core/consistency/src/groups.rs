@@ -57,12 +57,19 @@ pub fn compared(groups: &[Group], level: Level) -> Vec<Compared> {
             Level::Known { variance, dof } => (variance, dof),
         };
         let ratio = group.squares / group.freedom / variance.max(f64::MIN_POSITIVE);
-        let [above, under] = if below.is_finite() {
-            [f_tail(ratio, group.freedom, below), f_tail(ratio.recip(), below, group.freedom)]
+        let tail = if below.is_infinite() {
+            let [above, under] = chi2_above_and_below(ratio * group.freedom, group.freedom);
+            above.min(under)
         } else {
-            chi2_above_and_below(ratio * group.freedom, group.freedom)
+            // The tail on the side of the ratio is computed, the other one is its complement.
+            let tail = if ratio > 1.0 {
+                f_tail(ratio, group.freedom, below)
+            } else {
+                f_tail(ratio.recip(), below, group.freedom)
+            };
+            tail.min(1.0 - tail)
         };
-        let p = (2.0 * above.min(under) * judged.len() as f64).min(1.0);
+        let p = (2.0 * tail * judged.len() as f64).min(1.0);
         Compared { group: *index, ratio, dof: [group.freedom, below], p }
     };
     judged.iter().map(one).collect()
@@ -75,7 +82,12 @@ const LEAST_FREEDOM: f64 = 0.5;
 /// below the others may come from.
 #[must_use]
 pub fn alike(what: &str, groups: &[Group], level: Level, why: &str) -> Vec<Check> {
-    let mut all = compared(groups, level);
+    said(what, groups, compared(groups, level), level, why)
+}
+
+/// The same of groups that are [`compared`] already.
+#[must_use]
+pub fn said(what: &str, groups: &[Group], mut all: Vec<Compared>, level: Level, why: &str) -> Vec<Check> {
     all.sort_by(|a, b| a.p.total_cmp(&b.p).then(a.group.cmp(&b.group)));
     let others = if level == Level::Others { "the others" } else { "the noise" };
     let found = all.iter().enumerate().filter(|(rank, one)| *rank == 0 || one.p < FINDING);

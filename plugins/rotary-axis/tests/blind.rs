@@ -49,7 +49,7 @@ fn random_campaigns_are_diagnosed() {
     let (mut visible, mut named, mut alarms, mut clean) = (0, 0, 0, 0);
     let (mut strangers, mut unexplained) = (0, 0);
     let mut location = [0.0; 2];
-    for seed in 0..150 {
+    for seed in 0..60 {
         let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
         let mut own = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
         let truth = [own(-50.0, 50.0), own(-50.0, 50.0), own(-80.0, 80.0), own(-80.0, 80.0)];

@@ -66,12 +66,18 @@ fn turns_against_the_mark(table: &TurnTable) -> Found {
         .map(|(now, before)| now * before.conj())
         .sum();
     let turned = |by_rad: f64, channel: usize| {
-        mean(table.series(1, channel).enumerate().map(move |(row, value)| value * Complex64::cis(-by_rad * row as f64)))
+        // Rounding of a power of a few hundred is 1e-13.
+        let step = Complex64::cis(-by_rad);
+        let turns = std::iter::successors(Some(Complex64::ONE), move |turned| Some(turned * step));
+        mean(table.series(1, channel).zip(turns).map(|(value, turned)| value * turned))
     };
-    let power = |by_rad: &f64| (0..table.channels).map(|channel| turned(*by_rad, channel).norm_sqr()).sum::<f64>();
+    let power = |by_rad: f64| (0..table.channels).map(|channel| turned(by_rad, channel).norm_sqr()).sum::<f64>();
     let step = REACH * TAU / (TRIED * rows) as f64;
     let tried = (0..=2 * TRIED).map(|place| lag.arg() + step * (place as f64 - TRIED as f64));
-    let by_rad = tried.max_by(|a, b| power(a).total_cmp(&power(b))).unwrap_or(0.0);
+    let by_rad = tried
+        .map(|by_rad| (power(by_rad), by_rad))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(0.0, |(_, by_rad)| by_rad);
     let coherence = |by_rad: f64, channel: usize| {
         let rms = (table.series(1, channel).map(|value| value.norm_sqr()).sum::<f64>() / rows as f64).sqrt();
         if rms > 0.0 { turned(by_rad, channel).norm() / rms } else { 1.0 }

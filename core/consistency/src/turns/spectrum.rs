@@ -26,6 +26,9 @@ impl Spectrum {
         let mut harmonics = [vec![Complex64::ZERO; rows], vec![Complex64::ZERO; rows]];
         let mut mirrored = vec![0.0; 2 * rows];
         let scale = (0.5 * rows as f64).sqrt();
+        // The rows' mirror image lies half a row behind.
+        let turned = |component: usize| scale * Complex64::cis(-PI * component as f64 / (2 * rows) as f64);
+        let turned: Vec<Complex64> = (0..rows).map(turned).collect();
         let mut found = Self { windows: Vec::new(), slow: Vec::new(), alternating: Vec::new() };
         for order in 1..=table.orders {
             let mut power = vec![0.0; rows];
@@ -42,8 +45,7 @@ impl Spectrum {
                     fourier.analyse_in_place(&mut mirrored, harmonics);
                 }
                 for (component, power) in power.iter_mut().enumerate().skip(1) {
-                    let turned = Complex64::cis(-PI * component as f64 / (2 * rows) as f64);
-                    let [re, im] = [0, 1].map(|part: usize| scale * (turned * harmonics[part][component]).re);
+                    let [re, im] = [0, 1].map(|part: usize| (turned[component] * harmonics[part][component]).re);
                     *power += re * re + im * im;
                     if let Some(slow) = slow.get_mut(component - 1) {
                         slow[channel] = Complex64::new(re, im);

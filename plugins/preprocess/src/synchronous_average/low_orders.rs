@@ -19,9 +19,10 @@ pub(super) struct LowOrders {
     angles: usize,
     /// First angle of each sector, and of what follows.
     edges: Vec<usize>,
-    /// What a sector's sum is taken times, `[order from 1][sector]`.
+    /// What a sector's sum is taken times, `[sector][order from 1]`.
     waves: Vec<Complex64>,
-    sums: Vec<f64>,
+    /// Coefficients of one turn of one channel, by order from 1.
+    turn: Vec<Complex64>,
     table: TurnTable,
     /// Turns in the last row.
     filled: usize,
@@ -34,8 +35,10 @@ impl LowOrders {
         let sectors = SECTORS.min(angles);
         let orders = ORDERS.min(orders - 1).min(sectors.saturating_sub(1) / 2);
         let edges: Vec<usize> = (0..=sectors).map(|sector| sector * angles / sectors).collect();
+        let phases: Vec<Complex64> =
+            (0..angles).map(|angle| Complex64::cis(TAU * angle as f64 / angles as f64)).collect();
         let mean = |order: usize, sector: &[usize]| {
-            let phase = |angle: usize| Complex64::cis(TAU * (order * angle) as f64 / angles as f64);
+            let phase = |angle: usize| phases[order * angle % angles];
             (sector[0]..sector[1]).map(phase).sum::<Complex64>() / (sector[1] - sector[0]).max(1) as f64
         };
         let waves = |order: usize| {
@@ -43,21 +46,22 @@ impl LowOrders {
             let lengths = edges.windows(2).map(|sector| (sector[1] - sector[0]) as f64);
             // A wave of this order keeps its size; a level has none of it.
             let kept: f64 = means.iter().zip(lengths).map(|(mean, length)| length * mean.norm_sqr()).sum();
-            means.into_iter().map(move |mean| mean * (2.0 / kept))
+            means.into_iter().map(move |mean| mean * (2.0 / kept)).collect::<Vec<_>>()
         };
+        let waves: Vec<Vec<Complex64>> = (1..=orders).map(waves).collect();
         Self {
             angles,
-            waves: (1..=orders).flat_map(waves).collect(),
-            sums: vec![0.0; sectors],
+            waves: (0..sectors).flat_map(|sector| waves.iter().map(move |wave| wave[sector])).collect(),
+            turn: vec![Complex64::ZERO; orders],
             edges,
             table: TurnTable { together: planned.div_ceil(MOST_ROWS).max(1), orders, channels, ..TurnTable::default() },
             filled: 0,
         }
     }
 
-    /// Takes the readings of a turn, `[channel][angle]`, and their mean levels.
-    pub(super) fn take(&mut self, number: usize, readings: &[f64], levels_um: &[f64]) {
-        let Self { angles, edges, waves, sums, table, filled } = self;
+    /// Takes the readings of a turn, `[channel][angle]`, and appends their mean levels.
+    pub(super) fn take(&mut self, number: usize, readings: &[f64], levels_um: &mut Vec<f64>) {
+        let Self { angles, edges, waves, turn, table, filled } = self;
         let row = table.orders * table.channels;
         if *filled == 0 {
             table.turns.push(number);
@@ -65,24 +69,23 @@ impl LowOrders {
             table.coefficients.resize(table.coefficients.len() + row, Complex64::ZERO);
         }
         let share = 1.0 / table.together as f64;
-        let levels = table.levels_um.iter_mut().rev().zip(levels_um.iter().rev());
-        levels.take(table.channels).for_each(|(sum, level)| *sum += share * level);
         let start = table.coefficients.len() - row;
         let target = &mut table.coefficients[start..];
+        let first = table.levels_um.len() - table.channels;
         for (channel, readings) in readings.chunks_exact(*angles).enumerate() {
-            for (sum, sector) in sums.iter_mut().zip(edges.windows(2)) {
-                *sum = share * sum_of(&readings[sector[0]..sector[1]]);
+            turn.fill(Complex64::ZERO);
+            let mut whole = 0.0;
+            // Orders side by side: none of them waits for the sum before it.
+            for (number, sector) in edges.windows(2).enumerate() {
+                let sum = sum_of(&readings[sector[0]..sector[1]]);
+                whole += sum;
+                turn.iter_mut().zip(&waves[number * table.orders..]).for_each(|(turn, wave)| *turn += wave * sum);
             }
-            for (waves, target) in
-                waves.chunks_exact(sums.len()).zip(target[channel..].iter_mut().step_by(table.channels))
-            {
-                let [mut re, mut im] = [target.re, target.im];
-                for (wave, sum) in waves.iter().zip(&*sums) {
-                    re += wave.re * sum;
-                    im += wave.im * sum;
-                }
-                *target = Complex64::new(re, im);
-            }
+            let level = whole / *angles as f64;
+            levels_um.push(level);
+            table.levels_um[first + channel] += share * level;
+            let of_channel = target[channel..].iter_mut().step_by(table.channels);
+            of_channel.zip(&*turn).for_each(|(target, turn)| *target += turn * share);
         }
         *filled = (*filled + 1) % table.together;
     }
@@ -101,7 +104,7 @@ impl LowOrders {
 
 /// Sum of a few values: the compiler keeps the order of additions.
 fn sum_of(values: &[f64]) -> f64 {
-    const LANES: usize = 4;
+    const LANES: usize = 8;
     let mut sums = [0.0; LANES];
     let chunks = values.chunks_exact(LANES);
     let rest: f64 = chunks.remainder().iter().sum();
@@ -128,10 +131,11 @@ mod tests {
                     .map(|angle| amplitude * wave(3, angle, 0.7))
                     .chain((0..angles).map(|angle| 5.0 + wave(4, angle, 0.2)))
                     .collect();
-                low.take(turn, &readings, &[0.0, 5.0]);
+                low.take(turn, &readings, &mut Vec::new());
             }
             let table = low.table();
-            assert_eq!((table.turns.len(), table.levels_um[5]), (3, 5.0));
+            assert_eq!(table.turns.len(), 3);
+            assert!((table.levels_um[5] - 5.0).abs() < 1e-12, "{}", table.levels_um[5]);
             let at = |turn: usize, order: usize, channel: usize| {
                 table.coefficients[(turn * table.orders + order - 1) * 2 + channel]
             };
@@ -153,7 +157,7 @@ mod tests {
         let mut low = LowOrders::new(size, 1200);
         for turn in 0..1200 {
             let value = |angle: usize| turn as f64 * (TAU * angle as f64 / 64.0).cos();
-            low.take(turn, &(0..64).map(value).collect::<Vec<_>>(), &[1.0]);
+            low.take(turn, &(0..64).map(value).collect::<Vec<_>>(), &mut Vec::new());
         }
         let table = low.table();
         assert_eq!((table.together, table.turns.len(), table.turns[1]), (3, 400, 3));

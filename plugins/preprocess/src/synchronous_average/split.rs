@@ -30,8 +30,6 @@ pub(super) struct Means {
     pending: usize,
     /// Of so many turns, one is looked at.
     stride: usize,
-    /// Equal angles of a turn.
-    angles: usize,
     levels: TurnLevels,
     low_orders: LowOrders,
 }
@@ -75,7 +73,6 @@ impl Means {
             readings,
             pending: 0,
             stride: stride.max(1),
-            angles: size.angles,
             levels: TurnLevels::default(),
             low_orders: LowOrders::new(size, planned),
         }
@@ -108,9 +105,7 @@ impl Means {
         let taken = self.turns();
         let readings = &self.waiting[self.pending * self.readings..][..self.readings];
         self.levels.numbers.push(turn.number);
-        let before = self.levels.levels_um.len();
-        self.levels.levels_um.extend(readings.chunks_exact(self.angles).map(mean));
-        self.low_orders.take(turn.number, readings, &self.levels.levels_um[before..]);
+        self.low_orders.take(turn.number, readings, &mut self.levels.levels_um);
         self.pending += 1;
         if looked_at {
             self.whole.look_at(harmonics);
@@ -188,19 +183,6 @@ impl Means {
             turns: parts.turns.clone(),
         })
     }
-}
-
-/// Mean of readings.
-fn mean(readings: &[f64]) -> f64 {
-    /// Sums side by side: the compiler keeps the order of additions.
-    const LANES: usize = 8;
-    let mut sums = [0.0; LANES];
-    let chunks = readings.chunks_exact(LANES);
-    let rest: f64 = chunks.remainder().iter().sum();
-    for chunk in chunks {
-        sums.iter_mut().zip(chunk).for_each(|(sum, value)| *sum += value);
-    }
-    (sums.iter().sum::<f64>() + rest) / readings.len().max(1) as f64
 }
 
 /// Leaves out the orders from `orders` on.

@@ -92,35 +92,41 @@ fn in_capture(profile: &Profile, setup: usize, channels: &[usize], creeping: &[O
     Some(Change { setup, sensor, turn: turns.numbers[turn], by: by.collect() })
 }
 
-/// Steps of the level of a sensor in a capture, but those of `known` changes.
-pub(crate) fn level_steps(selection: &Selection, stations: &[Station], known: &[&Change]) -> Vec<Unexplained> {
-    let rig = &selection.rig;
+/// Steps of the level of a sensor in a station's captures, but those of `known` changes.
+pub(crate) fn level_steps(selection: &Selection, station: &Station, known: &[Change]) -> Vec<Unexplained> {
     let mut found = Vec::new();
-    for station in stations {
-        for (setup, id) in selection.setups.iter().enumerate() {
-            let Some(profile) = station.profiles.iter().find(|profile| profile.setup == *id) else { continue };
-            for (sensor, id) in selection.sensors.iter().enumerate() {
-                let Some(channel) = profile.sensors.iter().position(|found| found == id) else { continue };
-                let step = level_step(&profile.levels, channel, profile.channels());
-                let Some(LevelStep { turn, by_um, .. }) = step else { continue };
-                if known.iter().any(|change| (change.setup, change.sensor) == (setup, sensor)) {
-                    continue;
-                }
-                let numbers = &profile.levels.numbers;
-                let share = numbers.iter().filter(|number| **number > turn).count() as f64 / numbers.len() as f64;
-                let at = if stations.len() > 1 { format!(" of station {}", station.name) } else { String::new() };
-                found.push(Unexplained {
-                    station: None,
-                    sensor: rig.sensors.get(sensor).map(|sensor| sensor.id.clone()),
-                    setup: rig.setups.get(setup).map(|setup| setup.id.clone()),
-                    orders: [0, 0],
-                    rms_um: by_um.abs() * (share * (1.0 - share)).sqrt(),
-                    place: format!("the level steps by {by_um:+.2} µm at turn {turn}{at}"),
-                });
+    for (setup, id) in selection.setups.iter().enumerate() {
+        let Some(profile) = station.profiles.iter().find(|profile| profile.setup == *id) else { continue };
+        for (sensor, id) in selection.sensors.iter().enumerate() {
+            let Some(channel) = profile.sensors.iter().position(|found| found == id) else { continue };
+            let step = level_step(&profile.levels, channel, profile.channels());
+            let Some(LevelStep { turn, by_um, .. }) = step else { continue };
+            if known.iter().any(|change| (change.setup, change.sensor) == (setup, sensor)) {
+                continue;
             }
+            let numbers = &profile.levels.numbers;
+            let share = numbers.iter().filter(|number| **number > turn).count() as f64 / numbers.len() as f64;
+            found.push(Unexplained {
+                rms_um: by_um.abs() * (share * (1.0 - share)).sqrt(),
+                place: format!("the level steps by {by_um:+.2} µm at turn {turn}"),
+                ..reading(selection, setup, sensor)
+            });
         }
     }
     found
+}
+
+/// A reading of which nothing is said yet.
+fn reading(selection: &Selection, setup: usize, sensor: usize) -> Unexplained {
+    let rig = &selection.rig;
+    Unexplained {
+        station: None,
+        sensor: rig.sensors.get(sensor).map(|sensor| sensor.id.clone()),
+        setup: rig.setups.get(setup).map(|setup| setup.id.clone()),
+        orders: [0, 0],
+        rms_um: 0.0,
+        place: String::new(),
+    }
 }
 
 /// The turns' harmonics about their mean, `[order][turn][channel]`, and their sums before each turn.
@@ -300,14 +306,11 @@ impl Change {
             held += squares[*order];
             wanted
         });
-        let rig = &selection.rig;
         Unexplained {
-            station: None,
-            sensor: rig.sensors.get(self.sensor).map(|sensor| sensor.id.clone()),
-            setup: rig.setups.get(self.setup).map(|setup| setup.id.clone()),
             orders: [orders.iter().copied().min().unwrap_or(0), orders.iter().copied().max().unwrap_or(0)],
             rms_um: (0.5 * sum).sqrt(),
             place: format!("from turn {} on", self.turn),
+            ..reading(selection, self.setup, self.sensor)
         }
     }
 }

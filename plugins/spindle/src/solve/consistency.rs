@@ -4,7 +4,7 @@ use runout_core::{
     consistency::{
         Check,
         check::FINDING,
-        groups::{Group, Level, alike, compared},
+        groups::{Group, Level, compared, said},
         linear,
     },
     profile::{NEIGHBOURS, SMOOTHING, orders_beside},
@@ -57,14 +57,15 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
             known.iter().filter(|order| orders_beside(order.order) == beside).collect();
         let groups: Vec<Group> = alike_orders.iter().map(|order| group(order)).collect();
         let level = Level::Known { variance: 1.0, dof: freedom * (2 * beside + 1) as f64 };
-        for one in compared(&groups, level) {
+        let all = compared(&groups, level);
+        for one in &all {
             let place = alike_orders[one.group].order - 1;
             let is_above = one.ratio > 1.0 && (above > 1.0 || one.p * CLASSES < FINDING);
             if is_above && let Some(factor) = factors.get_mut(place) {
                 *factor = factor.max(one.ratio);
             }
         }
-        let checks = alike("orders", &groups, level, "the noise there is overestimated");
+        let checks = said("orders", &groups, all, level, "the noise there is overestimated");
         // Less than the noise is no finding of an order: a low-pass leaves less than what its covariance is at least.
         let above = checks.into_iter().filter(|check| check.statistic > 1.0);
         single.extend(above.map(|check| check.among(CLASSES as usize)));

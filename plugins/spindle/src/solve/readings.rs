@@ -8,7 +8,7 @@ use crate::{layout::Layout, selection::Selection};
 
 /// Share of a channel's readings by which resampling may change each order of them. Recordings without noise, as simulators write them, would
 /// otherwise contradict every model by what they are computed with.
-const RESAMPLING: f64 = 1e-8;
+pub(crate) const RESAMPLING: f64 = 1e-8;
 
 /// Averaged readings of one station: Re Σ uₙ e^{−inΦ}, with their covariance.
 #[derive(Debug, Clone)]

@@ -15,7 +15,7 @@ use std::{f64::consts::PI, ops::Range};
 use runout_core::{Complex64, numerics::golden_section::maximum, stage::Station};
 
 use super::drift::Part;
-use crate::{layout::Layout, selection::Selection};
+use crate::{layout::Layout, selection::Selection, solve::RESAMPLING};
 pub(super) use source::Source;
 use turns::{Amplitudes, Capture, Fixed};
 
@@ -270,7 +270,7 @@ impl Searched<'_> {
     fn weighed(&self, line: f64, fixed: Fixed, amplitudes: &Amplitudes) -> Option<Vec<OfSensor>> {
         let channels = self.captures.first()?.channels.len();
         let mut sensors = vec![OfSensor::default(); channels];
-        let (mut about_mean, mut entries) = (0.0, 0);
+        let (mut about_mean, mut entries, mut means) = (0.0, 0, 0.0);
         for (setup, capture) in self.captures.iter().enumerate() {
             let shape = capture.shape(line, fixed, capture.turns.orders);
             let count = capture.fitted as f64;
@@ -289,6 +289,7 @@ impl Searched<'_> {
                         });
                     about_mean += (0..capture.fitted).map(|turn| (of(turn).0 - mean).norm_sqr()).sum::<f64>();
                     entries += 2 * (capture.fitted - 1);
+                    means += if order > 0 { mean.norm_sqr() } else { 0.0 };
                     for (value, line) in (capture.fitted..capture.turns.count()).map(of) {
                         sensor.held_out[0] += (value - mean).norm_sqr();
                         sensor.held_out[1] += (value - mean - (line - leak)).norm_sqr();
@@ -296,7 +297,9 @@ impl Searched<'_> {
                 }
             }
         }
-        let square = (about_mean - amplitudes.all_explained()).max(0.0) / entries.max(1) as f64;
+        let readings = self.captures.len() * channels;
+        let resampling = RESAMPLING * RESAMPLING * means / (2 * readings.max(1)) as f64;
+        let square = ((about_mean - amplitudes.all_explained()) / entries.max(1) as f64).max(resampling);
         for sensor in &mut sensors {
             sensor.explained /= square;
             sensor.held_out = sensor.held_out.map(|sum| sum / square);
