@@ -29,6 +29,8 @@ pub(super) const SAME: f64 = 1e-9;
 const SHORTLIST: (usize, f64) = (6, 0.2);
 /// Candidates that explain most beside correlated errors, which join that list.
 const BESIDE_CORRELATED: usize = 4;
+/// Candidates whose gains differ by less than this share to first order have one signature.
+const SAME_SIGNATURE: f64 = 1e-6;
 /// Effects of single parts on that list at most.
 const PARTS_LISTED: usize = 2;
 /// How a loop is to be run.
@@ -215,17 +217,8 @@ impl<M: Model> Tracing<'_, M> {
             .iter()
             .filter_map(|effect| Some((*effect, self.model.start(*effect, &current.settings)?)))
             .collect();
-        let mut ranked = self.ranked(current, candidates, &basis, &starts);
-        let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
+        let ranked = self.ranked(current, candidates, &basis, &starts);
         let mut trials: Vec<(usize, Refit<Remainder>, Evidence)> = Vec::new();
-        // Effects of single parts are many and alike: they do not crowd out the others.
-        let parts: Vec<usize> = (0..self.model.effects().len()).flat_map(|whole| self.model.parts(whole)).collect();
-        let mut part_places = PARTS_LISTED;
-        ranked.retain(|(effect, _)| {
-            let listed = !parts.contains(effect) || part_places > 0;
-            part_places -= usize::from(listed && parts.contains(effect));
-            listed
-        });
         let keyed = Keyed::of(&current.fit, &basis);
         let mut beside: Vec<(usize, f64)> = ranked
             .iter()
@@ -235,12 +228,8 @@ impl<M: Model> Tracing<'_, M> {
             })
             .collect();
         beside.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let listed = |rank: usize, effect: usize, gain: f64| {
-            let explains = || beside.iter().take(BESIDE_CORRELATED).any(|(other, _)| *other == effect);
-            rank < SHORTLIST.0 && gain >= promising || explains()
-        };
-        let ranked = ranked.into_iter().enumerate().filter(|(rank, (effect, gain))| listed(*rank, *effect, *gain));
-        for (effect, gain) in ranked.map(|(_, one)| one) {
+        let beside: Vec<usize> = beside.into_iter().take(BESIDE_CORRELATED).map(|(effect, _)| effect).collect();
+        for (effect, gain) in self.listed(ranked, &beside) {
             let parameters = self.model.effects()[effect].parameters.len();
             let evidence = |after: f64| {
                 self.evidence(effect, before.chi2(), after, &before, before.dof.saturating_sub(parameters), count)
@@ -338,6 +327,29 @@ impl<M: Model> Tracing<'_, M> {
             })
             .collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        ranked
+    }
+
+    /// Of ranked candidates, those of which a joint refit is tried: the best, and those that explain most beside correlated errors.
+    fn listed(&self, mut ranked: Vec<(usize, f64)>, beside: &[usize]) -> Vec<(usize, f64)> {
+        let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
+        // Effects of single parts are many and alike: they do not crowd out the others.
+        let parts: Vec<usize> = (0..self.model.effects().len()).flat_map(|whole| self.model.parts(whole)).collect();
+        let (mut part_places, mut places, mut last) = (PARTS_LISTED, SHORTLIST.0, f64::INFINITY);
+        ranked.retain(|(effect, gain)| {
+            let is_part = parts.contains(effect);
+            if is_part && part_places == 0 {
+                return false;
+            }
+            part_places -= usize::from(is_part);
+            // Effects of one signature share a place: only their fits differ.
+            let takes_place = *gain < last * (1.0 - SAME_SIGNATURE);
+            let has_place = (places > 0 || !takes_place) && *gain >= promising;
+            if has_place && takes_place {
+                (places, last) = (places - 1, *gain);
+            }
+            has_place || beside.contains(effect)
+        });
         ranked
     }
 

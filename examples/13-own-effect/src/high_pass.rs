@@ -1,6 +1,4 @@
-//! `channel-delay`: shifts one channel of a recording by whole samples, to see what a late channel does.
-
-use std::collections::VecDeque;
+//! `high-pass-channel`: takes the slow part out of one channel of a recording, to see what an AC-coupled input does.
 
 use runout_core::{
     Error, Result,
@@ -12,58 +10,61 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// `plugin = "channel-delay"`.
+/// `plugin = "high-pass-channel"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ChannelDelayConfig {
-    /// The sensor whose readings come late.
+pub struct HighPassChannelConfig {
+    /// The sensor whose input is AC-coupled.
     pub sensor: String,
-    /// By how many samples.
-    pub samples: usize,
+    /// −3 dB, in Hz.
+    pub cutoff_hz: f64,
 }
 
-/// More than a turn of most recordings.
-const MOST_SAMPLES: usize = 100_000;
-
-impl StageConfig for ChannelDelayConfig {
+impl StageConfig for HighPassChannelConfig {
     type Stage = Preprocessor;
 
-    const NAME: &'static str = "channel-delay";
-    const ABOUT: &'static str = "makes one channel late by whole samples";
+    const NAME: &'static str = "high-pass-channel";
+    const ABOUT: &'static str = "takes the slow part out of one channel";
 
     fn check(self, _context: &Context) -> std::result::Result<Preprocessor, Fault> {
-        if self.samples > MOST_SAMPLES {
-            return Err(Fault::at(
-                "samples",
-                format!("expected at most {MOST_SAMPLES} samples, found {}", self.samples),
-            ));
+        if !(self.cutoff_hz.is_finite() && self.cutoff_hz >= 0.0) {
+            return Err(Fault::at("cutoff_hz", format!("expected 0 or more, found {}", self.cutoff_hz)));
         }
-        Ok(Preprocessor::Conditioner(Box::new(ChannelDelay(self))))
+        Ok(Preprocessor::Conditioner(Box::new(HighPassChannel(self))))
     }
 }
 
-struct ChannelDelay(ChannelDelayConfig);
+struct HighPassChannel(HighPassChannelConfig);
 
-impl Conditioner for ChannelDelay {
+impl Conditioner for HighPassChannel {
     fn attach<'a>(&'a self, input: Box<dyn SampleStream + 'a>) -> Result<Box<dyn SampleStream + 'a>> {
-        let Capture { object, sensor_ids, .. } = input.capture();
+        let Capture { object, sensor_ids, sample_rate_hz, .. } = input.capture();
         let Some(channel) = sensor_ids.iter().position(|id| *id == self.0.sensor) else {
-            return Err(Error::new("delay", object, format!("it has no sensor `{}`", self.0.sensor))
+            return Err(Error::new("filter", object, format!("it has no sensor `{}`", self.0.sensor))
                 .help(format!("its sensors: {}", sensor_ids.join(", "))));
         };
-        Ok(Box::new(Delayed { input, channel, samples: self.0.samples, waiting: VecDeque::new() }))
+        let Some(rate_hz) = *sample_rate_hz else {
+            return Err(
+                Error::new("filter", object, "it states no sampling rate").help("add `sample_rate_hz` to the file")
+            );
+        };
+        // The bilinear transform of s/(s + ω), with its cut-off kept.
+        let k = (std::f64::consts::PI * self.0.cutoff_hz / rate_hz).tan();
+        Ok(Box::new(HighPass { input, channel, pole: (1.0 - k) / (1.0 + k), gain: 1.0 / (1.0 + k), last: None }))
     }
 }
 
-/// The first reading stands for those before it.
-struct Delayed<'a> {
+/// y ← pole·y + gain·(x − x before): as if the first reading had been there for ever.
+struct HighPass<'a> {
     input: Box<dyn SampleStream + 'a>,
     channel: usize,
-    samples: usize,
-    waiting: VecDeque<f64>,
+    pole: f64,
+    gain: f64,
+    /// The reading before, and what was made of it.
+    last: Option<[f64; 2]>,
 }
 
-impl SampleStream for Delayed<'_> {
+impl SampleStream for HighPass<'_> {
     fn capture(&self) -> &Capture {
         self.input.capture()
     }
@@ -72,17 +73,10 @@ impl SampleStream for Delayed<'_> {
         let more = self.input.next_block(block)?;
         let channels = self.capture().channels();
         for reading in block.samples.iter_mut().skip(self.channel).step_by(channels) {
-            self.waiting.push_back(*reading);
-            let late = if self.waiting.len() > self.samples {
-                self.waiting.pop_front()
-            } else {
-                self.waiting.front().copied()
-            };
-            *reading = late.unwrap_or(*reading);
-        }
-        for defect in block.defects.iter_mut().filter(|defect| defect.channel == self.channel) {
-            let late = self.samples as u64;
-            defect.samples = defect.samples.start + late..defect.samples.end + late;
+            let [before, made] = self.last.unwrap_or([*reading, 0.0]);
+            let made = self.pole * made + self.gain * (*reading - before);
+            self.last = Some([*reading, made]);
+            *reading = made;
         }
         Ok(more)
     }

@@ -1,16 +1,12 @@
-//! `probe-lag`: one channel is late by a constant time, as behind electronics with a group delay of their own. A multiplexer
-//! that reads a channel after the others makes its lag negative.
+//! `ac-coupling`: the input of one channel is AC-coupled, so that it passes on what is slow too small and too early.
 //!
-//! At a constant speed the time is an angle λ of the spindle, and the reading is u(Φ − λ). By the shift theorem (Bracewell, *The
-//! Fourier Transform and Its Applications*, chapter 6) a reading Re Σ c e^{−inΦ} becomes Re Σ c e^{inλ} e^{−inΦ}, and
-//! ∂c/∂λ = i n c.
+//! A first-order high-pass s/(s + ω) has at order n the response H = 1/(1 + i c/n), with −3 dB at the order c (time runs with
+//! e^{−inΦ}, s = −i n). A reading Re Σ u e^{−inΦ} becomes Re Σ H u e^{−inΦ}, and ∂ln H/∂c = −(i/n)/(1 + i c/n) (Horowitz, Hill, *The Art of
+//! Electronics*, section 1.7).
 //!
-//! Three effects of the toolkit come close. To first order a low-pass in one channel (`filter-attenuation`, p = λ) is the
-//! same: the amplitudes of high orders distinguish them, once nλ is no longer small. A turned sensor (`sensor-angle`) shifts the
-//! form as much and the motion otherwise. A lag in all channels alike is another zero of the spindle's angle, and is never
-//! observable.
+//! The low-passes of the toolkit (`filter-attenuation`) act on high orders; this effect acts on the lowest ones.
 
-mod channel_delay;
+mod high_pass;
 
 use std::sync::Arc;
 
@@ -20,33 +16,41 @@ use runout_core::{
 };
 use runout_spindle::effects::{self, About, ActsOn, Alterations, Predicted, SpindleEffect, Transfer, parameter};
 
-pub use channel_delay::ChannelDelayConfig;
+pub use high_pass::HighPassChannelConfig;
 
-/// Adds the effect `probe-lag`, and the preprocessor `channel-delay` to try it with.
+/// Adds the effect `ac-coupling`, and the preprocessor `high-pass-channel` to try it with.
 pub fn register(registry: &mut Registry) {
-    registry.effects.add(effects::entry(Arc::new(ProbeLag)));
-    registry.preprocessors.add(Plugin::of::<ChannelDelayConfig>());
+    registry.effects.add(effects::entry(Arc::new(AcCoupling)));
+    registry.preprocessors.add(Plugin::of::<HighPassChannelConfig>());
 }
 
-/// A channel that is late.
-pub struct ProbeLag;
+/// A channel without the slow part of its signal.
+pub struct AcCoupling;
 
-impl SpindleEffect for ProbeLag {
+const ID: &str = "ac-coupling";
+
+impl SpindleEffect for AcCoupling {
     fn about(&self) -> About {
-        // One sample of 512 a turn is 0.012 rad.
-        let parameters = vec![parameter("lag", "rad", 0.01)];
-        About { id: "probe-lag", does: "a channel is later than the others", acts_on: ActsOn::Sensor, parameters }
+        // At 600 rpm, 0.1/rev is 1 Hz.
+        let parameters = vec![parameter("cut-off", "1/rev", 0.1)];
+        About { id: ID, does: "the input of a channel is AC-coupled", acts_on: ActsOn::Sensor, parameters }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
-        let lag = values[0];
-        let late = Transfer::new(move |order| Complex64::from_polar(1.0, order as f64 * lag));
-        alterations.sensors[target].transfers.push(late);
+        let cut_off = values[0];
+        // The mean level is no part of form or motion; a response is never 0.
+        let response = move |order: usize| Complex64::new(1.0, cut_off / order.max(1) as f64).inv();
+        alterations.sensors[target].transfers.push(Transfer::new(response).of(ID, values));
     }
 
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
-        let late = |order: usize, at: usize| Complex64::I * order as f64 * predicted.readings[at];
-        vec![predicted.each(|reading| reading.sensor == target, late)]
+        let cut_off = predicted.alterations.sensors[target].applied(ID).map_or(0.0, |values| values[0]);
+        let change = |order: usize| -Complex64::I / Complex64::new(order as f64, cut_off);
+        vec![predicted.each(|reading| reading.sensor == target, |order, at| change(order) * predicted.readings[at])]
+    }
+
+    fn is_possible(&self, values: &[f64]) -> bool {
+        values.iter().all(|cut_off| *cut_off > 0.0)
     }
 }
 
@@ -54,7 +58,7 @@ impl SpindleEffect for ProbeLag {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
-    use std::{f64::consts::TAU, path::Path};
+    use std::path::Path;
 
     use runout_core::{
         inspection::Inspection,
@@ -104,8 +108,8 @@ mod tests {
         config
     }
 
-    /// The simulated recording with one channel moved by whole samples, averaged with a fifth of the turns held out.
-    fn averaged(config: &SpindleConfig, rig: &Rig, delay: &ChannelDelayConfig) -> Station {
+    /// The simulated recording with one channel behind a high-pass, averaged with a fifth of the turns held out.
+    fn averaged(config: &SpindleConfig, rig: &Rig, high_pass: &HighPassChannelConfig) -> Station {
         let simulator = simulate::simulator(config).unwrap();
         let recording = simulator.spindle_recording();
         let context = Context { folder: Path::new(""), rig: None };
@@ -116,15 +120,15 @@ mod tests {
             outlier_sigma: None,
             speed_tolerance_percent: 2.0,
         };
-        let (Preprocessor::Conditioner(delay), Preprocessor::Averager(average)) =
-            (delay.clone().check(&context).unwrap(), average.check(&context).unwrap())
+        let (Preprocessor::Conditioner(high_pass), Preprocessor::Averager(average)) =
+            (high_pass.clone().check(&context).unwrap(), average.check(&context).unwrap())
         else {
             panic!("other stages");
         };
         let wanted = AverageRequest { hold_out: Some(0.2), ..AverageRequest::default() };
         let profile = |setup| {
             let stream = Inspection::new(recording.open(0, setup).unwrap());
-            average.average_requested(delay.attach(Box::new(stream)).unwrap(), wanted).unwrap()
+            average.average_requested(high_pass.attach(Box::new(stream)).unwrap(), wanted).unwrap()
         };
         let profiles = (0..rig.setups.len()).map(profile).collect();
         Station { name: "s001".into(), z_mm: 0.0, profiles }
@@ -138,49 +142,52 @@ mod tests {
         registry.effects.of()
     }
 
-    /// Two seeds: a lag of one sample in S2, and of two in S3. The shift is that of the recording, not of the model.
+    /// Two seeds and sizes. The filter is in the recording, not in the model.
     #[test]
-    fn a_late_channel_is_found() {
-        for (seed, id, samples) in [(1, "S2", 1), (2, "S3", 2)] {
+    fn an_ac_coupled_channel_is_found() {
+        for (seed, id, cut_off) in [(1, "S2", 0.5), (2, "S3", 1.0)] {
             let config = campaign(seed);
             let rig = config.rig.clone().check().unwrap();
-            let station = averaged(&config, &rig, &ChannelDelayConfig { sensor: id.into(), samples });
+            let cutoff_hz = cut_off * config.recording.speed_rpm / 60.0;
+            let station = averaged(&config, &rig, &HighPassChannelConfig { sensor: id.into(), cutoff_hz });
             let (selection, layout) = (Selection::whole(&rig), Layout::new(&rig, false));
             let said = diagnose(selection, layout, true, every_effect(), &[station], &Settings::default()).unwrap();
             let diagnosis = said.diagnosis;
             let chi2 = [&diagnosis.before, &diagnosis.after].map(|level| level.chi2_per_dof.unwrap());
-            println!("simulated, {id} {samples} late: χ² {:.2} → {:.2}, {:?}", chi2[0], chi2[1], diagnosis.added);
+            println!(
+                "simulated, {id} from {cut_off}/rev on: χ² {:.2} → {:.2}, {:?}",
+                chi2[0], chi2[1], diagnosis.added
+            );
             assert_eq!(diagnosis.verdict, Verdict::Explained, "{:?}", diagnosis.added);
             let [added] = &diagnosis.added[..] else { panic!("{:?}", diagnosis.added) };
-            assert_eq!((&*added.effect, &*added.targets), ("probe-lag", &[id.to_owned()][..]));
+            assert_eq!((&*added.effect, &*added.targets), (ID, &[id.to_owned()][..]));
             assert!(added.confounded_with.is_empty(), "{:?}", added.confounded_with);
-            let lag = &added.parameters[0];
-            let truth = TAU * samples as f64 / SAMPLES_PER_REV as f64;
+            let found = &added.parameters[0];
             // Five standard uncertainties: what two seeds never reach by chance.
-            assert!((lag.value - truth).abs() < 5.0 * lag.std.unwrap(), "{lag:?} for {truth}");
+            assert!((found.value - cut_off).abs() < 5.0 * found.std.unwrap(), "{found:?} for {cut_off}");
         }
     }
 
-    /// The signature is what the residual does when the lag is a little more and a little less.
+    /// The signature is what the residual does when the cut-off is a little more and a little less.
     #[test]
     fn partials_are_finite_differences() {
         let config = campaign(3);
         let rig = config.rig.clone().check().unwrap();
-        let station = averaged(&config, &rig, &ChannelDelayConfig { sensor: "S1".into(), samples: 0 });
+        let station = averaged(&config, &rig, &HighPassChannelConfig { sensor: "S1".into(), cutoff_hz: 0.0 });
         let layout = Layout::new(&rig, false);
         let model =
-            SpindleModel::new(Selection::whole(&rig), layout, true, vec![Arc::new(ProbeLag)], &[station]).unwrap();
+            SpindleModel::new(Selection::whole(&rig), layout, true, vec![Arc::new(AcCoupling)], &[station]).unwrap();
         let declared = model.fit(&[]).unwrap();
         let norm = |vector: &[f64]| vector.iter().map(|value| value * value).sum::<f64>().sqrt();
         for (effect, Effect { targets, .. }) in model.effects().iter().enumerate() {
             let step = 1e-4;
-            let residual = |lag: f64| {
-                let applied = [Setting { effect, values: vec![lag] }];
+            let residual = |cut_off: f64| {
+                let applied = [Setting { effect, values: vec![cut_off] }];
                 model.fit(&applied).unwrap().remainder().residual.clone()
             };
-            let (late, early) = (residual(step), residual(-step));
+            let (above, below) = (residual(step), residual(-step));
             let analytic = &declared.signature(effect)[0];
-            let slope = late.iter().zip(&early).map(|(late, early)| (late - early) / (2.0 * step));
+            let slope = above.iter().zip(&below).map(|(above, below)| (above - below) / (2.0 * step));
             let off: Vec<f64> = slope.zip(analytic).map(|(slope, analytic)| slope - analytic).collect();
             // 5 %: what exact geometry adds to the linear reading, and the projection's own change (Kaufman).
             assert!(norm(&off) < 0.05 * norm(analytic), "{targets:?}: {} of {}", norm(&off), norm(analytic));

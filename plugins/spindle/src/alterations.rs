@@ -4,6 +4,8 @@ use std::{fmt, sync::Arc};
 
 use runout_core::{Complex64, rig};
 
+use crate::layout::{Layout, Reading};
+
 /// Everything that effects change, at its declared value until one does.
 #[derive(Debug, Clone)]
 #[allow(clippy::struct_excessive_bools, reason = "each is an effect that is there or not")]
@@ -14,6 +16,8 @@ pub struct Alterations {
     pub setups: Vec<SetupAlteration>,
     /// Motion along the axis, in µm.
     pub axial_um: Vec<Harmonic>,
+    /// What channels read of others.
+    pub cross_talk: Vec<CrossTalk>,
     /// Lines of the turns' spectrum that are taken out of the averages, by number: of a sensor (the first of those that have it), or of
     /// the axis.
     pub lines: Vec<(usize, Option<usize>)>,
@@ -58,10 +62,21 @@ pub struct SensorAlteration {
     pub creep_um: f64,
     /// In each setup, creep over the turns at hand, over that which `creep_um` is meant for; 1 without it.
     pub creep_shares: Vec<f64>,
-    /// Reciprocal of the order at which a first-order low-pass is −3 dB.
-    pub inverse_cutoff: f64,
-    /// What a channel does besides, order by order: for effects of other crates.
+    /// True less declared angle in single setups, besides: index of the setup, and the angle in rad.
+    pub angles_in_setups: Vec<(usize, f64)>,
+    /// What the channel does besides, order by order.
     pub transfers: Vec<Transfer>,
+}
+
+/// A share of one channel's displacement in the reading of another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CrossTalk {
+    /// Index of the sensor that is read.
+    pub from: usize,
+    /// Index of the sensor whose reading has it.
+    pub to: usize,
+    /// Relative.
+    pub share: f64,
 }
 
 /// Reading over displacement at an order, never 0: any linear change of a channel.
@@ -70,12 +85,20 @@ pub struct Transfer {
     at: Arc<dyn Fn(usize) -> Complex64 + Send + Sync>,
     /// The effect that it is of, and the values of its parameters.
     effect: Option<(&'static str, Vec<f64>)>,
+    /// The only setup in which it acts; all without it.
+    setup: Option<usize>,
 }
 
 impl Transfer {
     /// By a function of the order.
     pub fn new(of: impl Fn(usize) -> Complex64 + Send + Sync + 'static) -> Self {
-        Self { at: Arc::new(of), effect: None }
+        Self { at: Arc::new(of), effect: None, setup: None }
+    }
+
+    /// Only in one setup, or in all.
+    #[must_use]
+    pub fn in_setup(self, setup: Option<usize>) -> Self {
+        Self { setup, ..self }
     }
 
     /// Which effect it is of, for partials that depend on the values of its parameters ([`SensorAlteration::applied`]).
@@ -145,7 +168,8 @@ impl Alterations {
     #[must_use]
     pub fn are_possible(&self) -> bool {
         let sensor = |sensor: &SensorAlteration| {
-            GAINS.contains(&(1.0 + sensor.gain)) && sensor.angle_rad.abs() < 0.5 && sensor.inverse_cutoff > -0.1
+            let turned = sensor.angles_in_setups.iter().map(|(_, angle_rad)| angle_rad.abs()).fold(0.0, f64::max);
+            GAINS.contains(&(1.0 + sensor.gain)) && sensor.angle_rad.abs() + turned < 0.5
         };
         let steepness = |setup: &SetupAlteration| -> f64 {
             setup.ripples.iter().map(|ripple| ripple.order as f64 * ripple.cosine.hypot(ripple.sine)).sum()
@@ -156,6 +180,26 @@ impl Alterations {
         };
         let numbers = self.sensors.iter().flat_map(|s| [s.quadratic_per_um, s.cubic_per_um2, s.creep_um, s.z_mm]);
         self.sensors.iter().all(sensor) && self.setups.iter().all(setup) && numbers.into_iter().all(f64::is_finite)
+    }
+}
+
+impl Alterations {
+    /// Reading over displacement at an order.
+    #[must_use]
+    pub fn response(&self, reading: &Reading, order: usize) -> Complex64 {
+        self.sensors[reading.sensor].response(reading.setup, order)
+    }
+
+    /// What displacements of an order are recorded as, `[reading]`.
+    pub(crate) fn recorded(&self, layout: &Layout, order: usize, displacements: &[Complex64]) -> Vec<Complex64> {
+        let mut recorded = displacements.to_vec();
+        let sensors = self.sensors.len();
+        for readings in recorded.chunks_exact_mut(sensors) {
+            let last_first = self.cross_talk.iter().rev();
+            last_first.for_each(|CrossTalk { from, to, share }| readings[*to] += readings[*from] * *share);
+        }
+        recorded.iter_mut().zip(&layout.readings).for_each(|(value, reading)| *value *= self.response(reading, order));
+        recorded
     }
 }
 
@@ -185,22 +229,37 @@ impl SensorAlteration {
         cubic_per_um2: 0.0,
         creep_um: 0.0,
         creep_shares: Vec::new(),
-        inverse_cutoff: 0.0,
+        angles_in_setups: Vec::new(),
         transfers: Vec::new(),
     };
 
-    /// Reading over displacement at an order: gain, low-pass and what else the channel does.
+    /// Reading over displacement in a setup at an order: gain, low-pass and what else the channel does.
     #[must_use]
-    pub fn response(&self, order: usize) -> Complex64 {
-        let known = self.sign * (1.0 + self.gain) / Complex64::new(1.0, -(order as f64) * self.inverse_cutoff);
-        self.transfers.iter().fold(known, |response, transfer| response * (transfer.at)(order))
+    pub fn response(&self, setup: usize, order: usize) -> Complex64 {
+        let here = self.transfers.iter().filter(|transfer| transfer.setup.is_none_or(|only| only == setup));
+        let gain = Complex64::from(self.sign * (1.0 + self.gain));
+        here.fold(gain, |response, transfer| response * (transfer.at)(order))
     }
 
     /// The values with which an effect [stated](Transfer::of) its transfer; `None` where it is not applied.
     #[must_use]
     pub fn applied(&self, effect: &str) -> Option<&[f64]> {
-        let stated = self.transfers.iter().filter_map(|transfer| transfer.effect.as_ref());
-        stated.rev().find(|(known, _)| *known == effect).map(|(_, values)| &values[..])
+        self.applied_in(effect, None)
+    }
+
+    /// The same of a transfer that acts in one setup only.
+    #[must_use]
+    pub fn applied_in(&self, effect: &str, setup: Option<usize>) -> Option<&[f64]> {
+        let stated = self.transfers.iter().filter(|transfer| transfer.setup == setup);
+        let found = stated.filter_map(|transfer| transfer.effect.as_ref()).rev().find(|(known, _)| *known == effect);
+        found.map(|(_, values)| &values[..])
+    }
+
+    /// True less declared angle in a setup, in rad.
+    #[must_use]
+    pub fn turned_rad(&self, setup: usize) -> f64 {
+        let here = self.angles_in_setups.iter().filter(|(only, _)| *only == setup);
+        self.angle_rad + here.map(|(_, angle_rad)| angle_rad).sum::<f64>()
     }
 
     /// Creep in a setup, over that which `creep_um` is meant for.

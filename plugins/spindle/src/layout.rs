@@ -245,7 +245,7 @@ impl Layout {
                 reading.part_angle_rad -= 2.0 * angle_rad;
             }
             let opposite = if sensor.opposite { PI } else { 0.0 };
-            let turned = sensor.angle_rad + setup.sensors_rad + opposite;
+            let turned = sensor.turned_rad(reading.setup) + setup.sensors_rad + opposite;
             reading.angle_rad += turned;
             reading.part_angle_rad += turned - setup.part_rad;
             if !reading.view.is_axial() {
@@ -254,6 +254,12 @@ impl Layout {
             reading.motion_ratio *= 1.0 + setup.motion;
         }
         layout
+    }
+
+    /// Setups.
+    #[must_use]
+    pub fn setups(&self) -> usize {
+        self.setups
     }
 
     /// +1, or −1 where motion of this order is assumed to change sign in this setup.

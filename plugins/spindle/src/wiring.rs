@@ -128,7 +128,7 @@ fn single_mistakes(layout: &Layout) -> Vec<(Mistake, usize)> {
             ActsOn::SensorCopy => ordered_pairs(sensors).collect(),
             ActsOn::SetupPair => pairs(setups).collect(),
             ActsOn::SetupCopy => ordered_pairs(setups).collect(),
-            ActsOn::Setup | ActsOn::LaterSetup | ActsOn::Rig => vec![0],
+            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::LaterSetup | ActsOn::Rig => vec![0],
         };
         targets.into_iter().map(move |target| (mistake, target))
     });
@@ -199,7 +199,7 @@ impl<'a> Trial<'a> {
         let mut matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
         let columns = matrix.len() / layout.readings.len();
         for (reading, row) in layout.readings.iter().zip(matrix.chunks_exact_mut(columns)) {
-            let response = alterations.sensors[reading.sensor].response(order);
+            let response = alterations.response(reading, order);
             for entry in row {
                 *entry *= response;
             }
@@ -267,7 +267,7 @@ pub(crate) fn warning(
             ActsOn::SetupPair | ActsOn::SetupCopy => {
                 pair_of(*target, rig.setups.len()).map(|setup| rig.setups[setup].id.clone()).to_vec()
             }
-            ActsOn::Setup | ActsOn::LaterSetup | ActsOn::Rig => Vec::new(),
+            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::LaterSetup | ActsOn::Rig => Vec::new(),
         };
         format!("`{}`", foresight::name(mistake.id(), &ids))
     };

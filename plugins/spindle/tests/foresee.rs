@@ -115,7 +115,12 @@ fn a_third_sensor_distinguishes_the_gains_of_its_section() {
             assert!(matches!(change.addition, Addition::Sensor { section: of, .. } if of == section), "{change:?}");
         }
     }
-    assert!(found.still_confounded.is_empty(), "{:?}", found.still_confounded);
+    // What a filter and a delay of one sensor do to small angles is the same in any layout.
+    for set in &found.still_confounded {
+        let of_one_channel =
+            |name: &String| name.starts_with("filter-attenuation") || name.starts_with("channel-delay");
+        assert!(set.iter().all(of_one_channel), "{set:?}");
+    }
 }
 
 /// The layout that assumes odd motion would show that it is not.

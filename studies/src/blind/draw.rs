@@ -103,10 +103,12 @@ pub struct Planted {
     pub parameters: Vec<(&'static str, f64)>,
     /// In words.
     pub size: String,
+    /// Names of effects that it is too, in the mean over the turns: a probe that slips stands elsewhere in one setup.
+    pub is_also: Vec<String>,
 }
 
-/// The effects that are planted: their ids, and a speed ripple of a single setup.
-pub const EFFECTS: [&str; 21] = [
+/// The effects that are planted: their ids, and those of a single setup.
+pub const EFFECTS: [&str; 31] = [
     "sensor-gain",
     "sensor-angle",
     "sensor-axial-position",
@@ -128,6 +130,16 @@ pub const EFFECTS: [&str; 21] = [
     "setups-swapped",
     "rotation-reversed",
     "part-angle-sign",
+    "channel-delay",
+    "channel-skew",
+    "filter-attenuation-2",
+    "filter-attenuation-4",
+    "sensor-gain-of-setup",
+    "sensor-angle-of-setup",
+    "setup-gain",
+    "index-offset",
+    "cross-talk",
+    "channel-ghost",
 ];
 /// Those of which two are planted at a time.
 const PAIRED: [&str; 7] = [

@@ -155,7 +155,8 @@ fn holds(added: &Added, planted: &Planted) -> bool {
     let true_order = planted.parameters.iter().find(|(name, _)| *name == "order").map(|(_, order)| *order);
     // Of effects with an order, another order is another effect.
     let same_order = found_order.zip(true_order).is_none_or(|(found, order)| (found - order).abs() < 0.1);
-    (name(added) == wanted && same_order) || added.confounded_with.contains(&wanted)
+    let also = planted.is_also.iter().any(|other| name(added) == *other || added.confounded_with.contains(other));
+    (name(added) == wanted && same_order) || added.confounded_with.contains(&wanted) || also
 }
 
 /// Parameters within two standard uncertainties of the truth, of those that can be compared.
@@ -258,7 +259,7 @@ impl Judged {
             failures.push("the noise is not known".into());
         }
         match self.campaign.kind {
-            Kind::Stranger if !left && self.effects.iter().any(|traced| traced.visible) => {
+            Kind::Stranger if !left && self.effects.iter().any(|traced| traced.visible && !traced.named) => {
                 failures.push("not said to be unexplained".into());
             }
             Kind::Stranger => {}

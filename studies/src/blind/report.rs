@@ -97,7 +97,7 @@ fn strangers(all: &[Judged]) -> String {
         let visible = |judged: &Judged| judged.effects.iter().any(|traced| traced.visible);
         let count = |which: &dyn Fn(&Judged) -> bool| these.iter().filter(|judged| which(judged)).count();
         let left = |judged: &Judged| judged.diagnosis.verdict == Verdict::Unexplained;
-        let blamed = |judged: &Judged| !judged.diagnosis.added.is_empty();
+        let blamed = |judged: &Judged| !judged.false_alarms.is_empty();
         line(
             &mut text,
             format_args!(
@@ -107,7 +107,7 @@ fn strangers(all: &[Judged]) -> String {
                 count(&|judged| left(judged) && !blamed(judged)),
                 count(&|judged| left(judged) && blamed(judged)),
                 count(&|judged| !left(judged) && blamed(judged)),
-                count(&|judged| visible(judged) && !left(judged) && !blamed(judged)),
+                count(&|judged| visible(judged) && !left(judged) && judged.diagnosis.added.is_empty()),
                 count(&|judged| judged.form.after > 1.05 * judged.form.before),
             ),
         );

@@ -331,12 +331,12 @@ impl StationData {
 
     /// W of an order from 1 for displacements: that of the readings times what they respond with.
     pub(crate) fn weights_of(&self, order: usize, layout: &Layout, alterations: &Alterations) -> Blocks {
-        let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order);
+        let response = |index: usize| alterations.response(&layout.readings[index], order);
         let setups = self.readings.turns.len();
         let unweighted = || Blocks::identity(self.readings.count / setups, setups);
         let weights = self.freed(alterations).map_or(&self.weights, |freed| &freed.weights);
         let weights = weights.as_ref().map_or_else(unweighted, |weights| weights[order - 1].clone());
-        weights.with_columns_scaled(response)
+        weights.with_columns_scaled(response).with_shares(&alterations.cross_talk)
     }
 
     /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals: `corrected` are the

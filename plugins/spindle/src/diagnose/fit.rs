@@ -347,7 +347,7 @@ impl Fit for SpindleFit {
             others.sort_by(f64::total_cmp);
             let (rms_um, median) = (rms(&all[capture]), others[others.len() / 2]);
             Unexplained {
-                station: Some(self.shared.data[capture / setups].name.clone()),
+                station: (self.shared.data.len() > 1).then(|| self.shared.data[capture / setups].name.clone()),
                 sensor: None,
                 setup: self.shared.selection.rig.setups.get(capture % setups).map(|setup| setup.id.clone()),
                 orders: [1, self.max_order()],
@@ -375,8 +375,16 @@ impl Fit for SpindleFit {
 
     fn distinguished_by(&self, effects: &[usize]) -> Option<String> {
         let on = |effect: &usize| self.shared.kind(*effect).about().acts_on;
-        let of_sensors = [ActsOn::Sensor, ActsOn::SensorPair, ActsOn::SensorCopy];
-        let more = if effects.iter().all(|effect| of_sensors.contains(&on(effect))) {
+        let of_sensors = [ActsOn::Sensor, ActsOn::SensorInSetup, ActsOn::SensorPair, ActsOn::SensorCopy];
+        let places = || effects.iter().map(|effect| &self.shared.places[*effect]);
+        let of_one_sensor = places().all(|place| {
+            on(&effects[0]) == ActsOn::Sensor
+                && Some(&place.effect.targets) == places().next().map(|one| &one.effect.targets)
+        });
+        let more = if of_one_sensor {
+            // Angles keep their size, delays and filters do not.
+            "a recording at another speed"
+        } else if effects.iter().all(|effect| of_sensors.contains(&on(effect))) {
             "a third sensor in the section"
         } else {
             "another setup with the part at an angle that no other setup has"

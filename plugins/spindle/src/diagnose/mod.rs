@@ -174,6 +174,12 @@ fn targets(acts_on: ActsOn, rig: &Rig) -> Vec<(usize, Vec<String>)> {
     let (sensors, setups) = (rig.sensors.len(), rig.setups.len());
     match acts_on {
         ActsOn::Sensor => (0..sensors).map(|index| (index, vec![sensor(index)])).collect(),
+        // Of one setup, it is the sensor's everywhere.
+        ActsOn::SensorInSetup if setups < 2 => Vec::new(),
+        ActsOn::SensorInSetup => {
+            let both = |target: usize| (target, vec![sensor(target / setups), setup(target % setups)]);
+            (0..sensors * setups).map(both).collect()
+        }
         ActsOn::Setup => (0..setups).map(|index| (index, vec![setup(index)])).collect(),
         ActsOn::LaterSetup => (1..setups).map(|index| (index, vec![setup(index)])).collect(),
         ActsOn::SensorPair => pairs(sensors).map(|pair| (pair, pair_of(pair, sensors).map(sensor).to_vec())).collect(),
@@ -303,9 +309,15 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
     for added in diagnosis.added.iter_mut().filter(|added| !added.confounded_with.is_empty()) {
         added.parameters.iter_mut().for_each(|parameter| parameter.std = None);
     }
-    let steps = changes::level_steps(&model.traced.selection, stations, &changes);
-    let said = changes.iter().map(|change| change.said(&model.traced.selection));
-    let changes: Vec<Unexplained> = said.chain(steps).collect();
+    let selection = &model.traced.selection;
+    let within = model.traced.data.iter().zip(stations).flat_map(|(data, station)| {
+        let changes = &data.seen.changes;
+        let said = changes.iter().map(|change| change.said(selection));
+        let name = (stations.len() > 1).then(|| station.name.clone());
+        let all = said.chain(changes::level_steps(selection, station, changes));
+        all.map(move |one| Unexplained { station: name.clone(), ..one })
+    });
+    let changes: Vec<Unexplained> = within.collect();
     if !changes.is_empty() {
         if closed.after.remainder().noise_is_known() {
             diagnosis.verdict = Verdict::Unexplained;

@@ -65,6 +65,9 @@ pub(super) fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, a
     }
 }
 
+/// What shakes the eccentricity, order 1, is often more than all else, and shakes no other order: the plain squares leave it out.
+const FORM_AND_MOTION: usize = 2;
+
 /// Residual on the turns held out, summed over orders and readings.
 struct HeldOut {
     /// Weighted squares.
@@ -106,9 +109,9 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
             .zip(predicted)
             .map(|((held, beyond), predicted)| held - beyond - predicted)
             .collect();
-        // Readings were recorded, not displacements.
-        let response = |index: usize| alterations.sensors[layout.readings[index].sensor].response(order).norm_sqr();
-        squares += left.iter().enumerate().map(|(index, value)| value.norm_sqr() * response(index)).sum::<f64>();
+        if order >= FORM_AND_MOTION {
+            squares += alterations.recorded(layout, order, &left).iter().map(Complex64::norm_sqr).sum::<f64>();
+        }
         let weighted = data.weights_of(order, layout, alterations).times(&left, 1);
         chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / solved.floor_std[order - 1].powi(2);
     }
@@ -121,7 +124,7 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
 fn held_out_expected(solved: &Solved, held: &Readings) -> f64 {
     let (Some(propagation), Some(setups)) = (&solved.propagation, &held.covariance) else { return f64::NAN };
     let sensors = held.count / setups.len().max(1);
-    let orders = 1..=held.max_order.min(solved.corrected.max_order);
+    let orders = FORM_AND_MOTION..=held.max_order.min(solved.corrected.max_order);
     let noise = orders.clone().flat_map(|order| {
         let block = order * sensors * sensors..(order + 1) * sensors * sensors;
         setups.iter().flat_map(move |setup| setup[block.clone()].iter().step_by(sensors + 1)).map(|entry| entry.re)

@@ -3,7 +3,7 @@
 use runout_core::{Complex64, numerics::fourier::Fourier};
 
 use crate::{
-    alterations::{Alterations, SensorAlteration, SetupAlteration},
+    alterations::{Alterations, CrossTalk, SensorAlteration, SetupAlteration},
     layout::{Layout, Reading},
     solve::{OVERSAMPLING, Readings, interpolate},
 };
@@ -23,6 +23,7 @@ impl Alterations {
             part_angles_reversed: false,
             sensor_angles_reversed: false,
             axial_um: Vec::new(),
+            cross_talk: Vec::new(),
             lines: Vec::new(),
             even_order_motion: false,
             exact_geometry: false,
@@ -42,7 +43,7 @@ impl Alterations {
             for (order, row) in mean.chunks_exact_mut(count).enumerate() {
                 let value = &mut row[index];
                 *value -= sensor.creep_um * share * creep(order, angles);
-                *value /= sensor.response(order);
+                *value /= sensor.response(reading.setup, order);
             }
             let curved = sensor.quadratic_per_um != 0.0 || sensor.cubic_per_um2 != 0.0;
             let setup = &self.setups[reading.setup];
@@ -57,17 +58,36 @@ impl Alterations {
                 mean.iter_mut().skip(index).step_by(count).zip(harmonics).for_each(|(to, from)| *to = from);
             }
         }
+        self.take_out_cross_talk(&mut readings.mean);
         self.correct_covariance(readings);
     }
 
-    /// E[δ δᴴ] of displacements: that of the readings over what they respond with.
+    /// Takes what channels read of others out of displacements (`[order][reading]`). What cross-talk of cross-talk is, a share of a share, is
+    /// taken out one after the other.
+    fn take_out_cross_talk(&self, mean: &mut [Complex64]) {
+        if self.cross_talk.is_empty() {
+            return;
+        }
+        for readings in mean.chunks_exact_mut(self.sensors.len()) {
+            self.cross_talk.iter().for_each(|CrossTalk { from, to, share }| readings[*to] -= readings[*from] * *share);
+        }
+    }
+
+    /// E[δ δᴴ] of displacements: that of the readings over what they respond with, without shares of others.
     fn correct_covariance(&self, readings: &mut Readings) {
         let sensors = self.sensors.len();
-        for matrices in readings.covariance.iter_mut().flatten() {
+        for (setup, matrices) in readings.covariance.iter_mut().flatten().enumerate() {
             for (order, matrix) in matrices.chunks_exact_mut(sensors * sensors).enumerate() {
-                let responses: Vec<Complex64> = self.sensors.iter().map(|sensor| sensor.response(order)).collect();
+                let responses: Vec<Complex64> =
+                    self.sensors.iter().map(|sensor| sensor.response(setup, order)).collect();
                 for (row, one) in matrix.chunks_exact_mut(sensors).zip(&responses) {
                     row.iter_mut().zip(&responses).for_each(|(entry, other)| *entry /= one * other.conj());
+                }
+                for CrossTalk { from, to, share } in &self.cross_talk {
+                    (0..sensors)
+                        .for_each(|other| matrix[to * sensors + other] -= matrix[from * sensors + other] * *share);
+                    (0..sensors)
+                        .for_each(|other| matrix[other * sensors + to] -= matrix[other * sensors + from] * *share);
                 }
             }
         }

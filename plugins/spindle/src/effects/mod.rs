@@ -10,9 +10,10 @@
 
 mod asynchronous_line;
 mod axial_motion;
+mod channel_response;
 mod correct;
+mod cross_talk;
 mod even_order_motion;
-mod filter_attenuation;
 mod mistakes;
 mod predicted;
 mod reversal_angle;
@@ -41,6 +42,7 @@ pub use mistakes::{Mistake, ordered_pairs, pair_of, pairs};
 pub use predicted::Predicted;
 
 use crate::layout::Layout;
+use channel_response::ChannelResponse;
 
 /// An effect on a spindle measurement.
 pub trait SpindleEffect: Send + Sync {
@@ -71,6 +73,11 @@ pub trait SpindleEffect: Send + Sync {
 
     /// The order of an effect that is there at several orders, each by itself.
     fn order(&self) -> Option<usize> {
+        None
+    }
+
+    /// The effect that has the same partials while it is small: of both, foresight lists that one.
+    fn first_order_like(&self) -> Option<&'static str> {
         None
     }
 
@@ -144,6 +151,8 @@ pub enum ActsOn {
     SensorPair,
     /// The same in either order: the second instead of the first is another target.
     SensorCopy,
+    /// Any sensor in any one setup: the target is sensor · (number of setups) + setup.
+    SensorInSetup,
     /// Any setup.
     Setup,
     /// Any setup but the first, which the others are counted from.
@@ -198,7 +207,8 @@ pub fn entry(effect: Arc<dyn SpindleEffect>) -> EffectEntry {
 pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
     let mut all: Vec<Arc<dyn SpindleEffect>> = vec![
         Arc::new(sensor_gain::SensorGain),
-        Arc::new(sensor_angle::SensorAngle),
+        Arc::new(sensor_angle::SensorAngle { in_one_setup: false }),
+        Arc::new(sensor_angle::SensorAngle { in_one_setup: true }),
         Arc::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: false }),
         Arc::new(sensor_axial_position::SensorAxialPosition { sees_another_circle: true }),
         Arc::new(sensor_nonlinearity::SensorNonlinearity),
@@ -206,10 +216,12 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         Arc::new(sensors_angle::SensorsAngle),
         Arc::new(setup_motion_change::SetupMotionChange),
         Arc::new(thermal_drift::ThermalDrift),
-        Arc::new(filter_attenuation::FilterAttenuation),
         Arc::new(even_order_motion::EvenOrderMotion),
         Arc::new(second_order_geometry::SecondOrderGeometry),
     ];
+    all.extend(ChannelResponse::all().map(|response| -> Arc<dyn SpindleEffect> { Arc::new(response) }));
+    all.push(Arc::new(cross_talk::OfOneChannel));
+    all.push(Arc::new(cross_talk::ChannelGhost));
     for number in 0..MOST_LINES {
         all.push(Arc::new(asynchronous_line::AsynchronousLine { number }));
         all.push(Arc::new(sensor_line::SensorLine { number }));

@@ -134,9 +134,10 @@ impl Asynchronous {
         (tones * self.scales[0].hypot(self.scales[1]) + lines, tones * self.scales[2].hypot(self.scales[3]))
     }
 
-    /// The motion in one capture.
-    pub(crate) fn capture(&self, seed: u64, setup: usize, station: usize) -> Wandering {
+    /// The motion in one capture, as a channel sees it that is late by some samples.
+    pub(crate) fn capture(&self, seed: u64, setup: usize, station: usize, delay_samples: f64) -> Wandering {
         let mut wandering = Wandering {
+            delay_samples,
             cycles_per_sample: self.tones.iter().map(|tone| tone.cycles_per_sample).collect(),
             amplitudes: [const { Vec::new() }; 5],
             rotors: vec![Complex64::ONE; self.tones.len()],
@@ -159,6 +160,7 @@ impl Asynchronous {
 
 /// Asynchronous motion of one capture, sample after sample from the first.
 pub(super) struct Wandering {
+    delay_samples: f64,
     cycles_per_sample: Vec<f64>,
     /// Of x, y, tilt about x and y, z; empty where there is none.
     amplitudes: [Vec<Complex64>; 5],
@@ -196,7 +198,7 @@ impl Wandering {
     fn turn_rotors(&mut self, sample: u64) {
         if sample.is_multiple_of(AFRESH) {
             for (rotor, cycles) in self.rotors.iter_mut().zip(&self.cycles_per_sample) {
-                *rotor = Complex64::cis(TAU * (cycles * sample as f64).fract());
+                *rotor = Complex64::cis(TAU * (cycles * (sample as f64 - self.delay_samples)).fract());
             }
         } else {
             for (rotor, step) in self.rotors.iter_mut().zip(&self.steps) {
@@ -212,7 +214,7 @@ mod tests {
 
     fn series(config: &AsynchronousConfig, samples: u64) -> Vec<[f64; 5]> {
         let asynchronous = Asynchronous::new(config, 1000.0, samples).unwrap();
-        let mut capture = asynchronous.capture(3, 0, 0);
+        let mut capture = asynchronous.capture(3, 0, 0, 0.0);
         (0..samples)
             .map(|sample| {
                 let mut displacement = [[0.0; LANES]; 5];
@@ -243,7 +245,7 @@ mod tests {
     fn the_fractal_is_the_formula() {
         let config = AsynchronousConfig { scale_mm: Some(1e-4), dimension: 1.6, ..AsynchronousConfig::default() };
         let asynchronous = Asynchronous::new(&config, 1000.0, 4000).unwrap();
-        let capture = asynchronous.capture(3, 0, 0);
+        let capture = asynchronous.capture(3, 0, 0, 0.0);
         let phases: Vec<f64> = capture.amplitudes[0].iter().map(|amplitude| amplitude.arg()).collect();
         let motion = series(&config, 4000);
         for sample in [0_u16, 255, 256, 3999] {

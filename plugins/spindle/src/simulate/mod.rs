@@ -44,10 +44,11 @@ pub use config::{
     StationsConfig, TiltHarmonic,
 };
 pub use effects::{
-    AsynchronousLine, AxialMotion, Backlash, Dent, Effect, EvenOrderMotion, FilterAttenuation, PartAngleSign,
-    PartEccentricity, ReversalAngle, RotationReversed, SecondOrderGeometry, SensorAngle, SensorAxialPosition,
-    SensorGain, SensorLine, SensorNonlinearity, SensorSign, SensorsAngle, SensorsIdentical, SensorsSwapped,
-    SetupMotionChange, SetupRepeated, SetupsSwapped, SlippedProbe, SpeedRipple, Step, ThermalDrift,
+    AsynchronousLine, AxialMotion, Backlash, ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, Dent, Effect,
+    EvenOrderMotion, FilterAttenuation, IndexOffset, PartAngleSign, PartEccentricity, ReversalAngle, RotationReversed,
+    SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, SensorSign,
+    SensorsAngle, SensorsIdentical, SensorsSwapped, SetupGain, SetupMotionChange, SetupRepeated, SetupsSwapped,
+    SlippedProbe, SpeedRipple, Step, ThermalDrift,
 };
 pub use recording::SpindleRecording;
 

@@ -78,13 +78,20 @@ struct SimulatedStream<'a> {
     /// Index of the next sample.
     position: u64,
     spin: Spin,
-    wandering: Wandering,
+    /// By how many samples sensors are late, and the asynchronous motion as they see it then; the first ones are not late.
+    late: Vec<(f64, Wandering)>,
+    /// Angle of the spindle at its mark, in turns.
+    mark_turns: f64,
     motion_ratio: f64,
     sensors: Vec<Looking<'a>>,
 }
 
 /// A sensor in one capture.
 struct Looking<'a> {
+    /// Index of how late it is.
+    late: usize,
+    /// What its reading is taken times in this setup.
+    gain: f64,
     stance: Stance,
     z_mm: f64,
     /// What a sensor that looks along the axis sees.
@@ -136,11 +143,21 @@ impl<'a> SimulatedStream<'a> {
         let clamped_in = world.setups.get(setup).ok_or_else(|| missing("setup", setup))?;
         let name = world.rig.setups.get(setup).map_or("", |setup| setup.id.as_str());
         let spin = world.course.spin(world.seed, setup, station);
+        let mut delays = vec![0.0];
+        for sensor in world.sensors.iter().filter(|sensor| sensor.delay_samples != 0.0) {
+            delays.push(sensor.delay_samples);
+        }
+        let of_setup = |values: &[(usize, f64)]| -> Vec<f64> {
+            values.iter().filter(|(only, _)| *only == setup).map(|(_, value)| *value).collect()
+        };
         let sensors = world.sensors.iter().enumerate().map(|(item, sensor)| {
-            let angle = sensor.angle_rad + clamped_in.sensors_rad;
+            let angle =
+                sensor.angle_rad + clamped_in.sensors_rad + of_setup(&sensor.angles_in_setups).iter().sum::<f64>();
             let z_mm = sensor.z_mm + key.z_mm;
             let random = stream(world.seed, Purpose::Noise, Place { setup, station, item });
             Looking {
+                late: delays.iter().position(|delay| delay.total_cmp(&sensor.delay_samples).is_eq()).unwrap_or(0),
+                gain: clamped_in.gain * of_setup(&sensor.gains_in_setups).iter().product::<f64>(),
                 stance: Stance { line: Complex64::cis(angle), toward: Complex64::cis(angle - clamped_in.part_rad) },
                 z_mm,
                 face: sensor.axial_radius_mm.map(|radius_mm| Face {
@@ -159,6 +176,7 @@ impl<'a> SimulatedStream<'a> {
                 }),
             }
         });
+        let late = delays.iter().map(|delay| (*delay, world.asynchronous.capture(world.seed, setup, station, *delay)));
         let limits: Option<Vec<[f64; 2]>> = world.sensors.iter().map(|sensor| sensor.chain.limits_um()).collect();
         let capture = Capture {
             object: format!("simulation:/{name}/{}", key.name),
@@ -171,7 +189,7 @@ impl<'a> SimulatedStream<'a> {
             sensors: (0..world.sensors.len()).collect(),
             sensor_ids: world.rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
             converter_limits_um: limits,
-            marks: spin.marks(),
+            marks: spin.marks(clamped_in.mark_turns),
             marks_within_samples: 0.0,
             encoder: world.phase == Phase::Encoder,
             trimmed: Vec::new(),
@@ -183,27 +201,26 @@ impl<'a> SimulatedStream<'a> {
             block_samples: block_samples.max(1),
             position: 0,
             spin,
-            wandering: world.asynchronous.capture(world.seed, setup, station),
+            late: late.collect(),
+            mark_turns: clamped_in.mark_turns,
             motion_ratio: clamped_in.motion_ratio,
             sensors: sensors.collect(),
         })
     }
 
-    /// The spindle at `count` samples from `start`; lanes behind repeat the last.
-    fn instants(&mut self, start: u64, count: usize, angle_rev: &mut Vec<f64>) -> Instants {
+    /// The spindle as late sensors see it at `count` samples from `start`; lanes behind repeat the last.
+    fn instants(&mut self, late: usize, start: u64, count: usize) -> Instants {
+        let (delay_samples, wandering) = &mut self.late[late];
         let mut turns = [(0.0, 0.0); LANES];
         for (lane, angle) in turns.iter_mut().enumerate() {
-            *angle = self.spin.turns(start + lane.min(count - 1) as u64);
-        }
-        if self.capture.encoder {
-            angle_rev.extend(turns[..count].iter().map(|(whole, rest)| whole + rest));
+            *angle = self.spin.turns((start + lane.min(count - 1) as u64) as f64 - *delay_samples);
         }
         let turn = Phasor::of_turns(&turns.map(|(_, rest)| rest));
         let mut displacement = self.world.motion.at(&turn);
         for value in displacement.iter_mut().flatten() {
             *value *= self.motion_ratio;
         }
-        self.wandering.add(start, count, &turns, &mut displacement);
+        wandering.add(start, count, &turns, &mut displacement);
         let axial = &self.world.axial_um;
         let mut axial_um = (!axial.is_empty()).then(|| axial.as_slice().sum(&turn.conj()));
         if displacement[4].iter().any(|z| *z != 0.0) {
@@ -333,14 +350,22 @@ impl SampleStream for SimulatedStream<'_> {
         for (batch, rows) in block.samples.chunks_mut(LANES * channels).enumerate() {
             let start = self.position + (batch * LANES) as u64;
             let count = rows.len() / channels;
-            let instants = self.instants(start, count, &mut block.angle_rev);
+            let instants: Vec<Instants> = (0..self.late.len()).map(|late| self.instants(late, start, count)).collect();
+            if self.capture.encoder {
+                let turns = instants[0].turns[..count].iter();
+                block.angle_rev.extend(turns.map(|(whole, rest)| whole + rest - self.mark_turns));
+            }
             for (index, sensor) in self.sensors.iter_mut().enumerate() {
-                let seen = sensor.look(world, &instants, count);
+                let seen = sensor.look(world, &instants[sensor.late], count);
                 for (lane, (row, displacement_um)) in rows.chunks_mut(channels).zip(seen).enumerate() {
                     let turns = (start + lane as u64) as f64 / world.samples_per_rev as f64;
                     let sample = start + lane as u64;
-                    row[index] = sensor.channel.record(displacement_um, turns, sample, instants.turns[lane]);
+                    let turned = instants[0].turns[lane];
+                    row[index] = sensor.gain * sensor.channel.record(displacement_um, turns, sample, turned);
                 }
+            }
+            for row in rows.chunks_mut(channels) {
+                world.cross_talk.iter().for_each(|one| row[one.to] += one.relative * row[one.from]);
             }
         }
         self.position += samples as u64;

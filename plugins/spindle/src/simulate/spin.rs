@@ -128,7 +128,7 @@ impl Spin {
     fn path(&self, position: f64) -> f64 {
         let Course { start_up, run_down, .. } = self.course;
         let end = self.course.length() + start_up + run_down;
-        if position < 2.0 * start_up {
+        if start_up > 0.0 && position < 2.0 * start_up {
             position * position / (4.0 * start_up)
         } else if position > end - 2.0 * run_down {
             let left = (end - position).max(0.0);
@@ -161,21 +161,21 @@ impl Spin {
         })
     }
 
-    /// The spindle's angle at a sample: whole turns since the first mark, and the rest in turns.
+    /// The spindle's angle at a position in samples: whole turns since the first mark, and the rest in turns.
     ///
     /// Kept apart, so that the rest does not lose digits to the turns before it.
-    pub(crate) fn turns(&self, sample: u64) -> (f64, f64) {
+    pub(crate) fn turns(&self, position: f64) -> (f64, f64) {
         let Course { samples_per_rev, margin, .. } = self.course;
-        let path = self.path(sample as f64) - margin;
+        let path = self.path(position) - margin;
         let whole = (path / samples_per_rev).floor();
         let rest = (path - whole * samples_per_rev) / samples_per_rev;
         (whole, rest + self.deviation(path / samples_per_rev).0)
     }
 
-    /// Fractional sample positions of whole turns, as many as lie within the capture.
-    pub(crate) fn marks(&self) -> Vec<f64> {
+    /// Fractional sample positions of marks that come `mark_turns` behind whole turns, as many as lie within the capture.
+    pub(crate) fn marks(&self, mark_turns: f64) -> Vec<f64> {
         let last = (self.course.samples() - 1) as f64;
-        let marks = (0..=self.course.turns).map(|turn| self.mark(turn as f64));
+        let marks = (0..=self.course.turns).map(|turn| self.mark(turn as f64 + mark_turns));
         // Rounding may put the closing mark a hair behind the last sample.
         marks.filter(|mark| (-HAIR..=last + HAIR).contains(mark)).map(|mark| mark.clamp(0.0, last)).collect()
     }
@@ -215,9 +215,9 @@ mod tests {
     fn steady_turns_have_marks_on_whole_samples() {
         let spin = course(0, 0, 0.0).spin(1, 0, 0);
         let expected: Vec<f64> = (0..=20).map(|turn| f64::from(16 + 360 * turn)).collect();
-        assert_eq!(spin.marks(), expected);
-        assert_eq!(spin.turns(16 + 90), (0.0, 0.25));
-        assert_eq!(spin.turns(7), (-1.0, 351.0 / 360.0));
+        assert_eq!(spin.marks(0.0), expected);
+        assert_eq!(spin.turns(106.0), (0.0, 0.25));
+        assert_eq!(spin.turns(7.0), (-1.0, 351.0 / 360.0));
     }
 
     /// The angle at a mark, interpolated by the cubic through four samples around it, is a whole turn.
@@ -227,12 +227,12 @@ mod tests {
         course.add_ripple(Ripple { order: 2.0, amplitude_turns: 0.002, phase_rad: 0.4 }, None).unwrap();
         course.add_ripple(Ripple { order: 0.37, amplitude_turns: 0.01, phase_rad: 2.0 }, None).unwrap();
         let spin = course.spin(5, 1, 3);
-        let marks = spin.marks();
+        let marks = spin.marks(0.0);
         assert_eq!(marks.len(), 26);
         for (turn, mark) in marks.iter().enumerate() {
             let first = mark.floor() as u64 - 1;
             let at = |offset: u64| {
-                let (whole, rest) = spin.turns(first + offset);
+                let (whole, rest) = spin.turns((first + offset) as f64);
                 whole - turn as f64 + rest
             };
             let x = mark - first as f64;
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn ramps_take_twice_the_time_of_their_turns() {
         let spin = course(3, 2, 0.0).spin(0, 0, 0);
-        let marks = spin.marks();
+        let marks = spin.marks(0.0);
         assert_eq!(spin.course.samples(), 360 * (20 + 2 * 3 + 2 * 2) + 2 * 16 + 1);
         let lengths: Vec<f64> = marks.windows(2).map(|pair| pair[1] - pair[0]).collect();
         assert!(lengths[..3].windows(2).all(|pair| pair[0] > pair[1]), "the start-up speeds up: {lengths:?}");
@@ -262,7 +262,7 @@ mod tests {
         let spin = course(0, 0, 0.5).spin(9, 0, 0);
         let (mut square, mut count) = (0.0, 0.0);
         let turn = |sample: u64| {
-            let (whole, rest) = spin.turns(sample);
+            let (whole, rest) = spin.turns(sample as f64);
             whole + rest
         };
         for sample in 16..16 + 20 * 360 {

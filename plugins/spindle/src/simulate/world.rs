@@ -42,6 +42,8 @@ pub(super) struct World {
     pub motion: Motion,
     /// Axial motion, Re Σ a e^{−inΦ}, in µm.
     pub axial_um: Vec<Complex64>,
+    /// Shares of channels in the readings of others.
+    pub cross_talk: Vec<Share>,
     pub asynchronous: Asynchronous,
     pub sensors: Vec<TrueSensor>,
     pub setups: Vec<TrueSetup>,
@@ -57,8 +59,21 @@ pub(super) struct TrueSensor {
     /// Distance from the axis of a sensor that looks along it.
     pub axial_radius_mm: Option<f64>,
     pub section: usize,
+    /// By how much its readings are late.
+    pub delay_samples: f64,
+    /// Of single setups: index and angle in rad, index and gain.
+    pub angles_in_setups: Vec<(usize, f64)>,
+    pub gains_in_setups: Vec<(usize, f64)>,
     pub chain: Chain,
     pub strangers: Vec<Stranger>,
+}
+
+/// A share of a channel's reading in that of another.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Share {
+    pub from: usize,
+    pub to: usize,
+    pub relative: f64,
 }
 
 /// A setup as it really is.
@@ -67,6 +82,10 @@ pub(super) struct TrueSetup {
     pub part_rad: f64,
     pub sensors_rad: f64,
     pub motion_ratio: f64,
+    /// What all readings are taken times.
+    pub gain: f64,
+    /// Angle of the spindle at its mark, in turns.
+    pub mark_turns: f64,
     /// One a section.
     pub clamping: Vec<Clamping>,
     /// By which angle the surface under a sensor on the axis is turned, as e^{iψ}.
@@ -131,6 +150,9 @@ impl World {
             z_mm: sensor.z_mm,
             axial_radius_mm: sensor.axial_radius_mm,
             section: sensor.section,
+            delay_samples: 0.0,
+            angles_in_setups: Vec::new(),
+            gains_in_setups: Vec::new(),
             chain: Chain::new(config.noise.rms_um, sensor.sign, converter),
             strangers: Vec::new(),
         };
@@ -144,6 +166,8 @@ impl World {
                 part_rad: setup.part_rad,
                 sensors_rad: setup.sensors_rad,
                 motion_ratio: 1.0,
+                gain: 1.0,
+                mark_turns: 0.0,
                 clamping: vec![clamping; rig.sections.len()],
                 pole: phase(&mut stream(config.seed, Purpose::Pole, Place { setup: index, ..Place::default() })),
             }
@@ -161,6 +185,7 @@ impl World {
             form,
             faces,
             motion,
+            cross_talk: Vec::new(),
             axial_um: Vec::new(),
             asynchronous,
             sensors: rig.sensors.iter().map(sensor).collect(),

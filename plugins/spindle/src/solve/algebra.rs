@@ -2,6 +2,8 @@
 
 use runout_core::{Complex64, separation::OrderResidual};
 
+use crate::alterations::CrossTalk;
+
 /// Matrix (`[row][col]`) times vector.
 pub(crate) fn apply(matrix: &[Complex64], vector: &[Complex64]) -> Vec<Complex64> {
     matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
@@ -88,6 +90,15 @@ impl Blocks {
             for row in block.chunks_exact_mut(size) {
                 row.iter_mut().enumerate().for_each(|(index, entry)| *entry *= factor(setup * size + index));
             }
+        }
+        self
+    }
+
+    /// Each reading with shares of others of its setup: of a share of one in another, its own column has the other's.
+    #[must_use]
+    pub(crate) fn with_shares(mut self, shares: &[CrossTalk]) -> Self {
+        for row in self.entries.chunks_exact_mut(self.size) {
+            shares.iter().for_each(|CrossTalk { from, to, share }| row[*from] += *share * row[*to]);
         }
         self
     }

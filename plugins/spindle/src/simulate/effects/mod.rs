@@ -2,6 +2,7 @@
 //!
 //! Strangers are effects that no model knows.
 
+mod channels;
 mod mistakes;
 mod sensors;
 mod setups;
@@ -12,6 +13,7 @@ use runout_core::fault::{Fault, known_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use channels::{ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, IndexOffset, SetupGain};
 pub use mistakes::{
     PartAngleSign, RotationReversed, SensorSign, SensorsIdentical, SensorsSwapped, SetupRepeated, SetupsSwapped,
 };
@@ -60,6 +62,18 @@ pub enum Effect {
     AxialMotion(AxialMotion),
     /// A low-pass in one channel.
     FilterAttenuation(FilterAttenuation),
+    /// A channel records what it saw a while ago.
+    ChannelDelay(ChannelDelay),
+    /// Each channel records later than the one before it.
+    ChannelSkew(ChannelSkew),
+    /// A share of one channel's reading is in that of another.
+    CrossTalk(CrossTalk),
+    /// Every reading has a share of that of the channel before it.
+    ChannelGhost(ChannelGhost),
+    /// All readings of a setup are too large or too small by a factor.
+    SetupGain(SetupGain),
+    /// The mark of a setup comes at another angle of the spindle.
+    IndexOffset(IndexOffset),
     /// A mistake in the rig: readings have the opposite sign.
     SensorSign(SensorSign),
     /// A mistake in the rig: two channels are swapped.
@@ -129,6 +143,12 @@ impl Effect {
             Self::SpeedRipple(effect) => effect,
             Self::AxialMotion(effect) => effect,
             Self::FilterAttenuation(effect) => effect,
+            Self::ChannelDelay(effect) => effect,
+            Self::ChannelSkew(effect) => effect,
+            Self::CrossTalk(effect) => effect,
+            Self::ChannelGhost(effect) => effect,
+            Self::SetupGain(effect) => effect,
+            Self::IndexOffset(effect) => effect,
             Self::Dent(effect) => effect,
             Self::Backlash(effect) => effect,
             Self::Step(effect) => effect,

@@ -4,7 +4,7 @@ use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, places, sensor_ids, setup_ids};
+use super::{Acts, channels::named_setups, places, sensor_ids, setup_ids};
 use crate::simulate::{
     chain::{Drift, LowPass, PickUp, Runs},
     check,
@@ -19,6 +19,9 @@ pub struct SensorGain {
     pub targets: Vec<String>,
     /// Relative: 0.01 reads 1 % too much.
     pub relative_gain: f64,
+    /// Ids of the setups in which it is so; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub setups: Vec<String>,
     /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
@@ -31,7 +34,11 @@ impl Acts for SensorGain {
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("relative_gain", self.relative_gain)?;
-        on_sensors(world, &self.targets, |sensor| sensor.chain.gain *= 1.0 + self.relative_gain)
+        let (setups, gain) = (named_setups(world, &self.setups)?, 1.0 + self.relative_gain);
+        on_sensors(world, &self.targets, |sensor| {
+            sensor.chain.gain *= if setups.is_empty() { gain } else { 1.0 };
+            sensor.gains_in_setups.extend(setups.iter().map(|setup| (*setup, gain)));
+        })
     }
 }
 
@@ -43,6 +50,9 @@ pub struct SensorAngle {
     pub targets: Vec<String>,
     /// In degrees about +z.
     pub angle_deg: f64,
+    /// Ids of the setups in which it is so; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub setups: Vec<String>,
     /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
@@ -55,7 +65,11 @@ impl Acts for SensorAngle {
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("angle_deg", self.angle_deg)?;
-        on_sensors(world, &self.targets, |sensor| sensor.angle_rad += self.angle_deg.to_radians())
+        let (setups, angle_rad) = (named_setups(world, &self.setups)?, self.angle_deg.to_radians());
+        on_sensors(world, &self.targets, |sensor| {
+            sensor.angle_rad += if setups.is_empty() { angle_rad } else { 0.0 };
+            sensor.angles_in_setups.extend(setups.iter().map(|setup| (*setup, angle_rad)));
+        })
     }
 }
 

@@ -145,7 +145,7 @@ impl Acts for PartEccentricity {
     }
 }
 
-fn on_setups(world: &mut World, targets: &[String], change: impl Fn(&mut TrueSetup)) -> Result<(), Fault> {
+pub(super) fn on_setups(world: &mut World, targets: &[String], change: impl Fn(&mut TrueSetup)) -> Result<(), Fault> {
     for index in places("targets", targets, &setup_ids(world), "setup")? {
         change(&mut world.setups[index]);
     }

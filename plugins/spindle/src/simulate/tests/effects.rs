@@ -81,7 +81,7 @@ pub(super) fn ids(names: &[&str]) -> Vec<String> {
 
 #[test]
 fn sensor_gain() {
-    let effect = SensorGain { targets: ids(&["S2", "S3"]), relative_gain: 0.017, declared: false };
+    let effect = SensorGain { targets: ids(&["S2", "S3"]), relative_gain: 0.017, setups: Vec::new(), declared: false };
     check(
         Effect::SensorGain(effect),
         |channel, _| channel == 1 || channel == 2,
@@ -91,7 +91,7 @@ fn sensor_gain() {
 
 #[test]
 fn sensor_angle() {
-    let effect = SensorAngle { targets: ids(&["S4"]), angle_deg: 1.1, declared: false };
+    let effect = SensorAngle { targets: ids(&["S4"]), angle_deg: 1.1, setups: Vec::new(), declared: false };
     check(
         Effect::SensorAngle(effect),
         |channel, _| channel == 3,
@@ -363,7 +363,7 @@ fn filter_attenuation() {
 #[test]
 fn an_effect_that_claims_to_be_declared_is_refused() {
     let with = |declared| {
-        let gain = SensorGain { targets: vec!["S1".into()], relative_gain: 0.01, declared };
+        let gain = SensorGain { targets: vec!["S1".into()], relative_gain: 0.01, setups: Vec::new(), declared };
         simulator(&SpindleConfig { effect: vec![Effect::SensorGain(gain)], ..scene() })
     };
     let refused = with(true).err().map(|fault| fault.to_string()).unwrap_or_default();
