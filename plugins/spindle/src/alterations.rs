@@ -4,8 +4,6 @@ use std::{fmt, sync::Arc};
 
 use runout_core::{Complex64, rig};
 
-use crate::layout::{Layout, Reading};
-
 /// Everything that effects change, at its declared value until one does.
 #[derive(Debug, Clone)]
 #[allow(clippy::struct_excessive_bools, reason = "each is an effect that is there or not")]
@@ -180,26 +178,6 @@ impl Alterations {
         };
         let numbers = self.sensors.iter().flat_map(|s| [s.quadratic_per_um, s.cubic_per_um2, s.creep_um, s.z_mm]);
         self.sensors.iter().all(sensor) && self.setups.iter().all(setup) && numbers.into_iter().all(f64::is_finite)
-    }
-}
-
-impl Alterations {
-    /// Reading over displacement at an order.
-    #[must_use]
-    pub fn response(&self, reading: &Reading, order: usize) -> Complex64 {
-        self.sensors[reading.sensor].response(reading.setup, order)
-    }
-
-    /// What displacements of an order are recorded as, `[reading]`.
-    pub(crate) fn recorded(&self, layout: &Layout, order: usize, displacements: &[Complex64]) -> Vec<Complex64> {
-        let mut recorded = displacements.to_vec();
-        let sensors = self.sensors.len();
-        for readings in recorded.chunks_exact_mut(sensors) {
-            let last_first = self.cross_talk.iter().rev();
-            last_first.for_each(|CrossTalk { from, to, share }| readings[*to] += readings[*from] * *share);
-        }
-        recorded.iter_mut().zip(&layout.readings).for_each(|(value, reading)| *value *= self.response(reading, order));
-        recorded
     }
 }
 

@@ -256,12 +256,6 @@ impl Layout {
         layout
     }
 
-    /// Setups.
-    #[must_use]
-    pub fn setups(&self) -> usize {
-        self.setups
-    }
-
     /// +1, or −1 where motion of this order is assumed to change sign in this setup.
     #[must_use]
     pub fn motion_sign(&self, setup: usize, order: usize) -> f64 {

@@ -30,6 +30,24 @@ impl Alterations {
         }
     }
 
+    /// Reading over displacement at an order.
+    #[must_use]
+    pub fn response(&self, reading: &Reading, order: usize) -> Complex64 {
+        self.sensors[reading.sensor].response(reading.setup, order)
+    }
+
+    /// What displacements of an order are recorded as, `[reading]`.
+    pub(crate) fn recorded(&self, layout: &Layout, order: usize, displacements: &[Complex64]) -> Vec<Complex64> {
+        let mut recorded = displacements.to_vec();
+        let sensors = self.sensors.len();
+        for readings in recorded.chunks_exact_mut(sensors) {
+            let last_first = self.cross_talk.iter().rev();
+            last_first.for_each(|CrossTalk { from, to, share }| readings[*to] += readings[*from] * *share);
+        }
+        recorded.iter_mut().zip(&layout.readings).for_each(|(value, reading)| *value *= self.response(reading, order));
+        recorded
+    }
+
     /// Takes averaged readings (`[order][reading]`, orders from 0) back to displacements: creep, gain and
     /// low-pass, characteristic, angle.
     pub(crate) fn correct(&self, layout: &Layout, readings: &mut Readings) {

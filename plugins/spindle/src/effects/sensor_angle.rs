@@ -36,7 +36,8 @@ impl SpindleEffect for SensorAngle {
 
     /// On the axis a sensor has no angle.
     fn suits(&self, target: usize, layout: &Layout) -> bool {
-        let (sensor, _) = self.place(target, layout.setups());
+        let setups = layout.readings.last().map_or(1, |reading| reading.setup + 1);
+        let (sensor, _) = self.place(target, setups);
         layout.readings.iter().any(|reading| reading.sensor == sensor && reading.view != View::OnAxis)
     }
 

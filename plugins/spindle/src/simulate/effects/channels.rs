@@ -4,7 +4,7 @@ use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, places, sensor_ids, sensors::on_sensors, setup_ids, setups::on_setups};
+use super::{Acts, places, sensor_ids, sensors::on_sensors, setups::on_setups};
 use crate::simulate::{
     check,
     world::{Share, World},
@@ -159,9 +159,4 @@ impl Acts for IndexOffset {
         check::finite("angle_deg", self.angle_deg)?;
         on_setups(world, &self.targets, |setup| setup.mark_turns += self.angle_deg / 360.0)
     }
-}
-
-/// Indices of the setups that are named.
-pub(super) fn named_setups(world: &World, named: &[String]) -> Result<Vec<usize>, Fault> {
-    if named.is_empty() { Ok(Vec::new()) } else { places("setups", named, &setup_ids(world), "setup") }
 }

@@ -165,6 +165,11 @@ fn setup_ids(world: &World) -> Vec<&str> {
     world.rig.setups.iter().map(|setup| setup.id.as_str()).collect()
 }
 
+/// Indices of the setups that are named.
+fn named_setups(world: &World, named: &[String]) -> Result<Vec<usize>, Fault> {
+    if named.is_empty() { Ok(Vec::new()) } else { places("setups", named, &setup_ids(world), "setup") }
+}
+
 /// Indices of the ids under a key among the known ones.
 fn places(key: &str, ids: &[String], known: &[&str], noun: &str) -> Result<Vec<usize>, Fault> {
     if ids.is_empty() {

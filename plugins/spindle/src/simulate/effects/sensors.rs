@@ -4,7 +4,7 @@ use runout_core::fault::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, channels::named_setups, places, sensor_ids, setup_ids};
+use super::{Acts, named_setups, places, sensor_ids, setup_ids};
 use crate::simulate::{
     chain::{Drift, LowPass, PickUp, Runs},
     check,
