@@ -185,7 +185,7 @@ class Quadrature:
     predicted. Default: 100."""
 
     max_order: Union[int, None] = None
-    """Highest harmonic of the phase that may be in the radius. Default: 8."""
+    """Highest harmonic of the phase that may be in the radius. Default: 16."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

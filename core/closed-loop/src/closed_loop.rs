@@ -11,8 +11,8 @@ use super::{
     fit::{INDEPENDENT, Refit, refit},
     found::Found,
     judgement::{
-        BIC_LIMIT, OVERLAP, P_LIMIT, above_chance, at_the_floor, disturbed, independent, is, mixed, no_gain,
-        noise_only, overlap, raises_held_out, unit, weak,
+        OVERLAP, above_chance, at_the_floor, independent, is, mixed, no_gain, noise_only, overlap, raises_held_out,
+        too_little, unit,
     },
     keyed::Keyed,
     report::{added, blind, level, moved, verdict},
@@ -268,15 +268,17 @@ impl<M: Model> Tracing<'_, M> {
             let keys = keyed.keys(effect, [found, &trial.fit.residual], &taken, count);
             // Each key has its own limit; the chance that is stated is the largest.
             let stated = Evidence { p_value: evidence.p_value.max(keys.p), ..evidence };
-            let by_keys = keys.refused.is_some();
-            match self.doubt(effect, [&before, &trial.fit], &evidence).or(keys.refused) {
-                // What correlated errors or blocks refuse says nothing of the others.
-                Some(reason) if by_keys => self.refuse(effect, reason),
-                Some(reason) => {
-                    self.refuse(effect, reason);
-                    return None;
-                }
+            let too_little = too_little([&before, &trial.fit], &evidence);
+            // Where one explains too little, so do the others; what held-out data, correlated errors or blocks refuse says nothing of them.
+            let ends = too_little.is_some() && keys.refused.is_none();
+            let raises = || raises_held_out(&before, &trial.fit, self.model.is_seen_besides(effect));
+            let doubt = too_little.or(keys.refused).or_else(|| raises().then(|| no_gain(&before, &trial.fit)));
+            match doubt {
+                Some(reason) => self.refuse(effect, reason),
                 None => believed = Some((effect, trial, stated)),
+            }
+            if ends {
+                return None;
             }
         }
         let (effect, trial, evidence) = believed?;
@@ -364,20 +366,6 @@ impl<M: Model> Tracing<'_, M> {
         let mut columns = orthonormal(columns, basis, INDEPENDENT);
         columns.truncate(self.model.effects()[effect].parameters.len());
         columns
-    }
-
-    /// Why an effect is not believed, by what is left without and with it.
-    fn doubt(&self, effect: usize, [before, after]: [&Remainder; 2], evidence: &Evidence) -> Option<String> {
-        let lowered = before.chi2() - after.chi2();
-        if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
-            Some(weak(evidence))
-        } else if lowered <= before.disturbed_chi2 {
-            Some(disturbed(lowered, before.disturbed_chi2))
-        } else if raises_held_out(before, after, self.model.is_seen_besides(effect)) {
-            Some(no_gain(before, after))
-        } else {
-            None
-        }
     }
 
     /// Evidence for an effect, of χ² without and with it, by what is known of the noise.

@@ -101,8 +101,20 @@ pub(super) fn above_chance(remainder: &Remainder) -> bool {
     remainder.noise_is_known() && remainder.chi2_per_dof() > chance(remainder)
 }
 
+/// Why an effect explains too little to be believed, by what is left without and with it.
+pub(super) fn too_little([before, after]: [&Remainder; 2], evidence: &Evidence) -> Option<String> {
+    let lowered = before.chi2() - after.chi2();
+    if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {
+        Some(weak(evidence))
+    } else if lowered <= before.disturbed_chi2 {
+        Some(disturbed(lowered, before.disturbed_chi2))
+    } else {
+        None
+    }
+}
+
 /// Evidence that is too weak, with the limit that it misses.
-pub(super) fn weak(evidence: &Evidence) -> String {
+fn weak(evidence: &Evidence) -> String {
     let Evidence { p_value, delta_bic } = evidence;
     let [p_limit, bic_limit] = [
         if *p_value > P_LIMIT { format!(", above {P_LIMIT:e}") } else { String::new() },
@@ -112,7 +124,7 @@ pub(super) fn weak(evidence: &Evidence) -> String {
 }
 
 /// An effect that explains no more than known disturbances may.
-pub(super) fn disturbed(found: f64, expected: f64) -> String {
+fn disturbed(found: f64, expected: f64) -> String {
     format!(
         "lost orders carry as much into the data: it lowers χ² by {found:.1}, and {expected:.1} is expected from them"
     )

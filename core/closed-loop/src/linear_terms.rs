@@ -6,7 +6,7 @@ mod tests;
 
 use std::{ops::Range, sync::Arc};
 
-use super::{Effect, Model, Remainder, Setting};
+use super::{Effect, Model, Remainder, Setting, diagnosis::Unexplained};
 pub use fit::LinearFit;
 use runout_consistency::{Kind, Structure};
 use runout_error::{Error, ErrorKind, Result};
@@ -85,6 +85,8 @@ struct Data {
     places: Vec<usize>,
     structure: Arc<Structure>,
     unseen: Vec<HeldOut>,
+    /// What is not among the points, since nothing explains it.
+    set_aside: Vec<Unexplained>,
     /// Effects that are declared with their values: never refitted.
     known: Vec<usize>,
     /// The last effect of each list, by id, and what ends the list.
@@ -146,6 +148,7 @@ impl LinearTerms {
             places,
             structure: Arc::new(structure),
             unseen,
+            set_aside: Vec::new(),
             known,
             ends,
             chosen,
@@ -171,6 +174,13 @@ impl LinearTerms {
     #[must_use]
     pub fn predicting(mut self, unseen: Vec<HeldOut>) -> Self {
         Arc::make_mut(&mut self.0).unseen = unseen;
+        self
+    }
+
+    /// Says what is not among the points: each diagnosis lists it as not explained.
+    #[must_use]
+    pub fn setting_aside(mut self, found: Vec<Unexplained>) -> Self {
+        Arc::make_mut(&mut self.0).set_aside = found;
         self
     }
 

@@ -5,6 +5,8 @@ use std::{collections::HashMap, ops::Range, path::PathBuf};
 use runout_error::{Error, Result};
 use runout_turning::{input_file::InputFile, provenance::Input};
 
+pub mod mistakes;
+
 /// Numbers of a row without time and repeat from which on equal rows are no chance.
 const FEWEST_FOR_COPIES: usize = 4;
 

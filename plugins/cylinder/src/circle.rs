@@ -1,6 +1,9 @@
 //! Harmonics of one measured circle, on the angles as they are.
 
-use std::f64::consts::{PI, TAU};
+use std::{
+    f64::consts::{PI, TAU},
+    ops::Range,
+};
 
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
@@ -197,8 +200,21 @@ impl Cleaned {
     /// # Errors
     /// What hinders the fit, in words.
     pub(crate) fn of(scan: &Scan, max_order: usize, about_mm: Option<f64>, deviations: f64) -> Result<Self, String> {
+        Self::beginning_with(vec![true; scan.len()], scan, max_order, about_mm, deviations)
+    }
+
+    /// The same from points that are kept at first.
+    ///
+    /// # Errors
+    /// What hinders the fit, in words.
+    pub(crate) fn beginning_with(
+        mut kept: Vec<bool>,
+        scan: &Scan,
+        max_order: usize,
+        about_mm: Option<f64>,
+        deviations: f64,
+    ) -> Result<Self, String> {
         let max_order = max_order.min((scan.len() / POINTS_AN_ORDER).max(LOWEST_ORDER));
-        let mut kept = vec![true; scan.len()];
         for round in 1.. {
             let fit = Harmonics::fit(&scan.keep(&kept), max_order, about_mm)?;
             let distance_um: Vec<f64> =
@@ -227,25 +243,27 @@ impl Cleaned {
         self.kept.iter().filter(|kept| !**kept).count()
     }
 
-    /// Stretches of the trace that points were left out of, as angles in degrees: from, to, how many.
+    /// Arcs that points were left out of: from the first of them to the last, and how many.
+    #[must_use]
+    pub(crate) fn arcs(&self) -> Vec<(Range<usize>, usize)> {
+        // Ringing leaves out every other point; so many kept ones between do not end an arc.
+        const BRIDGED: usize = 5;
+        let mut arcs: Vec<(Range<usize>, usize)> = Vec::new();
+        for (point, _) in self.kept.iter().enumerate().filter(|(_, kept)| !**kept) {
+            match arcs.last_mut() {
+                Some((arc, count)) if point < arc.end + BRIDGED => (arc.end, *count) = (point + 1, *count + 1),
+                _ => arcs.push((point..point + 1, 1)),
+            }
+        }
+        arcs
+    }
+
+    /// The same as angles in degrees: from, to, how many.
     #[must_use]
     pub(crate) fn stretches(&self, scan: &Scan) -> Vec<(f64, f64, usize)> {
-        // Ringing leaves out every other point; so many kept ones between do not end a stretch.
-        const BRIDGED: usize = 5;
-        let mut stretches: Vec<(f64, f64, usize)> = Vec::new();
-        let mut since = BRIDGED + 1;
-        for (angle, kept) in scan.angle_rad.iter().zip(&self.kept) {
-            since += 1;
-            if *kept {
-                continue;
-            }
-            match stretches.last_mut() {
-                Some((_, to, count)) if since <= BRIDGED => (*to, *count) = (angle.to_degrees(), *count + 1),
-                _ => stretches.push((angle.to_degrees(), angle.to_degrees(), 1)),
-            }
-            since = 0;
-        }
-        stretches
+        let degrees = |point: usize| scan.angle_rad[point].to_degrees();
+        let arcs = self.arcs().into_iter();
+        arcs.map(|(arc, count)| (degrees(arc.start), degrees(arc.end - 1), count)).collect()
     }
 }
 

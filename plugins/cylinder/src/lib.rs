@@ -6,6 +6,7 @@
 mod circle;
 mod config;
 mod consistency;
+mod defects;
 mod generatrix;
 mod model;
 mod predict;

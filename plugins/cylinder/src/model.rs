@@ -13,6 +13,7 @@ use runout_core::{
     Complex64, Result,
     model::{
         Effect, Fit, Parameter,
+        diagnosis::Unexplained,
         linear_terms::{Declared, HeldOut, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
@@ -22,6 +23,7 @@ use runout_core::{
 
 use crate::{
     consistency::structure,
+    defects::set_aside,
     generatrix::open_profiles,
     scan::Scan,
     separate::{Circle, LeastSquaresCylinder},
@@ -91,9 +93,10 @@ fn missing(max_lobes: usize, mean_square: f64) -> Vec<Missing> {
     all
 }
 
-/// The circles used without their outliers, about the least-squares axis.
+/// The circles used without their outliers and local defects, about the least-squares axis.
 struct Basis<'a> {
     circles: Vec<Circle<'a>>,
+    defects: Vec<Unexplained>,
     /// The points of each circle about the axis, their distances with its first-order run-out.
     placed: Vec<Scan>,
     cylinder: Cylinder,
@@ -102,13 +105,20 @@ struct Basis<'a> {
 
 impl<'a> Basis<'a> {
     fn of(separator: &LeastSquaresCylinder, points: &'a Points) -> Result<Self> {
-        let circles = separator.circles(points)?;
+        let mut circles = separator.circles(points)?;
+        let mut defects = Vec::new();
+        // Where outliers are asked for to be left out, they are.
+        for circle in circles.iter_mut().filter(|_| separator.outlier_mad().is_none()) {
+            let (scan, found) = set_aside(&circle.scan, &format!("{} {}", circle.kind, circle.id));
+            circle.scan = scan;
+            defects.extend(found);
+        }
         let cylinder = separator.fit_cylinder(points, &circles)?;
         let placed: Vec<Scan> = circles.iter().map(|circle| place(&cylinder, &circle.scan)).collect();
         let arms = || placed.iter().flat_map(|scan| &scan.z_mm).map(|z| arm_mm(&cylinder, *z));
         let mean_square = arms().map(|arm| arm * arm).sum::<f64>() / arms().count() as f64;
         let missing = missing(separator.max_lobes(), mean_square);
-        Ok(Self { circles, placed, cylinder, missing })
+        Ok(Self { circles, defects, placed, cylinder, missing })
     }
 
     /// Columns of all effects at some points, `[effect][parameter][point]`.
@@ -184,7 +194,7 @@ impl LinearModel for LeastSquaresCylinder {
         let highest = self.max_lobes();
         let limit = format!("order {highest} is the highest one looked for: higher ones need a larger `max_lobes`");
         let model = model.ending_at(format!("lobes-{highest}"), limit);
-        Ok(model.predicting(basis.unseen(self, points)?))
+        Ok(model.predicting(basis.unseen(self, points)?).setting_aside(basis.defects))
     }
 
     fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {

@@ -47,7 +47,7 @@ fn default_blocks() -> usize {
 }
 
 fn default_max_order() -> usize {
-    8
+    16
 }
 
 /// Stretches of time whose errors are independent of each other; without times every eighth sample along the phase.

@@ -14,6 +14,7 @@ mod diagnose;
 mod effects;
 mod kinematics;
 mod left_out;
+mod mistakes;
 mod model;
 mod motion;
 mod nest;

@@ -199,7 +199,8 @@ impl RotaryAxis {
         let checks = checks(axis, campaign, effects, &found);
         let refuted = refuted_by(&checks);
         values = values.into_iter().map(|value| value.refuted_by(refuted.clone())).collect();
-        let mut remarks = campaign.warnings.clone();
+        let mistake = if effects.is_empty() { self.mistake(points, found.chi2_per_dof().sqrt()) } else { None };
+        let mut remarks: Vec<String> = mistake.into_iter().chain(campaign.warnings.iter().cloned()).collect();
         remarks.extend(self.lost(&found, campaign));
         let notes = noise_remark(campaign.noise).into_iter().collect();
         remarks.extend(scale.remark.clone());

@@ -5,7 +5,10 @@
 mod common;
 
 use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, column, scenario, separated, separator, value};
-use runout_core::stage::PointSeparator;
+use runout_core::{
+    points::{Points, mistakes},
+    stage::PointSeparator,
+};
 
 const LOCATION_SYMBOLS: [&str; 4] = ["EX0C", "EY0C", "EA0C", "EB0C"];
 const TRUE_LOCATION: [f64; 4] = [23.7, 3.1, 41.0, 34.6];
@@ -354,6 +357,29 @@ fn compensation_removes_most_on_commands_that_the_fit_has_not_seen() {
             let [before, after] = ["before", "after"].map(|when| range(&format!("{coordinate}_range_{when}")));
             println!("{ball} {coordinate} {before:.1} {after:.1}");
             assert!(after < 0.3 * before, "{ball} {coordinate} {before} {after}");
+        }
+    }
+}
+
+/// Columns of the file that are exchanged or have the other sign are named, and sound files are not.
+#[test]
+fn mistakes_of_the_file_are_named() {
+    let text = format!(
+        "{THREE_BALLS}{COMPONENTS}{LOCATION}{PLACEMENT}noise_um = 1.0\nseed = 5\ncommands = {{ step_deg = 10, count = 36 }}"
+    );
+    let points = scenario(&text).simulate().points();
+    let said = |points: &Points| {
+        let remarks = separated(&format!("{THREE_BALLS}std_um = 1.0"), points).remarks;
+        remarks.into_iter().filter(|remark| remark.starts_with("it looks as if")).collect::<Vec<_>>()
+    };
+    assert_eq!(said(&points), Vec::<String>::new());
+    // The sign of dz shows by tilts only, which are as small as the noise here; x and y turned by 90° are another frame, and leave no trace.
+    let exchanged = [["dx_mm", "dy_mm"], ["dx_mm", "dz_mm"]];
+    for (what, wrong) in mistakes::columns(&points, &exchanged, &[&["dx_mm"], &["c_deg"]]) {
+        let said = said(&wrong);
+        println!("{what}: {said:?}");
+        if !what.contains("exchanged, ") {
+            assert!(said.first().is_some_and(|first| first.contains(&what)), "{what}: {said:?}");
         }
     }
 }

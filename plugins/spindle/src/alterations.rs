@@ -44,6 +44,8 @@ pub struct SensorAlteration {
     pub sign: f64,
     /// Whether it stands half a turn from the declared angle.
     pub opposite: bool,
+    /// Whether it looks at the other section.
+    pub in_other_section: bool,
     /// Relative gain less 1.
     pub gain: f64,
     /// True less declared angle, in rad.
@@ -119,6 +121,8 @@ pub struct SetupAlteration {
     pub part_rad: f64,
     /// True less declared angle of all sensors, in rad.
     pub sensors_rad: f64,
+    /// Whether the sensors were turned with the part where they are declared to stay, or stayed where they are declared to be turned.
+    pub sensors_otherwise: bool,
     /// Motion over that of the first setup, less 1.
     pub motion: f64,
     /// Uneven speed within the turn.
@@ -149,6 +153,9 @@ impl Harmonic {
 /// one sensor and the inverse one of its neighbour often explain the same.
 const GAINS: std::ops::RangeInclusive<f64> = 0.05..=20.0;
 
+/// By how much an angle may be off: 45° and a little. Beyond, it is another place.
+const FARTHEST_RAD: f64 = 0.8;
+
 impl Alterations {
     /// Whether a sign, a channel, a setup or a way of counting angles is not as declared.
     #[must_use]
@@ -157,7 +164,8 @@ impl Alterations {
         self.rotation_reversed
             || self.part_angles_reversed
             || self.sensor_angles_reversed
-            || self.sensors.iter().any(|sensor| sensor.sign < 0.0 || sensor.opposite)
+            || self.sensors.iter().any(|sensor| sensor.sign < 0.0 || sensor.opposite || sensor.in_other_section)
+            || self.setups.iter().any(|setup| setup.sensors_otherwise)
             || moved(&self.places)
             || moved(&self.clampings)
     }
@@ -167,14 +175,14 @@ impl Alterations {
     pub fn are_possible(&self) -> bool {
         let sensor = |sensor: &SensorAlteration| {
             let turned = sensor.angles_in_setups.iter().map(|(_, angle_rad)| angle_rad.abs()).fold(0.0, f64::max);
-            GAINS.contains(&(1.0 + sensor.gain)) && sensor.angle_rad.abs() + turned < 0.5
+            GAINS.contains(&(1.0 + sensor.gain)) && sensor.angle_rad.abs() + turned < FARTHEST_RAD
         };
         let steepness = |setup: &SetupAlteration| -> f64 {
             setup.ripples.iter().map(|ripple| ripple.order as f64 * ripple.cosine.hypot(ripple.sine)).sum()
         };
         let setup = |setup: &SetupAlteration| {
             let angles = [setup.part_rad, setup.sensors_rad];
-            angles.iter().all(|angle| angle.abs() < 0.5) && setup.motion > -0.95 && steepness(setup) < 0.5
+            angles.iter().all(|angle| angle.abs() < FARTHEST_RAD) && setup.motion > -0.95 && steepness(setup) < 0.5
         };
         let numbers = self.sensors.iter().flat_map(|s| [s.quadratic_per_um, s.cubic_per_um2, s.creep_um, s.z_mm]);
         self.sensors.iter().all(sensor) && self.setups.iter().all(setup) && numbers.into_iter().all(f64::is_finite)
@@ -199,6 +207,7 @@ impl SensorAlteration {
     pub const NONE: Self = Self {
         sign: 1.0,
         opposite: false,
+        in_other_section: false,
         gain: 0.0,
         angle_rad: 0.0,
         z_mm: 0.0,

@@ -83,6 +83,14 @@ pub struct Reading {
     pub declared_sign: f64,
 }
 
+impl Reading {
+    /// By how much the sensor is turned where all of them were turned with the part and not as declared: not at all, or as the part.
+    pub(crate) fn turned_otherwise_rad(&self) -> f64 {
+        let part_rad = self.angle_rad - self.part_angle_rad;
+        if self.turned_rad == 0.0 { part_rad } else { -self.turned_rad }
+    }
+}
+
 /// Which way a sensor looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum View {
@@ -244,6 +252,14 @@ impl Layout {
                 reading.angle_rad -= 2.0 * angle_rad;
                 reading.part_angle_rad -= 2.0 * angle_rad;
             }
+            if setup.sensors_otherwise {
+                let by = reading.turned_otherwise_rad();
+                reading.angle_rad += by;
+                reading.part_angle_rad += by;
+            }
+            if let Some(other) = self.other_section(declared).filter(|_| sensor.in_other_section) {
+                (reading.section, reading.lever_mm) = (other.section, other.lever_mm);
+            }
             let opposite = if sensor.opposite { PI } else { 0.0 };
             let turned = sensor.turned_rad(reading.setup) + setup.sensors_rad + opposite;
             reading.angle_rad += turned;
@@ -254,6 +270,15 @@ impl Layout {
             reading.motion_ratio *= 1.0 + setup.motion;
         }
         layout
+    }
+
+    /// A reading of the section that a radial sensor does not look at, where there are two.
+    pub(crate) fn other_section(&self, reading: &Reading) -> Option<&Reading> {
+        let others = self.readings.iter().filter(|other| !other.view.is_axial() && other.section != reading.section);
+        others
+            .clone()
+            .next()
+            .filter(|first| !reading.view.is_axial() && others.clone().all(|other| other.section == first.section))
     }
 
     /// +1, or −1 where motion of this order is assumed to change sign in this setup.

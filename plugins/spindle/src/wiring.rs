@@ -31,6 +31,9 @@ const ALIKE: f64 = 1.5;
 const LARGEST_GAIN: f64 = 0.5;
 /// What was measured twice differs by noise only, whatever else is wrong with the rig.
 const COPIES: [Mistake; 2] = [Mistake::SensorsIdentical, Mistake::SetupRepeated];
+/// Another circle of the part explains much that is none: it has to leave next to nothing.
+const ONLY_NEAR_NOISE: [Mistake; 3] =
+    [Mistake::SensorsIdentical, Mistake::SetupRepeated, Mistake::SensorInOtherSection];
 /// As many are worth a whole fit.
 const MOST: usize = 8;
 /// Form, motion and eccentricity live in the low orders.
@@ -60,7 +63,7 @@ pub(crate) fn suspects(
     let noise = if weights.is_some() { FAR_FROM_NOISE } else { SHARE_OF_TWO * declared };
     for mistake in &single {
         let limit = SUSPICIOUS_SHARE * declared;
-        let limit = if COPIES.contains(&mistake.0) { limit.min(noise) } else { limit };
+        let limit = if ONLY_NEAR_NOISE.contains(&mistake.0) { limit.min(noise) } else { limit };
         found.extend(trial.suspect(vec![*mistake], limit));
     }
     let least = |found: &[Suspect]| found.iter().map(|suspect| suspect.chi2).fold(declared, f64::min);
@@ -112,6 +115,29 @@ pub(crate) fn traceless(
     found
 }
 
+/// Of values of an effect, the one with which low orders leave least, where far more than noise is left without it and far less with it.
+pub(crate) fn far_value(
+    layout: &Layout,
+    applied: &Alterations,
+    readings: &Readings,
+    weights: Option<&[Blocks]>,
+    values: &[f64],
+    alter: impl Fn(f64, &mut Alterations),
+) -> Option<f64> {
+    let trial = Trial::new(layout, applied, readings, weights);
+    let declared =
+        trial.left_with(applied, f64::INFINITY).filter(|chi2| weights.is_none() || *chi2 > FAR_FROM_NOISE)?;
+    let (mut limit, mut best) = (SUSPICIOUS_SHARE * declared, None);
+    for value in values {
+        let mut alterations = applied.clone();
+        alter(*value, &mut alterations);
+        if let Some(chi2) = trial.left_with(&alterations, limit) {
+            (limit, best) = (chi2, Some(*value));
+        }
+    }
+    best
+}
+
 /// Mistakes of the rig file: the recording holds what was measured.
 fn file_mistakes(layout: &Layout) -> Vec<(Mistake, usize)> {
     single_mistakes(layout).into_iter().filter(|(mistake, _)| !COPIES.contains(mistake)).collect()
@@ -128,9 +154,11 @@ fn single_mistakes(layout: &Layout) -> Vec<(Mistake, usize)> {
             ActsOn::SensorCopy => ordered_pairs(sensors).collect(),
             ActsOn::SetupPair => pairs(setups).collect(),
             ActsOn::SetupCopy => ordered_pairs(setups).collect(),
-            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::LaterSetup | ActsOn::Rig => vec![0],
+            ActsOn::LaterSetup => (1..setups).collect(),
+            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::Rig => vec![0],
         };
-        targets.into_iter().map(move |target| (mistake, target))
+        let suited = targets.into_iter().filter(move |target| mistake.suits(*target, layout));
+        suited.map(move |target| (mistake, target))
     });
     each.collect()
 }
@@ -216,13 +244,18 @@ impl<'a> Trial<'a> {
         for (mistake, target) in mistakes {
             mistake.correct(*target, &mut alterations);
         }
-        let layout = self.layout.altered(&alterations);
+        self.left_with(&alterations, limit)
+    }
+
+    /// The same with effects applied.
+    fn left_with(&self, alterations: &Alterations, limit: f64) -> Option<f64> {
+        let layout = self.layout.altered(alterations);
         let count = layout.readings.len();
         // No more degrees of freedom than real numbers.
         let most = limit * (2 * count * self.readings.len()) as f64;
         let (mut chi2, mut dof) = (0.0, 0);
         for (index, readings) in self.readings.iter().enumerate() {
-            let matrix = self.matrix(&layout, &alterations, index);
+            let matrix = self.matrix(&layout, alterations, index);
             let qr = layout.factor_matrix(matrix.len() / count, &matrix);
             let fitted = apply(&matrix, &apply(&qr.operator(), readings));
             // A real degree of freedom has half of a complex one's square.
@@ -267,7 +300,8 @@ pub(crate) fn warning(
             ActsOn::SetupPair | ActsOn::SetupCopy => {
                 pair_of(*target, rig.setups.len()).map(|setup| rig.setups[setup].id.clone()).to_vec()
             }
-            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::LaterSetup | ActsOn::Rig => Vec::new(),
+            ActsOn::LaterSetup => vec![rig.setups[*target].id.clone()],
+            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::Rig => Vec::new(),
         };
         format!("`{}`", foresight::name(mistake.id(), &ids))
     };

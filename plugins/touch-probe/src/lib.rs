@@ -12,6 +12,7 @@ mod diagnose;
 mod effects;
 mod held_out;
 mod lobe;
+mod mistakes;
 mod noise;
 mod outcome;
 mod plan;

@@ -104,6 +104,7 @@ impl PointSeparator for TouchProbe {
         let readings = prepared.readings_um();
         let (fit, mut outcome) = self.fitted_outcome(&prepared, &[], &Content::declared(), &readings)?;
         outcome.tables.push(residual_rows(&self.0, &prepared.touches, &fit.residual_um, &fit.residual_um)?);
+        outcome.remarks.splice(..0, self.mistake(points, fit.chi2_per_dof.sqrt()));
         Ok(outcome)
     }
 

@@ -119,3 +119,30 @@ fn correlated_touches_are_remarked_and_widen() {
     assert_eq!(warned, [0, CAMPAIGNS as usize]);
     assert!(chi2.iter().all(|chi2| *chi2 < 2.5), "{chi2:?}");
 }
+
+/// Angles of ring and probe that count the other way are named; right ones are not.
+#[test]
+fn angles_that_are_declared_wrongly_are_named() {
+    let angles = [(0.0, 0.0), (100.0, 0.0), (217.0, 35.0), (40.0, 150.0)];
+    let mut scenario = scenario(3, &setups(&angles));
+    // The noise of repeats says what is too much.
+    scenario.repeats = 3;
+    let points = scenario.touched().points();
+    let said = |angles: &[(f64, f64)]| {
+        let mut declared = scenario.clone();
+        for (setup, (ring_deg, probe_deg)) in declared.setups.iter_mut().zip(angles) {
+            (setup.ring_deg, setup.probe_deg) = (*ring_deg, *probe_deg);
+        }
+        let remarks = config(&declared, 12, None).separate(&points).unwrap().remarks;
+        remarks.into_iter().filter(|remark| remark.starts_with("it looks as if")).collect::<Vec<_>>()
+    };
+    assert_eq!(said(&angles), Vec::<String>::new());
+    for (what, change) in [
+        ("`ring_deg` counts", (|(ring, probe)| (-ring, probe)) as fn((f64, f64)) -> (f64, f64)),
+        ("`probe_deg` counts", |(ring, probe)| (ring, -probe)),
+    ] {
+        let said = said(&angles.map(change));
+        println!("{what}: {said:?}");
+        assert!(said.first().is_some_and(|first| first.contains(what)), "{what}: {said:?}");
+    }
+}

@@ -2,6 +2,7 @@
 
 mod channels;
 
+use runout_core::rig::SetupConfig;
 use runout_spindle::simulate::{
     AsynchronousLine, AxialMotion, Backlash, Dent, Effect, EvenOrderMotion, FilterAttenuation, MotionHarmonic,
     PartAngleSign, ReversalAngle, RotationReversed, SensorAngle, SensorAxialPosition, SensorGain, SensorLine,
@@ -312,8 +313,12 @@ impl Chance {
                     effect.after_turns,
                     effect.setup
                 );
-                let is_also =
-                    ["sensor-angle", "sensor-gain"].map(|id| format!("{id} {sensor} {}", effect.setup)).to_vec();
+                // It stays there.
+                let later = config.rig.setups.iter().skip_while(|setup| setup.id != effect.setup);
+                let in_setup = |setup: &SetupConfig| {
+                    ["sensor-angle", "sensor-gain"].map(|id| format!("{id} {sensor} {}", setup.id))
+                };
+                let is_also = later.flat_map(in_setup).collect();
                 (Effect::SlippedProbe(effect), Planted { is_also, ..named("slipped-probe", size) })
             }
         }

@@ -327,7 +327,7 @@ impl Fit for LinearFit {
                 place: format!("{name}: {:.1} times the median of {} groups", rms_um / median, all.len()),
             }
         };
-        far_worse(&self.groups).into_iter().map(report).collect()
+        self.data.set_aside.iter().cloned().chain(far_worse(&self.groups).into_iter().map(report)).collect()
     }
 
     fn distinguished_by(&self, _effects: &[usize]) -> Option<String> {

@@ -119,3 +119,23 @@ fn a_refusal_states_the_limit() {
         assert!(stated.iter().any(|limit| refused.reason.contains(limit)), "{refused:?}");
     }
 }
+
+/// A chip, an edge, dirt: a few degrees of one circle, from hardly more than the noise to far more than all else.
+#[test]
+fn a_local_defect_is_set_aside_with_its_place() {
+    for (size, from, to) in [(-8.0, 40.0_f64, 47.0_f64), (30.0, 100.0, 120.0), (-500.0, 300.0, 312.0)] {
+        let found = diagnosed(|circle, angle, _| {
+            let within = (from.to_radians()..to.to_radians()).contains(&angle);
+            if circle == 2 && within { size } else { 0.0 }
+        });
+        let place = &found.unexplained.first().unwrap_or_else(|| panic!("{size}: {found:?}")).place;
+        assert!(place.starts_with("circle C3: a local defect from "), "{place}");
+        let angles: Vec<f64> = place.split([' ', '°']).filter_map(|word| word.parse().ok()).collect();
+        // Its edges, to a point of 1.8°.
+        assert!((angles[0] - from).abs() < 2.0 && (angles[1] - to).abs() < 2.0, "{place}");
+        assert_eq!(names(&found), ["part-eccentricity", "axis-tilt", "lobes-2"], "{size}");
+        // 0.5 µm over √800, six times.
+        assert!((value(&found, "x") - 8.0 * 0.2_f64.cos()).abs() < 0.15, "{found:?}");
+        assert!((value(&found, "cosine") - 0.4).abs() < 0.15, "{found:?}");
+    }
+}

@@ -24,7 +24,7 @@ const SAME_UM: f64 = 1e-6;
 const VISIBLE: f64 = 3.0;
 
 impl SpindleModel {
-    fn alterations(&self, applied: &[Setting]) -> Alterations {
+    pub(super) fn alterations(&self, applied: &[Setting]) -> Alterations {
         let Shared { layout, kinds, places, .. } = &*self.traced;
         data::altered(layout, kinds, places, applied).unwrap_or_else(|_| Alterations::none(layout))
     }

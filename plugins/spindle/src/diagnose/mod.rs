@@ -1,5 +1,6 @@
 //! The closed loop on spindle measurements.
 
+mod beyond;
 mod changes;
 mod data;
 mod declared;
@@ -29,7 +30,7 @@ use runout_core::{
 };
 
 use crate::{
-    effects::{ActsOn, SpindleEffect, TurnEvidence, ordered_pairs, pair_of, pairs},
+    effects::{ActsOn, Alterations, SpindleEffect, TurnEvidence, ordered_pairs, pair_of, pairs},
     layout::Layout,
     selection::Selection,
     sizes, wiring,
@@ -209,6 +210,18 @@ impl Model for SpindleModel {
         self.traced.kind(effect).is_possible(values)
     }
 
+    fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {
+        let (kind, place) = (self.traced.kind(effect), &self.traced.places[effect]);
+        let values = kind.far_values();
+        let data = self.traced.data.first().filter(|_| !values.is_empty())?;
+        let (alterations, alter) = (self.alterations(applied), |value: f64, alterations: &mut Alterations| {
+            kind.alter(place.index, &[value], alterations);
+        });
+        let weights = data.weights.as_deref();
+        let far = wiring::far_value(&self.traced.layout, &alterations, &data.readings, weights, &values, alter)?;
+        Some(vec![far])
+    }
+
     fn is_seen_besides(&self, effect: usize) -> bool {
         of_turns(self, &self.traced.places[effect])
     }
@@ -327,6 +340,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
     diagnosis.warnings.extend(model.advice(&closed.settings));
     model.join_swaps(&mut diagnosis, &closed.settings);
     diagnosis.blind_to.extend(model.unobservable(&closed.settings)?);
+    diagnosis.blind_to.extend(model.beyond_the_layout(&closed.after));
     diagnosis.lost_orders = Some(lost_orders(&closed.after));
     for (level, fit) in [(&mut diagnosis.before, &closed.before), (&mut diagnosis.after, &closed.after)] {
         level.orders = fit.redundant();

@@ -7,6 +7,7 @@ use runout_core::{
 };
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect};
+use crate::layout::Layout;
 
 /// A mistake that people make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,11 +30,15 @@ pub enum Mistake {
     PartAngleSign,
     /// The sensors' angles count the other way.
     SensorAnglesSign,
+    /// A sensor looks at the other section.
+    SensorInOtherSection,
+    /// In a setup the sensors were turned with the part, and are declared to have stayed; or the other way.
+    SensorsTurned,
 }
 
 impl Mistake {
     /// All of them, the more frequent ones first.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::SensorSign,
         Self::SensorOpposite,
         Self::SetupsSwapped,
@@ -41,6 +46,8 @@ impl Mistake {
         Self::PartAngleSign,
         Self::RotationReversed,
         Self::SensorAnglesSign,
+        Self::SensorsTurned,
+        Self::SensorInOtherSection,
         Self::SetupRepeated,
         Self::SensorsIdentical,
     ];
@@ -58,6 +65,8 @@ impl Mistake {
             Self::RotationReversed => "rotation-reversed",
             Self::PartAngleSign => "part-angle-sign",
             Self::SensorAnglesSign => "sensor-angles-sign",
+            Self::SensorInOtherSection => "sensor-in-other-section",
+            Self::SensorsTurned => "sensors-turned",
         }
     }
 
@@ -65,12 +74,31 @@ impl Mistake {
     #[must_use]
     pub fn acts_on(self) -> ActsOn {
         match self {
-            Self::SensorSign | Self::SensorOpposite => ActsOn::Sensor,
+            Self::SensorSign | Self::SensorOpposite | Self::SensorInOtherSection => ActsOn::Sensor,
+            Self::SensorsTurned => ActsOn::LaterSetup,
             Self::SensorsSwapped => ActsOn::SensorPair,
             Self::SensorsIdentical => ActsOn::SensorCopy,
             Self::SetupsSwapped => ActsOn::SetupPair,
             Self::SetupRepeated => ActsOn::SetupCopy,
             Self::RotationReversed | Self::PartAngleSign | Self::SensorAnglesSign => ActsOn::Rig,
+        }
+    }
+
+    /// Whether it changes anything at a target of a layout.
+    #[must_use]
+    pub fn suits(self, target: usize, layout: &Layout) -> bool {
+        let mut readings = layout.readings.iter();
+        match self {
+            Self::SensorInOtherSection => {
+                readings.find(|reading| reading.sensor == target).is_some_and(|own| layout.other_section(own).is_some())
+            }
+            Self::SensorsTurned => {
+                let own = readings.find(|reading| reading.setup == target);
+                own.is_some_and(|own| {
+                    own.turned_otherwise_rad().sin().hypot(1.0 - own.turned_otherwise_rad().cos()) > 1e-6
+                })
+            }
+            _ => true,
         }
     }
 
@@ -100,6 +128,8 @@ impl Mistake {
             Self::RotationReversed => alterations.rotation_reversed ^= true,
             Self::PartAngleSign => alterations.part_angles_reversed ^= true,
             Self::SensorAnglesSign => alterations.sensor_angles_reversed ^= true,
+            Self::SensorInOtherSection => alterations.sensors[target].in_other_section ^= true,
+            Self::SensorsTurned => alterations.setups[target].sensors_otherwise ^= true,
         }
     }
 
@@ -134,6 +164,21 @@ impl Mistake {
                 exchanged("setups", pair, setups, pair.map(|setup| rig.setups[setup].id.as_str()))
             }
             Self::SensorsIdentical | Self::SetupRepeated => Vec::new(),
+            Self::SensorInOtherSection => {
+                let own = &rig.sensors[target];
+                let other = rig.sensors.iter().find(|sensor| sensor.section != own.section);
+                let keys = other.map(|other| {
+                    let key = |rest: String| format!("sensors.{}.{rest}", sensors[target]);
+                    let section = key(format!("section = \"{}\"", rig.sections[other.section]));
+                    vec![section, key(format!("z_mm = {:?}", other.z_mm))]
+                });
+                keys.unwrap_or_default()
+            }
+            Self::SensorsTurned => {
+                let setup = &rig.setups[target];
+                let turned_rad = if setup.sensors_rad == 0.0 { setup.part_rad } else { 0.0 };
+                vec![format!("setups.{}.sensors_deg = {:?}", setups[target], degrees(turned_rad))]
+            }
             Self::RotationReversed => {
                 vec![format!("rotation = \"{}\"", if rig.rotation.direction() > 0.0 { "cw" } else { "ccw" })]
             }
@@ -196,6 +241,10 @@ impl SpindleEffect for Mistake {
             Self::RotationReversed => "a mistake in the rig: the part turns the other way",
             Self::PartAngleSign => "a mistake in the rig: the part's angles count the other way",
             Self::SensorAnglesSign => "a mistake in the rig: the sensors' angles count the other way",
+            Self::SensorInOtherSection => "a mistake in the rig: a sensor looks at the other section",
+            Self::SensorsTurned => {
+                "a mistake in the rig: the sensors stayed or were turned with the part, in one setup"
+            }
         };
         About { id: self.id(), does, acts_on: self.acts_on(), parameters: Vec::new() }
     }
@@ -206,6 +255,10 @@ impl SpindleEffect for Mistake {
 
     fn partials(&self, _target: usize, _predicted: &Predicted) -> Vec<Vec<Complex64>> {
         Vec::new()
+    }
+
+    fn suits(&self, target: usize, layout: &Layout) -> bool {
+        Mistake::suits(*self, target, layout)
     }
 
     fn mistake(&self) -> Option<Mistake> {

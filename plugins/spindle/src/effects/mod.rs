@@ -91,6 +91,11 @@ pub trait SpindleEffect: Send + Sync {
         true
     }
 
+    /// Values of its only parameter at which a fit may begin besides 0: an angle that is far off turns high orders by whole periods.
+    fn far_values(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// What ends the list of effects (orders, lines) of which this one is the last.
     fn last_of_list(&self) -> Option<String> {
         None
@@ -233,6 +238,11 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         all.push(Arc::new(axial_motion::AxialMotion { order }));
     }
     all
+}
+
+/// Angles of 6° to 42° to either side, as near to each other as orders to 24 ask for, in degrees.
+fn far_angles_deg() -> Vec<f64> {
+    (2..=14).flat_map(|step| [-3.0, 3.0].map(|angle_deg| angle_deg * f64::from(step))).collect()
 }
 
 /// What ends a list of orders, where this one is the last.

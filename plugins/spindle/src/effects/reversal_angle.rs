@@ -2,7 +2,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, parameter};
+use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, far_angles_deg, parameter};
 
 /// The part's angle in a setup.
 pub(crate) struct ReversalAngle;
@@ -25,6 +25,10 @@ impl SpindleEffect for ReversalAngle {
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let turned = |order: usize| -Complex64::I * predicted.layout.direction * order as f64 * RAD_PER_DEG;
         vec![predicted.each(|reading| reading.setup == target, |order, at| turned(order) * predicted.part[at])]
+    }
+
+    fn far_values(&self) -> Vec<f64> {
+        far_angles_deg()
     }
 
     fn rig_key(&self) -> Option<RigKey> {

@@ -3,7 +3,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, parameter};
+use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, far_angles_deg, parameter};
 use crate::layout::{Layout, View};
 
 /// A sensor's angle.
@@ -57,6 +57,10 @@ impl SpindleEffect for SensorAngle {
         };
         let seen = |order: usize, at: usize| turned(order) * predicted.part[at] + predicted.across[at];
         vec![predicted.each(on, |order, at| seen(order, at) * RAD_PER_DEG)]
+    }
+
+    fn far_values(&self) -> Vec<f64> {
+        if self.in_one_setup { Vec::new() } else { far_angles_deg() }
     }
 
     fn rig_key(&self) -> Option<RigKey> {

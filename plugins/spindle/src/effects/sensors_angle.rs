@@ -2,7 +2,7 @@
 
 use runout_core::Complex64;
 
-use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, parameter};
+use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, RigKey, SpindleEffect, far_angles_deg, parameter};
 
 /// The angle of all sensors in a setup.
 pub(crate) struct SensorsAngle;
@@ -26,6 +26,10 @@ impl SpindleEffect for SensorsAngle {
         let on = |reading: &crate::layout::Reading| reading.setup == target;
         let seen = |order: usize, at: usize| turned(order) * predicted.part[at] + predicted.across[at];
         vec![predicted.each(on, |order, at| seen(order, at) * RAD_PER_DEG)]
+    }
+
+    fn far_values(&self) -> Vec<f64> {
+        far_angles_deg()
     }
 
     fn rig_key(&self) -> Option<RigKey> {

@@ -95,3 +95,25 @@ fn shares_of_other_channels_are_found() {
     finds(r#"{"plugin":"cross-talk","targets":["S1","S4"],"share":0.02}"#, "cross-talk S1 S4", Some(("share", 0.02)));
     finds(r#"{"plugin":"channel-ghost","share":0.01}"#, "channel-ghost", Some(("share", 0.01)));
 }
+
+/// What two sensors a section take for motion, and what a wide spot takes from the form of any rig.
+#[test]
+fn what_no_layout_shows_is_said() {
+    let blind = |config: &SpindleConfig| {
+        let found = diagnosed(config).0.diagnosis.blind_to;
+        found.into_iter().map(|one| (one.effect, one.bias_per_unit.value)).collect::<Vec<_>>()
+    };
+    let four = blind(&campaign(1, "[]"));
+    assert!(four.contains(&("chuck-form".into(), 1.0)) && four.contains(&("bracket-motion".into(), 1.0)), "{four:?}");
+    let spot = four.iter().find(|(effect, _)| effect == "probe-spot").unwrap().1;
+    // 4 µm rms of a form with orders to 60 on 30 mm.
+    assert!((1e-4..0.1).contains(&spot), "{spot}");
+    let mut config = campaign(1, "[]");
+    for (index, angle_deg) in [202.5, 202.5].into_iter().enumerate() {
+        let mut third = config.rig.sensors[2 * index].clone();
+        (third.id, third.angle_deg) = (format!("S{}", 5 + index), angle_deg);
+        config.rig.sensors.push(third);
+    }
+    let six = blind(&config);
+    assert!(six.iter().all(|(effect, _)| effect != "chuck-form"), "{six:?}");
+}
