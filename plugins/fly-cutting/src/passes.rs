@@ -162,14 +162,15 @@ impl Cut {
     }
 
     /// Passes to each side of the nearest one that may be lower than it.
-    fn reach(&self, row: &Row, tips: &[f64]) -> i64 {
+    fn reach(&self, row: &Row, tips: impl FnOnce() -> Vec<f64>) -> i64 {
         let waves: f64 = self.applied.lines.iter().map(|line| 2.0 * (line.amplitude * line.lever(row)).abs()).sum();
-        if waves == 0.0 && self.applied.table_nm.iter().all(|size| *size == 0.0) {
+        let is_straight = self.applied.table_nm.iter().all(|size| *size == 0.0);
+        if waves == 0.0 && is_straight {
             return 0;
         }
         // What is not a line is smooth: its step from pass to pass is bounded.
-        let smooth = tips.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-        let steps = if self.applied.table_nm.iter().any(|size| *size != 0.0) { smooth } else { 0.0 };
+        let smooth = |tips: Vec<f64>| tips.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        let steps = if is_straight { 0.0 } else { smooth(tips()) };
         let per_pass_mm = self.feed_mm * row.cosine;
         let most = (2.0 * self.nose_mm / per_pass_mm).ceil() as i64;
         let mut reach = 1;
@@ -202,14 +203,14 @@ impl Cut {
         let start_mm = self.first_mm(row) + phase_mm;
         let turns = |x: f64| (x - start_mm) / self.feed_mm;
         let [low, high] = [x_mm.first(), x_mm.last()].map(|x| turns(x.copied().unwrap_or(start_mm)));
-        // Passes around the row, so that the reach is known before the ends are.
+        // Passes of the row, so that the reach is known before the ends are.
         let most = (2.0 * self.nose_mm / (self.feed_mm * row.cosine)).ceil() as i64;
-        let probe = self.tips(row, low.round() as i64, (high - low) as usize + 2);
-        let reach = self.reach(row, &probe).min(most);
+        let reach = self.reach(row, || self.tips(row, low.round() as i64, (high - low) as usize + 2)).min(most);
         let first = low.round() as i64 - reach;
         let count = (high.round() as i64 + reach - first + 1) as usize;
         let tips = if reach == 0 { vec![0.0; count] } else { self.tips(row, first, count) };
         let square = self.nose_mm * self.nose_mm;
+        let parabola = 0.5e6 / self.nose_mm;
         let per_pass_mm = self.feed_mm * row.cosine;
         let [tilt_x, tilt_y] = self.applied.tilt_urad;
         let shape_nm: f64 = self.across(row).iter().zip(self.applied.shape_nm).map(|(value, size)| value * size).sum();
@@ -217,18 +218,20 @@ impl Cut {
             let at = turns(*x);
             let nearest = at.round() as i64;
             let mut best = (f64::INFINITY, 0_i64, 0.0);
-            for pass in nearest - reach..=nearest + reach {
+            let mut cut = |pass: i64| {
                 let beside_mm = (at - pass as f64) * per_pass_mm;
-                let depth = square - beside_mm * beside_mm;
-                if depth < 0.0 {
-                    continue;
+                let (tip, across) = (tips[(pass - first) as usize], beside_mm * beside_mm);
+                // An arc is nowhere lower than its parabola: most passes beside the nearest are not looked at.
+                if across > square || across * parabola + tip > best.0 {
+                    return;
                 }
-                let edge_nm = 1e6 * beside_mm * beside_mm / (self.nose_mm + depth.sqrt());
-                let height = edge_nm + tips[(pass - first) as usize];
+                let height = 1e6 * across / (self.nose_mm + (square - across).sqrt()) + tip;
                 if height < best.0 {
                     best = (height, pass, beside_mm);
                 }
-            }
+            };
+            cut(nearest);
+            (1..=reach).for_each(|beside| [nearest - beside, nearest + beside].into_iter().for_each(&mut cut));
             // µrad times mm is nm.
             surface.height_nm.push(best.0 + shape_nm + tilt_x * x + tilt_y * row.y_mm);
             surface.pass.push(best.1 as i32);

@@ -74,24 +74,13 @@ impl Trial {
                 break;
             }
             let most = 0.25 * cut.feed_mm;
-            let mut step = (dot(&column, &self.residual_nm) / square).clamp(-most, most);
-            let mut better = None;
-            for _ in 0..4 {
-                let trial = Self::new(cut, heights, self.phase_mm + step);
-                if trial.squares < self.squares {
-                    better = Some(trial);
-                    break;
-                }
-                if step.abs() < SETTLED * cut.feed_mm {
-                    break;
-                }
-                step *= 0.25;
-            }
-            let Some(trial) = better else { break };
+            let step = (dot(&column, &self.residual_nm) / square).clamp(-most, most);
+            let steps = [1.0, 0.25, 0.0625, 0.015_625].map(|share| share * step).into_iter();
+            let mut trials = steps
+                .filter(|step| step.abs() >= SETTLED * cut.feed_mm)
+                .map(|step| Self::new(cut, heights, self.phase_mm + step));
+            let Some(trial) = trials.find(|trial| trial.squares < self.squares) else { break };
             self = trial;
-            if step.abs() < SETTLED * cut.feed_mm {
-                break;
-            }
         }
         self
     }

@@ -6,6 +6,8 @@ use crate::{campaign::Campaign, config::RotaryAxis, solve::fit};
 
 /// Mistakes are looked for where the fit leaves more than so many times the noise, or, without one, more than this, in µm.
 const FAR: f64 = 5.0;
+/// And said where the correction leaves less than this share of it.
+const SHARE: f64 = 0.2;
 const EXCHANGED: [[&str; 2]; 3] = [["dx_mm", "dy_mm"], ["dy_mm", "dz_mm"], ["dx_mm", "dz_mm"]];
 
 impl RotaryAxis {
@@ -22,6 +24,6 @@ impl RotaryAxis {
             let found = fit(&campaign.layout, &campaign.readings, &[]).ok()?;
             Some((what, found.chi2_per_dof().sqrt()))
         };
-        mistakes::likeliest(left, corrected.filter_map(left_of))
+        mistakes::likeliest(left, SHARE * left, corrected.filter_map(left_of))
     }
 }

@@ -5,8 +5,9 @@ use runout_core::points::{Points, mistakes};
 
 use crate::{config::TouchProbeConfig, design::Content, separate::TouchProbe};
 
-/// Mistakes are looked for where the fit leaves more than so many times the noise.
-const FAR: f64 = 5.0;
+/// Mistakes are looked for where the fit leaves more than so many times the noise, and said where the correction leaves noise.
+const FAR: f64 = 1.25;
+const NOISE: f64 = 1.1;
 
 impl TouchProbe {
     /// The likeliest mistake, where a fit leaves so many times the noise.
@@ -31,6 +32,6 @@ impl TouchProbe {
             let fit = probe.fit(&prepared, &[], &Content::declared(), &prepared.readings_um());
             Some((what, fit.chi2_per_dof.sqrt()))
         };
-        mistakes::likeliest(left, all.into_iter().filter_map(left_of))
+        mistakes::likeliest(left, NOISE, all.into_iter().filter_map(left_of))
     }
 }

@@ -2,9 +2,6 @@
 
 use super::{Column, Points};
 
-/// A mistake is said where its correction leaves less than this share of the rms.
-const SHARE: f64 = 0.2;
-
 /// The points with two columns exchanged, with columns negated, and with two exchanged of which one is negated (turned by 90°), each with what
 /// is wrong in words. Columns that the points lack are left out.
 pub fn columns<'a>(
@@ -53,14 +50,14 @@ fn exchange(mut points: Points, [one, other]: [&str; 2]) -> Points {
     points
 }
 
-/// The correction that leaves least, in words with what it leaves, where that is far less than what the data as declared leave: `left` are
-/// root mean squares in one unit.
+/// The correction that leaves least, in words, where that is less than a limit: what the data leave as declared, and corrected, are root mean
+/// squares in one unit.
 #[must_use]
-pub fn likeliest(declared: f64, corrected: impl Iterator<Item = (String, f64)>) -> Option<String> {
+pub fn likeliest(declared: f64, limit: f64, corrected: impl Iterator<Item = (String, f64)>) -> Option<String> {
     let (what, left) = corrected.filter(|(_, left)| left.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
     let times = declared / left.max(f64::MIN_POSITIVE);
-    (left < SHARE * declared)
-        .then(|| format!("it looks as if {what}: corrected for it, the fit would leave {times:.0} times less"))
+    (left < limit)
+        .then(|| format!("it looks as if {what}: corrected for it, the fit would leave {times:.1} times less"))
 }
 
 #[cfg(test)]
@@ -93,8 +90,8 @@ mod tests {
 
     #[test]
     fn a_mistake_has_to_leave_far_less() {
-        let said = |left: f64| likeliest(10.0, [("a".to_owned(), 9.0), ("b".to_owned(), left)].into_iter());
-        assert!(said(1.0).is_some_and(|words| words.contains("if b: ") && words.contains("10 times less")));
+        let said = |left: f64| likeliest(10.0, 2.0, [("a".to_owned(), 9.0), ("b".to_owned(), left)].into_iter());
+        assert!(said(1.0).is_some_and(|words| words.contains("if b: ") && words.contains("10.0 times less")));
         assert_eq!(said(3.0), None);
     }
 }

@@ -33,7 +33,7 @@ const LEAST_FREEDOM: f64 = 8.0;
 ///
 /// Where all orders together are above the noise, each is uncertain by as much more, or by its own residual where that is larger; an order
 /// that is above it by itself, by its own.
-pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> Vec<f64> {
+pub(super) fn judge(residual: &mut Residual, turns: &[usize], sensors: usize, orders: usize) -> Vec<f64> {
     let mut factors = vec![1.0; orders];
     let known: Vec<OrderResidual> = residual.by_order.iter().filter(|order| order.expected > 0.0).copied().collect();
     let freedom = noise_freedom(turns.iter().copied()) as f64;
@@ -46,7 +46,8 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
     };
     let dof = effective(&|order| order.dof as f64);
     // Known no better than the residual, and to some percent at best: weights follow a part of the noise.
-    let below = effective(&|_| freedom).min(dof).clamp(LEAST_FREEDOM, MOST_FREEDOM);
+    let weights = |beside| Weights::of(turns, sensors, beside);
+    let below = effective(&|_| freedom).min(dof).min(weights(SMOOTHING).freedom()).clamp(LEAST_FREEDOM, MOST_FREEDOM);
     let pooled = linear::residual(residual.chi2_per_dof, dof, below);
     let above = if pooled.refutes() && residual.chi2_per_dof > 1.0 { residual.chi2_per_dof } else { 1.0 };
     factors.fill(above);
@@ -56,13 +57,15 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
         let alike_orders: Vec<&OrderResidual> =
             known.iter().filter(|order| orders_beside(order.order) == beside).collect();
         let groups: Vec<Group> = alike_orders.iter().map(|order| group(order)).collect();
-        let level = Level::Known { variance: 1.0, dof: freedom * (2 * beside + 1) as f64 };
+        let weights = weights(beside);
+        let dof = (freedom * (2 * beside + 1) as f64).min(weights.freedom());
+        let level = Level::Known { variance: weights.inflation(), dof };
         let all = compared(&groups, level);
         for one in &all {
             let place = alike_orders[one.group].order - 1;
             let is_above = one.ratio > 1.0 && (above > 1.0 || one.p * CLASSES < FINDING);
             if is_above && let Some(factor) = factors.get_mut(place) {
-                *factor = factor.max(one.ratio);
+                *factor = factor.max(one.ratio * weights.inflation());
             }
         }
         let checks = said("orders", &groups, all, level, "the noise there is overestimated");
@@ -85,6 +88,37 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], orders: usize) -> 
     factors
 }
 
+/// Weights that are the inverse of a covariance from few turns: what they weigh is larger than the noise by chance (Hotelling's T², Anderson, *An
+/// Introduction to Multivariate Statistical Analysis*, theorem 5.2.2).
+struct Weights {
+    setups: f64,
+    sensors: f64,
+    /// Turns less 1 in a setup, times the orders averaged.
+    own: f64,
+}
+
+impl Weights {
+    fn of(turns: &[usize], sensors: usize, beside: usize) -> Self {
+        let fewest = turns.iter().copied().min().unwrap_or(0).saturating_sub(1);
+        Self { setups: turns.len() as f64, sensors: sensors as f64, own: (fewest * (2 * beside + 1)) as f64 }
+    }
+
+    /// Complex degrees of freedom of one setup.
+    fn left(&self) -> f64 {
+        (self.own - self.sensors + 1.0).max(0.5)
+    }
+
+    /// By how much weighted squares are larger.
+    fn inflation(&self) -> f64 {
+        (self.own / self.left()).max(1.0)
+    }
+
+    /// Real degrees of freedom of all setups.
+    fn freedom(&self) -> f64 {
+        2.0 * self.setups * self.left()
+    }
+}
+
 fn group(order: &OrderResidual) -> Group {
     let freedom = order.dof as f64;
     Group { name: format!("order {}", order.order), squares: order.chi2_per_dof() * freedom, freedom }
@@ -105,7 +139,7 @@ mod tests {
     fn one_order_of_many_is_named_and_widened_by_its_own_residual() {
         for at in [3, 40] {
             let mut found = residual(|order| if order == at { 30.0 } else { 1.0 });
-            let factors = judge(&mut found, &[60, 60, 60], 128);
+            let factors = judge(&mut found, &[60, 60, 60], 4, 128);
             let named: Vec<&str> =
                 found.checks.iter().filter(|check| check.refutes()).map(|check| &*check.of).collect();
             assert_eq!(named, [format!("order {at}")], "{:?}", found.checks);
@@ -116,16 +150,27 @@ mod tests {
     #[test]
     fn all_orders_are_widened_where_all_are_above_the_noise() {
         let mut found = residual(|order| if order == 5 { 1000.0 } else { 100.0 });
-        let factors = judge(&mut found, &[60, 60, 60], 130);
+        let factors = judge(&mut found, &[60, 60, 60], 4, 130);
         assert!(found.checks[0].refutes() && (found.checks[0].factor - 1000_f64.sqrt()).abs() < 1e-9);
         // Orders at which nothing is redundant have no residual of their own.
         assert!((factors[0] - found.chi2_per_dof).abs() < 1e-9 && (factors[4] - 1000.0).abs() < 1e-9);
     }
 
+    /// Of five turns, four sensors and one order, no weight is known: 16 times the noise are no finding.
+    #[test]
+    fn few_turns_refute_little() {
+        let found = |turns: usize| {
+            let mut found = residual(|order| if order == 3 { 16.0 } else { 1.0 });
+            judge(&mut found, &[turns; 3], 4, 128);
+            found.checks.iter().any(Check::refutes)
+        };
+        assert!(!found(5) && found(60));
+    }
+
     #[test]
     fn less_than_the_noise_refutes_nothing() {
         let mut found = residual(|_| 0.1);
-        let factors = judge(&mut found, &[60, 60, 60], 128);
+        let factors = judge(&mut found, &[60, 60, 60], 4, 128);
         assert!(found.checks[0].finding.contains("only") && !found.checks.iter().any(Check::bars_verdict));
         assert!(factors.iter().all(|factor| (*factor - 1.0).abs() < 1e-12));
         assert_eq!([0, 1, 2, 3, 4, 60].map(|turns| noise_freedom([turns])), [0, 0, 2, 4, 4, 8]);

@@ -79,7 +79,8 @@ pub(crate) fn judged_residual(
 ) -> (Residual, Vec<f64>) {
     let mut residual = residual(operators, readings, linear, propagation);
     angles::explain(&mut residual, operators, readings, linear, propagation);
-    let factors = judge(&mut residual, &readings.turns, operators.orders.len());
+    let sensors = readings.count / readings.turns.len().max(1);
+    let factors = judge(&mut residual, &readings.turns, sensors, operators.orders.len());
     (residual, factors)
 }
 
