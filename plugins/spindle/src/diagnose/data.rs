@@ -329,9 +329,15 @@ impl StationData {
         self.freed.as_deref().filter(|_| alterations.even_order_motion)
     }
 
-    /// W of an order from 1 for displacements: that of the readings times what they respond with.
-    pub(crate) fn weights_of(&self, order: usize, layout: &Layout, alterations: &Alterations) -> Blocks {
-        let response = |index: usize| alterations.response(&layout.readings[index], order);
+    /// W of an order from 1 for displacements: that of the readings times what they respond with, and the slope of their characteristic.
+    pub(crate) fn weights_of(
+        &self,
+        order: usize,
+        layout: &Layout,
+        alterations: &Alterations,
+        slopes: &[f64],
+    ) -> Blocks {
+        let response = |index: usize| alterations.response(&layout.readings[index], order) * slopes[index];
         let setups = self.readings.turns.len();
         let unweighted = || Blocks::identity(self.readings.count / setups, setups);
         let weights = self.freed(alterations).map_or(&self.weights, |freed| &freed.weights);

@@ -110,9 +110,10 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
             .map(|((held, beyond), predicted)| held - beyond - predicted)
             .collect();
         if order >= FORM_AND_MOTION {
-            squares += alterations.recorded(layout, order, &left).iter().map(Complex64::norm_sqr).sum::<f64>();
+            let recorded = alterations.recorded(layout, order, &left);
+            squares += recorded.iter().zip(&solved.slopes).map(|(left, slope)| (left * slope).norm_sqr()).sum::<f64>();
         }
-        let weighted = data.weights_of(order, layout, alterations).times(&left, 1);
+        let weighted = data.weights_of(order, layout, alterations, &solved.slopes).times(&left, 1);
         chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / solved.floor_std[order - 1].powi(2);
     }
     let expected = held_out_expected(solved, &held);

@@ -34,6 +34,8 @@ pub(super) struct Solved {
     pub whitened: Vec<Vec<Complex64>>,
     /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals.
     pub floor_std: Vec<f64>,
+    /// Mean slope of the characteristics, `[reading]`.
+    pub slopes: Vec<f64>,
     /// What is left of the readings, as a run states it.
     pub residual: Residual,
 }
@@ -59,7 +61,9 @@ impl Solved {
         altered.correct(layout, &mut corrected);
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.
-        let weights: Vec<_> = (1..=max_order).map(|order| data.weights_of(order, layout, alterations)).collect();
+        let slopes = alterations.slopes(layout, &corrected.mean);
+        let weights: Vec<_> =
+            (1..=max_order).map(|order| data.weights_of(order, layout, alterations, &slopes)).collect();
         let mut operators = Operators::least_squares(layout, max_order, Some(weights.clone()));
         if data.weights.is_none() {
             operators.weights = None;
@@ -97,7 +101,19 @@ impl Solved {
         operators.weights = None;
         (corrected.covariance, corrected.scatter) = (None, None);
         let alterations = altered;
-        Self { operators, alterations, propagation, stated, estimate, corrected, linear, whitened, floor_std, residual }
+        Self {
+            operators,
+            alterations,
+            propagation,
+            stated,
+            estimate,
+            corrected,
+            linear,
+            whitened,
+            floor_std,
+            slopes,
+            residual,
+        }
     }
 }
 

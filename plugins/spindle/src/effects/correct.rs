@@ -36,6 +36,23 @@ impl Alterations {
         self.sensors[reading.sensor].response(reading.setup, order)
     }
 
+    /// Slope of the characteristic, reading over displacement, in the mean over the turn, `[reading]`: what noise of a reading is in its
+    /// displacement. `displacements` are `[order][reading]` from order 0.
+    pub(crate) fn slopes(&self, layout: &Layout, displacements: &[Complex64]) -> Vec<f64> {
+        let count = layout.readings.len();
+        let of = |(index, reading): (usize, &Reading)| {
+            let sensor = &self.sensors[reading.sensor];
+            if sensor.quadratic_per_um == 0.0 && sensor.cubic_per_um2 == 0.0 {
+                return 1.0;
+            }
+            let mut orders = displacements.iter().skip(index).step_by(count);
+            let level = orders.next().map_or(0.0, |level| level.re);
+            let square = level * level + 0.5 * orders.map(Complex64::norm_sqr).sum::<f64>();
+            1.0 + 2.0 * sensor.quadratic_per_um * level + 3.0 * sensor.cubic_per_um2 * square
+        };
+        layout.readings.iter().enumerate().map(of).collect()
+    }
+
     /// What displacements of an order are recorded as, `[reading]`.
     pub(crate) fn recorded(&self, layout: &Layout, order: usize, displacements: &[Complex64]) -> Vec<Complex64> {
         let mut recorded = displacements.to_vec();
@@ -77,7 +94,8 @@ impl Alterations {
             }
         }
         self.take_out_cross_talk(&mut readings.mean);
-        self.correct_covariance(readings);
+        let slopes = self.slopes(layout, &readings.mean);
+        self.correct_covariance(readings, &slopes);
     }
 
     /// Takes what channels read of others out of displacements (`[order][reading]`). What cross-talk of cross-talk is, a share of a share, is
@@ -92,12 +110,13 @@ impl Alterations {
     }
 
     /// E[δ δᴴ] of displacements: that of the readings over what they respond with, without shares of others.
-    fn correct_covariance(&self, readings: &mut Readings) {
+    fn correct_covariance(&self, readings: &mut Readings, slopes: &[f64]) {
         let sensors = self.sensors.len();
         for (setup, matrices) in readings.covariance.iter_mut().flatten().enumerate() {
             for (order, matrix) in matrices.chunks_exact_mut(sensors * sensors).enumerate() {
+                let of_sensors = self.sensors.iter().zip(&slopes[setup * sensors..]);
                 let responses: Vec<Complex64> =
-                    self.sensors.iter().map(|sensor| sensor.response(setup, order)).collect();
+                    of_sensors.map(|(sensor, slope)| sensor.response(setup, order) * slope).collect();
                 for (row, one) in matrix.chunks_exact_mut(sensors).zip(&responses) {
                     row.iter_mut().zip(&responses).for_each(|(entry, other)| *entry /= one * other.conj());
                 }

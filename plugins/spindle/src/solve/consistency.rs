@@ -24,6 +24,9 @@ pub(crate) fn noise_freedom(turns: impl IntoIterator<Item = usize>) -> usize {
 
 /// Classes of orders, by how many neighbours their covariance is averaged over.
 const CLASSES: f64 = (SMOOTHING + 1) as f64;
+/// Turns from which single orders are judged: with fewer, most frequencies between two orders are neighbours, and a tone of asynchronous motion
+/// next to a whole order cannot be distinguished from it.
+const FEWEST_TURNS: usize = 8;
 /// Degrees of freedom of the noise of all orders together, at most and at least: the few turns' scatter that weights are taken from biases it by
 /// some percent however many orders there are, and asynchronous motion of low frequency makes it scatter as from so few.
 const MOST_FREEDOM: f64 = 400.0;
@@ -53,7 +56,8 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], sensors: usize, or
     factors.fill(above);
     // Orders whose covariance is averaged over as many neighbours have noise that is known as well.
     let mut single: Vec<Check> = Vec::new();
-    for beside in 0..=SMOOTHING {
+    let fewest = turns.iter().copied().min().unwrap_or(0);
+    for beside in (0..=SMOOTHING).filter(|_| fewest >= FEWEST_TURNS) {
         let alike_orders: Vec<&OrderResidual> =
             known.iter().filter(|order| orders_beside(order.order) == beside).collect();
         let groups: Vec<Group> = alike_orders.iter().map(|order| group(order)).collect();
