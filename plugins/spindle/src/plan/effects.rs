@@ -61,11 +61,11 @@ pub fn foresee(
     let (mistakes, mut kinds): (Vec<_>, Vec<_>) = kinds.into_iter().partition(|kind| kind.mistake().is_some());
     kinds.retain(|kind| {
         let about = kind.about();
-        // What single turns show, they show in any rig, and an average says little of it. What a setup has by itself shows as
+        // What single turns show, they show in any rig, and an average says little of it. Pairs of channels are many and alike. What a setup has by itself shows as
         // what all have does.
         kind.turn_evidence().is_none()
             && kind.first_order_like().is_none()
-            && ![ActsOn::Setup, ActsOn::SensorInSetup].contains(&about.acts_on)
+            && ![ActsOn::Setup, ActsOn::SensorInSetup, ActsOn::SensorCopy].contains(&about.acts_on)
     });
     let model = |kinds| {
         SpindleModel::new(selection.clone(), layout.clone(), second_order, kinds, std::slice::from_ref(&station))
