@@ -251,17 +251,18 @@ impl Panels {
         let marks: Vec<Option<Names>> =
             self.values.iter().map(|value| value.marks.as_ref().map(|column| Names::of(rows, column))).collect();
         let places = self.place_column.as_ref().map(|column| Names::of(rows, column));
-        let mut last: Option<(String, String)> = None;
+        let named = || panel_names.iter().chain(&curve_names);
+        let mut last: Option<usize> = None;
         let mut at: Option<(usize, Vec<usize>)> = None;
         for row in 0..rows.num_rows() {
             if only.as_ref().is_some_and(|(column, names)| names.iter().all(|name| column.get(row) != name)) {
                 continue;
             }
-            let key = (joined(&panel_names, row), joined(&curve_names, row));
-            if last.as_ref() != Some(&key) {
-                at = self.place(&key.0, &key.1);
-                last = Some(key);
+            // Most rows go where the one before them went.
+            if !last.is_some_and(|last| named().all(|names| names.get(row) == names.get(last))) {
+                at = self.place(&joined(&panel_names, row), &joined(&curve_names, row));
             }
+            last = Some(row);
             let Some((panel, places_of)) = &at else { continue };
             for (offset, columns) in columns.iter().enumerate() {
                 let number = |column: &Option<Numbers>| column.as_ref().map_or(f64::NAN, |column| column.get(row));
