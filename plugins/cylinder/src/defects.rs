@@ -20,6 +20,10 @@ pub(crate) fn set_aside(scan: &Scan, name: &str) -> (Scan, Vec<Unexplained>) {
     let begin = Cleaned::of(scan, ORDERS[0], None, FAR_MAD);
     let more = |cleaned: Cleaned, order: &usize| Cleaned::beginning_with(cleaned.kept, scan, *order, None, FAR_MAD);
     let Ok(cleaned) = begin.and_then(|begin| ORDERS[1..].iter().try_fold(begin, more)) else { return whole() };
+    // Of few points, a form of higher orders cannot be distinguished from a defect.
+    if cleaned.max_order < ORDERS[ORDERS.len() - 1] {
+        return whole();
+    }
     let arcs: Vec<_> = cleaned.arcs().into_iter().filter(|(_, count)| *count >= FEWEST).collect();
     let mut kept = vec![true; scan.len()];
     arcs.iter().for_each(|(points, _)| kept[points.clone()].fill(false));

@@ -151,7 +151,7 @@ impl Harmonic {
 
 /// Gains that a channel may have over the declared one: a wrong range or unit is 10 times off. The bounds are reciprocal, since the gain of
 /// one sensor and the inverse one of its neighbour often explain the same.
-const GAINS: std::ops::RangeInclusive<f64> = 0.05..=20.0;
+pub(crate) const GAINS: std::ops::RangeInclusive<f64> = 0.05..=20.0;
 
 /// By how much an angle may be off: 45° and a little. Beyond, it is another place.
 const FARTHEST_RAD: f64 = 0.8;

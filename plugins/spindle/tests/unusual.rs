@@ -4,28 +4,12 @@
 
 mod campaigns;
 
-use campaigns::{averaged, campaign};
+use campaigns::{averaged, campaign, two_sections};
 use runout_core::{
     model::{closed_loop::Settings, diagnosis::Verdict},
-    rig::{SensorConfig, SetupConfig},
+    rig::SetupConfig,
 };
 use runout_spindle::{diagnose::diagnose, effects, layout::Layout, selection::Selection, simulate::SpindleConfig};
-
-/// Sensors at some angles in each of two sections.
-fn sensors(angles_deg: &[f64]) -> Vec<SensorConfig> {
-    let places = [(100.0, "a"), (130.0, "b")]
-        .into_iter()
-        .flat_map(|(z_mm, section)| angles_deg.iter().map(move |angle_deg| (*angle_deg, z_mm, section)));
-    let sensor = |(number, (angle_deg, z_mm, section)): (usize, (f64, f64, &str))| SensorConfig {
-        id: format!("S{number}"),
-        angle_deg,
-        z_mm,
-        section: section.into(),
-        sign: 1,
-        ..SensorConfig::default()
-    };
-    (1..).zip(places).map(sensor).collect()
-}
 
 fn unusual(name: &str, seed: u64) -> SpindleConfig {
     let mut config = campaign(seed, "[]");
@@ -37,7 +21,7 @@ fn unusual(name: &str, seed: u64) -> SpindleConfig {
         }
         "a part of 300 mm" => config.rig.part_radius_mm = 300.0,
         "twelve sensors" => {
-            config.rig.sensors = sensors(&[0.0, 47.0, 99.844, 153.0, 202.5, 290.0]);
+            config.rig.sensors = two_sections(&[0.0, 47.0, 99.844, 153.0, 202.5, 290.0]);
             config.rig.setups.truncate(1);
         }
         "eight setups" => {

@@ -15,6 +15,8 @@ use std::f64::consts::SQRT_2;
 
 use runout_core::{Complex64, model::diagnosis::Estimated};
 
+use crate::alterations::GAINS;
+
 use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, SpindleEffect, Transfer, parameter};
 
 /// An effect of one value that is a response of channels.
@@ -151,7 +153,8 @@ impl SpindleEffect for ChannelResponse {
         match self.response {
             // A negative one amplifies.
             Response::LowPass(_) => values.first().is_some_and(|inverse_cutoff| *inverse_cutoff > 0.0),
-            Response::Delay(_) | Response::Gain => true,
+            Response::Gain => values.iter().all(|gain| GAINS.contains(&(1.0 + gain))),
+            Response::Delay(_) => true,
         }
     }
 

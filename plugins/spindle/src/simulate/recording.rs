@@ -144,9 +144,9 @@ impl<'a> SimulatedStream<'a> {
         let name = world.rig.setups.get(setup).map_or("", |setup| setup.id.as_str());
         let spin = world.course.spin(world.seed, setup, station);
         let mut delays = vec![0.0];
-        for sensor in world.sensors.iter().filter(|sensor| sensor.delay_samples != 0.0) {
-            delays.push(sensor.delay_samples);
-        }
+        delays.extend(world.sensors.iter().map(|sensor| sensor.delay_samples).filter(|delay| *delay != 0.0));
+        delays.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        delays.dedup_by(|a, b| a.total_cmp(b).is_eq());
         let of_setup = |values: &[(usize, f64)]| -> Vec<f64> {
             values.iter().filter(|(only, _)| *only == setup).map(|(_, value)| *value).collect()
         };

@@ -51,6 +51,22 @@ pub(crate) fn campaign(seed: u64, effects: &str) -> SpindleConfig {
     config
 }
 
+/// Sensors at some angles in each of two sections, 30 mm apart.
+pub(crate) fn two_sections(angles_deg: &[f64]) -> Vec<SensorConfig> {
+    let places = [(100.0, "a"), (130.0, "b")]
+        .into_iter()
+        .flat_map(|(z_mm, section)| angles_deg.iter().map(move |angle_deg| (*angle_deg, z_mm, section)));
+    let sensor = |(number, (angle_deg, z_mm, section)): (usize, (f64, f64, &str))| SensorConfig {
+        id: format!("S{number}"),
+        angle_deg,
+        z_mm,
+        section: section.into(),
+        sign: 1,
+        ..SensorConfig::default()
+    };
+    (1..).zip(places).map(sensor).collect()
+}
+
 /// The station that a campaign records, a fifth of its turns held out, and its truth.
 pub(crate) fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     averaged_behind(None, config, rig)

@@ -8,7 +8,7 @@ use runout_core::{
         closed_loop::Settings,
         diagnosis::{Added, Verdict},
     },
-    rig::{RigConfig, SensorConfig},
+    rig::RigConfig,
     stage::{Station, StationDiagnosis, StationSeparator},
 };
 use runout_spindle::{
@@ -22,30 +22,14 @@ use runout_spindle::{
 
 use super::{
     CLEAN_UM,
-    campaigns::{averaged, campaign},
+    campaigns::{averaged, campaign, two_sections},
     diagnosed,
 };
 
-/// Three sensors in each of two sections: every mistake in one channel shows by itself.
-fn six_sensors() -> Vec<SensorConfig> {
-    let places = [(100.0, "a"), (130.0, "b")]
-        .into_iter()
-        .flat_map(|(z_mm, section)| [0.0, 99.844, 202.5].map(|angle_deg| (angle_deg, z_mm, section)));
-    let sensor = |(number, (angle_deg, z_mm, section)): (usize, (f64, f64, &str))| SensorConfig {
-        id: format!("S{number}"),
-        angle_deg,
-        z_mm,
-        section: section.into(),
-        sign: 1,
-        ..SensorConfig::default()
-    };
-    (1..).zip(places).map(sensor).collect()
-}
-
-/// A campaign with six sensors.
+/// A campaign with three sensors in each of two sections: every mistake in one channel shows by itself.
 fn six(seed: u64, effects: &str) -> SpindleConfig {
     let mut config = campaign(seed, effects);
-    config.rig.sensors = six_sensors();
+    config.rig.sensors = two_sections(&[0.0, 99.844, 202.5]);
     config
 }
 
