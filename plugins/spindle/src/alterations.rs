@@ -54,6 +54,10 @@ pub struct SensorAlteration {
     pub z_mm: f64,
     /// The same, as far as the sensor sees another circle of the part there, in mm.
     pub circle_mm: f64,
+    /// Share of the spindle's motion with which the sensor's own bracket moves.
+    pub bracket_share: f64,
+    /// Squared width of the spot over which it averages the form, in mm².
+    pub spot_mm2: f64,
     /// Reading = u + quadratic·u² + cubic·u³, in 1/µm.
     pub quadratic_per_um: f64,
     /// In 1/µm².
@@ -153,6 +157,12 @@ impl Harmonic {
 /// one sensor and the inverse one of its neighbour often explain the same.
 pub(crate) const GAINS: std::ops::RangeInclusive<f64> = 0.05..=20.0;
 
+/// Share of the motion with which a bracket may move: a sensor that sees next to none of the motion says nothing of it.
+const LARGEST_SHARE: f64 = 0.95;
+
+/// Squared widths that a spot may have: to 30 mm, and below 0 as far as a fit may go on its way to a small one.
+const SPOTS_MM2: std::ops::RangeInclusive<f64> = -1.0..=900.0;
+
 /// By how much an angle may be off: 45° and a little. Beyond, it is another place.
 const FARTHEST_RAD: f64 = 0.8;
 
@@ -175,7 +185,10 @@ impl Alterations {
     pub fn are_possible(&self) -> bool {
         let sensor = |sensor: &SensorAlteration| {
             let turned = sensor.angles_in_setups.iter().map(|(_, angle_rad)| angle_rad.abs()).fold(0.0, f64::max);
-            GAINS.contains(&(1.0 + sensor.gain)) && sensor.angle_rad.abs() + turned < FARTHEST_RAD
+            GAINS.contains(&(1.0 + sensor.gain))
+                && sensor.angle_rad.abs() + turned < FARTHEST_RAD
+                && sensor.bracket_share < LARGEST_SHARE
+                && SPOTS_MM2.contains(&sensor.spot_mm2)
         };
         let steepness = |setup: &SetupAlteration| -> f64 {
             setup.ripples.iter().map(|ripple| ripple.order as f64 * ripple.cosine.hypot(ripple.sine)).sum()
@@ -212,6 +225,8 @@ impl SensorAlteration {
         angle_rad: 0.0,
         z_mm: 0.0,
         circle_mm: 0.0,
+        bracket_share: 0.0,
+        spot_mm2: 0.0,
         quadratic_per_um: 0.0,
         cubic_per_um2: 0.0,
         creep_um: 0.0,

@@ -12,10 +12,12 @@ mod altered;
 mod first_order;
 mod observable;
 mod reference;
+mod seen_form;
 mod systems;
 
 pub use first_order::FirstOrder;
 pub use reference::ToReference;
+pub(crate) use seen_form::ENOUGH;
 pub use systems::System;
 use systems::Systems;
 
@@ -44,6 +46,8 @@ pub struct Layout {
     pub unknowns: Vec<Quantity>,
     /// Mean z of the radial sensors, before the station's position is added, in mm.
     pub mean_z_mm: f64,
+    /// Nominal radius of the part, in mm.
+    pub part_radius_mm: f64,
     /// +1 where the part turns counter-clockwise.
     pub direction: f64,
     /// An unknown whose noise gain is above this is lost. Tilts count by what they move at the sensors' rms lever.
@@ -76,8 +80,10 @@ pub struct Reading {
     pub view: View,
     /// z minus the sensors' mean z, in mm; of an axial sensor −ρ: what a tilt towards the sensor moves it by.
     pub lever_mm: f64,
-    /// Synchronous motion in this setup over that in the first.
+    /// Synchronous motion that it reads in this setup, over that of the spindle in the first.
     pub motion_ratio: f64,
+    /// Squared width of the sensor's spot on the part, in rad².
+    pub spot_rad2: f64,
     /// ±1 as the rig declares it: readings are multiplied by it as they are read.
     pub declared_sign: f64,
 }
@@ -127,6 +133,7 @@ impl Layout {
                     },
                     lever_mm: sensor.axial_radius_mm.map_or(sensor.z_mm - mean_z_mm, |radius_mm| 0.0 - radius_mm),
                     motion_ratio: 1.0,
+                    spot_rad2: 0.0,
                     declared_sign: sensor.sign,
                 });
             }
@@ -162,6 +169,7 @@ impl Layout {
             readings,
             unknowns,
             mean_z_mm,
+            part_radius_mm: rig.part_radius_mm,
             direction: rig.rotation.direction(),
             max_noise_gain: f64::INFINITY,
             sections,
@@ -249,12 +257,6 @@ impl Layout {
             Quantity::TiltAlong(azimuth) => lever * exact_cos(reading.angle_rad - azimuth.radians()),
         };
         reading.motion_ratio * motion
-    }
-
-    /// What a reading sees of a unit of its section's form: the [phase](Self::part_phase), 1 on the axis.
-    #[must_use]
-    pub fn form_phase(&self, reading: &Reading, order: usize) -> Complex64 {
-        if reading.view == View::OnAxis { Complex64::ONE } else { self.part_phase(reading, order) }
     }
 
     /// e^{±in(θ'−β)}, + where the part turns counter-clockwise.

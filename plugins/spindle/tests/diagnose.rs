@@ -5,6 +5,7 @@
 
 mod campaigns;
 mod channels;
+mod profiles;
 mod turns;
 mod unexplained;
 mod wiring;

@@ -108,7 +108,7 @@ pub struct Planted {
 }
 
 /// The effects that are planted: their ids, and those of a single setup.
-pub const EFFECTS: [&str; 31] = [
+pub const EFFECTS: [&str; 33] = [
     "sensor-gain",
     "sensor-angle",
     "sensor-axial-position",
@@ -140,6 +140,8 @@ pub const EFFECTS: [&str; 31] = [
     "index-offset",
     "cross-talk",
     "channel-ghost",
+    "probe-spot",
+    "bracket-motion",
 ];
 /// Those of which two are planted at a time.
 const PAIRED: [&str; 7] = [

@@ -1,6 +1,7 @@
 //! What goes wrong in a campaign, and how much.
 
 mod channels;
+mod profiles;
 
 use runout_core::rig::SetupConfig;
 use runout_spindle::simulate::{
@@ -38,6 +39,7 @@ impl Chance {
             "sensor-gain-of-setup" | "sensor-angle-of-setup" | "setup-gain" | "index-offset" => {
                 self.of_one_setup(id, config)
             }
+            "probe-spot" | "bracket-motion" => self.of_shares(id, config),
             "dent" | "backlash" | "step" | "slipped-probe" => self.stranger(id, config),
             _ => self.of_sensor(id, large, config),
         };

@@ -6,9 +6,7 @@ use runout_core::model::{
 };
 
 use super::{SpindleFit, SpindleModel};
-
-/// Radial sensors of a section that tell what turns with the spindle besides the part from its motion.
-const ENOUGH: usize = 3;
+use crate::layout::ENOUGH;
 
 impl SpindleModel {
     /// With two sensors a section, the form of a chuck under them, which turns with the spindle and not with the part, and a bracket that
@@ -21,9 +19,8 @@ impl SpindleModel {
         };
         let layout = &self.traced.layout;
         let radial = || layout.readings.iter().filter(|reading| reading.setup == 0 && !reading.view.is_axial());
-        let few = |section: usize| radial().filter(|reading| reading.section == section).count() < ENOUGH;
         let mut found = Vec::new();
-        if radial().count() > 0 && radial().all(|reading| few(reading.section)) {
+        if radial().count() > 0 && radial().all(|reading| layout.radial_sensors(reading.section) < ENOUGH) {
             found.push(blind("chuck-form", 1.0, "um/um", "motion"));
             found.push(blind("bracket-motion", 1.0, "um/um", "motion"));
         }

@@ -27,6 +27,7 @@ mod sensors_angle;
 mod setup_motion_change;
 mod speed_ripple;
 mod thermal_drift;
+mod unlike_shares;
 
 use std::sync::Arc;
 
@@ -225,6 +226,8 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         Arc::new(second_order_geometry::SecondOrderGeometry),
     ];
     all.extend(ChannelResponse::all().map(|response| -> Arc<dyn SpindleEffect> { Arc::new(response) }));
+    all.push(Arc::new(unlike_shares::ProbeSpot));
+    all.push(Arc::new(unlike_shares::BracketMotion));
     all.push(Arc::new(cross_talk::OfOneChannel));
     all.push(Arc::new(cross_talk::ChannelGhost));
     for number in 0..MOST_LINES {

@@ -50,7 +50,8 @@ impl Layout {
             if !reading.view.is_axial() {
                 reading.lever_mm += sensor.z_mm;
             }
-            reading.motion_ratio *= 1.0 + setup.motion;
+            reading.motion_ratio *= (1.0 + setup.motion) * (1.0 - sensor.bracket_share);
+            reading.spot_rad2 = sensor.spot_mm2 / (self.part_radius_mm * self.part_radius_mm);
         }
         layout
     }

@@ -20,6 +20,7 @@ mod form;
 mod geometry;
 mod measured;
 mod motion;
+mod profile;
 mod random;
 mod recording;
 mod series;
@@ -44,11 +45,11 @@ pub use config::{
     StationsConfig, TiltHarmonic,
 };
 pub use effects::{
-    AsynchronousLine, AxialMotion, Backlash, ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, Dent, Effect,
-    EvenOrderMotion, FilterAttenuation, IndexOffset, PartAngleSign, PartEccentricity, ReversalAngle, RotationReversed,
-    SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, SensorSign,
-    SensorsAngle, SensorsIdentical, SensorsSwapped, SetupGain, SetupMotionChange, SetupRepeated, SetupsSwapped,
-    SlippedProbe, SpeedRipple, Step, ThermalDrift,
+    AsynchronousLine, AxialMotion, Backlash, BracketMotion, ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, Dent,
+    Effect, EvenOrderMotion, FilterAttenuation, IndexOffset, PartAngleSign, PartEccentricity, ProbeSpot, ReversalAngle,
+    RotationReversed, SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorLine,
+    SensorNonlinearity, SensorSign, SensorsAngle, SensorsIdentical, SensorsSwapped, SetupGain, SetupMotionChange,
+    SetupRepeated, SetupsSwapped, SlippedProbe, SpeedRipple, Step, ThermalDrift,
 };
 pub use recording::SpindleRecording;
 

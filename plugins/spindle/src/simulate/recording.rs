@@ -13,6 +13,7 @@ use super::{
     config::{Geometry, Phase},
     geometry::{self, Sight},
     motion::Displacement,
+    profile::Profile,
     random::{Place, Purpose, phase, stream},
     series::{self, LANES, Phasor, Series},
     spin::Spin,
@@ -98,8 +99,10 @@ struct Looking<'a> {
     face: Option<Face<'a>>,
     /// The part's axis in the part's own coordinates, in µm.
     clamped: Complex64,
-    /// h at its z.
-    harmonics: Vec<Complex64>,
+    /// Share of the spindle's motion that it sees: less where its bracket moves too.
+    motion_share: f64,
+    /// What it sees of the part at its z.
+    profile: Profile,
     /// The same where axial motion has moved the part, instant by instant.
     moved: Vec<Phasor<LANES>>,
     strangers: Vec<Acting>,
@@ -167,7 +170,8 @@ impl<'a> SimulatedStream<'a> {
                     pole: clamped_in.pole,
                 }),
                 clamped: world.clamped_at(clamped_in, sensor, z_mm),
-                harmonics: world.form.at(z_mm),
+                motion_share: 1.0 - sensor.bracket_share,
+                profile: Profile::new(&world.form, sensor.spot_mm / world.rig.part_radius_mm, z_mm),
                 moved: Vec::new(),
                 strangers: Acting::all(&sensor.strangers, setup),
                 channel: Channel::new(&sensor.chain, random, setup, |item| {
@@ -270,6 +274,7 @@ impl Looking<'_> {
         let [x, y, tilt_x, tilt_y, _] = &instants.displacement;
         for lane in 0..LANES {
             let axis = Complex64::new(x[lane] + lever * tilt_y[lane], y[lane] - lever * tilt_x[lane]);
+            let axis = self.motion_share * axis;
             // The part's own x axis stands at angle −α₀ in the sensor's frame.
             let clamped = self.clamped * Complex64::new(toward.re[lane], -toward.im[lane]);
             let centre = axis * stance.line.conj() + clamped;
@@ -277,16 +282,18 @@ impl Looking<'_> {
         }
         let sight = Sight { toward, along, across };
         let mut seen = match &instants.axial_um {
-            None => meet(world, self.harmonics.as_slice(), &sight),
+            None => meet(world, self.profile.harmonics(), &sight),
             Some(axial_um) => {
                 // The part has moved up by a: the sensor sees what was at z − a.
                 world.form.fill(&axial_um.map(|axial_um| self.z_mm - 1e-3 * axial_um), &mut self.moved);
+                self.profile.see(&mut self.moved);
                 meet(world, self.moved.as_slice(), &sight)
             }
         };
         if world.form.is_grooved() {
             for (lane, seen) in seen.iter_mut().enumerate() {
-                *seen -= world.form.groove_um(Complex64::new(sight.toward.re[lane], sight.toward.im[lane]));
+                *seen -=
+                    self.profile.groove_um(&world.form, Complex64::new(sight.toward.re[lane], sight.toward.im[lane]));
             }
         }
         seen

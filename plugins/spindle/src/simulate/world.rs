@@ -59,6 +59,10 @@ pub(super) struct TrueSensor {
     /// Distance from the axis of a sensor that looks along it.
     pub axial_radius_mm: Option<f64>,
     pub section: usize,
+    /// Width of the arc over which it averages the form, in mm.
+    pub spot_mm: f64,
+    /// Share of the spindle's motion by which its bracket moves.
+    pub bracket_share: f64,
     /// By how much its readings are late.
     pub delay_samples: f64,
     /// Of single setups: index and angle in rad, index and gain.
@@ -150,6 +154,8 @@ impl World {
             z_mm: sensor.z_mm,
             axial_radius_mm: sensor.axial_radius_mm,
             section: sensor.section,
+            spot_mm: 0.0,
+            bracket_share: 0.0,
             delay_samples: 0.0,
             angles_in_setups: Vec::new(),
             gains_in_setups: Vec::new(),

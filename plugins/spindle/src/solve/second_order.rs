@@ -21,7 +21,7 @@ use super::{
     estimate::Estimate,
     interpolation::{LANES, interpolated, weighted, weights_at},
 };
-use crate::layout::{FirstOrder, Layout, UM_PER_MM_URAD};
+use crate::layout::{FirstOrder, Layout, Reading, UM_PER_MM_URAD};
 
 /// Finer grid on which form is tabulated, per angle of the profile.
 pub(crate) const OVERSAMPLING: usize = 4;
@@ -48,7 +48,9 @@ pub(crate) struct SecondOrder<'a> {
     finer: usize,
     turn: Fourier,
     fine: Fourier,
+    /// Form on the fine grid, `[section]`, and of the readings that see it in a way of their own.
     table: Vec<Vec<f64>>,
+    own: Vec<(usize, Vec<f64>)>,
     /// e^{i(α − α₀)} of the part angle at each sample.
     turned: Vec<Complex64>,
     /// Part angles where lines meet the profile, rad, `[reading][angle]`.
@@ -73,6 +75,7 @@ impl<'a> SecondOrder<'a> {
             turn: Fourier::new(samples_per_rev),
             fine: Fourier::new(samples_per_rev * OVERSAMPLING),
             table: Vec::new(),
+            own: Vec::new(),
             turned: turns.map(|turn| Complex64::from_polar(1.0, -layout.direction * TAU * turn)).collect(),
             met_rad: Vec::new(),
             met_at: Vec::new(),
@@ -125,8 +128,9 @@ impl<'a> SecondOrder<'a> {
             met.extend((0..samples).map(|step| layout.part_angle_rad(reading, step, samples)));
             curve.clear();
             curve.extend((0..samples).map(across));
+            let own = self.own.iter().find(|(own, _)| *own == index);
             let line = Line {
-                table: &self.table[reading.section],
+                table: own.map_or(&self.table[reading.section], |(_, table)| table),
                 start_rad: reading.part_angle_rad,
                 forwards: layout.direction < 0.0,
                 radius_um: self.radius_um,
@@ -160,21 +164,24 @@ impl<'a> SecondOrder<'a> {
         forms.map(|(unknown, _)| (0.5 * of_form(unknown)).sqrt()).fold(0.0, f64::max)
     }
 
-    /// Form of each section on the fine grid, over the part's angle.
+    /// Form of each section on the fine grid over the part's angle, and what single readings see of it.
     fn tabulate(&mut self, estimate: &Estimate, max_order: usize) {
         let layout = self.layout;
         let sections = layout.readings.iter().map(|reading| reading.section + 1).max().unwrap_or(0);
-        self.table.clear();
-        for section in 0..sections {
-            let Some(unknown) = layout.unknowns.iter().position(|known| *known == Quantity::Form(section)) else {
-                // A form that is taken as 0.
-                self.table.push(vec![0.0; self.fine.length()]);
-                continue;
-            };
-            let forms = (0..=max_order)
-                .map(|order| if order < 2 { Complex64::ZERO } else { estimate.likely_form(order, unknown) });
-            self.table.push(self.fine.synthesise(forms.map(|form| layout.of_part(form))).to_vec());
-        }
+        let unknown = |section: usize| layout.unknowns.iter().position(|known| *known == Quantity::Form(section));
+        let form = |order: usize, section: usize| match unknown(section) {
+            Some(unknown) if order > 1 => estimate.likely_form(order, unknown),
+            // A form that is taken as 0.
+            _ => Complex64::ZERO,
+        };
+        let fine = &mut self.fine;
+        let mut table = |form: &dyn Fn(usize) -> Complex64| {
+            fine.synthesise((0..=max_order).map(|order| layout.of_part(form(order)))).to_vec()
+        };
+        self.table = (0..sections).map(|section| table(&|order| form(order, section))).collect();
+        let own = layout.readings.iter().enumerate().filter(|(_, reading)| reading.has_own_profile());
+        let seen = |reading: &Reading, order: usize| form(order, reading.section) * reading.form_share(order);
+        self.own = own.map(|(index, reading)| (index, table(&|order| seen(reading, order)))).collect();
     }
 
     /// x, y, tilt about x and y at the sensors' mean z over the spindle's angle, as one setup sees them.

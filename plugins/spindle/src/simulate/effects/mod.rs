@@ -4,6 +4,7 @@
 
 mod channels;
 mod mistakes;
+mod profiles;
 mod sensors;
 mod setups;
 mod spindle;
@@ -17,6 +18,7 @@ pub use channels::{ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, IndexOffs
 pub use mistakes::{
     PartAngleSign, RotationReversed, SensorSign, SensorsIdentical, SensorsSwapped, SetupRepeated, SetupsSwapped,
 };
+pub use profiles::{BracketMotion, ProbeSpot};
 pub use sensors::{
     FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, ThermalDrift,
 };
@@ -74,6 +76,10 @@ pub enum Effect {
     SetupGain(SetupGain),
     /// The mark of a setup comes at another angle of the spindle.
     IndexOffset(IndexOffset),
+    /// A sensor averages the form over an arc.
+    ProbeSpot(ProbeSpot),
+    /// A sensor's bracket moves by a share of the spindle's motion.
+    BracketMotion(BracketMotion),
     /// A mistake in the rig: readings have the opposite sign.
     SensorSign(SensorSign),
     /// A mistake in the rig: two channels are swapped.
@@ -149,6 +155,8 @@ impl Effect {
             Self::ChannelGhost(effect) => effect,
             Self::SetupGain(effect) => effect,
             Self::IndexOffset(effect) => effect,
+            Self::ProbeSpot(effect) => effect,
+            Self::BracketMotion(effect) => effect,
             Self::Dent(effect) => effect,
             Self::Backlash(effect) => effect,
             Self::Step(effect) => effect,

@@ -4,6 +4,7 @@ mod campaign;
 mod channels;
 mod effects;
 mod faults;
+mod profiles;
 mod strangers;
 
 use std::f64::consts::TAU;
