@@ -339,7 +339,7 @@ impl<M: Model> Tracing<'_, M> {
         let parts: Vec<usize> = (0..self.model.effects().len()).flat_map(|whole| self.model.parts(whole)).collect();
         let (mut part_places, mut places, mut last) = (PARTS_LISTED, SHORTLIST.0, f64::INFINITY);
         ranked.retain(|(effect, gain)| {
-            let is_part = parts.contains(effect);
+            let is_part = parts.contains(effect) || self.model.is_one_of_many(*effect);
             if is_part && part_places == 0 {
                 return false;
             }

@@ -110,6 +110,11 @@ pub trait Model {
         false
     }
 
+    /// Whether an effect is one of a long list of effects that are alike, each of a part of the data: a few of them only are tried at a time.
+    fn is_one_of_many(&self, _effect: usize) -> bool {
+        false
+    }
+
     /// Whether an effect is a mistake in the declaration: it is there or not, and is looked for before any other.
     fn is_mistake(&self, _effect: usize) -> bool {
         false

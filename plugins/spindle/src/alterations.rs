@@ -14,6 +14,8 @@ pub struct Alterations {
     pub setups: Vec<SetupAlteration>,
     /// Motion along the axis, in µm.
     pub axial_um: Vec<Harmonic>,
+    /// What certain readings have besides the part's form.
+    pub patterns: Vec<Pattern>,
     /// What channels read of others.
     pub cross_talk: Vec<CrossTalk>,
     /// Lines of the turns' spectrum that are taken out of the averages, by number: of a sensor (the first of those that have it), or of
@@ -70,6 +72,30 @@ pub struct SensorAlteration {
     pub angles_in_setups: Vec<(usize, f64)>,
     /// What the channel does besides, order by order.
     pub transfers: Vec<Transfer>,
+}
+
+/// cosine·cos(nα) + sine·sin(nα) besides the part's form, in µm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pattern {
+    /// n, per turn.
+    pub order: usize,
+    /// Amplitude of the cosine.
+    pub cosine: f64,
+    /// Amplitude of the sine.
+    pub sine: f64,
+    /// Which readings have it.
+    pub of: PatternOf,
+}
+
+/// Which readings have a pattern, and what it turns with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PatternOf {
+    /// All; it turns with the spindle, however the part is clamped.
+    Spindle,
+    /// Those of a setup; it turns with the part.
+    Setup(usize),
+    /// Those of a sensor; it turns with the part.
+    Sensor(usize),
 }
 
 /// A share of one channel's displacement in the reading of another.

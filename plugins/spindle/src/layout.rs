@@ -84,6 +84,8 @@ pub struct Reading {
     pub motion_ratio: f64,
     /// Squared width of the sensor's spot on the part, in rad².
     pub spot_rad2: f64,
+    /// What it sees on the part besides the section's form: order, and amplitude as of a form's unknown, in µm.
+    pub patterns: Vec<(usize, Complex64)>,
     /// ±1 as the rig declares it: readings are multiplied by it as they are read.
     pub declared_sign: f64,
 }
@@ -134,6 +136,7 @@ impl Layout {
                     lever_mm: sensor.axial_radius_mm.map_or(sensor.z_mm - mean_z_mm, |radius_mm| 0.0 - radius_mm),
                     motion_ratio: 1.0,
                     spot_rad2: 0.0,
+                    patterns: Vec::new(),
                     declared_sign: sensor.sign,
                 });
             }

@@ -108,7 +108,7 @@ pub struct Planted {
 }
 
 /// The effects that are planted: their ids, and those of a single setup.
-pub const EFFECTS: [&str; 33] = [
+pub const EFFECTS: [&str; 36] = [
     "sensor-gain",
     "sensor-angle",
     "sensor-axial-position",
@@ -142,6 +142,9 @@ pub const EFFECTS: [&str; 33] = [
     "channel-ghost",
     "probe-spot",
     "bracket-motion",
+    "chuck-form",
+    "clamping-form",
+    "electrical-run-out",
 ];
 /// Those of which two are planted at a time.
 const PAIRED: [&str; 7] = [

@@ -40,6 +40,7 @@ impl Chance {
                 self.of_one_setup(id, config)
             }
             "probe-spot" | "bracket-motion" => self.of_shares(id, config),
+            "chuck-form" | "clamping-form" | "electrical-run-out" => self.of_pattern(id, config),
             "dent" | "backlash" | "step" | "slipped-probe" => self.stranger(id, config),
             _ => self.of_sensor(id, large, config),
         };

@@ -226,6 +226,10 @@ impl Model for SpindleModel {
         of_turns(self, &self.traced.places[effect])
     }
 
+    fn is_one_of_many(&self, effect: usize) -> bool {
+        self.traced.kind(effect).is_one_of_many()
+    }
+
     fn is_mistake(&self, effect: usize) -> bool {
         self.traced.kind(effect).mistake().is_some()
     }

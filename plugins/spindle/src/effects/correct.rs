@@ -23,6 +23,7 @@ impl Alterations {
             part_angles_reversed: false,
             sensor_angles_reversed: false,
             axial_um: Vec::new(),
+            patterns: Vec::new(),
             cross_talk: Vec::new(),
             lines: Vec::new(),
             even_order_motion: false,
@@ -94,6 +95,7 @@ impl Alterations {
             }
         }
         self.take_out_cross_talk(&mut readings.mean);
+        layout.take_out_patterns(&mut readings.mean);
         let slopes = self.slopes(layout, &readings.mean);
         self.correct_covariance(readings, &slopes);
     }

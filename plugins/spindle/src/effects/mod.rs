@@ -15,6 +15,7 @@ mod correct;
 mod cross_talk;
 mod even_order_motion;
 mod mistakes;
+mod pattern;
 mod predicted;
 mod reversal_angle;
 mod second_order_geometry;
@@ -37,7 +38,7 @@ use runout_core::{
     model::{Parameter, diagnosis::Estimated},
 };
 
-pub use crate::alterations::{Alterations, Harmonic, SensorAlteration, SetupAlteration, Transfer};
+pub use crate::alterations::{Alterations, Harmonic, Pattern, PatternOf, SensorAlteration, SetupAlteration, Transfer};
 pub use correct::creep;
 pub use mistakes::{Mistake, ordered_pairs, pair_of, pairs};
 pub use predicted::Predicted;
@@ -75,6 +76,11 @@ pub trait SpindleEffect: Send + Sync {
     /// The order of an effect that is there at several orders, each by itself.
     fn order(&self) -> Option<usize> {
         None
+    }
+
+    /// Whether it is one of a long list of effects that are alike: foresight leaves them out, and a few of them only are tried at a time.
+    fn is_one_of_many(&self) -> bool {
+        false
     }
 
     /// The effect that has the same partials while it is small: of both, foresight lists that one.
@@ -234,6 +240,7 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         all.push(Arc::new(asynchronous_line::AsynchronousLine { number }));
         all.push(Arc::new(sensor_line::SensorLine { number }));
     }
+    all.extend(pattern::OfOrder::all().map(|pattern| -> Arc<dyn SpindleEffect> { Arc::new(pattern) }));
     all.extend(Mistake::ALL.map(|mistake| -> Arc<dyn SpindleEffect> { Arc::new(mistake) }));
     for order in LOW_ORDERS {
         all.push(Arc::new(speed_ripple::SpeedRipple { order, in_one_setup: false }));

@@ -112,7 +112,23 @@ impl<'a> Predicted<'a> {
                 }
             }
         }
+        predicted.add_patterns();
         predicted
+    }
+
+    /// Patterns that are applied are part of what a sensor sees.
+    fn add_patterns(&mut self) {
+        let (layout, count) = (self.layout, self.layout.readings.len());
+        for (index, reading) in layout.readings.iter().enumerate() {
+            for (order, value) in &reading.patterns {
+                let at = order * count + index;
+                if at < self.part.len() {
+                    let value = value * layout.part_phase(reading, *order);
+                    self.part[at] += value;
+                    self.readings[at] += value;
+                }
+            }
+        }
     }
 
     /// Another circle around the part and how far along z it is; nothing of a face.

@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use runout_core::Complex64;
+
 use super::{Layout, Reading};
 use crate::alterations::Alterations;
 
@@ -52,6 +54,13 @@ impl Layout {
             }
             reading.motion_ratio *= (1.0 + setup.motion) * (1.0 - sensor.bracket_share);
             reading.spot_rad2 = sensor.spot_mm2 / (self.part_radius_mm * self.part_radius_mm);
+        }
+        for index in 0..layout.readings.len() {
+            let reading = &layout.readings[index];
+            let patterns = alterations.patterns.iter();
+            let own = patterns.map(|pattern| (pattern.order, layout.on_part(reading, pattern)));
+            let own = own.filter(|(_, value)| *value != Complex64::ZERO).collect();
+            layout.readings[index].patterns = own;
         }
         layout
     }

@@ -3,6 +3,7 @@
 use runout_core::Complex64;
 
 use super::{Layout, Reading, View};
+use crate::alterations::{Pattern, PatternOf};
 
 impl Reading {
     /// Share of a form's order that the reading has: sinc(n·w/2R) of a spot as wide as w. At order 1, form is how the part is clamped, which
@@ -25,7 +26,7 @@ impl Reading {
     /// Whether it sees the section's form in a way of its own.
     #[must_use]
     pub fn has_own_profile(&self) -> bool {
-        self.spot_rad2 != 0.0
+        self.spot_rad2 != 0.0 || !self.patterns.is_empty()
     }
 }
 
@@ -38,6 +39,33 @@ impl Layout {
     pub(crate) fn radial_sensors(&self, section: usize) -> usize {
         let radial = |reading: &&Reading| reading.setup == 0 && !reading.view.is_axial();
         self.readings.iter().filter(radial).filter(|reading| reading.section == section).count()
+    }
+
+    /// A pattern as it is on the part under a reading, as a form's unknown; 0 where the reading does not have it.
+    pub(crate) fn on_part(&self, reading: &Reading, pattern: &Pattern) -> Complex64 {
+        let turned_rad = match pattern.of {
+            // A chuck is at β less on the part than on the spindle.
+            PatternOf::Spindle => reading.angle_rad - reading.part_angle_rad,
+            PatternOf::Setup(setup) if setup == reading.setup => 0.0,
+            PatternOf::Sensor(sensor) if sensor == reading.sensor => 0.0,
+            _ => return Complex64::ZERO,
+        };
+        if reading.view.is_axial() {
+            return Complex64::ZERO;
+        }
+        self.of_part(Complex64::new(pattern.cosine, -pattern.sine) * Complex64::cis(pattern.order as f64 * turned_rad))
+    }
+
+    /// Takes out of displacements, `[order][reading]`, what readings have besides form.
+    pub(crate) fn take_out_patterns(&self, displacements: &mut [Complex64]) {
+        let count = self.readings.len();
+        for (index, reading) in self.readings.iter().enumerate() {
+            for (order, value) in &reading.patterns {
+                if let Some(displacement) = displacements.get_mut(order * count + index) {
+                    *displacement -= value * self.part_phase(reading, *order);
+                }
+            }
+        }
     }
 
     /// What a reading sees of a unit of its section's form: the [phase](Self::part_phase) with the share of its spot, 1 on the axis.

@@ -64,6 +64,7 @@ pub fn foresee(
         // What single turns show, they show in any rig, and an average says little of it. Pairs of channels are many and alike. What a setup has by itself shows as
         // what all have does.
         kind.turn_evidence().is_none()
+            && !kind.is_one_of_many()
             && kind.first_order_like().is_none()
             && ![ActsOn::Setup, ActsOn::SensorInSetup, ActsOn::SensorCopy].contains(&about.acts_on)
     });

@@ -160,7 +160,6 @@ impl Form {
 
     /// No |dh/dα| is larger, in µm/rad.
     pub(crate) fn slope_bound_um(&self) -> f64 {
-        let values = self.bands.iter().flat_map(|band| band.harmonics.iter().enumerate());
-        values.map(|(order, value)| order as f64 * value.norm()).sum()
+        self.bands.iter().map(|band| series::slope_bound(&band.harmonics)).sum()
     }
 }

@@ -45,11 +45,12 @@ pub use config::{
     StationsConfig, TiltHarmonic,
 };
 pub use effects::{
-    AsynchronousLine, AxialMotion, Backlash, BracketMotion, ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, Dent,
-    Effect, EvenOrderMotion, FilterAttenuation, IndexOffset, PartAngleSign, PartEccentricity, ProbeSpot, ReversalAngle,
-    RotationReversed, SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorLine,
-    SensorNonlinearity, SensorSign, SensorsAngle, SensorsIdentical, SensorsSwapped, SetupGain, SetupMotionChange,
-    SetupRepeated, SetupsSwapped, SlippedProbe, SpeedRipple, Step, ThermalDrift,
+    AsynchronousLine, AxialMotion, Backlash, BracketMotion, ChannelDelay, ChannelGhost, ChannelSkew, ChuckForm,
+    ClampingForm, CrossTalk, Dent, Effect, ElectricalRunOut, EvenOrderMotion, FilterAttenuation, IndexOffset,
+    PartAngleSign, PartEccentricity, ProbeSpot, ReversalAngle, RotationReversed, SecondOrderGeometry, SensorAngle,
+    SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, SensorSign, SensorsAngle, SensorsIdentical,
+    SensorsSwapped, SetupGain, SetupMotionChange, SetupRepeated, SetupsSwapped, SlippedProbe, SpeedRipple, Step,
+    ThermalDrift,
 };
 pub use recording::SpindleRecording;
 

@@ -171,7 +171,7 @@ impl<'a> SimulatedStream<'a> {
                 }),
                 clamped: world.clamped_at(clamped_in, sensor, z_mm),
                 motion_share: 1.0 - sensor.bracket_share,
-                profile: Profile::new(&world.form, sensor.spot_mm / world.rig.part_radius_mm, z_mm),
+                profile: Profile::new(world, clamped_in, sensor, z_mm),
                 moved: Vec::new(),
                 strangers: Acting::all(&sensor.strangers, setup),
                 channel: Channel::new(&sensor.chain, random, setup, |item| {

@@ -96,6 +96,11 @@ pub(super) fn bound(harmonics: &[Complex64]) -> f64 {
     harmonics.iter().map(|harmonic| harmonic.norm()).sum()
 }
 
+/// No derivative by the angle is larger, per rad.
+pub(super) fn slope_bound(harmonics: &[Complex64]) -> f64 {
+    harmonics.iter().enumerate().map(|(order, harmonic)| order as f64 * harmonic.norm()).sum()
+}
+
 /// Adds a harmonic, making room for its order.
 pub(super) fn add(harmonics: &mut Vec<Complex64>, order: usize, value: Complex64) {
     if harmonics.len() <= order {

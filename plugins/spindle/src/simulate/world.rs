@@ -37,6 +37,8 @@ pub(super) struct World {
     pub phase: Phase,
     pub course: Course,
     pub form: Form,
+    /// Form that turns with the spindle, in µm, from order 0.
+    pub chuck_um: Vec<Complex64>,
     /// Of each section, the harmonics of the face there, in µm, from order 0; empty of a circle around the part.
     pub faces: Vec<Vec<Complex64>>,
     pub motion: Motion,
@@ -59,6 +61,8 @@ pub(super) struct TrueSensor {
     /// Distance from the axis of a sensor that looks along it.
     pub axial_radius_mm: Option<f64>,
     pub section: usize,
+    /// What it sees of the part besides its form, in µm, from order 0.
+    pub run_out_um: Vec<Complex64>,
     /// Width of the arc over which it averages the form, in mm.
     pub spot_mm: f64,
     /// Share of the spindle's motion by which its bracket moves.
@@ -86,6 +90,8 @@ pub(super) struct TrueSetup {
     pub part_rad: f64,
     pub sensors_rad: f64,
     pub motion_ratio: f64,
+    /// What the part's form is more as it is clamped here, in µm, from order 0.
+    pub clamping_form_um: Vec<Complex64>,
     /// What all readings are taken times.
     pub gain: f64,
     /// Angle of the spindle at its mark, in turns.
@@ -154,6 +160,7 @@ impl World {
             z_mm: sensor.z_mm,
             axial_radius_mm: sensor.axial_radius_mm,
             section: sensor.section,
+            run_out_um: Vec::new(),
             spot_mm: 0.0,
             bracket_share: 0.0,
             delay_samples: 0.0,
@@ -172,6 +179,7 @@ impl World {
                 part_rad: setup.part_rad,
                 sensors_rad: setup.sensors_rad,
                 motion_ratio: 1.0,
+                clamping_form_um: Vec::new(),
                 gain: 1.0,
                 mark_turns: 0.0,
                 clamping: vec![clamping; rig.sections.len()],
@@ -192,6 +200,7 @@ impl World {
             faces,
             motion,
             cross_talk: Vec::new(),
+            chuck_um: Vec::new(),
             axial_um: Vec::new(),
             asynchronous,
             sensors: rig.sensors.iter().map(sensor).collect(),
@@ -249,7 +258,12 @@ impl World {
                 }
             }
         }
-        Reach { displacement: displacement_um, form: self.form.bound_um(), slope: self.form.slope_bound_um() }
+        let besides = self.sensors.iter().map(|sensor| &sensor.run_out_um);
+        let besides = besides.chain(self.setups.iter().map(|setup| &setup.clamping_form_um)).chain([&self.chuck_um]);
+        let (form, slope) = besides.fold((self.form.bound_um(), self.form.slope_bound_um()), |(form, slope), one| {
+            (form + series::bound(one), slope + series::slope_bound(one))
+        });
+        Reach { displacement: displacement_um, form, slope }
     }
 }
 

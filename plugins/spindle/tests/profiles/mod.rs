@@ -53,6 +53,39 @@ fn a_bracket_that_moves_is_found() {
     }
 }
 
+/// Patterns of one order, large and small, each with its amplitude, order and phase.
+#[test]
+fn patterns_beside_the_form_are_found() {
+    for (order, amplitude_um, phase_deg) in [(3, 0.5, 40.0), (8, 0.03, -100.0)] {
+        let pattern = format!(r#""order":{order},"amplitude_um":{amplitude_um},"phase_deg":{phase_deg}"#);
+        let parameters = [("amplitude", amplitude_um), ("order", f64::from(order)), ("phase", phase_deg)];
+        finds(&format!(r#"{{"plugin":"chuck-form",{pattern}}}"#), "chuck-form", &parameters);
+        let clamped = format!(r#"{{"plugin":"clamping-form","targets":["b"],{pattern}}}"#);
+        finds(&clamped, "clamping-form b", &parameters);
+        let run_out = format!(r#"{{"plugin":"electrical-run-out","targets":["S5"],{pattern}}}"#);
+        finds(&run_out, "electrical-run-out S5", &parameters);
+    }
+}
+
+/// Two sensors a section do not say which of them sees the pattern, and two setups not whether the chuck or a clamping has it.
+#[test]
+fn what_does_not_decide_between_patterns_is_said() {
+    let confounded = |config: &SpindleConfig| {
+        let found = diagnosed(config).0.diagnosis;
+        println!("simulated: {:?}, {:?}", found.verdict, found.added);
+        let [added] = &found.added[..] else { panic!("{:?}", found.added) };
+        let itself = std::iter::once(&added.effect).chain(&added.targets).cloned().collect::<Vec<_>>().join(" ");
+        let mut all: Vec<String> = added.confounded_with.iter().cloned().chain([itself]).collect();
+        all.sort();
+        all
+    };
+    let run_out = r#"[{"plugin":"electrical-run-out","targets":["S2"],"order":5,"amplitude_um":0.2}]"#;
+    assert_eq!(confounded(&campaign(1, run_out)), ["electrical-run-out S1", "electrical-run-out S2"]);
+    let mut config = six_sensors(1, r#"[{"plugin":"chuck-form","order":3,"amplitude_um":0.2}]"#);
+    config.rig.setups.truncate(2);
+    assert_eq!(confounded(&config), ["chuck-form", "clamping-form b"]);
+}
+
 /// Partials are what the residual does around 0, and around the values that the data have.
 #[test]
 fn partials_hold_at_any_value() {
@@ -94,7 +127,18 @@ fn partials_hold(named: &str, values: &[f64], effect: &str) {
 }
 
 /// Effects, values of their parameters, and the same in a scenario.
-const PLANTED: [(&str, &[f64], &str); 2] = [
+const PLANTED: [(&str, &[f64], &str); 5] = [
     ("probe-spot S2", &[6.25], r#"{"plugin":"probe-spot","targets":["S2"],"width_mm":2.5}"#),
     ("bracket-motion S5", &[0.1], r#"{"plugin":"bracket-motion","targets":["S5"],"share":0.1}"#),
+    ("chuck-form", &[0.3, 0.0], r#"{"plugin":"chuck-form","order":2,"amplitude_um":0.3}"#),
+    (
+        "clamping-form c",
+        &[0.0, 0.3],
+        r#"{"plugin":"clamping-form","targets":["c"],"order":2,"amplitude_um":0.3,"phase_deg":90}"#,
+    ),
+    (
+        "electrical-run-out S4",
+        &[0.3, 0.0],
+        r#"{"plugin":"electrical-run-out","targets":["S4"],"order":2,"amplitude_um":0.3}"#,
+    ),
 ];

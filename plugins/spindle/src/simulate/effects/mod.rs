@@ -18,7 +18,7 @@ pub use channels::{ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, IndexOffs
 pub use mistakes::{
     PartAngleSign, RotationReversed, SensorSign, SensorsIdentical, SensorsSwapped, SetupRepeated, SetupsSwapped,
 };
-pub use profiles::{BracketMotion, ProbeSpot};
+pub use profiles::{BracketMotion, ChuckForm, ClampingForm, ElectricalRunOut, ProbeSpot};
 pub use sensors::{
     FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, ThermalDrift,
 };
@@ -80,6 +80,12 @@ pub enum Effect {
     ProbeSpot(ProbeSpot),
     /// A sensor's bracket moves by a share of the spindle's motion.
     BracketMotion(BracketMotion),
+    /// A form turns with the spindle and not with the part.
+    ChuckForm(ChuckForm),
+    /// The part has another form as it is clamped in a setup.
+    ClampingForm(ClampingForm),
+    /// A sensor sees a pattern of the part's material that is no form.
+    ElectricalRunOut(ElectricalRunOut),
     /// A mistake in the rig: readings have the opposite sign.
     SensorSign(SensorSign),
     /// A mistake in the rig: two channels are swapped.
@@ -157,6 +163,9 @@ impl Effect {
             Self::IndexOffset(effect) => effect,
             Self::ProbeSpot(effect) => effect,
             Self::BracketMotion(effect) => effect,
+            Self::ChuckForm(effect) => effect,
+            Self::ClampingForm(effect) => effect,
+            Self::ElectricalRunOut(effect) => effect,
             Self::Dent(effect) => effect,
             Self::Backlash(effect) => effect,
             Self::Step(effect) => effect,

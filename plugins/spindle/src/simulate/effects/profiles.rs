@@ -1,11 +1,11 @@
-//! What single sensors see of form and motion.
+//! What single sensors see of form and motion, and what is on the part besides its form.
 
-use runout_core::fault::Fault;
+use runout_core::{Complex64, fault::Fault};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, sensors::on_sensors};
-use crate::simulate::{check, world::World};
+use super::{Acts, sensors::on_sensors, setups::on_setups};
+use crate::simulate::{check, series, world::World};
 
 /// A sensor averages the form over an arc.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -53,4 +53,98 @@ impl Acts for BracketMotion {
         check::finite("share", self.share)?;
         on_sensors(world, &self.targets, |sensor| sensor.bracket_share = self.share)
     }
+}
+
+/// A form that turns with the spindle and not with the part; its angle counts from the spindle.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChuckForm {
+    /// Per turn, from 2.
+    pub order: usize,
+    /// In µm.
+    pub amplitude_um: f64,
+    /// Of amplitude · cos(order · angle − phase), in degrees.
+    #[serde(default)]
+    pub phase_deg: f64,
+    /// Always false: what the separation is to know is declared in the pipeline.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for ChuckForm {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let value = harmonic(world, self.order, self.amplitude_um, self.phase_deg)?;
+        series::add(&mut world.chuck_um, self.order, value);
+        Ok(())
+    }
+}
+
+/// The part has another form as it is clamped in a setup; its angle counts from the part.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClampingForm {
+    /// Ids of setups.
+    pub targets: Vec<String>,
+    /// Per turn, from 2.
+    pub order: usize,
+    /// In µm.
+    pub amplitude_um: f64,
+    /// Of amplitude · cos(order · angle − phase), in degrees.
+    #[serde(default)]
+    pub phase_deg: f64,
+    /// Always false: what the separation is to know is declared in the pipeline.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for ClampingForm {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let value = harmonic(world, self.order, self.amplitude_um, self.phase_deg)?;
+        on_setups(world, &self.targets, |setup| series::add(&mut setup.clamping_form_um, self.order, value))
+    }
+}
+
+/// A sensor sees a pattern of the part's material that is no form; its angle counts from the part.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElectricalRunOut {
+    /// Ids of sensors.
+    pub targets: Vec<String>,
+    /// Per turn, from 2.
+    pub order: usize,
+    /// In µm.
+    pub amplitude_um: f64,
+    /// Of amplitude · cos(order · angle − phase), in degrees.
+    #[serde(default)]
+    pub phase_deg: f64,
+    /// Always false: what the separation is to know is declared in the pipeline.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for ElectricalRunOut {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        let value = harmonic(world, self.order, self.amplitude_um, self.phase_deg)?;
+        on_sensors(world, &self.targets, |sensor| series::add(&mut sensor.run_out_um, self.order, value))
+    }
+}
+
+/// c of Re c·e^{i·order·α}.
+fn harmonic(world: &World, order: usize, amplitude_um: f64, phase_deg: f64) -> Result<Complex64, Fault> {
+    check::order("order", order, 2, world.orders())?;
+    check::finite("amplitude_um", amplitude_um)?;
+    check::finite("phase_deg", phase_deg)?;
+    Ok(Complex64::from_polar(amplitude_um, -phase_deg.to_radians()))
 }

@@ -1,7 +1,7 @@
 //! What single sensors see of form and motion.
 
 use super::{
-    effects::{INITIAL, ids, scene},
+    effects::{INITIAL, PART, TURNED, ids, place, scene},
     *,
 };
 
@@ -43,4 +43,36 @@ fn a_bracket_takes_motion_along() {
     let (all, without) = (readings(&clamped, 0, INITIAL), with(&clamped));
     let same = |sample: usize| (all[2][sample] - before[2][sample]) - (without[2][sample] - after[2][sample]);
     assert!((0..TURN).all(|sample| same(sample).abs() < 1e-12));
+}
+
+/// A pattern, whether it turns with the part (1) or the spindle (0), and which setup and channel has it.
+type Case = (Effect, f64, fn(usize, usize) -> bool);
+
+/// A chuck's form is where the sensor is on the spindle; those of a clamping and of a sensor are where it is on the part.
+#[test]
+fn patterns_turn_with_what_they_are_fixed_to() {
+    let scene = scene();
+    let both = |config: &SpindleConfig| [INITIAL, TURNED].map(|setup| readings(config, 0, setup));
+    let (order, amplitude_um, phase_deg, declared) = (4, 0.6, 25.0, false);
+    let clamping =
+        ClampingForm { targets: vec![scene.rig.setups[TURNED].id.clone()], order, amplitude_um, phase_deg, declared };
+    let run_out = ElectricalRunOut { targets: ids(&["S2"]), order, amplitude_um, phase_deg, declared };
+    let before = both(&scene);
+    let cases: [Case; 3] = [
+        (Effect::ChuckForm(ChuckForm { order, amplitude_um, phase_deg, declared }), 0.0, |_, _| true),
+        (Effect::ClampingForm(clamping), 1.0, |setup, _| setup == TURNED),
+        (Effect::ElectricalRunOut(run_out), 1.0, |_, channel| channel == 1),
+    ];
+    for (effect, on_part, has) in cases {
+        let after = both(&beside(&scene, effect));
+        for (setup, (after, before)) in after.iter().zip(&before).enumerate() {
+            for channel in 0..4 {
+                let from_rad = place(channel).0 - on_part * PART[setup].to_radians();
+                let angle = |phi: f64| 4.0 * (from_rad - phi) - 25.0_f64.to_radians();
+                let size = if has(setup, channel) { 0.6 } else { 0.0 };
+                let added: Vec<f64> = after[channel].iter().zip(&before[channel]).map(|(a, b)| a - b).collect();
+                assert!(largest_difference(&added, |phi| size * angle(phi).cos()) < 1e-12, "{setup} {channel}");
+            }
+        }
+    }
 }
