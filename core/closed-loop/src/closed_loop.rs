@@ -33,6 +33,9 @@ const BESIDE_CORRELATED: usize = 4;
 const SAME_SIGNATURE: f64 = 1e-6;
 /// Effects of single parts on that list at most.
 const PARTS_LISTED: usize = 2;
+/// An effect of a small part of the data counts as so many candidates, which asks for about 18 more of χ²: the noise of a part is known
+/// less well than that of all.
+const OF_A_PART: usize = 10_000;
 /// How a loop is to be run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -379,6 +382,7 @@ impl<M: Model> Tracing<'_, M> {
         count: usize,
     ) -> Evidence {
         let parameters = self.model.effects()[effect].parameters.len().max(1);
+        let count = if self.model.is_one_of_many(effect) { count.saturating_mul(OF_A_PART) } else { count };
         if remainder.noise_is_known() && self.model.is_seen_besides(effect) {
             return Evidence::seen_besides(without, with, parameters, dof, count);
         }

@@ -28,6 +28,8 @@ pub(crate) fn project_some(
         |reading: &usize| harmonics.iter().skip(*reading).step_by(count).any(|value| *value != Complex64::ZERO);
     let changed: Vec<usize> = (0..count).filter(changes).collect();
     for (matrix, readings) in matrices.iter().zip(harmonics.chunks_exact(count).skip(1)) {
+        let is_changed = changed.iter().any(|reading| readings[*reading] != Complex64::ZERO);
+        let changed = if is_changed { &changed[..] } else { &[] };
         for row in matrix.chunks_exact(count) {
             take(changed.iter().map(|reading| row[*reading] * readings[*reading]).sum());
         }
